@@ -1,0 +1,1 @@
+"""Logs and files to values and back."""

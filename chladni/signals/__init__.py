@@ -1,0 +1,1 @@
+"""Value records, units and errors; the floor that imports nothing of ours."""

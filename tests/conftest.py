@@ -1,0 +1,16 @@
+"""Fixtures shared by all tests."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of measured logs; tests that need it are skipped with a reason where it is absent."""
+    beside_the_project = Path(__file__).parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("CHLADNI_DATA", beside_the_project))
+    if not folder.is_dir():
+        pytest.skip(f"measured logs not found in {folder}; set CHLADNI_DATA to their folder")
+    return folder
