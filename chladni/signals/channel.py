@@ -1,0 +1,73 @@
+"""A channel: one measured quantity at one place in one direction."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from math import isfinite, sqrt
+from typing import Literal, Self
+
+from chladni.signals.errors import SetupError
+
+Role = Literal["response", "reference"]
+Vector = tuple[float, float, float]
+
+AXES: dict[str, Vector] = {
+    "+x": (1.0, 0.0, 0.0),
+    "-x": (-1.0, 0.0, 0.0),
+    "+y": (0.0, 1.0, 0.0),
+    "-y": (0.0, -1.0, 0.0),
+    "+z": (0.0, 0.0, 1.0),
+    "-z": (0.0, 0.0, -1.0),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """What a row of samples is.
+
+    Attributes
+    ----------
+    name
+        Message path, such as ``/imu/wrist.linear_acceleration.x``.
+    unit
+        Unit of the samples, SI: ``m/s^2``, ``N``, ``V``; ``1`` when the log says nothing.
+    point
+        Measurement point in the setup's geometry, or None.
+    direction
+        Unit vector in which the sensor counts positive, or None.
+    role
+        ``reference`` for an excitation, ``response`` otherwise.
+    overload
+        Largest magnitude, in `unit`, that the sensor can tell; None when unknown.
+    """
+
+    name: str
+    unit: str = "1"
+    point: str | None = None
+    direction: Vector | None = None
+    role: Role = "response"
+    overload: float | None = None
+
+    def with_name(self, name: str) -> Self:
+        """Give the same channel under another name."""
+        return replace(self, name=name)
+
+
+def unit_direction(direction: str | Iterable[float]) -> Vector:
+    """Turn ``"+x"`` ... ``"-z"`` or any non-zero vector into a unit vector.
+
+    Examples
+    --------
+    >>> unit_direction("-y")
+    (0.0, -1.0, 0.0)
+    >>> unit_direction([0, 3, 4])
+    (0.0, 0.6, 0.8)
+    """
+    if isinstance(direction, str):
+        if direction not in AXES:
+            raise SetupError(f"direction {direction!r} is none of {', '.join(AXES)}; or give a vector")
+        return AXES[direction]
+    components = tuple(float(component) for component in direction)
+    length = sqrt(sum(component**2 for component in components))
+    if len(components) != 3 or not isfinite(length) or length == 0:
+        raise SetupError(f"direction {components} must be three finite numbers, not all zero")
+    return (components[0] / length, components[1] / length, components[2] / length)

@@ -1,0 +1,58 @@
+"""The averaged matrix of cross-spectra, from which every estimate is derived."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError
+from chladni.signals.provenance import Provenance
+from chladni.signals.value import Value, require_frequency_axis, require_shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CrossSpectra(Value):
+    """One-sided cross-spectral densities of all channel pairs.
+
+    Attributes
+    ----------
+    frequency_hz
+        ``[frequency]``, strictly rising.
+    density
+        ``[channel, channel, frequency]`` complex, Hermitian in the first two axes: G_ij = conj(X_i) X_j in
+        unit_i unit_j / Hz, one-sided (Bendat & Piersol 2010, eq. 5.66), corrected for the window's power.
+    channels
+        One for each row and column.
+    bandwidth_hz
+        Effective noise bandwidth of a line; ``density * bandwidth_hz`` is the power (RMS^2) of a sine on that line.
+    noise_density
+        Like `density`: covariance of one period about the mean period, for periodic excitation only (None
+        otherwise). The mean of M periods carries 1/M of it.
+    provenance
+        How it was made.
+    """
+
+    frequency_hz: NDArray[np.float64]
+    density: NDArray[np.complexfloating[Any, Any]]
+    channels: tuple[Channel, ...]
+    bandwidth_hz: float
+    noise_density: NDArray[np.complexfloating[Any, Any]] | None = None
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        require_frequency_axis(self.frequency_hz)
+        count = len(self.channels)
+        expected = (count, count, self.frequency_hz.size)
+        require_shape("density", self.density, expected, "channels x channels x frequencies")
+        if self.noise_density is not None:
+            require_shape("noise_density", self.noise_density, expected, "channels x channels x frequencies")
+        self._freeze()
+
+    def index(self, name: str) -> int:
+        """Row of the named channel; `EstimateError` naming those there are when it's missing."""
+        for row, channel in enumerate(self.channels):
+            if channel.name == name:
+                return row
+        raise EstimateError(f"no channel {name!r}; channels: {', '.join(channel.name for channel in self.channels)}")

@@ -1,0 +1,71 @@
+"""Frequency response functions between channels, each with its uncertainty."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError
+from chladni.signals.provenance import Provenance
+from chladni.signals.units import quotient
+from chladni.signals.value import Value, require_frequency_axis, require_shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FrequencyResponse(Value):
+    """Response over reference, H = Y/X, with the convention e^{+j omega t}: a delay tau has the phase -omega tau.
+
+    Attributes
+    ----------
+    frequency_hz
+        ``[frequency]``, strictly rising.
+    values
+        ``[response, reference, frequency]`` complex, in response unit / reference unit.
+    std
+        ``[response, reference, frequency]``, one sigma of the magnitude, same unit (infinite where the data give
+        no bound).
+    coherence
+        ``[response, frequency]``, 0 to 1: ordinary with one reference, multiple with several.
+    excited
+        ``[frequency]`` boolean; False on lines that the references don't excite, where `values` is only noise.
+    responses, references
+        One channel for each row and column.
+    provenance
+        How it was made.
+    """
+
+    frequency_hz: NDArray[np.float64]
+    values: NDArray[np.complexfloating[Any, Any]]
+    std: NDArray[np.float64]
+    coherence: NDArray[np.float64]
+    excited: NDArray[np.bool_]
+    responses: tuple[Channel, ...]
+    references: tuple[Channel, ...]
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        require_frequency_axis(self.frequency_hz)
+        lines = self.frequency_hz.size
+        expected = (len(self.responses), len(self.references), lines)
+        require_shape("values", self.values, expected, "responses x references x frequencies")
+        require_shape("std", self.std, expected, "responses x references x frequencies")
+        require_shape("coherence", self.coherence, (len(self.responses), lines), "responses x frequencies")
+        require_shape("excited", self.excited, (lines,), "frequencies")
+        self._freeze()
+
+    def unit(self, response: int, reference: int) -> str:
+        """Unit of one function, such as ``(m/s^2)/N``."""
+        return quotient(self.responses[response].unit, self.references[reference].unit)
+
+    def function(self, response: str, reference: str) -> tuple[int, int]:
+        """Indices of the function between two named channels; `EstimateError` when it isn't there."""
+        return _find(self.responses, response, "response"), _find(self.references, reference, "reference")
+
+
+def _find(channels: tuple[Channel, ...], name: str, role: str) -> int:
+    for row, channel in enumerate(channels):
+        if channel.name == name:
+            return row
+    raise EstimateError(f"no {role} {name!r}; {role}s: {', '.join(channel.name for channel in channels)}")

@@ -1,0 +1,52 @@
+"""Power spectral densities of channels, each with its random error."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.channel import Channel
+from chladni.signals.provenance import Provenance
+from chladni.signals.units import power_density_unit
+from chladni.signals.value import Value, require_frequency_axis, require_shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PowerSpectralDensity(Value):
+    """One-sided auto-spectral densities.
+
+    Attributes
+    ----------
+    frequency_hz
+        ``[frequency]``, strictly rising.
+    values
+        ``[channel, frequency]``, at least 0, in unit^2/Hz of each channel.
+    std
+        ``[channel, frequency]``, one sigma of `values` (Bendat & Piersol 2010, eq. 8.156: value / sqrt(effective
+        averages); for periodic excitation from the scatter between periods).
+    channels
+        One for each row.
+    bandwidth_hz
+        Effective noise bandwidth of a line: ``values * bandwidth_hz`` is the RMS^2 of a sine on that line.
+    provenance
+        How it was made.
+    """
+
+    frequency_hz: NDArray[np.float64]
+    values: NDArray[np.float64]
+    std: NDArray[np.float64]
+    channels: tuple[Channel, ...]
+    bandwidth_hz: float
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        require_frequency_axis(self.frequency_hz)
+        expected = (len(self.channels), self.frequency_hz.size)
+        require_shape("values", self.values, expected, "channels x frequencies")
+        require_shape("std", self.std, expected, "channels x frequencies")
+        self._freeze()
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each row, such as ``(m/s^2)^2/Hz``."""
+        return tuple(power_density_unit(channel.unit) for channel in self.channels)

@@ -1,0 +1,47 @@
+"""All that was found in one log: what viewers and reports draw."""
+
+from dataclasses import dataclass, field
+
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.geometry import Geometry
+from chladni.signals.peak import Peak
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.time_series import TimeSeries
+from chladni.signals.waterfall import Waterfall
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Study:
+    """Results of one analysis, ready to be drawn.
+
+    Attributes
+    ----------
+    title
+        Short name, usually the log's file name.
+    series
+        Waveforms, one entry a sample rate.
+    densities
+        Power spectral densities, one entry a sample rate.
+    waterfalls
+        Spectra over time, one entry a sample rate.
+    response
+        Transfer functions to the references, or None when there is no reference.
+    peaks
+        Named peaks of the densities, the highest first.
+    response_peaks
+        Named peaks of the transfer functions, the highest first.
+    geometry
+        Where the points sit; empty when no setup file was given.
+    findings
+        Sentences about the log and its spectra: soundness first, then what was seen, then advice.
+    """
+
+    title: str
+    series: tuple[TimeSeries, ...] = ()
+    densities: tuple[PowerSpectralDensity, ...] = ()
+    waterfalls: tuple[Waterfall, ...] = ()
+    response: FrequencyResponse | None = None
+    peaks: tuple[Peak, ...] = ()
+    response_peaks: tuple[Peak, ...] = ()
+    geometry: Geometry = field(default_factory=Geometry)
+    findings: tuple[str, ...] = ()

@@ -1,0 +1,134 @@
+"""Uniformly sampled channels on one clock."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError
+from chladni.signals.value import Value, require_shape
+
+NS_PER_S = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TimeSeries(Value):
+    """Samples of one or more channels at one rate.
+
+    Attributes
+    ----------
+    values
+        ``[channel, sample]``, floating point, in each channel's unit; NaN where nothing was measured.
+    sample_rate_hz
+        Samples a second, finite and positive.
+    start_time_ns
+        Time of the first sample, nanoseconds since the Unix epoch.
+    channels
+        One for each row of `values`, names unique.
+    valid
+        ``[channel, sample]`` boolean, False where nothing (or nothing usable) was measured; None when every sample
+        is good. Estimators leave out segments that touch an invalid sample; they never bridge it.
+
+    Raises
+    ------
+    EstimateError
+        When shapes, rate or channel names don't fit together.
+
+    Examples
+    --------
+    >>> x = TimeSeries(values=np.zeros((1, 50)), sample_rate_hz=100.0, channels=(Channel(name="a", unit="N"),))
+    >>> x.duration_s
+    0.5
+    """
+
+    values: NDArray[np.floating[Any]]
+    sample_rate_hz: float
+    channels: tuple[Channel, ...]
+    start_time_ns: int = 0
+    valid: NDArray[np.bool_] | None = field(default=None)
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.sample_rate_hz) and self.sample_rate_hz > 0):
+            raise EstimateError(f"sample rate {self.sample_rate_hz} Hz must be finite and positive")
+        if self.values.ndim != 2 or not np.issubdtype(self.values.dtype, np.floating):
+            raise EstimateError(
+                f"values must be floating point [channel, sample], got {self.values.dtype} {self.values.shape}"
+            )
+        require_shape(
+            "values",
+            self.values,
+            (len(self.channels), self.values.shape[1]),
+            f"{len(self.channels)} channels",
+        )
+        if self.valid is not None:
+            require_shape("valid", self.valid, self.values.shape, "the shape of values")
+        names = [channel.name for channel in self.channels]
+        if len(set(names)) != len(names):
+            raise EstimateError(f"channel names must be unique, got {', '.join(names)}")
+        self._freeze()
+
+    @property
+    def samples(self) -> int:
+        """Samples of each channel."""
+        return int(self.values.shape[1])
+
+    @property
+    def duration_s(self) -> float:
+        """Number of samples over the rate."""
+        return self.samples / self.sample_rate_hz
+
+    def times_s(self) -> NDArray[np.float64]:
+        """Seconds of each sample since the first, computed from the index so that no error adds up."""
+        times: NDArray[np.float64] = np.arange(self.samples) / self.sample_rate_hz
+        return times
+
+    def times_ns(self) -> NDArray[np.int64]:
+        """Nanoseconds of each sample since the Unix epoch."""
+        offsets = np.rint(self.times_s() * NS_PER_S).astype(np.int64)
+        return offsets + np.int64(self.start_time_ns)
+
+    def index(self, name: str) -> int:
+        """Row of the named channel; `EstimateError` naming the channels there are when it's missing."""
+        for row, channel in enumerate(self.channels):
+            if channel.name == name:
+                return row
+        raise EstimateError(f"no channel {name!r}; channels: {', '.join(channel.name for channel in self.channels)}")
+
+    def select(self, names: Sequence[str]) -> Self:
+        """Give the named channels, in the order asked for."""
+        rows = [self.index(name) for name in names]
+        valid = None if self.valid is None else self.valid[rows]
+        return replace(
+            self, values=self.values[rows], valid=valid, channels=tuple(self.channels[row] for row in rows)
+        )
+
+    def window(self, *, start_s: float | None = None, end_s: float | None = None) -> Self:
+        """Give the samples with ``start_s <= t < end_s``, seconds from the first sample; no copy."""
+        first = 0 if start_s is None else self._sample_at(start_s)
+        last = self.samples if end_s is None else self._sample_at(end_s)
+        if first >= last:
+            raise EstimateError(
+                f"no sample between {start_s} s and {end_s} s; the series is {self.duration_s:g} s long"
+            )
+        return replace(
+            self,
+            values=self.values[:, first:last],
+            valid=None if self.valid is None else self.valid[:, first:last],
+            start_time_ns=self.start_time_ns + round(first / self.sample_rate_hz * NS_PER_S),
+        )
+
+    def with_channels(self, channels: Sequence[Channel]) -> Self:
+        """Give the same samples under other channel records (units, points, roles)."""
+        return replace(self, channels=tuple(channels))
+
+    def all_valid(self) -> bool:
+        """Whether no sample is marked missing."""
+        return self.valid is None or bool(self.valid.all())
+
+    def _sample_at(self, time_s: float) -> int:
+        # A time within a thousandth of a sample of the grid means that sample, whatever floating point says.
+        return int(np.clip(np.ceil(time_s * self.sample_rate_hz - 1e-3), 0, self.samples))

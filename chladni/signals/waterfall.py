@@ -1,0 +1,51 @@
+"""Spectra over time."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError
+from chladni.signals.provenance import Provenance
+from chladni.signals.value import Value, require_frequency_axis, require_shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Waterfall(Value):
+    """Short-time power spectral densities.
+
+    Attributes
+    ----------
+    time_s
+        ``[time]``, centre of each slice in seconds since `start_time_ns`, strictly rising.
+    frequency_hz
+        ``[frequency]``, strictly rising.
+    values
+        ``[channel, time, frequency]`` in unit^2/Hz; NaN in slices that touch a missing sample.
+    channels
+        One for each first index.
+    start_time_ns
+        Time of the first sample of the series, nanoseconds since the Unix epoch.
+    bandwidth_hz
+        Effective noise bandwidth of a line.
+    provenance
+        How it was made.
+    """
+
+    time_s: NDArray[np.float64]
+    frequency_hz: NDArray[np.float64]
+    values: NDArray[np.floating[Any]]
+    channels: tuple[Channel, ...]
+    start_time_ns: int
+    bandwidth_hz: float
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        require_frequency_axis(self.frequency_hz)
+        if self.time_s.ndim != 1 or np.any(np.diff(self.time_s) <= 0):
+            raise EstimateError("time_s must be one-dimensional and strictly rising")
+        expected = (len(self.channels), self.time_s.size, self.frequency_hz.size)
+        require_shape("values", self.values, expected, "channels x times x frequencies")
+        self._freeze()
