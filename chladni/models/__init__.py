@@ -1,0 +1,1 @@
+"""Simulated systems whose answer is known."""

@@ -1,0 +1,202 @@
+"""Lumped structures: bodies that move along one axis, joined by springs and dampers."""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.channel import Vector
+from chladni.signals.errors import ModelError
+from chladni.signals.value import Value
+
+GROUND = "ground"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Body:
+    """A rigid body with one degree of freedom; `mass` in kg, `position` in m for drawing only."""
+
+    name: str
+    mass: float
+    position: Vector = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.mass) and self.mass > 0):
+            raise ModelError(f"body {self.name!r}: mass {self.mass} kg must be finite and positive")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Joint:
+    """A spring (N/m) and a damper (N s/m) in parallel between two bodies, or between ``ground`` and a body."""
+
+    name: str
+    between: tuple[str, str]
+    stiffness: float
+    damping: float
+
+    def __post_init__(self) -> None:
+        for what, number in (("stiffness", self.stiffness), ("damping", self.damping)):
+            if not (np.isfinite(number) and number >= 0):
+                raise ModelError(f"joint {self.name!r}: {what} {number} must be finite and not negative")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NaturalModes(Value):
+    """Closed-form modes of a structure, by rising frequency.
+
+    Attributes
+    ----------
+    frequency_hz
+        ``[mode]``, undamped natural frequency abs(pole)/(2 pi).
+    damping_ratio
+        ``[mode]``, -Re(pole)/abs(pole).
+    shapes
+        ``[mode, body]`` complex, largest component 1.
+    """
+
+    frequency_hz: NDArray[np.float64]
+    damping_ratio: NDArray[np.float64]
+    shapes: NDArray[np.complex128]
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Structure:
+    """Bodies and joints: M x'' + C x' + K x = f.
+
+    Raises
+    ------
+    ModelError
+        When names repeat or a joint names a body that isn't there.
+
+    Examples
+    --------
+    >>> one = Structure(
+    ...     bodies=(Body(name="mass", mass=1.0),),
+    ...     joints=(Joint(name="spring", between=("ground", "mass"), stiffness=(2 * pi * 10) ** 2, damping=0.0),),
+    ... )
+    >>> one.natural_modes().frequency_hz.round(6)
+    array([10.])
+    """
+
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+
+    def __post_init__(self) -> None:
+        names = [body.name for body in self.bodies] + [joint.name for joint in self.joints]
+        for name in names:
+            if names.count(name) > 1 or name == GROUND:
+                raise ModelError(f"the name {name!r} is taken; names are unique and {GROUND!r} is reserved")
+        for joint in self.joints:
+            for end in joint.between:
+                self._degree(end, joint.name)
+
+    def mass_matrix(self) -> NDArray[np.float64]:
+        """``[body, body]`` in kg."""
+        return np.diag([body.mass for body in self.bodies])
+
+    def stiffness_matrix(self) -> NDArray[np.float64]:
+        """``[body, body]`` in N/m."""
+        return self._assemble([joint.stiffness for joint in self.joints])
+
+    def damping_matrix(self) -> NDArray[np.float64]:
+        """``[body, body]`` in N s/m."""
+        return self._assemble([joint.damping for joint in self.joints])
+
+    def receptance(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Displacement of each body per force on each body, (K + j omega C - omega^2 M)^-1.
+
+        Parameters
+        ----------
+        frequency_hz
+            ``[frequency]``.
+
+        Returns
+        -------
+        ``[body, body, frequency]`` in m/N.
+        """
+        omega = 2 * pi * frequency_hz[:, None, None]
+        dynamic_stiffness: NDArray[np.complex128] = (
+            self.stiffness_matrix() + 1j * omega * self.damping_matrix() - omega**2 * self.mass_matrix()
+        )
+        inverse: NDArray[np.complex128] = np.linalg.inv(dynamic_stiffness)
+        return np.moveaxis(inverse, 0, -1)
+
+    def accelerance(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Acceleration of each body per force on each body, ``[body, body, frequency]`` in (m/s^2)/N."""
+        return self.receptance(frequency_hz) * -((2 * pi * frequency_hz) ** 2)
+
+    def natural_modes(self) -> NaturalModes:
+        """Modes from the eigenvalues of the state matrix (Ewins 2000, section 2.7)."""
+        count = len(self.bodies)
+        inverse_mass = np.linalg.inv(self.mass_matrix())
+        state = np.block(
+            [
+                [np.zeros((count, count)), np.eye(count)],
+                [-inverse_mass @ self.stiffness_matrix(), -inverse_mass @ self.damping_matrix()],
+            ]
+        )
+        poles, vectors = np.linalg.eig(state)
+        oscillating = np.flatnonzero(poles.imag > 0)
+        chosen = oscillating[np.argsort(np.abs(poles[oscillating]))]
+        shapes = vectors[:count, chosen].T
+        largest = np.argmax(np.abs(shapes), axis=1, keepdims=True)
+        return NaturalModes(
+            frequency_hz=np.abs(poles[chosen]) / (2 * pi),
+            damping_ratio=-poles[chosen].real / np.abs(poles[chosen]),
+            shapes=shapes / np.take_along_axis(shapes, largest, axis=1),
+        )
+
+    def acceleration(self, force: NDArray[np.float64], *, at: str, sample_rate_hz: float) -> NDArray[np.float64]:
+        """Steady acceleration of every body under a force that repeats with the record.
+
+        The product with the accelerance at each line of the record's Fourier series is exact for such a force:
+        no hold, no transient, no integration error.
+
+        Parameters
+        ----------
+        force
+            ``[sample]`` in N, taken as one period and without content at or above half the sample rate.
+        at
+            Body that the force acts on.
+        sample_rate_hz
+            Samples a second.
+
+        Returns
+        -------
+        ``[body, sample]`` in m/s^2.
+        """
+        frequency_hz: NDArray[np.float64] = np.fft.rfftfreq(force.size, 1 / sample_rate_hz)
+        # The static line of a free structure has no bounded displacement, but its acceleration is read at f > 0 only.
+        accelerance = np.zeros((len(self.bodies), frequency_hz.size), dtype=complex)
+        accelerance[:, 1:] = self.accelerance(frequency_hz[1:])[:, self.body_index(at)]
+        return np.fft.irfft(accelerance * np.fft.rfft(force), n=force.size)
+
+    def body_index(self, name: str) -> int:
+        """Row of the named body; `ModelError` naming those there are when it's missing."""
+        for row, body in enumerate(self.bodies):
+            if body.name == name:
+                return row
+        raise ModelError(f"no body {name!r}; bodies: {', '.join(body.name for body in self.bodies)}")
+
+    def _degree(self, end: str, joint: str) -> int | None:
+        if end == GROUND:
+            return None
+        try:
+            return self.body_index(end)
+        except ModelError as error:
+            raise ModelError(f"joint {joint!r}: {error}") from None
+
+    def _assemble(self, coefficients: list[float]) -> NDArray[np.float64]:
+        matrix = np.zeros((len(self.bodies), len(self.bodies)))
+        for joint, coefficient in zip(self.joints, coefficients, strict=True):
+            ends = [self._degree(end, joint.name) for end in joint.between]
+            pattern = np.zeros(len(self.bodies))
+            for end, sign in zip(ends, (-1.0, 1.0), strict=True):
+                if end is not None:
+                    pattern[end] = sign
+            matrix += coefficient * np.outer(pattern, pattern)
+        return matrix
