@@ -119,10 +119,8 @@ class Structure:
         ``[body, body, frequency]`` in m/N.
         """
         omega = 2 * pi * frequency_hz[:, None, None]
-        dynamic_stiffness: NDArray[np.complex128] = (
-            self.stiffness_matrix() + 1j * omega * self.damping_matrix() - omega**2 * self.mass_matrix()
-        )
-        inverse: NDArray[np.complex128] = np.linalg.inv(dynamic_stiffness)
+        elastic = self.stiffness_matrix() + 1j * omega * self.damping_matrix()
+        inverse = np.asarray(np.linalg.inv(elastic - omega**2 * self.mass_matrix()), dtype=np.complex128)
         return np.moveaxis(inverse, 0, -1)
 
     def accelerance(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -169,7 +167,7 @@ class Structure:
         -------
         ``[body, sample]`` in m/s^2.
         """
-        frequency_hz: NDArray[np.float64] = np.fft.rfftfreq(force.size, 1 / sample_rate_hz)
+        frequency_hz = np.asarray(np.fft.rfftfreq(force.size, 1 / sample_rate_hz), dtype=np.float64)
         # The static line of a free structure has no bounded displacement, but its acceleration is read at f > 0 only.
         accelerance = np.zeros((len(self.bodies), frequency_hz.size), dtype=complex)
         accelerance[:, 1:] = self.accelerance(frequency_hz[1:])[:, self.body_index(at)]
