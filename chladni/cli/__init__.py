@@ -1,0 +1,1 @@
+"""The command line: arguments, tables, exit codes, nothing else."""

@@ -1,0 +1,84 @@
+"""The ``chladni`` program: its commands, and one place that turns errors into a line and an exit code."""
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from chladni import __version__
+from chladni.cli.compare import compare
+from chladni.cli.convert import convert
+from chladni.cli.demo import demo
+from chladni.cli.frf import frf
+from chladni.cli.info import info
+from chladni.cli.psd import psd
+from chladni.cli.view import view
+from chladni.signals.errors import ChladniError
+
+SUCCESS, DEFECT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
+
+app = typer.Typer(
+    name="chladni",
+    help="A virtual Fourier analyser: acceleration logs to spectra, transfer functions and coherence, in rerun.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+for command in (info, psd, frf, view, compare, convert, demo):
+    app.command()(command)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"chladni {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    _version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    pass
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and give its exit code.
+
+    0 success; 2 unusable input; 130 interrupted; 1 a defect of chladni. Each failure is one line on standard error;
+    with ``CHLADNI_TRACEBACK=1`` in the environment the traceback follows.
+    """
+    try:
+        code = app(args=arguments, prog_name="chladni", standalone_mode=False)
+    except (ChladniError, typer.TyperException) as error:
+        return _fail(error, UNUSABLE)
+    except BrokenPipeError:
+        # The reader of our output has gone, as with `| head`: nothing is wrong, and nothing more can be said.
+        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115  # must outlive this function
+        return SUCCESS
+    except (KeyboardInterrupt, typer.Abort):
+        return INTERRUPTED
+    except Exception as error:  # noqa: BLE001  # the last line of defence: a defect is told in one line
+        return _fail(error, DEFECT)
+    return code if isinstance(code, int) else SUCCESS
+
+
+def run() -> None:
+    """Entry point of the installed program."""
+    sys.exit(main())
+
+
+def _fail(error: Exception, code: int) -> int:
+    if os.environ.get("CHLADNI_TRACEBACK"):
+        import traceback
+
+        traceback.print_exception(error)
+    text = error.format_message() if isinstance(error, typer.TyperException) else str(error)
+    line = " ".join(text.split())
+    if code == DEFECT:
+        line = f"defect of chladni ({type(error).__name__}): {line}; CHLADNI_TRACEBACK=1 shows where"
+    print(f"chladni: {line}", file=sys.stderr)  # noqa: T201  # the one line that a failure prints
+    return code

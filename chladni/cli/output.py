@@ -1,0 +1,80 @@
+"""Where a command's words go: a table for people, JSON for programs, progress while one waits."""
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+Progress = Callable[[float], None]
+
+PROGRESS_AFTER_S = 1.0
+
+
+class Output:
+    """Tables go to standard output, unless JSON was asked for there: then to standard error."""
+
+    def __init__(self, json_target: str | None = None) -> None:
+        self.json_target = json_target
+        self.console = Console(stderr=json_target == "-", highlight=False, soft_wrap=False)
+        if not self.console.is_terminal:
+            # A pipe has no width of its own; rich's 80 would cut channel names in two.
+            self.console.width = max(self.console.width, 160)
+
+    def line(self, text: str = "", *, style: str = "") -> None:
+        """Print one line, wrapped at the terminal's width."""
+        self.console.print(Text(text), style=style)
+
+    def lines(self, texts: Sequence[str]) -> None:
+        """Print sentences as a list."""
+        for text in texts:
+            self.console.print(Text(f"- {text}"), style="yellow" if text.startswith("Warning") else "")
+
+    def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        """Print a table; the first column is text, the others line up to the right."""
+        table = Table(title=escape(title), title_justify="left", title_style="bold")
+        for number, column in enumerate(columns):
+            table.add_column(escape(column), justify="right" if number else "left", overflow="fold")
+        for row in rows:
+            table.add_row(*(escape(cell) for cell in row))
+        self.console.print(table)
+
+    def json(self, content: Mapping[str, Any]) -> None:
+        """Write `content` where ``--json`` said; nothing when it wasn't given."""
+        if self.json_target is None:
+            return
+        text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+        if self.json_target == "-":
+            sys.stdout.write(text)
+            return
+        from chladni.io.atomic import write_text
+
+        write_text(Path(self.json_target), text)
+
+    @contextmanager
+    def progress(self, title: str) -> Iterator[Progress]:
+        """Give a function that takes the share done; a bar shows after a second, on a terminal only."""
+        from time import monotonic
+
+        from rich.progress import Progress as Bar
+
+        console = Console(stderr=True)
+        bar = Bar(console=console, transient=True, disable=not console.is_terminal)
+        task = bar.add_task(escape(title), total=1.0)
+        begun = monotonic()
+
+        def show(share: float) -> None:
+            if not bar.disable and not bar.live.is_started and monotonic() - begun > PROGRESS_AFTER_S:
+                bar.start()
+            bar.update(task, completed=share)
+
+        try:
+            yield show
+        finally:
+            bar.stop()
