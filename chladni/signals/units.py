@@ -193,13 +193,13 @@ def _si_symbol(symbol: str) -> Scaled:
 def _known_symbol(symbol: str) -> Scaled:
     registry = _registry()
     # pint would take the s of "Ns" for a plural; only whole words may have one.
-    readings = [
+    readings: list[tuple[str, str]] = [
         (prefix, name) for prefix, name, plural in registry.parse_unit_name(symbol) if not plural or len(symbol) > 4
     ]
     if symbol in _REFUSED or not readings:
         raise SetupError(f"unit {symbol!r}: {_REFUSED.get(symbol) or _advice(symbol, registry)}")
     # A name without prefix comes first: "min" is a minute before it's a thousandth of an inch.
-    name = "".join(min(readings, key=lambda reading: bool(reading[0])))
+    name = "".join(min(readings, key=lambda reading: len(reading[0])))
     root = registry.Quantity(1.0, name).to_root_units()
     result: Scaled = (float(root.magnitude), {})
     for dimension, exponent in root.dimensionality.items():
@@ -221,7 +221,7 @@ def _advice(symbol: str, registry: Any) -> str:
 
 @lru_cache(maxsize=1)
 def _registry() -> Any:
-    # Any, because pint's own types say str where it gives names; imported here because pint takes longer to load than most logs take to describe.
+    # Any, because pint's types are looser than what it gives. Imported here because it loads longer than a log.
     import pint
 
     return pint.UnitRegistry(str(Path(__file__).with_name("units.txt")))
