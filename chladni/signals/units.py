@@ -199,8 +199,8 @@ def _known_symbol(symbol: str) -> Scaled:
     if symbol in _REFUSED or not readings:
         raise SetupError(f"unit {symbol!r}: {_REFUSED.get(symbol) or _advice(symbol, registry)}")
     # A name without prefix comes first: "min" is a minute before it's a thousandth of an inch.
-    name = "".join(min(readings, key=lambda reading: len(reading[0])))
-    root = registry.Quantity(1.0, name).to_root_units()
+    prefix, name = min(readings, key=lambda reading: len(reading[0]))
+    root = registry.Quantity(1.0, prefix + name).to_root_units()
     result: Scaled = (float(root.magnitude), {})
     for dimension, exponent in root.dimensionality.items():
         result = combined(result, symbol_as_written(str(dimension).strip("[]")), power=round(float(exponent)))
