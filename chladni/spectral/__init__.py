@@ -1,0 +1,1 @@
+"""Averaged spectra and everything derived from them; knows no file and no viewer."""
