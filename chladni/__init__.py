@@ -1,3 +1,104 @@
-"""A virtual Fourier analyser for acceleration logs."""
+"""A virtual Fourier analyser: acceleration logs to spectra, transfer functions and coherence, in rerun.
+
+::
+
+    log = chladni.open_log("arm.mcap")                          # lazy: nothing decoded yet
+    frf = chladni.frf(log, reference="/hammer.wrench.force.x", resolution_hz=0.5)
+    chladni.show(log, frf)                                      # rerun
+
+The names below are the public surface; each is imported when it is first used, so that ``import chladni`` is cheap.
+"""
+
+from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
+
+# Public name -> module that defines it.
+_HOME = {
+    "analyse": "chladni.apps.analyse",
+    "frf": "chladni.apps.spectra",
+    "psd": "chladni.apps.spectra",
+    "show": "chladni.apps.show",
+    "find_peaks": "chladni.spectral.peaks",
+    "find_response_peaks": "chladni.spectral.peaks",
+    "cross_spectra": "chladni.spectral.cross_spectra",
+    "coherence": "chladni.spectral.coherence",
+    "waterfall": "chladni.spectral.waterfall",
+    "load_setup": "chladni.io.setup",
+    "open_log": "chladni.io.log",
+    "write_mcap": "chladni.io.mcap.writer",
+    "Channel": "chladni.signals.channel",
+    "Coherence": "chladni.signals.coherence",
+    "CrossSpectra": "chladni.signals.cross_spectra",
+    "FrequencyResponse": "chladni.signals.frequency_response",
+    "PowerSpectralDensity": "chladni.signals.power_spectral_density",
+    "Study": "chladni.signals.study",
+    "TimeSeries": "chladni.signals.time_series",
+    "ChladniError": "chladni.signals.errors",
+    "EstimateError": "chladni.signals.errors",
+    "LogError": "chladni.signals.errors",
+    "ModelError": "chladni.signals.errors",
+    "SetupError": "chladni.signals.errors",
+}
+
+__all__ = [
+    "Channel",
+    "ChladniError",
+    "Coherence",
+    "CrossSpectra",
+    "EstimateError",
+    "FrequencyResponse",
+    "LogError",
+    "ModelError",
+    "PowerSpectralDensity",
+    "SetupError",
+    "Study",
+    "TimeSeries",
+    "analyse",
+    "coherence",
+    "cross_spectra",
+    "find_peaks",
+    "find_response_peaks",
+    "frf",
+    "load_setup",
+    "open_log",
+    "psd",
+    "show",
+    "waterfall",
+    "write_mcap",
+]
+
+if TYPE_CHECKING:
+    from chladni.apps.analyse import analyse
+    from chladni.apps.show import show
+    from chladni.apps.spectra import frf, psd
+    from chladni.io.log import open_log
+    from chladni.io.mcap.writer import write_mcap
+    from chladni.io.setup import load_setup
+    from chladni.signals.channel import Channel
+    from chladni.signals.coherence import Coherence
+    from chladni.signals.cross_spectra import CrossSpectra
+    from chladni.signals.errors import ChladniError, EstimateError, LogError, ModelError, SetupError
+    from chladni.signals.frequency_response import FrequencyResponse
+    from chladni.signals.power_spectral_density import PowerSpectralDensity
+    from chladni.signals.study import Study
+    from chladni.signals.time_series import TimeSeries
+    from chladni.spectral.coherence import coherence
+    from chladni.spectral.cross_spectra import cross_spectra
+    from chladni.spectral.peaks import find_peaks, find_response_peaks
+    from chladni.spectral.waterfall import waterfall
+else:
+
+    def __getattr__(name: str) -> object:
+        """Import a public name when it is first used."""
+        from importlib import import_module
+
+        if name not in _HOME:
+            raise AttributeError(f"module 'chladni' has no attribute {name!r}")
+        value = getattr(import_module(_HOME[name]), name)
+        globals()[name] = value
+        return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]
