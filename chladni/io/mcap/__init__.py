@@ -1,0 +1,1 @@
+"""The MCAP container: channels, and messages as columns of still encoded bytes."""

@@ -1,0 +1,43 @@
+"""The checksum over all data of a log, the only protection of messages outside chunks."""
+
+import zlib
+
+from chladni.io.mcap.log_file import LogFile
+from chladni.io.mcap.summary import LogEnd
+
+_BLOCK_BYTES = 1 << 20
+
+
+class DataCrc:
+    """CRC-32 from the start of the log up to DataEnd, kept in step with the walk so that pages are read once.
+
+    Parameters
+    ----------
+    file, end
+        The log, and what its end tells.
+    """
+
+    def __init__(self, file: LogFile, end: LogEnd) -> None:
+        self._file = file
+        self._end = end
+        self._position = 0
+        self._crc = 0
+
+    @property
+    def wanted(self) -> bool:
+        """Whether the log carries such a checksum."""
+        return self._end.data_crc != 0
+
+    def advance_to(self, offset: int) -> None:
+        """Take in the bytes up to ``offset``."""
+        while self._position < offset:
+            block = self._file.read(self._position, min(_BLOCK_BYTES, offset - self._position))
+            if not block:
+                return
+            self._crc = zlib.crc32(block, self._crc)
+            self._position += len(block)
+
+    def is_right(self) -> bool:
+        """Take in the rest and compare."""
+        self.advance_to(self._end.data_end)
+        return self._crc == self._end.data_crc

@@ -1,0 +1,136 @@
+"""Decompression of chunks that never yields more than was declared and allowed."""
+
+from collections.abc import Callable, Iterator
+
+# zstd hands out whole blocks; what a failing step had decoded before is lost with the step.
+_STEP_BYTES = 16 * 1024
+_LZ4_INPUT_BYTES = 64 * 1024
+_BELIEVED_BYTES = 16 * 1024 * 1024
+_BELIEVED_RATIO = 256
+
+
+class DecompressError(ValueError):
+    """Compressed data that can't be decoded; never leaves this package."""
+
+
+def decompress(data: bytes, compression: str, *, size: int) -> bytes:
+    """Decompress a whole chunk.
+
+    Parameters
+    ----------
+    data
+        Compressed bytes.
+    compression
+        ``"zstd"``, ``"lz4"`` (frame format) or ``""``.
+    size
+        Bytes that the chunk declares to hold, at most what the limits allow.
+
+    Raises
+    ------
+    DecompressError
+        When the data doesn't decode to exactly ``size`` bytes.
+    """
+    if compression not in _WHOLE:
+        raise DecompressError(f"unknown compression {compression!r}; known are 'zstd', 'lz4' and ''")
+    result = _WHOLE[compression](data, size)
+    if len(result) != size:
+        raise DecompressError(f"declares {size} bytes but {_more_or(len(result), size)} were found in it")
+    return result
+
+
+def decompress_start(data: bytes, compression: str, *, size: int) -> bytes:
+    """Decompress as much as there is of a chunk that was cut off.
+
+    Raises
+    ------
+    DecompressError
+        When the data isn't merely cut off: then a wrong byte may have spoiled what was decoded before.
+    """
+    if compression not in _STEPS:
+        return b""
+    result = bytearray()
+    for step in _STEPS[compression](data):
+        result += step
+        if len(result) > size:
+            raise DecompressError(f"declares {size} bytes but more were found in it")
+    return bytes(result)
+
+
+def _more_or(found: int, size: int) -> str:
+    return "more" if found > size else str(found)
+
+
+def _believable(compressed: int, size: int) -> bool:
+    """Tell whether memory for ``size`` bytes may be taken before they are seen."""
+    return size <= max(_BELIEVED_BYTES, _BELIEVED_RATIO * compressed)
+
+
+def _plain(data: bytes, _size: int) -> bytes:
+    return data
+
+
+def _plain_steps(data: bytes) -> Iterator[bytes]:
+    yield data
+
+
+def _zstd(data: bytes, size: int) -> bytes:
+    import zstandard
+
+    try:
+        # Without this check the library allocates whatever the frame's own header claims.
+        if zstandard.frame_content_size(data) == size and _believable(len(data), size):
+            decompressor = zstandard.ZstdDecompressor()
+            return decompressor.decompress(data, allow_extra_data=False)
+        return decompress_start(data, "zstd", size=size)
+    except zstandard.ZstdError as error:
+        raise DecompressError(f"zstd: {error}") from error
+
+
+def _zstd_steps(data: bytes) -> Iterator[bytes]:
+    import zstandard
+
+    with zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True) as reader:
+        try:
+            while step := reader.read(_STEP_BYTES):
+                yield step
+        except zstandard.ZstdError as error:
+            raise DecompressError(f"zstd: {error}") from error
+
+
+def _lz4(data: bytes, size: int) -> bytes:
+    import lz4.frame
+
+    if not _believable(len(data), size):
+        return decompress_start(data, "lz4", size=size)
+    decompressor = lz4.frame.LZ4FrameDecompressor()
+    try:
+        result: bytes = decompressor.decompress(data, max_length=size)
+    except (RuntimeError, EOFError) as error:
+        raise DecompressError(f"lz4: {error}") from error
+    if decompressor.eof and not decompressor.unused_data:
+        return result
+    return decompress_start(data, "lz4", size=size)
+
+
+def _lz4_steps(data: bytes) -> Iterator[bytes]:
+    import lz4.frame
+
+    decompressor = lz4.frame.LZ4FrameDecompressor()
+    try:
+        for start in range(0, len(data), _LZ4_INPUT_BYTES):
+            pending = data[start : start + _LZ4_INPUT_BYTES]
+            while pending or not decompressor.needs_input:
+                yield decompressor.decompress(pending, max_length=_STEP_BYTES)
+                pending = decompressor.unused_data or b"" if decompressor.eof else b""
+                if decompressor.eof and not pending:
+                    break
+    except (RuntimeError, EOFError) as error:
+        raise DecompressError(f"lz4: {error}") from error
+
+
+_WHOLE: dict[str, Callable[[bytes, int], bytes]] = {"": _plain, "zstd": _zstd, "lz4": _lz4}
+_STEPS: dict[str, Callable[[bytes], Iterator[bytes]]] = {
+    "": _plain_steps,
+    "zstd": _zstd_steps,
+    "lz4": _lz4_steps,
+}

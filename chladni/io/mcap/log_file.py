@@ -1,0 +1,102 @@
+"""Reads at a position of a file, and says in plain words when a file is no MCAP log at all."""
+
+import os
+import stat
+import threading
+from pathlib import Path
+
+from chladni.io.mcap.records import MAGIC
+from chladni.signals.errors import LogError
+
+_WINDOW_BYTES = 64 * 1024
+# What people open by mistake, by the first bytes, and what helps.
+_OTHER_FORMATS = (
+    (b"#ROSBAG", "a ROS 1 bag; convert it with 'mcap convert in.bag out.mcap'"),
+    (b"SQLite format 3\0", "a ROS 2 .db3 bag; convert it with 'mcap convert in.db3 out.mcap'"),
+    (b"\x1f\x8b", "compressed with gzip; unpack it with gunzip first"),
+    (b"\x28\xb5\x2f\xfd", "compressed with zstd; unpack it with 'zstd -d' first"),
+    (b"\x04\x22\x4d\x18", "compressed with lz4; unpack it with 'lz4 -d' first"),
+    (b"PK\x03\x04", "a zip archive; unpack it first"),
+    (b"\x89MCAP", "another version of MCAP, of which only version 0 is known"),
+)
+
+
+class LogFile:
+    """A file read by position, never mapped: a file cut short while it is read can't end the process.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Raises
+    ------
+    LogError
+        When the file can't be opened or doesn't start as MCAP does.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            # A named pipe would block in open() until someone writes to it.
+            if not stat.S_ISREG(path.stat().st_mode):
+                raise LogError(f"{path}: not a file; expected an MCAP log")
+            self._file = path.open("rb", buffering=0)
+        except OSError as error:
+            raise LogError(f"{path}: can't be opened: {error.strerror or error}") from error
+        self.size = os.fstat(self._file.fileno()).st_size
+        self._lock = threading.Lock()
+        try:
+            self._check_magic()
+        except LogError:
+            self.close()
+            raise
+
+    def _check_magic(self) -> None:
+        if self.size == 0:
+            raise LogError(f"{self.path}: the file is empty; expected an MCAP log")
+        start = self.read(0, 16)
+        if start.startswith(MAGIC):
+            return
+        looks_like = [f"; it looks like {hint}" for magic, hint in _OTHER_FORMATS if start.startswith(magic)]
+        raise LogError(
+            f"{self.path}: not an MCAP log: starts with {start[:8].hex(' ')}, expected the MCAP magic "
+            f"{MAGIC.hex(' ')}{''.join(looks_like)}"
+        )
+
+    def read(self, offset: int, size: int) -> bytes:
+        """Return ``size`` bytes at ``offset``, fewer only where the file ends."""
+        size = max(0, min(size, self.size - offset))
+        parts = []
+        with self._lock:
+            if self._file.closed:
+                raise LogError(f"{self.path}: the log is closed; open it again to read on")
+            try:
+                self._file.seek(offset)
+                while size > 0 and (part := self._file.read(size)):
+                    parts.append(part)
+                    size -= len(part)
+            except OSError as error:
+                raise LogError(f"{self.path}: can't be read at byte {offset}: {error.strerror or error}") from error
+        return parts[0] if len(parts) == 1 else b"".join(parts)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+class Window:
+    """Reads headers that lie close together from a stretch read ahead."""
+
+    def __init__(self, file: LogFile) -> None:
+        self._file = file
+        self._bytes = b""
+        self._offset = 0
+
+    def read(self, offset: int, size: int) -> bytes:
+        """Return ``size`` bytes at ``offset``, fewer only where the file ends."""
+        start = offset - self._offset
+        if start < 0 or start + size > len(self._bytes):
+            self._bytes = self._file.read(offset, max(size, _WINDOW_BYTES))
+            self._offset, start = offset, 0
+        return self._bytes[start : start + size]

@@ -1,0 +1,260 @@
+"""One pass over a log: decompresses ahead in threads, checks what comes out against the rest of the log."""
+
+import os
+from collections import Counter, deque
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+
+from chladni.io.mcap.channel_registry import ChannelRegistry
+from chladni.io.mcap.chunk import ChunkRules, decode_chunk, refuse_chunk
+from chladni.io.mcap.damage import DamageList
+from chladni.io.mcap.data_crc import DataCrc
+from chladni.io.mcap.data_section import BareSegment, ChunkSegment, DataSection, Segment
+from chladni.io.mcap.limits import MIB, Limits
+from chladni.io.mcap.log_file import LogFile
+from chladni.io.mcap.message_batch import MessageBatch
+from chladni.io.mcap.records import MalformedRecordError, record_name
+from chladni.io.mcap.selection import Selection
+from chladni.io.mcap.stretch_content import StretchContent, fill_content
+from chladni.io.mcap.summary import LogEnd
+
+_MOST_THREADS = 4
+_BYTES_AHEAD = 64 * MIB
+
+
+class LogPass:
+    """Reads the messages that are asked for, once, and keeps the books on all others that it meets.
+
+    Parameters
+    ----------
+    file, end
+        The log, and what its end tells.
+    registry
+        Channels known so far; the pass adds those that it finds.
+    damage
+        Where damage is noted.
+    selection
+        What is asked for.
+    limits, check_crc
+        As in `McapContainer.open`.
+    """
+
+    def __init__(
+        self,
+        file: LogFile,
+        *,
+        end: LogEnd,
+        registry: ChannelRegistry,
+        damage: DamageList,
+        selection: Selection,
+        limits: Limits,
+        check_crc: bool,
+    ) -> None:
+        self._file = file
+        self._end = end
+        self._registry = registry
+        self._damage = damage
+        self._selection = selection
+        self._limits = limits
+        self._check_crc = check_crc
+        self._crc = DataCrc(file, end)
+        self._crc_task: Future[None] | None = None
+        self._checksum_seen = False
+        self._contradicted: set[int] = set()
+        self._skipped_any = False
+        self.found: Counter[int] = Counter()
+        self._lost: Counter[int] = Counter()
+        self._first_ns: int | None = None
+        self._last_ns: int | None = None
+
+    @property
+    def time_range_ns(self) -> tuple[int, int] | None:
+        """Log time of the first and of the last message met, None before the first."""
+        if self._first_ns is None or self._last_ns is None:
+            return None
+        return self._first_ns, self._last_ns
+
+    def batches(self) -> Iterator[MessageBatch]:
+        """Yield the batches in file order; the books are complete at the end."""
+        section = DataSection(self._file, self._end, self._damage, self._limits)
+        threads = min(_MOST_THREADS, os.cpu_count() or 1)
+        pool = ThreadPoolExecutor(threads, thread_name_prefix="mcap")
+        ahead: deque[tuple[int, Future[StretchContent]]] = deque()
+        try:
+            for segment in section.segments():
+                size = _size(segment)
+                while ahead and (len(ahead) > threads or size + sum(n for n, _ in ahead) > _BYTES_AHEAD):
+                    yield from self._enter(ahead.popleft()[1].result())
+                task = self._start(pool, segment)
+                if task is not None:
+                    ahead.append((size, task))
+                self._advance_crc(pool, segment)
+            while ahead:
+                yield from self._enter(ahead.popleft()[1].result())
+            self._check_data_crc()
+        finally:
+            pool.shutdown(cancel_futures=True)
+        self._close_books()
+
+    def _advance_crc(self, pool: ThreadPoolExecutor, segment: Segment) -> None:
+        """Let the checksum over all data follow the walk, in a thread."""
+        if self._crc_task is not None:
+            self._crc_task.result()
+        if self._crc.wanted and self._check_crc and not self._skipped_any:
+            self._crc_task = pool.submit(self._crc.advance_to, segment.offset)
+
+    def _check_data_crc(self) -> None:
+        if self._crc_task is not None:
+            self._crc_task.result()
+        # With chunks left out, reading all bytes for the checksum would undo what leaving them out saves.
+        if not self._crc.wanted or not self._check_crc or self._skipped_any:
+            return
+        if not self._crc.is_right():
+            what = "the checksum over all data is wrong: messages outside chunks may not be what was recorded"
+            self._damage.add(what, offset=self._end.data_end, record="DataEnd", lost_messages=0)
+
+    # ---------------------------------------------------------------- one segment
+
+    def _start(self, pool: ThreadPoolExecutor, segment: Segment) -> Future[StretchContent] | None:
+        """Start decoding a segment in a thread; None when nothing in it is asked for."""
+        if isinstance(segment, BareSegment):
+            return pool.submit(_bare_content, segment, self._selection, self._check_crc)
+        if self._can_skip(segment):
+            self._skipped_any = True
+            self.found.update({one.channel_id: len(one.entries) for one in segment.index})
+            return None
+        header = segment.header
+        for size in (header.compressed_size, header.uncompressed_size):
+            excess = self._limits.excess("chunk_bytes", size)
+            if excess is not None:
+                return pool.submit(_refused_content, segment, f"the chunk {excess}")
+        rules = ChunkRules(check_crc=self._check_crc, checksum_expected=self._checksum_seen)
+        self._checksum_seen |= header.uncompressed_crc != 0
+        data = self._file.read(header.data_offset, header.compressed_size)
+        return pool.submit(decode_chunk, segment, data, self._selection, rules)
+
+    def _can_skip(self, segment: ChunkSegment) -> bool:
+        """Tell whether a chunk surely holds nothing that is asked for.
+
+        A wrong index must not hide messages: summary (under its checksum), the chunk's header and its
+        message indexes have to say the same; the statistics then settle at the end whether that was all.
+        """
+        end, listed = self._end, segment.listed
+        if not (end.crc_checked and end.lists_all_channels and end.statistics is not None):
+            return False
+        if listed is None or not segment.agrees or not segment.index:
+            return False
+        if {one.channel_id for one in segment.index} != listed.channel_ids:
+            return False
+        wanted = [one.entries for one in segment.index if one.channel_id in self._selection.channel_ids]
+        return not any(
+            self._selection.touches(int(entries["log_time"].min()), int(entries["log_time"].max()))
+            for entries in wanted
+            if len(entries)
+        )
+
+    def _enter(self, content: StretchContent) -> list[MessageBatch]:
+        """Enter a decoded stretch into the books and return those of its batches that can be given out."""
+        self._damage.extend(content.damage)
+        self._lost.update(content.lost)
+        self._define(content)
+        if content.unprotected and content.found.total():
+            what = "messages outside the chunks, in a log whose chunks carry the checksums, are left out"
+            self._leave_out(content, set(content.found), what)
+        unknown = content.found.keys() - self._registry.channels.keys()
+        if unknown:
+            what = f"messages of the undefined channel {_listing(unknown)} are left out"
+            self._leave_out(content, unknown, what)
+        contradicted = content.found.keys() & self._contradicted
+        if contradicted:
+            what = f"messages of channel {_listing(contradicted)}, defined in two ways, are left out"
+            self._leave_out(content, contradicted, what)
+        self.found.update(content.found)
+        self._note_times(content)
+        return content.batches
+
+    def _leave_out(self, content: StretchContent, channel_ids: set[int], what: str) -> None:
+        lost = Counter({number: content.found.pop(number) for number in sorted(channel_ids)})
+        self._lost.update(lost)
+        self._damage.add(what, offset=content.offset, record="Message", lost_messages=lost.total())
+        content.batches = [batch for batch in content.batches if batch.channel_id not in channel_ids]
+
+    def _define(self, content: StretchContent) -> None:
+        for definition in content.definitions:
+            name = record_name(definition.opcode)
+            known = len(self._registry.channels)
+            try:
+                contradicted = self._registry.define(definition.opcode, definition.content)
+            except MalformedRecordError as problem:
+                self._damage.add(str(problem), offset=content.offset, record=name, lost_messages=0)
+                continue
+            if contradicted:
+                self._contradicted |= contradicted
+                what = f"channel {_listing(contradicted)} is defined here otherwise than before"
+                self._damage.add(what, offset=content.offset, record=name, lost_messages=0)
+            if self._end.lists_all_channels and len(self._registry.channels) > known:
+                what = "a channel is defined here that the summary doesn't know"
+                self._damage.add(what, offset=content.offset, record=name, lost_messages=0)
+
+    def _note_times(self, content: StretchContent) -> None:
+        first, last = content.first_time_ns, content.last_time_ns
+        if first is None or last is None or not content.found.total():
+            return
+        self._first_ns = first if self._first_ns is None else min(first, self._first_ns)
+        self._last_ns = last if self._last_ns is None else max(last, self._last_ns)
+
+    # ---------------------------------------------------------------- the end
+
+    def _close_books(self) -> None:
+        for channel_id, schema_id in sorted(self._registry.undefined_schemas().items()):
+            what = f"channel {channel_id} refers to schema {schema_id}, which the log doesn't define"
+            self._damage.add(what, offset=self._end.data_end, record="Channel", lost_messages=0)
+        statistics = self._end.statistics
+        if statistics is None:
+            return
+        channel_ids = self._selection.channel_ids
+        if not self._end.lists_all_channels:
+            channel_ids = frozenset(statistics.message_counts) | frozenset(self.found)
+        for channel_id in sorted(channel_ids):
+            counted = statistics.message_counts.get(channel_id, 0)
+            self._compare(channel_id, counted=counted, met=self.found[channel_id] + self._lost[channel_id])
+
+    def _compare(self, channel_id: int, *, counted: int, met: int) -> None:
+        if counted == met:
+            return
+        way = "fewer" if met < counted else "more"
+        what = (
+            f"channel {channel_id} has {abs(counted - met)} messages {way} than the statistics count, "
+            "beyond other damage told of"
+        )
+        lost = max(counted - met, 0)
+        self._damage.add(what, offset=self._end.data_end, record="Statistics", lost_messages=lost)
+
+
+def _size(segment: Segment) -> int:
+    """Return how many bytes a segment takes in memory while it waits."""
+    if isinstance(segment, BareSegment):
+        return len(segment.buffer)
+    return segment.header.compressed_size + segment.header.uncompressed_size
+
+
+def _bare_content(segment: BareSegment, selection: Selection, check_crc: bool) -> StretchContent:
+    content = StretchContent(offset=segment.offset, unprotected=segment.in_chunked_log and check_crc)
+    fill_content(content, segment.buffer, segment.starts, selection)
+    return content
+
+
+def _refused_content(segment: ChunkSegment, why: str) -> StretchContent:
+    content = StretchContent(offset=segment.offset)
+    refuse_chunk(content, segment, why)
+    return content
+
+
+def _listing(channel_ids: set[int] | frozenset[int]) -> str:
+    """Return a few ids in words.
+
+    >>> _listing({3, 1, 2, 9, 7})
+    '1, 2, 3, ...'
+    """
+    first = ", ".join(str(number) for number in sorted(channel_ids)[:3])
+    return first if len(channel_ids) <= 3 else f"{first}, ..."

@@ -1,0 +1,40 @@
+"""Still encoded messages of one channel, as columns."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MessageBatch:
+    """Still encoded messages of one channel from one stretch (usually a chunk) of a log.
+
+    The payload of message ``i`` is ``buffer[offsets[i] : offsets[i] + lengths[i]]``; nothing is
+    copied. Messages of equal length that follow each other come with a constant stride, so that
+    a decoder can look at all of them through one strided view.
+
+    Parameters
+    ----------
+    channel_id
+        Id of the channel in the log.
+    buffer
+        Bytes of the stretch, shape ``(byte,)``, uint8, contiguous, read-only.
+    offsets, lengths
+        First payload byte of each message in ``buffer`` and its payload bytes, shape ``(message,)``.
+    log_time_ns, publish_time_ns
+        When each message was recorded and published, in ns since the log's epoch.
+    sequence
+        The publisher's counter.
+    """
+
+    channel_id: int
+    buffer: NDArray[np.uint8]
+    offsets: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+    log_time_ns: NDArray[np.int64]
+    publish_time_ns: NDArray[np.int64]
+    sequence: NDArray[np.uint32]
+
+    def __len__(self) -> int:
+        return len(self.offsets)

@@ -1,0 +1,138 @@
+"""Finds where the records in a stretch of bytes start, many at a time where their lengths repeat.
+
+Every record is checked to lie inside the stretch. Logs of sensors repeat a short pattern of
+records (one message of each channel, say) thousands of times; once a pattern has come twice, the
+walk guesses that it goes on, compares opcode and length of all further records at once and
+drops back to single steps where the guess fails.
+"""
+
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.io.mcap.records import MESSAGE_FIELDS_BYTES, PREFIX_BYTES, RECORD_PREFIX, Opcode
+
+_PREFIX = np.dtype([("opcode", "u1"), ("length", "<u8")])
+_LONGEST_PATTERN = 256
+_FIRST_LEAP_PERIODS = 16
+_LEAP_GROWTH = 8
+# A failed guess costs about as much as this many single steps.
+_STEPS_AFTER_FAILURE = 32
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RecordWalk:
+    """Starts of the records found, and the first byte that is not part of one of them."""
+
+    starts: NDArray[np.int64]
+    end: int
+
+
+def walk_records(
+    buffer: NDArray[np.uint8], *, start: int, stop: int, until: frozenset[int] = frozenset()
+) -> RecordWalk:
+    """Walk the records in ``buffer[start:stop]``.
+
+    Parameters
+    ----------
+    buffer
+        Bytes, shape ``(byte,)``.
+    start, stop
+        The stretch to walk.
+    until
+        Opcodes that end the walk.
+
+    Returns
+    -------
+    RecordWalk
+        ``end`` is ``stop`` when records tile the stretch; else the start of the first record that
+        is in ``until``, runs over ``stop`` or can't be one.
+    """
+    return _Walk(buffer, start=start, stop=stop, until=until).run()
+
+
+class _Walk:
+    def __init__(self, buffer: NDArray[np.uint8], *, start: int, stop: int, until: frozenset[int]) -> None:
+        self._buffer = buffer
+        self._view = buffer.data
+        self._stop = stop
+        self._until = until | {0}
+        self._position = start
+        self._starts = array("q")
+        self._last_seen: dict[tuple[int, int], int] = {}
+        self._period = 0
+        self._repeats = 0
+        self._next_try = 0
+
+    def run(self) -> RecordWalk:
+        while self._step():
+            # The last `period` records have each come twice: time to guess.
+            if self._repeats > self._period and len(self._starts) >= self._next_try:
+                self._leap()
+        return RecordWalk(starts=np.frombuffer(self._starts, np.int64), end=self._position)
+
+    def _step(self) -> bool:
+        position = self._position
+        if position + PREFIX_BYTES > self._stop:
+            return False
+        opcode, length = RECORD_PREFIX.unpack_from(self._view, position)
+        end = position + PREFIX_BYTES + length
+        if end > self._stop or opcode in self._until:
+            return False
+        if opcode == Opcode.MESSAGE and length < MESSAGE_FIELDS_BYTES:
+            return False
+        self._notice_period((opcode, length))
+        self._starts.append(position)
+        self._position = end
+        return True
+
+    def _notice_period(self, kind: tuple[int, int]) -> None:
+        index = len(self._starts)
+        period = index - self._last_seen.get(kind, -_LONGEST_PATTERN)
+        self._last_seen[kind] = index
+        self._repeats = self._repeats + 1 if period == self._period else 1
+        self._period = period
+
+    def _leap(self) -> None:
+        if self._period >= _LONGEST_PATTERN:
+            return
+        pattern = self._starts[-self._period :]
+        periods = self._count_periods(pattern)
+        if periods:
+            offsets = np.array(pattern, np.int64) - pattern[0]
+            bases = self._position + (self._position - pattern[0]) * np.arange(periods, dtype=np.int64)
+            self._starts.frombytes((bases[:, np.newaxis] + offsets).tobytes())
+            self._position += periods * (self._position - pattern[0])
+            self._last_seen.clear()
+            self._repeats = 0
+        if periods < _FIRST_LEAP_PERIODS:
+            self._next_try = len(self._starts) + _STEPS_AFTER_FAILURE
+
+    def _count_periods(self, pattern: Sequence[int]) -> int:
+        """Count how often the pattern follows without a break, in leaps that grow while they succeed."""
+        stride = self._position - pattern[0]
+        most = (self._stop - self._position) // stride
+        count, leap = 0, _FIRST_LEAP_PERIODS
+        while count < most:
+            asked = min(leap, most - count)
+            found = self._matching_periods(pattern, skip=count, count=asked)
+            count += found
+            if found < asked:
+                break
+            leap *= _LEAP_GROWTH
+        return count
+
+    def _matching_periods(self, pattern: Sequence[int], *, skip: int, count: int) -> int:
+        stride = self._position - pattern[0]
+        for record in pattern:
+            opcode, length = RECORD_PREFIX.unpack_from(self._view, record)
+            prefixes: NDArray[np.void] = np.ndarray(
+                count, _PREFIX, self._buffer, offset=record + (1 + skip) * stride, strides=(stride,)
+            )
+            same = (prefixes["opcode"] == opcode) & (prefixes["length"] == length)
+            if not same.all():
+                count = int(same.argmin())
+        return count

@@ -1,0 +1,39 @@
+"""Which messages of a log are asked for."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Selection:
+    """Messages of some channels with ``start_time_ns <= log_time < end_time_ns``; None is without bound."""
+
+    channel_ids: frozenset[int]
+    start_time_ns: int | None = None
+    end_time_ns: int | None = None
+
+    @property
+    def has_times(self) -> bool:
+        """Whether the time is bounded at all."""
+        return self.start_time_ns is not None or self.end_time_ns is not None
+
+    def touches(self, first_ns: int, last_ns: int) -> bool:
+        """Tell whether some time from ``first_ns`` to ``last_ns``, both included, is asked for.
+
+        >>> Selection(channel_ids=frozenset(), start_time_ns=5, end_time_ns=9).touches(9, 12)
+        False
+        """
+        starts_late = self.end_time_ns is not None and first_ns >= self.end_time_ns
+        ends_early = self.start_time_ns is not None and last_ns < self.start_time_ns
+        return not (starts_late or ends_early)
+
+    def mask(self, log_time_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which of these times are asked for."""
+        chosen = np.ones(len(log_time_ns), np.bool_)
+        if self.start_time_ns is not None:
+            chosen &= log_time_ns >= self.start_time_ns
+        if self.end_time_ns is not None:
+            chosen &= log_time_ns < self.end_time_ns
+        return chosen
