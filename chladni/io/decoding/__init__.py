@@ -1,0 +1,17 @@
+"""Encoded messages of a log to columns: CDR, ROS 1, protobuf and JSON."""
+
+from chladni.io.decoding.columns import Column, Decoded, Decoder, EncodedMessages, Strings
+from chladni.io.decoding.decoder import SUPPORTED, make_decoder
+from chladni.io.decoding.schema import FieldInfo, FieldKind
+
+__all__ = [
+    "SUPPORTED",
+    "Column",
+    "Decoded",
+    "Decoder",
+    "EncodedMessages",
+    "FieldInfo",
+    "FieldKind",
+    "Strings",
+    "make_decoder",
+]

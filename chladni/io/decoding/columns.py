@@ -1,0 +1,235 @@
+"""What a decoder takes and what it gives: encoded messages in, one column a field out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from chladni.signals.errors import LogError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from chladni.io.decoding.schema import FieldInfo
+
+StringValue = str | tuple[str, ...]
+"""One string, or all strings of an array of strings."""
+
+
+class EncodedMessages(Protocol):
+    """Messages of one channel as they stand in one buffer."""
+
+    @property
+    def buffer(self) -> NDArray[np.uint8]:
+        """Bytes that hold all messages (and whatever lies between them)."""
+
+    @property
+    def offsets(self) -> NDArray[np.int64]:
+        """Index of the first byte of each message."""
+
+    @property
+    def lengths(self) -> NDArray[np.int64]:
+        """Number of bytes of each message."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Strings:
+    """Strings of many messages, each distinct one stored once.
+
+    Parameters
+    ----------
+    codes : int32 array
+        Index into `table`, shaped as the values of a `Column`.
+    table : tuple of str, or of tuple of str
+        The distinct strings (or, for an array of strings, the distinct lists), in the order they first appear.
+    """
+
+    codes: NDArray[np.int32]
+    table: tuple[StringValue, ...]
+
+    def __len__(self) -> int:
+        return self.codes.size
+
+    def __getitem__(self, index: int) -> StringValue:
+        return self.table[int(self.codes.flat[index])]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Column:
+    """One field of many messages.
+
+    Parameters
+    ----------
+    values : ndarray or Strings
+        ``[message]`` for a scalar; ``[message, element]`` for an array of the same length in all messages;
+        ``[element]``, one message after another, for arrays of different length.
+    counts : int64 array, optional
+        Elements in each message, where the lengths differ; None where `values` has a row for each message.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> column = Column(values=np.array([1.0, 2.0, 3.0]), counts=np.array([1, 2]))
+    >>> column.per_message()
+    (array([1., 2., 3.]), array([1, 2]))
+    """
+
+    values: NDArray[np.generic] | Strings
+    counts: NDArray[np.int64] | None = None
+
+    @property
+    def numbers(self) -> NDArray[np.generic]:
+        """The values of a column that isn't one of strings.
+
+        Raises
+        ------
+        LogError
+            If it is one of strings.
+        """
+        if isinstance(self.values, Strings):
+            raise LogError("a column of strings was used as numbers; choose a numeric field of the message")
+        return self.values
+
+    @property
+    def strings(self) -> Strings:
+        """The values of a column of strings.
+
+        Raises
+        ------
+        LogError
+            If it is one of numbers.
+        """
+        if not isinstance(self.values, Strings):
+            raise LogError("a column of numbers was used as strings; choose a string field of the message")
+        return self.values
+
+    def per_message(self) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
+        """All numbers, one message after another, and how many belong to each message.
+
+        Returns
+        -------
+        values : ndarray [element]
+        counts : int64 array [message]
+        """
+        numbers = self.numbers
+        if self.counts is not None:
+            return numbers, self.counts
+        width = numbers.shape[1] if numbers.ndim == 2 else 1
+        return numbers.reshape(-1), np.full(len(numbers), width, np.int64)
+
+    def select(self, messages: NDArray[np.bool_]) -> Column:
+        """Give the column of some of the messages, dense again where those have the same number of elements.
+
+        Parameters
+        ----------
+        messages : bool array [message]
+
+        Returns
+        -------
+        Column
+        """
+        if self.counts is None:
+            return Column(values=_taken(self.values, messages))
+        counts = self.counts[messages]
+        values = _taken(self.values, np.repeat(messages, self.counts))
+        even = len(counts) > 0 and bool((counts == counts[0]).all())
+        return Column(values=_reshaped(values, len(counts))) if even else Column(values=values, counts=counts)
+
+
+def _taken(values: NDArray[np.generic] | Strings, chosen: NDArray[np.bool_]) -> NDArray[np.generic] | Strings:
+    if isinstance(values, Strings):
+        return Strings(codes=values.codes[chosen], table=values.table)
+    return values[chosen]
+
+
+def _reshaped(values: NDArray[np.generic] | Strings, rows: int) -> NDArray[np.generic] | Strings:
+    if isinstance(values, Strings):
+        return Strings(codes=values.codes.reshape(rows, -1), table=values.table)
+    return values.reshape(rows, -1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Decoded:
+    """Columns of a batch, and which of its messages could not be read.
+
+    Parameters
+    ----------
+    columns : mapping of path to Column
+        Values at bad messages are placeholders and mean nothing.
+    bad : bool array [message]
+        Messages that are malformed as far as the fields asked for go.
+    reasons : mapping of str to int
+        What was wrong, and with how many messages.
+    """
+
+    columns: Mapping[str, Column]
+    bad: NDArray[np.bool_]
+    reasons: Mapping[str, int] = field(default_factory=dict)
+
+
+class Decoder(Protocol):
+    """Turns messages of one schema to columns."""
+
+    @property
+    def fields(self) -> tuple[FieldInfo, ...]:
+        """Leaves of the message in the order of the schema; empty while only messages could tell."""
+
+    def informed_by(self, messages: EncodedMessages) -> Decoder:
+        """Complete the fields from the first messages; a decoder whose schema tells everything is returned as is.
+
+        Parameters
+        ----------
+        messages : EncodedMessages
+            The first messages of the channel.
+        """
+
+    def columns(self, messages: EncodedMessages, paths: Sequence[str]) -> Decoded:
+        """Decode the fields named.
+
+        Parameters
+        ----------
+        messages : EncodedMessages
+        paths : sequence of str
+            Paths out of `fields`.
+
+        Raises
+        ------
+        LogError
+            If a path isn't in the schema, or the messages as a whole are in a form that isn't supported.
+        """
+
+
+def require_known(paths: Sequence[str], fields: Sequence[FieldInfo], *, schema_name: str) -> None:
+    """Refuse a path that is not a leaf of the schema.
+
+    Raises
+    ------
+    LogError
+        Names the path and fields that come near it.
+    """
+    known = {info.path for info in fields}
+    for path in paths:
+        if path not in known:
+            from difflib import get_close_matches
+
+            near = get_close_matches(path, known, n=3) or sorted(known)[:5]
+            raise LogError(
+                f"{schema_name or 'message without schema'} has no field {path!r}; near: {', '.join(near) or 'none'}"
+            )
+
+
+def outside_buffer(messages: EncodedMessages) -> NDArray[np.bool_]:
+    """Messages whose claimed place isn't inside the buffer.
+
+    Returns
+    -------
+    bool array [message]
+    """
+    # `size - lengths` can't overflow where `offsets + lengths` could: both are non-negative where it matters.
+    room = messages.buffer.size - messages.lengths
+    outside: NDArray[np.bool_] = (messages.offsets < 0) | (messages.lengths < 0) | (messages.offsets > room)
+    return outside

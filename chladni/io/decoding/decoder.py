@@ -1,0 +1,73 @@
+"""Which decoder reads a channel."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from chladni.signals.errors import LogError
+
+if TYPE_CHECKING:
+    from chladni.io.decoding.columns import Decoder
+
+SUPPORTED: Final = (
+    ("cdr", "ros2msg"),
+    ("cdr", "ros2idl"),
+    ("cdr", "omgidl"),
+    ("ros1", "ros1msg"),
+    ("protobuf", "protobuf"),
+    ("json", "jsonschema"),
+    ("json", ""),
+)
+"""Pairs of message encoding and schema encoding that can be decoded."""
+
+
+def make_decoder(*, message_encoding: str, schema_name: str, schema_encoding: str, schema_data: bytes) -> Decoder:
+    """Make the decoder of a channel.
+
+    Parameters
+    ----------
+    message_encoding, schema_encoding : str
+        As the MCAP channel and schema records give them; `schema_encoding` is empty for a channel without schema.
+    schema_name : str
+        Name of the message type.
+    schema_data : bytes
+        The schema, untrusted.
+
+    Returns
+    -------
+    Decoder
+
+    Raises
+    ------
+    LogError
+        If the encoding isn't supported, or the schema is malformed or unreasonably large.
+    """
+    match message_encoding, schema_encoding:
+        case "cdr", "ros2msg":
+            from chladni.io.decoding.binary import BinaryDecoder
+            from chladni.io.decoding.message_text import parse_ros2_text
+
+            return BinaryDecoder(parse_ros2_text(schema_name, _text(schema_data, schema_name)), encapsulated=True)
+        case "ros1", "ros1msg":
+            from chladni.io.decoding.binary import BinaryDecoder
+            from chladni.io.decoding.message_text import parse_ros1_text
+
+            return BinaryDecoder(parse_ros1_text(schema_name, _text(schema_data, schema_name)), encapsulated=False)
+        case "json", "jsonschema" | "":
+            from chladni.io.decoding.json_messages import JsonDecoder
+
+            return JsonDecoder.of_schema(schema_name, schema_data)
+    pairs = ", ".join(f"{message}/{schema or 'no schema'}" for message, schema in SUPPORTED)
+    raise LogError(
+        f"schema {schema_name!r}: message encoding {message_encoding!r} with schema encoding {schema_encoding!r} "
+        f"can't be decoded; supported: {pairs}"
+    )
+
+
+def _text(data: bytes, name: str) -> str:
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise LogError(
+            f"schema {name!r}: the definition isn't UTF-8 text ({error.reason} at {error.start})"
+        ) from error

@@ -1,0 +1,100 @@
+"""Values of one leaf as a block of messages gave them, and their joining to a column."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chladni.io.decoding.assemble import dense_if_even
+from chladni.io.decoding.columns import Column, Strings
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from chladni.io.decoding.columns import StringValue
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Found:
+    """Values of one leaf in the sound messages of a block.
+
+    Parameters
+    ----------
+    values : ndarray or Strings [element]
+        One after another.
+    counts : int64 array, optional
+        Elements in each sound message; None where each has exactly one.
+    """
+
+    values: NDArray[np.generic] | Strings
+    counts: NDArray[np.int64] | None = None
+
+
+def interned(values: Iterable[StringValue]) -> Strings:
+    """Store each distinct string once.
+
+    Examples
+    --------
+    >>> interned(["a", "b", "a"]).table
+    ('a', 'b')
+    """
+    known: dict[StringValue, int] = {}
+    codes = np.array([known.setdefault(value, len(known)) for value in values], np.int32)
+    return Strings(codes=codes, table=tuple(known))
+
+
+def joined_column(found: Sequence[Found], bad: NDArray[np.bool_], *, empty: NDArray[np.generic] | Strings) -> Column:
+    """Make one column of what the blocks of a batch gave.
+
+    Parameters
+    ----------
+    found : sequence of Found
+        In the order of the messages.
+    bad : bool array [message]
+        Messages that gave nothing.
+    empty : ndarray or Strings
+        No values, of the right kind.
+
+    Returns
+    -------
+    Column
+        With a row for each message, bad ones included.
+    """
+    table: tuple[StringValue, ...] = ()
+    if isinstance(empty, Strings):
+        parts, table = _one_table([one.values for one in found if isinstance(one.values, Strings)])
+    else:
+        parts = [np.asarray(one.values) for one in found]
+    flat = np.concatenate([empty.codes if isinstance(empty, Strings) else empty, *parts])
+    values, counts = _placed(flat, [one.counts for one in found], bad)
+    if isinstance(empty, Strings):
+        return Column(values=Strings(codes=values.astype(np.int32, copy=False), table=table or ("",)), counts=counts)
+    return Column(values=values, counts=counts)
+
+
+def _placed(
+    flat: NDArray[np.generic], counts: Sequence[NDArray[np.int64] | None], bad: NDArray[np.bool_]
+) -> tuple[NDArray[np.generic], NDArray[np.int64] | None]:
+    given = [count for count in counts if count is not None]
+    if given:
+        of_all = np.zeros(len(bad), np.int64)
+        of_all[~bad] = np.concatenate(given)
+        return dense_if_even(flat, of_all, bad)
+    if not bad.any():
+        return flat, None
+    values = np.zeros(len(bad), flat.dtype)
+    values[~bad] = flat
+    return values, None
+
+
+def _one_table(parts: Sequence[Strings]) -> tuple[list[NDArray[np.generic]], tuple[StringValue, ...]]:
+    known: dict[StringValue, int] = {}
+    codes: list[NDArray[np.generic]] = []
+    for part in parts:
+        new = np.array([known.setdefault(value, len(known)) for value in part.table], np.int32)
+        codes.append(new[part.codes] if len(new) else part.codes)
+    return codes, tuple(known)

@@ -1,0 +1,154 @@
+"""JSON messages to columns by Arrow's parser: the fast path for messages that all fit the schema.
+
+Messages are joined by newlines and parsed as one stream of objects. That is only safe because no message can hide a
+boundary: each begins with ``{``, ends with ``}`` and holds no newline and no NUL, a string can't contain a newline,
+and after a closing brace another opening brace is legal at the top level only. So each message gives at least one
+row, and as many rows as messages means exactly one row each. Whatever Arrow refuses, and whatever it would take more
+generously than the rules of `chladni.io.decoding.json_values`, is left to those.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from chladni.io.decoding.columns import Strings
+from chladni.io.decoding.found import Found
+from chladni.io.decoding.json_schema import NANOSECONDS, SECONDS
+from chladni.io.decoding.schema import Array, FieldType, Leaf, Primitive, Stamp, Text, tree_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import ModuleType
+
+    import pyarrow as pa
+
+    from chladni.io.decoding.schema import Tree
+
+LARGEST_TIME_S: Final = 9_000_000_000
+"""Seconds (the year 2255) beyond which nanoseconds come near the end of 64 bits; left to exact arithmetic."""
+
+
+def read_by_arrow(contents: Sequence[bytes], leaves: Sequence[Leaf]) -> list[Found] | None:
+    """Read leaves of messages that are all sound.
+
+    Parameters
+    ----------
+    contents : sequence of bytes
+        Messages, surrounding white space stripped.
+    leaves : sequence of Leaf
+
+    Returns
+    -------
+    list of Found or None
+        One for each leaf; None where any message, or a leaf's type, is beyond this path.
+    """
+    stream = b"\n".join(contents)
+    if not all(_is_plain(leaf) for leaf in leaves) or not _is_safe(stream, contents):
+        return None
+    import pyarrow as pa
+    from pyarrow import json as arrow_json
+
+    try:
+        table = arrow_json.read_json(
+            pa.BufferReader(stream),
+            read_options=arrow_json.ReadOptions(use_threads=False, block_size=len(stream) + 1),
+            parse_options=arrow_json.ParseOptions(
+                explicit_schema=pa.schema(_arrow_fields(tree_of(leaves), pa)), unexpected_field_behavior="ignore"
+            ),
+        )
+    except pa.ArrowInvalid:
+        return None
+    if table.num_rows != len(contents):
+        return None
+    found = [_found(table, leaf) for leaf in leaves]
+    complete = [one for one in found if one is not None]
+    return complete if len(complete) == len(found) else None
+
+
+def _is_plain(leaf: Leaf) -> bool:
+    scalar = leaf.type.element if isinstance(leaf.type, Array) else leaf.type
+    return not any(leaf.lists) and (isinstance(scalar, Primitive) or isinstance(leaf.type, Stamp | Text))
+
+
+def _is_safe(stream: bytes, contents: Sequence[bytes]) -> bool:
+    # Arrow doesn't look at the encoding of what it skips; the rules do.
+    if b"\0" in stream or stream.count(b"\n") != len(contents) - 1:
+        return False
+    try:
+        stream.isascii() or stream.decode("utf-8")
+    except UnicodeDecodeError:
+        return False
+    return all(content.startswith(b"{") and content.endswith(b"}") for content in contents)
+
+
+def _arrow_fields(tree: Tree, pa: ModuleType) -> list[pa.Field]:
+    return [
+        pa.field(
+            name,
+            _arrow_type(below.type, pa) if isinstance(below, Leaf) else pa.struct(_arrow_fields(below, pa)),
+        )
+        for name, below in tree.items()
+    ]
+
+
+def _arrow_type(kind: FieldType, pa: ModuleType) -> pa.DataType:
+    match kind:
+        case Array(element=element):
+            return pa.list_(_arrow_type(element, pa))
+        case Stamp():
+            return pa.struct([(name, pa.int64()) for name in (SECONDS, *NANOSECONDS)])
+        case Primitive(dtype=dtype):
+            return pa.from_numpy_dtype(dtype)
+        case _:
+            return pa.string()
+
+
+def _found(table: pa.Table, leaf: Leaf) -> Found | None:
+    array = _complete(table.column(leaf.names[0]).combine_chunks())
+    for name in leaf.names[1:]:
+        array = None if array is None else _complete(array.field(name))
+    if array is None:
+        return None
+    match leaf.type:
+        case Array():
+            return _of_lists(array)
+        case Stamp():
+            return _of_times(array)
+        case Primitive():
+            return _of_numbers(array)
+        case _:
+            coded = array.dictionary_encode()
+            codes = coded.indices.to_numpy(zero_copy_only=False).astype(np.int32, copy=False)
+            return Found(values=Strings(codes=codes, table=tuple(coded.dictionary.to_pylist())))
+
+
+def _complete(array: pa.Array) -> pa.Array | None:
+    # A null is a key that is missing, or null itself: the rules say which message is bad for it.
+    return None if array.null_count else array
+
+
+def _of_numbers(array: pa.Array) -> Found | None:
+    values = array.to_numpy(zero_copy_only=False)
+    return Found(values=values) if values.dtype.kind != "f" or np.isfinite(values).all() else None
+
+
+def _of_lists(array: pa.Array) -> Found | None:
+    elements = _complete(array.flatten())
+    numbers = None if elements is None else _of_numbers(elements)
+    if numbers is None:
+        return None
+    counts = np.diff(array.offsets.to_numpy()).astype(np.int64)
+    return Found(values=numbers.values, counts=counts)
+
+
+def _of_times(array: pa.Array) -> Found | None:
+    seconds = _complete(array.field(SECONDS))
+    given = [part for part in (array.field(name) for name in NANOSECONDS) if part.null_count < len(part)]
+    if seconds is None or len(given) != 1 or given[0].null_count:
+        return None
+    whole, part = seconds.to_numpy(), given[0].to_numpy()
+    if (np.abs(whole) > LARGEST_TIME_S).any() or (np.abs(part) > LARGEST_TIME_S).any():
+        return None
+    return Found(values=whole * 1_000_000_000 + part)

@@ -1,0 +1,54 @@
+"""Messages for the decoders' tests: batches of bytes and a reference serialiser of CDR and ROS 1."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.io.decoding import Decoded, Decoder
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Encoded:
+    """The least that a decoder takes."""
+
+    buffer: NDArray[np.uint8]
+    offsets: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+
+
+def batch_of(messages: Sequence[bytes], *, gaps: Sequence[int] = (5,)) -> Encoded:
+    """Messages one after another with `gaps` bytes of 0xEE between them, in turn: one gap gives constant stride."""
+    content, offsets = bytearray(), []
+    for index, message in enumerate(messages):
+        content += b"\xee" * gaps[index % len(gaps)]
+        offsets.append(len(content))
+        content += message
+    return Encoded(
+        buffer=np.frombuffer(bytes(content), np.uint8),
+        offsets=np.array(offsets, np.int64),
+        lengths=np.array([len(message) for message in messages], np.int64),
+    )
+
+
+def values_of(decoded: Decoded, path: str) -> list[Any]:
+    """One Python value a message: a scalar or a list."""
+    column = decoded.columns[path]
+    if column.counts is None:
+        if isinstance(column.values, np.ndarray):
+            return column.values.tolist()
+        table, codes = column.values.table, column.values.codes
+        return [[table[c] for c in row] if np.ndim(row) else table[row] for row in codes]
+    flat: list[Any]
+    if isinstance(column.values, np.ndarray):
+        flat = column.values.tolist()
+    else:
+        flat = [column.values.table[code] for code in column.values.codes]
+    ends = np.cumsum(column.counts)
+    return [flat[end - count : end] for end, count in zip(ends.tolist(), column.counts.tolist(), strict=True)]
+
+
+def decode_all(decoder: Decoder, messages: Encoded) -> Decoded:
+    return decoder.columns(messages, [info.path for info in decoder.fields])
