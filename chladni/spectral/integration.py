@@ -74,7 +74,7 @@ def integrate(series: TimeSeries, *, low_hz: float, times: int = 1) -> Converted
     -----
     Division of the run's spectrum by (j omega)^times, exact below the Nyquist frequency, where a running sum is wrong
     by (omega dt)^2 / 12. What lies beyond the ends is unknown: of a tone of frequency f, integrated n times, the ends
-    leave a drift near `low_hz` of up to 1.5 % of the tone's result times (f / low_hz)^(n - 1) at `edge_s`, and falling.
+    leave a drift near `low_hz`, at `edge_s` up to 1.5 % of the tone's result times (f / low_hz)^(n - 1), and falling.
     """
     _require_times(times)
     nyquist_hz = series.sample_rate_hz / 2

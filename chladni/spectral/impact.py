@@ -1,0 +1,414 @@
+"""Impact tests: hits found in the force, judged one by one, and averaged."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.errors import EstimateError
+from chladni.signals.provenance import Provenance
+from chladni.signals.time_series import TimeSeries
+from chladni.spectral.force_pulses import (
+    LONGEST_PULSE_S,
+    NOISE_SIGMAS,
+    Pulses,
+    find_pulses,
+    is_clipped,
+    typical_peak,
+)
+
+# At equal noise, a hit of a quarter of the usual force has a sixteenth of the usual ratio of signal to noise power.
+WEAK_SHARE = 0.25
+# Widths of the pulse after the trigger during which the force window is one, and then falls to zero.
+FORCE_WINDOW_PULSES = 4
+# A softer blow lasts longer (Hertz: as its speed to the power of -1/5); what's much shorter than the first pulse is the
+# ringing of an anti-alias filter.
+LIKE_THE_FIRST = 0.75
+# A response whose last tenth still holds this share of its energy has not died away: its record is cut off.
+STILL_RINGING = 1e-3
+
+Samples = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hit:
+    """One hit of the hammer.
+
+    Attributes
+    ----------
+    record
+        Its number in the log, the first hit is 1; rejected hits count too.
+    time_s
+        When the force crosses the trigger level, seconds since the first sample.
+    peak
+        Largest force, in the channel's unit, with its sign.
+    """
+
+    record: int
+    time_s: float
+    peak: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rejection:
+    """A hit that was left out, and why; `record` and `time_s` as in `Hit`."""
+
+    record: int
+    time_s: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Impacts:
+    """The hits of an impact test.
+
+    Attributes
+    ----------
+    force
+        Name of the force channel.
+    trigger_level
+        Force at which a hit begins, in the channel's unit, with the sign of the pulses.
+    pretrigger_s, record_s
+        A record begins `pretrigger_s` before the trigger and lasts `record_s`.
+    pulse_s
+        Typical width of the force pulse at half its height.
+    accepted, rejected
+        In order of time.
+    notes
+        Sentences of advice.
+    """
+
+    force: str
+    trigger_level: float
+    pretrigger_s: float
+    record_s: float
+    pulse_s: float
+    accepted: tuple[Hit, ...]
+    rejected: tuple[Rejection, ...]
+    notes: tuple[str, ...] = ()
+
+
+def is_impact_test(series: TimeSeries, channel: str) -> bool:
+    """Tell whether a channel looks like the force of a hammer: short one-sided pulses with silence between.
+
+    Parameters
+    ----------
+    series
+        The log, or a part of it that holds at least one hit.
+    channel
+        Name of the channel to judge.
+
+    Returns
+    -------
+    bool
+        True when pulses at least 50 times the noise, 3 samples to 30 ms wide, none of them followed by a swing to the
+        other side of a third of it, fill less than 5 % of the time.
+    """
+    alone = series.select([channel])
+    measured = np.isfinite(alone.values) if alone.valid is None else alone.valid & np.isfinite(alone.values)
+    if not measured.any():
+        return False
+    pulses = find_pulses(alone, channel, level=None)
+    if not pulses.starts.size:
+        return False
+    heights = pulses.force[pulses.peaks]
+    typical = float(np.median(heights))
+    lasting = np.count_nonzero(pulses.force > pulses.level) / pulses.force.size
+    width_s = float(np.median(pulses.widths)) / series.sample_rate_hz
+    wide_enough = float(np.median(pulses.widths)) >= 3
+    one_sided = -pulses.force.min() < heights.max() / 3
+    silent = typical > 50 * pulses.noise and lasting < 0.05
+    return bool(silent and one_sided and wide_enough and width_s <= LONGEST_PULSE_S)
+
+
+def find_impacts(
+    series: TimeSeries,
+    *,
+    force: str,
+    level: float | None = None,
+    pretrigger_s: float | None = None,
+    record_s: float | None = None,
+    double_hit_share: float = 0.03,
+) -> Impacts:
+    """Find the hits of an impact test and reject those that would spoil the average.
+
+    Parameters
+    ----------
+    series
+        Force and responses on one clock.
+    force
+        Name of the hammer's channel; pulses may point either way.
+    level
+        Trigger level as a magnitude in the force's unit; default a tenth of the typical peak.
+    pretrigger_s
+        Time before the trigger that belongs to a record, default twice the width of the pulse.
+    record_s
+        Length of a record; default as long as fits between the hits.
+    double_hit_share
+        A second pulse that rises by this share of the peak rejects the hit, 0 to 1.
+
+    Returns
+    -------
+    Impacts
+        With a `Rejection` for each hit left out: overload (a channel's limit reached, or a crest cut flat), a double
+        hit, a hit too weak, samples missing, a record that begins while the hit before still rings or that leaves
+        the log.
+
+    Raises
+    ------
+    EstimateError
+        When the force holds no pulse, or the times don't fit.
+    """
+    if not 0 < double_hit_share < 1:
+        raise EstimateError(f"double_hit_share is {double_hit_share}; it must lie between 0 and 1")
+    pulses = find_pulses(series, force, level=level)
+    if not pulses.starts.size:
+        raise EstimateError(
+            f"{force!r} holds no pulse above its noise; name another force channel or a trigger level"
+        )
+    rate_hz = series.sample_rate_hz
+    pulse = int(np.median(pulses.widths))
+    before = 2 * pulse if pretrigger_s is None else round(pretrigger_s * rate_hz)
+    length = (
+        _record_length(pulses.starts, before, pulses.force.size) if record_s is None else round(record_s * rate_hz)
+    )
+    if not 0 <= before < length:
+        raise EstimateError(
+            f"a record of {length / rate_hz:g} s can't hold {before / rate_hz:g} s of pretrigger; make it longer"
+        )
+    judge = _Judge(series=series, pulses=pulses, before=before, length=length, double_hit_share=double_hit_share)
+    accepted, rejected = judge.verdicts()
+    return Impacts(
+        force=force,
+        trigger_level=pulses.sign * pulses.level,
+        pretrigger_s=before / rate_hz,
+        record_s=length / rate_hz,
+        pulse_s=pulse / rate_hz,
+        accepted=accepted,
+        rejected=rejected,
+        notes=_advice(pulses, double_hit_share, len(accepted)),
+    )
+
+
+def impact_cross_spectra(
+    series: TimeSeries, impacts: Impacts, *, force_window: bool = True, decay_per_s: float = 0.0
+) -> CrossSpectra:
+    """Average the accepted hits to cross-spectra of all channel pairs.
+
+    Parameters
+    ----------
+    series
+        The series in which `impacts` were found.
+    impacts
+        What `find_impacts` gave.
+    force_window
+        Whether to silence the force after its pulse, where it holds only noise: one until four pulse widths after the
+        trigger, then a cosine down to zero over four more.
+    decay_per_s
+        Decay rate sigma of an exponential window exp(-sigma t) on *all* channels, for a response that still rings at
+        the end of the record; 0 for none. It adds sigma to the decay of every pole, so it's carried in
+        ``provenance.window_decay_per_s`` for whoever estimates damping.
+
+    Returns
+    -------
+    CrossSpectra
+        ``averaging="impact"``, in unit_i unit_j / Hz: energy spectral density over the length of the record. Times
+        ``impacts.record_s`` it is the energy spectral density; ratios such as H1 don't depend on that length.
+
+    Raises
+    ------
+    EstimateError
+        When no hit was accepted, or the decay is negative.
+
+    Notes
+    -----
+    G_ij = 2/(M T) sum over hits of conj(X_i) X_j with X the Fourier integral of the record (Bendat & Piersol 2010,
+    section 12.3; windows after Fladung & Brown, IMAC 1993, and Halvorsen & Brown 1977).
+    """
+    if not impacts.accepted:
+        reasons = "; ".join(f"record {r.record}: {r.reason}" for r in impacts.rejected) or "no hit was found"
+        raise EstimateError(f"no hit of {impacts.force!r} was accepted ({reasons})")
+    if not 0 <= decay_per_s < np.inf:
+        raise EstimateError(f"decay_per_s is {decay_per_s}; it must be 0 or positive")
+    rate_hz = series.sample_rate_hz
+    length = round(impacts.record_s * rate_hz)
+    windows = _windows(series, impacts, length, force_window=force_window, decay_per_s=decay_per_s)
+    total: NDArray[np.complex128] = np.zeros((*2 * (len(series.channels),), length // 2 + 1), dtype=np.complex128)
+    for hit in impacts.accepted:
+        spectrum = scipy.fft.rfft(_record(series, impacts, hit, length) * windows) / rate_hz
+        total += spectrum.conj()[:, np.newaxis] * spectrum
+    # One-sided: every line but 0 Hz and the Nyquist frequency stands for two.
+    total[..., 1 : (length + 1) // 2] *= 2
+    return CrossSpectra(
+        frequency_hz=scipy.fft.rfftfreq(length, 1 / rate_hz),
+        density=total / (len(impacts.accepted) * impacts.record_s),
+        channels=series.channels,
+        bandwidth_hz=1 / impacts.record_s,
+        provenance=_provenance(series, impacts, force_window=force_window, decay_per_s=decay_per_s),
+    )
+
+
+def _record_length(starts: NDArray[np.int64], before: int, samples: int) -> int:
+    """Longest record that fits between hits; hits that follow each other unusually fast are judged, not obeyed."""
+    spaces = np.diff(np.append(starts, samples + before))
+    usual = float(np.median(spaces))
+    longest = int(spaces[spaces >= 0.8 * usual].min())
+    return scipy.fft.prev_fast_len(longest, real=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Judge:
+    """Looks at one hit after the other and collects every reason against it."""
+
+    series: TimeSeries
+    pulses: Pulses
+    before: int
+    length: int
+    double_hit_share: float
+
+    def verdicts(self) -> tuple[tuple[Hit, ...], tuple[Rejection, ...]]:
+        accepted, rejected = [], []
+        for at, start in enumerate(self.pulses.starts):
+            record, time_s = at + 1, float(start / self.series.sample_rate_hz)
+            reasons = self.reasons(at)
+            if reasons:
+                rejected.append(Rejection(record=record, time_s=time_s, reason="; ".join(reasons)))
+            else:
+                height = self.pulses.sign * self.pulses.force[self.pulses.peaks[at]]
+                accepted.append(Hit(record=record, time_s=time_s, peak=float(height)))
+        return tuple(accepted), tuple(rejected)
+
+    def reasons(self, at: int) -> list[str]:
+        first = int(self.pulses.starts[at]) - self.before
+        inside = slice(max(first, 0), min(first + self.length, self.pulses.force.size))
+        found = [
+            self.overload(inside),
+            self.double_hit(at, inside),
+            self.weak(at),
+            self.ringing(at),
+            self.missing(inside),
+            self.beyond(first),
+        ]
+        return [reason for reason in found if reason]
+
+    def overload(self, inside: slice) -> str:
+        over = []
+        for channel, values in zip(self.series.channels, self.series.values[:, inside], strict=True):
+            x = np.nan_to_num(values.astype(np.float64))
+            limited = channel.overload is not None and bool(np.any(np.abs(x) >= channel.overload))
+            if limited or any(is_clipped(side, int(np.argmax(side)), 0.0) for side in (x, -x)):
+                over.append(f"{channel.name} reads up to {np.abs(x).max():.4g} {channel.unit}")
+        return f"overload: {', '.join(over)}" if over else ""
+
+    def double_hit(self, at: int, inside: slice) -> str:
+        from scipy.signal import find_peaks
+
+        force, peak = self.pulses.force, int(self.pulses.peaks[at])
+        rise = max(self.double_hit_share * float(force[peak]), NOISE_SIGMAS * self.pulses.noise)
+        tops, _ = find_peaks(force[inside], prominence=rise, width=LIKE_THE_FIRST * self.pulses.widths[at])
+        others = [top for top in (tops + inside.start).tolist() if abs(top - peak) > self.pulses.widths[at] / 2]
+        if not others:
+            return ""
+        second = max(others, key=lambda top: float(force[top]))
+        unit = self.pulses.unit
+        return (
+            f"double hit: a second pulse of {force[second]:.3g} {unit} ({force[second] / force[peak]:.0%}), "
+            f"{(second - peak) / self.series.sample_rate_hz * 1e3:.1f} ms after the first"
+        )
+
+    def weak(self, at: int) -> str:
+        height = float(self.pulses.force[self.pulses.peaks[at]])
+        typical = typical_peak(self.pulses.force, self.pulses.peaks)
+        return (
+            f"too weak: its peak is {height / typical:.0%} of the usual one" if height < WEAK_SHARE * typical else ""
+        )
+
+    def ringing(self, at: int) -> str:
+        since = int(self.pulses.starts[at] - self.pulses.starts[at - 1]) if at else self.length
+        if since >= self.length:
+            return ""
+        return f"the hit {since / self.series.sample_rate_hz:.3g} s before still rings in this record"
+
+    def missing(self, inside: slice) -> str:
+        valid = self.series.valid
+        return "samples are missing in it" if valid is not None and not valid[:, inside].all() else ""
+
+    def beyond(self, first: int) -> str:
+        if first < 0:
+            return "its pretrigger begins before the log"
+        return "its record ends after the log" if first + self.length > self.pulses.force.size else ""
+
+
+def _advice(pulses: Pulses, double_hit_share: float, accepted: int) -> tuple[str, ...]:
+    notes = []
+    if pulses.ignored:
+        notes.append(f"{pulses.ignored} bumps below the trigger level of {pulses.level:.3g} were ignored")
+    hidden = NOISE_SIGMAS * pulses.noise / typical_peak(pulses.force, pulses.peaks)
+    if hidden > double_hit_share:
+        notes.append(f"second pulses under {hidden:.0%} of the usual peak can't be told from the noise of the force")
+    if 0 < accepted < 3:
+        notes.append(f"only {accepted} accepted: errors from so few hits are themselves uncertain; take 5 or more")
+    return tuple(notes)
+
+
+def _record(series: TimeSeries, impacts: Impacts, hit: Hit, length: int) -> Samples:
+    """Samples of one hit, each channel freed of its offset."""
+    first = round(hit.time_s * series.sample_rate_hz) - round(impacts.pretrigger_s * series.sample_rate_hz)
+    record = series.values[:, first : first + length].astype(np.float64)
+    if first < 0 or record.shape[1] < length:
+        raise EstimateError(f"record {hit.record} leaves the series; give the one in which the impacts were found")
+    offset = record.mean(axis=1)
+    # The mean of a force holds its pulse; what it reads in silence is the median.
+    force = series.index(impacts.force)
+    offset[force] = np.median(record[force])
+    centred: Samples = record - offset[:, np.newaxis]
+    return centred
+
+
+def _windows(series: TimeSeries, impacts: Impacts, length: int, *, force_window: bool, decay_per_s: float) -> Samples:
+    since_trigger_s = np.arange(length) / series.sample_rate_hz - impacts.pretrigger_s
+    # From the record's first sample on, without a bend at the trigger: only so is it a pure shift of all poles.
+    exponential = np.exp(-decay_per_s * np.arange(length) / series.sample_rate_hz)
+    windows = np.tile(exponential, (len(series.channels), 1))
+    if force_window:
+        span_s = FORCE_WINDOW_PULSES * impacts.pulse_s
+        fading = np.clip(since_trigger_s / span_s - 1, 0.0, 1.0)
+        windows[series.index(impacts.force)] *= (1 + np.cos(np.pi * fading)) / 2
+    return windows
+
+
+def _provenance(series: TimeSeries, impacts: Impacts, *, force_window: bool, decay_per_s: float) -> Provenance:
+    parts = ["force"] * force_window + [f"exponential {decay_per_s:g}/s"] * (decay_per_s > 0)
+    notes = [f"record {r.record} at {r.time_s:.3f} s rejected: {r.reason}" for r in impacts.rejected]
+    return Provenance(
+        window=" + ".join(parts) or "boxcar",
+        segment_s=impacts.record_s,
+        averages=len(impacts.accepted),
+        effective_averages=float(len(impacts.accepted)),
+        averaging="impact",
+        window_decay_per_s=decay_per_s,
+        skipped=len(impacts.rejected),
+        notes=(*impacts.notes, *notes, *_still_ringing(series, impacts, decay_per_s)),
+    )
+
+
+def _still_ringing(series: TimeSeries, impacts: Impacts, decay_per_s: float) -> list[str]:
+    """Advice for channels that haven't died away when the record ends."""
+    length = round(impacts.record_s * series.sample_rate_hz)
+    energy = np.zeros((len(series.channels), length))
+    for hit in impacts.accepted:
+        energy += _record(series, impacts, hit, length) ** 2
+    late = energy[:, -length // 10 :].sum(axis=1) * np.exp(-2 * decay_per_s * impacts.record_s)
+    names = [
+        c.name for c, share in zip(series.channels, late / energy.sum(axis=1), strict=True) if share > STILL_RINGING
+    ]
+    if not names:
+        return []
+    advised = np.log(100) / impacts.record_s
+    note = (
+        f"{', '.join(names)}: not died away at the end of the record, which smears peaks; take longer records or an "
+        f"exponential window of {advised:.3g}/s (1 % at the end)"
+    )
+    return [note]
