@@ -1,0 +1,325 @@
+"""Averages cross-spectra of all channel pairs from consecutive blocks, and merges with others of its kind."""
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+from math import exp, isclose
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.channel import Channel
+from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.errors import EstimateError, SetupError
+from chladni.signals.provenance import Provenance
+from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.spectral.averaging import PeakHold, SegmentAverage, WeightedSum
+from chladni.spectral.segment_spectra import segment_spectra
+from chladni.spectral.segmentation import Segmentation
+from chladni.spectral.stretches import Stretch, valid_runs
+from chladni.spectral.uncertainty import EffectiveAverages
+from chladni.spectral.windows import noise_bandwidth_bins, window_name, window_samples
+
+SegmentAveraging = Literal["linear", "exponential", "peak-hold"]
+AVERAGINGS = ("linear", "exponential", "peak-hold")
+
+# Segments of one matrix product: enough to make BLAS worth calling, and spectra of at most so many bytes.
+MOST_SEGMENTS_TOGETHER = 128
+BYTES_TOGETHER = 64 << 20
+MOST_RESULT_BYTES = 2 << 30
+MOST_THREADS = 8
+
+
+class CrossSpectraAccumulator:
+    """Running average of cross-spectra; mutable, the result is a frozen `CrossSpectra`.
+
+    Blocks of one stretch of time may have any lengths: the end of each is kept until the next arrives, so that the
+    result doesn't depend on where the blocks were cut. A break in time or an invalid sample in any channel ends a
+    stretch: segments that would touch it are left out (and those that invalid samples cost are counted as skipped),
+    and segmentation starts anew at the first valid sample after it.
+
+    Parameters
+    ----------
+    channels
+        Channels of every block, in this order.
+    sample_rate_hz
+        Rate of every block.
+    segmentation
+        Segments and their window; see `plan_segmentation` for one from seconds and hertz.
+    averaging
+        ``linear``: all segments count the same. ``exponential``: a segment fades with `time_constant_s`; time without
+        data doesn't count. ``peak-hold``: the largest magnitude that any segment had, for each pair and line.
+    time_constant_s
+        For exponential averaging: after this time a segment's weight has fallen to 1/e.
+
+    Raises
+    ------
+    SetupError
+        When averaging, time constant or window are none there are.
+    EstimateError
+        When the result would take more than 2 GB.
+
+    Examples
+    --------
+    >>> series = TimeSeries(values=np.ones((1, 64)), sample_rate_hz=64.0, channels=(Channel(name="a"),))
+    >>> plan = Segmentation(samples=16, hop=16, window="boxcar", detrend="none")
+    >>> average = CrossSpectraAccumulator(series.channels, 64.0, plan)
+    >>> average.update(series)
+    >>> average.result().density[0, 0, :2].real
+    array([0.25, 0.  ])
+    """
+
+    def __init__(
+        self,
+        channels: Sequence[Channel],
+        sample_rate_hz: float,
+        segmentation: Segmentation,
+        *,
+        averaging: SegmentAveraging = "linear",
+        time_constant_s: float | None = None,
+    ) -> None:
+        self.channels = tuple(channels)
+        self.sample_rate_hz = float(sample_rate_hz)
+        self.segmentation = segmentation
+        self.averaging = averaging
+        self.time_constant_s = time_constant_s
+        _require_fitting_result(len(self.channels), segmentation.samples)
+        self._window = window_samples(segmentation.window, segmentation.samples)
+        decay = _decay(averaging, time_constant_s, segmentation.hop / self.sample_rate_hz)
+        lines = segmentation.samples // 2 + 1
+        self.average: SegmentAverage = (
+            PeakHold(lines, len(self.channels))
+            if averaging == "peak-hold"
+            else WeightedSum(lines, len(self.channels), decay)
+        )
+        self.count = EffectiveAverages(self._window, segmentation.hop, decay)
+        self.stretch = Stretch(segmentation)
+        # Samples of the unbroken run that later segments still need, and the number its next segment has in the run.
+        self._held: NDArray[np.floating[Any]] = np.empty((len(self.channels), 0))
+        self._position = 0
+
+    @property
+    def averages(self) -> int:
+        """Segments averaged so far."""
+        return self.count.segments + self.segmentation.count(self._held.shape[1])
+
+    def update(self, block: TimeSeries) -> None:
+        """Take in the next block.
+
+        Raises
+        ------
+        EstimateError
+            When channels or rate differ from those promised, the block starts before the last one ended, or a
+            sample that isn't marked invalid isn't finite.
+        """
+        self._require_agreement(block)
+        runs = valid_runs(block)
+        _require_finite(block, runs)
+        with _threads() as executor:
+            if self.stretch.breaks_at(block.start_time_ns, block.sample_rate_hz):
+                self._end_run(executor)
+            self.stretch.extend(block, runs)
+            for first, last in runs:
+                if first > 0:
+                    self._end_run(executor)
+                self._take(block.values[:, first:last], executor)
+            if block.samples > (runs[-1][1] if runs else 0):
+                self._end_run(executor)
+
+    def merge(self, other: Self) -> None:
+        """Take in all that another accumulator has seen; `other` stays as it is.
+
+        Its unfinished last segment is left out: "merged = whole" holds when the parts are cut where segments are, and
+        each part holds its last segment to the end.
+
+        Raises
+        ------
+        EstimateError
+            When channels, rate, segments or averaging differ, or an exponential average is merged against time order.
+        """
+        self._require_mergeable(other)
+        with _threads() as executor:
+            self.average_held(executor)
+            flushed = other.flushed(executor)
+        self.average.merge(flushed.average)
+        self.count.merge(flushed.count)
+        self.stretch.merge(flushed.stretch)
+
+    def result(self) -> CrossSpectra:
+        """Give the average so far; more blocks may follow.
+
+        Raises
+        ------
+        EstimateError
+            When not a single whole segment of valid samples has come.
+        """
+        with _threads() as executor:
+            flushed = self.flushed(executor)
+        if flushed.count.segments == 0:
+            raise EstimateError(self._nothing_averaged())
+        samples, rate = self.segmentation.samples, self.sample_rate_hz
+        density = flushed.average.mean()
+        density *= one_sided_weights(samples) / (rate * np.sum(self._window**2))
+        return CrossSpectra(
+            frequency_hz=line_frequencies_hz(samples, rate),
+            density=density,
+            channels=self.channels,
+            bandwidth_hz=noise_bandwidth_bins(self._window) * rate / samples,
+            provenance=self._provenance(flushed.count),
+        )
+
+    def _take(self, values: NDArray[np.floating[Any]], executor: Executor) -> None:
+        # Segments go to the average in batches of a fixed number, counted from the start of the run: so sums are
+        # grouped in the same way however the blocks are cut, and the result is the same to the last bit.
+        batch = self._segments_together()
+        step, length = batch * self.segmentation.hop, self.segmentation.length_of(batch)
+        while self._held.shape[1] and self._held.shape[1] + values.shape[1] >= length:
+            missing = max(0, length - self._held.shape[1])
+            self._average_batch(np.concatenate([self._held, values[:, :missing]], axis=1), executor)
+            used = step - self._held.shape[1]
+            self._held = self._held[:, step:]
+            if used >= 0:
+                values = values[:, used:]
+        if self._held.shape[1] == 0:
+            while values.shape[1] >= length:
+                self._average_batch(values[:, :length], executor)
+                values = values[:, step:]
+        self._held = np.concatenate([self._held, values], axis=1)
+
+    def _average_batch(self, values: NDArray[np.floating[Any]], executor: Executor | None) -> None:
+        self.average.add(segment_spectra(values, self.segmentation, self._window, executor), executor)
+        count = self.segmentation.count(values.shape[1])
+        self.count.add(self._position, count)
+        self._position += count
+
+    def average_held(self, executor: Executor | None = None) -> None:
+        """Average now the whole segments that wait for their batch to fill."""
+        count = self.segmentation.count(self._held.shape[1])
+        if count:
+            self._average_batch(self._held[:, : self.segmentation.length_of(count)], executor)
+            self._held = self._held[:, count * self.segmentation.hop :]
+
+    def _end_run(self, executor: Executor) -> None:
+        self.average_held(executor)
+        self._held, self._position = self._held[:, :0], 0
+
+    def _segments_together(self) -> int:
+        bytes_each = 16 * len(self.channels) * (self.segmentation.samples // 2 + 1)
+        return min(MOST_SEGMENTS_TOGETHER, max(1, BYTES_TOGETHER // bytes_each))
+
+    def flushed(self, executor: Executor | None = None) -> Self:
+        """Give an independent copy in which every whole segment has been averaged."""
+        twin = type(self).__new__(type(self))
+        twin.__dict__.update(
+            self.__dict__, average=self.average.copy(), count=self.count.copy(), stretch=self.stretch.copy()
+        )
+        twin.average_held(executor)
+        return twin
+
+    def _provenance(self, count: EffectiveAverages) -> Provenance:
+        # The largest of many scatters like a single one, not like their mean.
+        effective = 1.0 if self.averaging == "peak-hold" else count.value
+        return Provenance(
+            window=window_name(self.segmentation.window),
+            segment_s=self.segmentation.samples / self.sample_rate_hz,
+            overlap=self.segmentation.overlap,
+            averages=count.segments,
+            effective_averages=effective,
+            averaging=self.averaging,
+            detrend=self.segmentation.detrend,
+            skipped=self.stretch.skipped,
+        )
+
+    def _nothing_averaged(self) -> str:
+        samples = self.segmentation.samples
+        return (
+            f"no segment of {samples / self.sample_rate_hz:g} s ({samples} samples) fits between gaps: the longest "
+            f"stretch valid in all of {len(self.channels)} channels has {self.stretch.longest_run} samples; "
+            "ask for a coarser resolution or leave out the channels that have gaps"
+        )
+
+    def _require_agreement(self, block: TimeSeries) -> None:
+        if block.channels != self.channels:
+            raise EstimateError(
+                f"the block has channels {_names(block.channels)}, the average {_names(self.channels)}; "
+                "give blocks of the same channels in the same order"
+            )
+        if not isclose(block.sample_rate_hz, self.sample_rate_hz, rel_tol=1e-9):
+            raise EstimateError(
+                f"the block has {block.sample_rate_hz} samples/s, the average {self.sample_rate_hz}; "
+                "resample one of them"
+            )
+
+    def _require_mergeable(self, other: Self) -> None:
+        for what in ("channels", "sample_rate_hz", "segmentation", "averaging", "time_constant_s"):
+            mine, theirs = getattr(self, what), getattr(other, what)
+            if mine != theirs:
+                raise EstimateError(f"averages can't be merged: {what} {mine!r} here, {theirs!r} there")
+        if self.averaging == "exponential":
+            self.stretch.require_before(other.stretch)
+
+
+def line_frequencies_hz(samples: int, sample_rate_hz: float) -> NDArray[np.float64]:
+    """Give the frequencies of a real transform's lines, each computed from its number so that no error adds up."""
+    return np.asarray(np.arange(samples // 2 + 1) * sample_rate_hz / samples, dtype=np.float64)
+
+
+def one_sided_weights(samples: int) -> NDArray[np.float64]:
+    """Give ``[frequency]`` 2 where a line has a negative twin; 1 at 0 and at an even length's last line."""
+    weights = np.full(samples // 2 + 1, 2.0)
+    weights[0] = 1.0
+    if samples % 2 == 0:
+        weights[-1] = 1.0
+    return weights
+
+
+def _decay(averaging: SegmentAveraging, time_constant_s: float | None, hop_s: float) -> float:
+    if averaging not in AVERAGINGS:
+        raise SetupError(f"averaging {averaging!r} is none of {', '.join(AVERAGINGS)}")
+    if (averaging == "exponential") != (time_constant_s is not None):
+        raise SetupError(f"time_constant_s is for exponential averaging and needed there; averaging is {averaging!r}")
+    if time_constant_s is None:
+        return 1.0
+    if not 0 < time_constant_s < float("inf"):
+        raise SetupError(f"time constant {time_constant_s} s must be finite and above 0")
+    return exp(-hop_s / time_constant_s)
+
+
+def _require_fitting_result(channels: int, samples: int) -> None:
+    size = 16 * channels**2 * (samples // 2 + 1)
+    if size > MOST_RESULT_BYTES:
+        raise EstimateError(
+            f"{channels} channels x {samples // 2 + 1} lines would take {size / 2**30:.3g} GB; "
+            "ask for a coarser resolution or fewer channels"
+        )
+
+
+def _require_finite(block: TimeSeries, runs: Sequence[tuple[int, int]]) -> None:
+    for first, last in runs:
+        # One sum a channel is many times cheaper than asking each sample; an overflow is infinite too, and found.
+        with np.errstate(over="ignore", invalid="ignore"):
+            sums = block.values[:, first:last].sum(axis=1, dtype=np.float64)
+        for row in np.flatnonzero(~np.isfinite(sums)):
+            bad = np.flatnonzero(~np.isfinite(block.values[row, first:last]))
+            if bad.size:
+                raise EstimateError(
+                    f"channel {block.channels[row].name!r} is {block.values[row, first + bad[0]]} at "
+                    f"{block.times_ns()[first + bad[0]] / NS_PER_S:.6f} s and {bad.size - 1} more times without "
+                    "being marked invalid; mark such samples in `valid`"
+                )
+
+
+def _names(channels: Sequence[Channel]) -> str:
+    return ", ".join(f"{channel.name} [{channel.unit}]" for channel in channels)
+
+
+@contextmanager
+def _threads() -> Iterator[Executor]:
+    # A pool a call and not a pool an object: an accumulator can be pickled and sent to other machines.
+    workers = min(
+        MOST_THREADS, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
+    with ThreadPoolExecutor(workers) as executor:
+        yield executor

@@ -1,0 +1,52 @@
+"""Which channels are references and which responses."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.errors import EstimateError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChannelChoice:
+    """Rows of the references and of the responses in the matrix of cross-spectra."""
+
+    references: list[int]
+    responses: list[int]
+
+
+def choose_channels(
+    spectra: CrossSpectra, references: str | Sequence[str], responses: str | Sequence[str] | None
+) -> ChannelChoice:
+    """Find the named channels; responses default to all channels that are no reference.
+
+    Raises
+    ------
+    EstimateError
+        When a channel is missing or named twice, none is left as response, or the spectra are peak-held.
+    """
+    if spectra.provenance.averaging == "peak-hold":
+        raise EstimateError(
+            "a peak hold keeps no phase between channels; average linearly for responses and coherence"
+        )
+    inputs = _as_names(references)
+    outputs = (
+        tuple(channel.name for channel in spectra.channels if channel.name not in inputs)
+        if responses is None
+        else _as_names(responses)
+    )
+    for role, names in (("reference", inputs), ("response", outputs)):
+        if not names:
+            raise EstimateError(
+                f"no {role} among {', '.join(channel.name for channel in spectra.channels)}; name one"
+            )
+        twice = {name for name in names if names.count(name) > 1}
+        if twice:
+            raise EstimateError(f"{role} {', '.join(sorted(twice))} is named twice; name each channel once")
+    return ChannelChoice(
+        references=[spectra.index(name) for name in inputs], responses=[spectra.index(name) for name in outputs]
+    )
+
+
+def _as_names(names: str | Sequence[str]) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names)

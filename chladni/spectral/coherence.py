@@ -1,0 +1,117 @@
+"""Ordinary, multiple and partial coherence."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.coherence import Coherence
+from chladni.signals.cross_spectra import CrossSpectra
+from chladni.spectral.channel_choice import choose_channels
+from chladni.spectral.line_algebra import conditioned_density, solve_lines
+from chladni.spectral.power_spectral_density import auto_densities
+from chladni.spectral.uncertainty import coherence_std
+
+# What is left of a channel after its own double was taken out is rounding: not more than this share of its power.
+ROUNDING = 1e-12
+
+
+def coherence(
+    spectra: CrossSpectra, *, references: str | Sequence[str], responses: str | Sequence[str] | None = None
+) -> Coherence:
+    """Give the share of each response's power that is linearly due to the references.
+
+    Parameters
+    ----------
+    spectra
+        Averaged cross-spectra.
+    references
+        Names of the excitations: one gives the ordinary coherence |G_xy|^2/(G_xx G_yy) (Bendat & Piersol 2010,
+        chapter 6), several the multiple coherence G_xy^H G_xx^-1 G_xy / G_yy (chapter 7).
+    responses
+        Names of the responses; None takes all other channels.
+
+    Returns
+    -------
+    Coherence
+        ``[response, frequency]``, 0 to 1; 0 where the response has no power or the references can't be told apart.
+
+    Raises
+    ------
+    EstimateError
+        When a channel is missing or named twice, or the spectra are peak-held.
+    """
+    chosen = choose_channels(spectra, references, responses)
+    density = np.asarray(spectra.density, dtype=np.complex128)
+    solution = solve_lines(density, chosen.references, chosen.responses)
+    values = share(solution.explained, auto_densities(density)[chosen.responses])
+    kind = "ordinary coherence" if len(chosen.references) == 1 else "multiple coherence"
+    return Coherence(
+        frequency_hz=spectra.frequency_hz,
+        values=values,
+        std=coherence_std(values, spectra.provenance.effective_averages),
+        kind="ordinary" if len(chosen.references) == 1 else "multiple",
+        responses=tuple(spectra.channels[row] for row in chosen.responses),
+        references=tuple(spectra.channels[row] for row in chosen.references),
+        provenance=spectra.provenance.with_estimator(kind),
+    )
+
+
+def partial_coherence(
+    spectra: CrossSpectra,
+    *,
+    reference: str,
+    conditioned_on: str | Sequence[str],
+    responses: str | Sequence[str] | None = None,
+) -> Coherence:
+    """Give the coherence of one reference with each response after others have been taken out of both.
+
+    What is linearly due to the channels `conditioned_on` is removed, G_ij.r = G_ij - G_ir G_rr^-1 G_rj, then the
+    ordinary coherence of what is left is taken (Bendat & Piersol 2010, section 7.3).
+
+    Parameters
+    ----------
+    spectra
+        Averaged cross-spectra.
+    reference
+        Name of the excitation that is judged.
+    conditioned_on
+        Names of the channels whose contribution is removed first.
+    responses
+        Names of the responses; None takes all other channels.
+
+    Returns
+    -------
+    Coherence
+        ``[response, frequency]``, 0 to 1; 0 where nothing is left of the reference or the response. Each channel
+        taken out costs one average, which its one sigma accounts for.
+
+    Raises
+    ------
+    EstimateError
+        When a channel is missing or named twice, or the spectra are peak-held.
+    """
+    names = (reference, *([conditioned_on] if isinstance(conditioned_on, str) else conditioned_on))
+    chosen = choose_channels(spectra, names, responses)
+    kept, removed = [chosen.references[0], *chosen.responses], chosen.references[1:]
+    density = np.asarray(spectra.density, dtype=np.complex128)
+    rest = conditioned_density(density, removed, kept)
+    power = auto_densities(rest)
+    left = power > ROUNDING * auto_densities(density)[kept]
+    values = np.where(left[0] & left[1:], share(np.abs(rest[0, 1:]) ** 2, power[0] * power[1:]), 0.0)
+    return Coherence(
+        frequency_hz=spectra.frequency_hz,
+        values=values,
+        std=coherence_std(values, spectra.provenance.effective_averages - len(removed)),
+        kind="partial",
+        responses=tuple(spectra.channels[row] for row in chosen.responses),
+        references=(spectra.channels[kept[0]],),
+        conditioned_on=tuple(spectra.channels[row] for row in removed),
+        provenance=spectra.provenance.with_estimator("partial coherence"),
+    )
+
+
+def share(part: NDArray[np.float64], whole: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give part/whole within 0 to 1; 0 where the whole is 0. Rounding may lift a part above its whole."""
+    ratio = np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
+    return np.asarray(np.clip(ratio, 0.0, 1.0), dtype=np.float64)

@@ -1,0 +1,80 @@
+"""Averaged cross-spectra of a series or a stream of blocks."""
+
+from chladni.signals.cross_spectra import CrossSpectra
+from chladni.spectral.accumulator import CrossSpectraAccumulator, SegmentAveraging
+from chladni.spectral.blocks import Source, leading_part, samples_known
+from chladni.spectral.segmentation import SAMPLES_TO_CHOOSE_FROM, Detrend, plan_segmentation
+from chladni.spectral.windows import Window
+
+
+def cross_spectra(
+    source: Source,
+    *,
+    resolution_hz: float | None = None,
+    window: Window = "hann",
+    overlap: float = 0.5,
+    detrend: Detrend = "constant",
+    averaging: SegmentAveraging = "linear",
+    time_constant_s: float | None = None,
+) -> CrossSpectra:
+    """Average the cross-spectra of all channel pairs after Welch.
+
+    Parameters
+    ----------
+    source
+        A series, or consecutive blocks of one (taken one at a time, so memory doesn't grow with the log).
+    resolution_hz
+        Spacing of the lines; None chooses, see `plan_segmentation`.
+    window
+        Name, or tuple of name and parameters, as in `scipy.signal.get_window`.
+    overlap
+        Share of a segment that the next one repeats, 0 <= overlap < 1.
+    detrend
+        ``none``, ``constant`` or ``linear``, removed from each segment.
+    averaging, time_constant_s
+        See `CrossSpectraAccumulator`.
+
+    Returns
+    -------
+    CrossSpectra
+        One-sided densities, G_ij = 2/(f_s sum w^2) mean(conj(X_i) X_j) (Welch 1967; Bendat & Piersol 2010,
+        section 11.5).
+
+    Raises
+    ------
+    EstimateError
+        When there is no sample, or no whole segment of valid ones.
+    SetupError
+        When an option is out of its range, or the resolution needs a longer record.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from chladni.signals.channel import Channel
+    >>> from chladni.signals.time_series import TimeSeries
+    >>> time_s = np.arange(8000) / 1000
+    >>> series = TimeSeries(
+    ...     values=np.sqrt(2) * np.sin(2 * np.pi * 50 * time_s)[np.newaxis],
+    ...     sample_rate_hz=1000.0,
+    ...     channels=(Channel(name="a", unit="m/s^2"),),
+    ... )
+    >>> spectra = cross_spectra(series, resolution_hz=1.0)
+    >>> float(round(spectra.density[0, 0, 50].real * spectra.bandwidth_hz, 12))  # RMS^2 of the sine
+    1.0
+    """
+    lead, blocks = leading_part(source, SAMPLES_TO_CHOOSE_FROM)
+    first = lead[0]
+    plan = plan_segmentation(
+        first.sample_rate_hz,
+        samples_available=samples_known(source, lead, SAMPLES_TO_CHOOSE_FROM),
+        resolution_hz=resolution_hz,
+        window=window,
+        overlap=overlap,
+        detrend=detrend,
+    )
+    accumulator = CrossSpectraAccumulator(
+        first.channels, first.sample_rate_hz, plan, averaging=averaging, time_constant_s=time_constant_s
+    )
+    for block in blocks:
+        accumulator.update(block)
+    return accumulator.result()

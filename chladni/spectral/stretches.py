@@ -1,0 +1,105 @@
+"""Where a stream of blocks breaks, and what the breaks cost."""
+
+from collections.abc import Sequence
+from copy import copy
+from typing import Self
+
+import numpy as np
+
+from chladni.signals.errors import EstimateError
+from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.spectral.segmentation import Segmentation
+
+Run = tuple[int, int]
+
+
+def valid_runs(block: TimeSeries) -> list[Run]:
+    """Give ``(first, last + 1)`` of each run of samples that are valid in all channels, in order."""
+    if block.samples == 0:
+        return []
+    if block.valid is None:
+        return [(0, block.samples)]
+    good = np.concatenate([[False], block.valid.all(axis=0), [False]])
+    edges = np.flatnonzero(good[1:] != good[:-1])
+    return [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
+
+
+class Stretch:
+    """Book of the samples seen: continuity of time, and segments lost to invalid samples.
+
+    A stretch is what lies between two breaks in time; in it are runs of valid samples. Skipped segments are those
+    that the stretch would have had more without invalid samples.
+    """
+
+    def __init__(self, segmentation: Segmentation) -> None:
+        self.segmentation = segmentation
+        self.start_ns: int | None = None
+        self.end_ns: int | None = None
+        self.longest_run = 0
+        self._samples = 0
+        self._run = 0
+        self._segments_of_runs = 0
+        self._skipped_before = 0
+
+    @property
+    def skipped(self) -> int:
+        """Segments left out so far because samples in them are invalid."""
+        possible = self.segmentation.count(self._samples)
+        return self._skipped_before + possible - self._segments_of_runs - self.segmentation.count(self._run)
+
+    def breaks_at(self, start_ns: int, sample_rate_hz: float) -> bool:
+        """Whether a block that starts then doesn't continue the last one; half a sample is forgiven.
+
+        Raises
+        ------
+        EstimateError
+            When the block starts before the last one ended.
+        """
+        if self.end_ns is None:
+            return False
+        late_s = (start_ns - self.end_ns) / NS_PER_S
+        if late_s < -0.5 / sample_rate_hz:
+            raise EstimateError(
+                f"a block starts {-late_s:g} s before the last one ended; give blocks in time order, none twice "
+                "(TimeSeries.window keeps the time of a part)"
+            )
+        return late_s > 0.5 / sample_rate_hz
+
+    def extend(self, block: TimeSeries, runs: Sequence[Run]) -> None:
+        """Take note of a block and its runs."""
+        if self.breaks_at(block.start_time_ns, block.sample_rate_hz):
+            self._skipped_before = self.skipped
+            self._samples = self._run = self._segments_of_runs = 0
+        cursor = 0
+        for first, last in runs:
+            if first > cursor:
+                self._close_run()
+            self._run += last - first
+            self.longest_run = max(self.longest_run, self._run)
+            cursor = last
+        if cursor < block.samples:
+            self._close_run()
+        self._samples += block.samples
+        self.start_ns = block.start_time_ns if self.start_ns is None else self.start_ns
+        self.end_ns = block.start_time_ns + round(block.samples / block.sample_rate_hz * NS_PER_S)
+
+    def merge(self, other: Self) -> None:
+        """Add what another book has lost; the stretch that is open here goes on."""
+        self._skipped_before += other.skipped
+        self.longest_run = max(self.longest_run, other.longest_run)
+
+    def require_before(self, other: Self) -> None:
+        """Raise `EstimateError` unless all that was seen here was before all that was seen there."""
+        if self.end_ns is not None and other.start_ns is not None and other.start_ns < self.end_ns:
+            raise EstimateError(
+                f"exponential averages merge in time order only: the other starts "
+                f"{(self.end_ns - other.start_ns) / NS_PER_S:g} s before this one ends"
+            )
+
+    def copy(self) -> Self:
+        """Give an independent copy."""
+        return copy(self)
+
+    def _close_run(self) -> None:
+        self._segments_of_runs += self.segmentation.count(self._run)
+        self._run = 0

@@ -1,0 +1,170 @@
+"""Random errors: how many independent averages there are, and what scatter that leaves."""
+
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.errors import EstimateError
+
+Floats = NDArray[np.float64]
+
+
+class EffectiveAverages:
+    """Count of segments under overlap, window and weighting.
+
+    The variance of an average of K overlapping segments with weights w_k is that of ``n`` independent ones,
+
+        n = (sum w_k)^2 / sum_k sum_l w_k w_l rho(k - l),
+        rho(m) = (sum_n w(n) w(n + m D))^2 / (sum_n w(n)^2)^2,
+
+    with hop D (Welch 1967, p. 72; equal weights and no gaps give his formula). Segments of separate stretches count
+    as independent.
+
+    Parameters
+    ----------
+    window
+        ``[sample]``, the window.
+    hop
+        Samples between segment starts.
+    decay
+        Ratio of the weights of consecutive segments, newest first; 1 for equal weights.
+
+    Examples
+    --------
+    >>> count = EffectiveAverages(np.ones(8), hop=8)
+    >>> count.add(0, 10)
+    >>> count.value
+    10.0
+    """
+
+    def __init__(self, window: Floats, hop: int, decay: float = 1.0) -> None:
+        self.decay = decay
+        self.segments = 0
+        self.weight = 0.0
+        self.correlation = window_correlation(window, hop)
+        self.pairs = np.zeros(self.correlation.size)
+        self._gains = decay ** np.arange(self.correlation.size)
+
+    def add(self, first: int, count: int) -> None:
+        """Count `count` segments, the first of which is number `first` (from 0) of its unbroken stretch."""
+        for position in range(first, first + count):
+            self._fade(1)
+            self.weight += 1
+            # A segment overlaps with earlier ones of its stretch only, as far as the window reaches.
+            self.pairs[: position + 1] += self._gains[: position + 1]
+
+    def merge(self, later: Self) -> None:
+        """Count the segments of another stretch, later in time."""
+        self._fade(later.segments)
+        self.weight += later.weight
+        self.pairs += later.pairs
+
+    def copy(self) -> Self:
+        """Give an independent copy."""
+        twin = type(self).__new__(type(self))
+        twin.__dict__.update(self.__dict__, pairs=self.pairs.copy())
+        return twin
+
+    @property
+    def value(self) -> float:
+        """Independent segments that would scatter as much."""
+        if self.segments == 0:
+            return 0.0
+        return float(self.weight**2 / (self.pairs[0] + 2 * self.pairs[1:] @ self.correlation[1:]))
+
+    def _fade(self, segments: int) -> None:
+        self.segments += segments
+        if self.decay != 1:
+            self.weight *= self.decay**segments
+            self.pairs *= self.decay ** (2 * segments)
+
+
+def window_correlation(window: Floats, hop: int) -> Floats:
+    """Squared correlation of segment spectra at multiples of the hop, for white noise (Welch 1967); 1 at lag 0."""
+    lags = range(0, window.size, hop)
+    overlaps = np.array([window[lag:] @ window[: window.size - lag] for lag in lags])
+    return np.asarray((overlaps / overlaps[0]) ** 2, dtype=np.float64)
+
+
+def response_std(
+    residual_power: Floats, inverse_reference_power: Floats, *, averages: float, references: int
+) -> Floats:
+    """Give one sigma of the magnitude of least-squares frequency responses.
+
+    With q references and n effective averages,
+
+        var |H_yi| = (1 - coherence) G_yy [G_xx^-1]_ii / (2 (n - q)),
+
+    which for one reference is Bendat & Piersol (2010), eq. 9.90, with n - 1 in place of n: the coherence is
+    estimated from the same n averages, and one of them is spent on H.
+
+    Parameters
+    ----------
+    residual_power
+        (1 - multiple coherence) G_yy, unit_y^2/Hz, at least 0.
+    inverse_reference_power
+        Diagonal elements of the inverse reference matrix, Hz/unit_x^2; broadcasts against `residual_power`.
+    averages
+        Effective averages.
+    references
+        Number q of references.
+
+    Returns
+    -------
+    ndarray
+        Infinite when there are too few averages to tell, n <= q.
+    """
+    variance = residual_power * inverse_reference_power
+    if averages <= references:
+        return np.full(variance.shape, np.inf)
+    return np.asarray(np.sqrt(variance / (2 * (averages - references))), dtype=np.float64)
+
+
+def coherence_std(coherence: Floats, averages: float) -> Floats:
+    """One sigma of a coherence, sqrt(2) (1 - c) sqrt(c) / sqrt(n) (Bendat & Piersol 2010, table 9.6).
+
+    Infinite when one average or less went in: such a coherence is 1 whatever the data.
+    """
+    if averages <= 1:
+        return np.full(coherence.shape, np.inf)
+    return np.asarray((1 - coherence) * np.sqrt(2 * coherence / averages), dtype=np.float64)
+
+
+def periodic_response_std(
+    spectra: CrossSpectra, values: NDArray[np.complex128], reference: int, responses: list[int]
+) -> Floats:
+    """Give one sigma of the magnitude of mean response over mean reference, from the scatter between periods.
+
+        var H = |H|^2 / M (s_yy/|Y|^2 + s_xx/|X|^2 - 2 Re(s_xy/(conj(X) Y)))
+
+    with the covariances s of one period and M periods (Pintelon & Schoukens 2012, chapter 2); half of it is in the
+    magnitude, half in the phase.
+
+    Parameters
+    ----------
+    spectra
+        Averages over periods, with their scatter.
+    values
+        ``[response, frequency]`` mean response over mean reference.
+    reference, responses
+        Rows of the channels.
+
+    Returns
+    -------
+    ndarray
+        ``[response, frequency]``; infinite where the mean reference has no power.
+    """
+    if spectra.noise_density is None:
+        raise EstimateError("the scatter between periods is known for periodic averages only")
+    periods = spectra.provenance.averages
+    scatter = np.asarray(spectra.noise_density)
+    mean = np.asarray(spectra.density) - scatter * ((periods - 1) / periods)
+    power = mean[reference, reference].real
+    # Written with H instead of Y, so that a response that is zero still has an error.
+    own = scatter[responses, responses].real
+    common = 2 * (np.conj(values) * scatter[reference, responses]).real
+    spread = own + np.abs(values) ** 2 * scatter[reference, reference].real - common
+    variance = np.divide(np.maximum(spread, 0.0), power * periods, out=np.full(own.shape, np.inf), where=power > 0)
+    return np.asarray(np.sqrt(variance / 2), dtype=np.float64)

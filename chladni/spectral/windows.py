@@ -1,0 +1,93 @@
+"""Window functions and what they do to noise."""
+
+import difflib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.errors import SetupError
+
+Window = str | tuple[Any, ...]
+
+# General cosine windows, w(n) = a0 - a1 cos(2 pi n/N) + a2 cos(4 pi n/N) - ... Importing scipy.signal costs most of a
+# second; these cover daily work without it (coefficients: Harris 1978, table 1; flattop: D'Antona & Ferrero 2006).
+_COSINES: dict[str, tuple[float, ...]] = {
+    "boxcar": (1.0,),
+    "hann": (0.5, 0.5),
+    "hamming": (0.54, 0.46),
+    "blackman": (0.42, 0.5, 0.08),
+    "blackmanharris": (0.35875, 0.48829, 0.14128, 0.01168),
+    "nuttall": (0.3635819, 0.4891775, 0.1365995, 0.0106411),
+    "flattop": (0.21557895, 0.41663158, 0.277263158, 0.083578947, 0.006947368),
+}
+_ALIASES = {"rectangular": "boxcar", "rect": "boxcar", "box": "boxcar", "ones": "boxcar", "hanning": "hann"}
+
+
+def window_samples(window: Window, samples: int) -> NDArray[np.float64]:
+    """Sample a window, periodic (one sample short of symmetric), as averaging of spectra wants it.
+
+    Parameters
+    ----------
+    window
+        Name, or tuple of name and parameters, as in `scipy.signal.get_window`: ``"hann"``, ``("kaiser", 8.6)``.
+    samples
+        Length, at least 1.
+
+    Returns
+    -------
+    ndarray
+        ``[samples]``, dimensionless.
+
+    Raises
+    ------
+    SetupError
+        When there is no such window, or its parameters are missing or wrong.
+
+    Examples
+    --------
+    >>> window_samples("hann", 4)
+    array([0. , 0.5, 1. , 0.5])
+    """
+    coefficients = _COSINES.get(_ALIASES.get(window, window)) if isinstance(window, str) else None
+    if coefficients is None:
+        return _scipy_window(window, samples)
+    angle = 2 * np.pi * np.arange(samples) / samples
+    terms = [(-1) ** order * weight * np.cos(order * angle) for order, weight in enumerate(coefficients)]
+    return np.asarray(np.sum(terms, axis=0), dtype=np.float64)
+
+
+def window_name(window: Window) -> str:
+    """Write a window the way a person would: ``hann``, ``kaiser 8.6``.
+
+    Examples
+    --------
+    >>> window_name(("kaiser", 8.6))
+    'kaiser 8.6'
+    """
+    if isinstance(window, str):
+        return _ALIASES.get(window, window)
+    return " ".join(str(part) for part in window)
+
+
+def noise_bandwidth_bins(samples: NDArray[np.float64]) -> float:
+    """Effective noise bandwidth of a window in lines, N sum(w^2)/sum(w)^2 (Harris 1978, eq. 11); 1.5 for Hann."""
+    return float(samples.size * np.sum(samples**2) / np.sum(samples) ** 2)
+
+
+def _scipy_window(window: Window, samples: int) -> NDArray[np.float64]:
+    from scipy.signal import get_window
+
+    try:
+        sampled = np.asarray(get_window(window, samples, fftbins=True), dtype=np.float64)
+    except (ValueError, TypeError) as error:
+        raise SetupError(f"window {window!r} can't be used: {error}{_hint(window)}") from error
+    if not np.all(np.isfinite(sampled)) or np.sum(sampled) == 0:
+        raise SetupError(f"window {window!r} over {samples} samples has no finite, non-zero sum; choose another")
+    return sampled
+
+
+def _hint(window: Window) -> str:
+    name = window if isinstance(window, str) else str(window[0] if window else "")
+    near = difflib.get_close_matches(name, [*_COSINES, *_ALIASES, "kaiser", "tukey", "gaussian", "bartlett"])
+    return f"; did you mean {', '.join(near)}?" if near and name not in near else ""
