@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from chladni.io.mcap.damage import Damage
 from chladni.io.mcap.data_section import ChunkSegment
 from chladni.io.mcap.decompress import DecompressError, decompress, decompress_start
-from chladni.io.mcap.message_table import RecordStarts, split_starts, starts_from_index
+from chladni.io.mcap.message_table import MessageTable, table_from_index, table_from_walk
 from chladni.io.mcap.record_walk import walk_records
+from chladni.io.mcap.records import ChunkHeader
 from chladni.io.mcap.selection import Selection
 from chladni.io.mcap.stretch_content import StretchContent, fill_content
 
@@ -33,35 +34,40 @@ class _UnreadableChunkError(Exception):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Opened:
-    """Decompressed bytes; ``flaw`` says what is wrong when they are not all."""
+class OpenedChunk:
+    """What could be decompressed; ``flaw`` says what is wrong when that isn't all, or is nothing (None)."""
 
-    buffer: NDArray[np.uint8]
+    buffer: NDArray[np.uint8] | None
     flaw: str | None = None
 
 
-def decode_chunk(segment: ChunkSegment, data: bytes, selection: Selection, rules: ChunkRules) -> StretchContent:
-    """Decode a chunk from its compressed bytes, of which a cut chunk has fewer than it declares.
+def open_chunk(header: ChunkHeader, data: bytes | memoryview, rules: ChunkRules) -> OpenedChunk:
+    """Decompress and check a chunk, of which fewer bytes than it declares are there when it is cut.
 
-    Safe to run in a thread: nothing shared is touched.
+    Made to run in a thread: nothing shared is touched, and nearly all of it runs outside Python's
+    global lock. The rest of the work waits for `chunk_content`, since threads that take turns at the
+    lock for every chunk are slower than one.
     """
-    content = StretchContent(offset=segment.offset)
     try:
-        opened = _open(segment, data, rules)
+        return _open(header, data, rules)
     except (_UnreadableChunkError, DecompressError) as problem:
-        refuse_chunk(content, segment, str(problem))
+        return OpenedChunk(buffer=None, flaw=str(problem))
+
+
+def chunk_content(segment: ChunkSegment, opened: OpenedChunk, selection: Selection) -> StretchContent:
+    """Find the messages in an opened chunk."""
+    content = StretchContent(offset=segment.offset)
+    if opened.buffer is None:
+        _report(content, segment, f"{opened.flaw}; none of the chunk's messages are given")
         return content
-    starts = _find_records(content, segment, opened)
-    fill_content(content, opened.buffer, starts, selection)
-    if opened.flaw is not None or starts.end != len(opened.buffer):
-        flaw = opened.flaw or f"the chunk's records stop making sense {starts.end} bytes into its content"
-        _report(content, segment, flaw)
+    table = _find_records(content, segment, opened.buffer, whole=opened.flaw is None)
+    fill_content(content, opened.buffer, table, selection)
+    if opened.flaw is not None:
+        _report(content, segment, opened.flaw)
+    elif table.end != len(opened.buffer):
+        what = f"the chunk's records stop making sense {table.end} bytes into its content"
+        _report(content, segment, f"{what}; the messages before that are given")
     return content
-
-
-def refuse_chunk(content: StretchContent, segment: ChunkSegment, why: str) -> None:
-    """Note that no message of the chunk is given out."""
-    _report(content, segment, f"{why}; none of the chunk's messages are given")
 
 
 def _report(content: StretchContent, segment: ChunkSegment, what: str) -> None:
@@ -79,40 +85,36 @@ def _report(content: StretchContent, segment: ChunkSegment, what: str) -> None:
     )
 
 
-def _open(segment: ChunkSegment, data: bytes, rules: ChunkRules) -> _Opened:
-    header = segment.header
+def _open(header: ChunkHeader, data: bytes | memoryview, rules: ChunkRules) -> OpenedChunk:
     if len(data) < header.compressed_size:
         missing = header.compressed_size - len(data)
-        return _open_start(segment, data, f"the file ends within the chunk, {missing} bytes are missing")
+        return _open_start(header, data, f"the file ends within the chunk, {missing} bytes are missing")
     try:
         opened = decompress(data, header.compression, size=header.uncompressed_size)
         _check_crc(opened, header.uncompressed_crc, rules)
     except (DecompressError, _UnreadableChunkError):
-        start = data.rstrip(b"\0")
-        if len(data) - len(start) < _ZERO_TAIL_BYTES:
-            raise
-        if header.compression == "" and _tiles(data):
+        start = bytes(data).rstrip(b"\0")
+        if len(data) - len(start) < _ZERO_TAIL_BYTES or (header.compression == "" and _tiles(data)):
             raise
         what = f"the last {len(data) - len(start)} bytes of the chunk are filled with zeros"
-        return _open_start(segment, start, what)
-    return _Opened(buffer=np.frombuffer(opened, np.uint8))
+        return _open_start(header, start, what)
+    return OpenedChunk(buffer=np.frombuffer(opened, np.uint8))
 
 
-def _open_start(segment: ChunkSegment, data: bytes, what: str) -> _Opened:
-    header = segment.header
+def _open_start(header: ChunkHeader, data: bytes | memoryview, what: str) -> OpenedChunk:
     try:
         opened = decompress_start(data, header.compression, size=header.uncompressed_size)
     except DecompressError as problem:
         raise _UnreadableChunkError(f"{what}, and {problem}") from problem
-    return _Opened(buffer=np.frombuffer(opened, np.uint8), flaw=f"{what}; {_UNCHECKED}")
+    return OpenedChunk(buffer=np.frombuffer(opened, np.uint8), flaw=f"{what}; {_UNCHECKED}")
 
 
-def _tiles(data: bytes) -> bool:
+def _tiles(data: bytes | memoryview) -> bool:
     """Tell whether the records are whole although the checksum is wrong: then its zeros are meant."""
     return walk_records(np.frombuffer(data, np.uint8), start=0, stop=len(data)).end == len(data)
 
 
-def _check_crc(content: bytes, crc: int, rules: ChunkRules) -> None:
+def _check_crc(content: bytes | memoryview, crc: int, rules: ChunkRules) -> None:
     if not rules.check_crc or not content:
         return
     if crc and zlib.crc32(content) != crc:
@@ -121,12 +123,13 @@ def _check_crc(content: bytes, crc: int, rules: ChunkRules) -> None:
         raise _UnreadableChunkError("the chunk carries no checksum, unlike others of this log")
 
 
-def _find_records(content: StretchContent, segment: ChunkSegment, opened: _Opened) -> RecordStarts:
-    if segment.index and opened.flaw is None:
-        starts = starts_from_index(opened.buffer, segment.index)
-        if starts is not None:
-            return starts
+def _find_records(
+    content: StretchContent, segment: ChunkSegment, buffer: NDArray[np.uint8], *, whole: bool
+) -> MessageTable:
+    if segment.index and whole:
+        table = table_from_index(buffer, segment.index)
+        if table is not None:
+            return table
         what = "the message index contradicts the chunk before it, which is read record by record"
         content.damage.append(Damage(what=what, offset=segment.offset, record="MessageIndex", lost_messages=0))
-    walk = walk_records(opened.buffer, start=0, stop=len(opened.buffer))
-    return split_starts(opened.buffer, walk.starts, end=walk.end)
+    return table_from_walk(buffer, walk_records(buffer, start=0, stop=len(buffer)))

@@ -14,7 +14,7 @@ from chladni.io.mcap.chunk_search import find_chunk
 from chladni.io.mcap.damage import DamageList
 from chladni.io.mcap.limits import MIB, Limits
 from chladni.io.mcap.log_file import LogFile, Window
-from chladni.io.mcap.message_table import RecordStarts, split_starts
+from chladni.io.mcap.message_table import MessageTable, table_from_walk
 from chladni.io.mcap.record_walk import walk_records
 from chladni.io.mcap.records import (
     CHUNK_HEADER_BYTES,
@@ -37,6 +37,7 @@ from chladni.io.mcap.summary import ChunkIndex, LogEnd
 
 _STRETCH_BYTES = 16 * MIB
 _FIRST_STRETCH_BYTES = 64 * 1024
+_READ_ALONG_BYTES = 16 * MIB
 _ZERO_BLOCK_BYTES = MIB
 # Records that end a stretch: each is looked at by itself, an attachment not read at all.
 _SINGLE = frozenset([Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER, Opcode.ATTACHMENT])
@@ -45,7 +46,7 @@ _READ_BARE = frozenset([Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL])
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ChunkSegment:
-    """A chunk whose data is not read yet.
+    """A chunk that is not decompressed yet.
 
     ``listed`` is the summary's entry for it, if any; ``agrees`` tells whether the chunk's own header says
     the same, ``cut`` whether the file ends within it.
@@ -54,6 +55,8 @@ class ChunkSegment:
     offset: int
     header: ChunkHeader
     index: tuple[MessageIndex, ...]
+    # The compressed bytes if they were read along with the rest; None when they still have to be read.
+    data: memoryview | None
     listed: ChunkIndex | None
     agrees: bool
     cut: bool
@@ -65,7 +68,7 @@ class BareSegment:
 
     offset: int
     buffer: NDArray[np.uint8]
-    starts: RecordStarts
+    table: MessageTable
     in_chunked_log: bool
 
 
@@ -83,15 +86,26 @@ class DataSection:
         Where damage is noted.
     limits
         What may be read into memory.
+    channel_ids
+        Chunks of which the summary says that they hold none of these are not read along with the walk.
     """
 
-    def __init__(self, file: LogFile, end: LogEnd, damage: DamageList, limits: Limits) -> None:
+    def __init__(
+        self,
+        file: LogFile,
+        end: LogEnd,
+        damage: DamageList,
+        limits: Limits,
+        *,
+        channel_ids: frozenset[int],
+    ) -> None:
+        self._channel_ids = channel_ids
         self._file = file
         self._window = Window(file)
         self._end = end
         self._damage = damage
         self._limits = limits
-        self._stones = SteppingStones(end.chunk_indexes, Window(file))
+        self._stones = SteppingStones(end.chunk_indexes, self._window)
         self._stretch = _FIRST_STRETCH_BYTES
         self._chunks_seen = len(self._stones) > 0
         self._reached: set[int] = set()
@@ -131,8 +145,10 @@ class DataSection:
     # ---------------------------------------------------------------- one record
 
     def _next(self, position: int) -> tuple[Segment | None, int]:
-        prefix = self._window.read(position, PREFIX_BYTES)
         listed = self._stones.at(position)
+        if listed is not None:
+            self._read_along(listed)
+        prefix = self._window.read(position, PREFIX_BYTES)
         if position + PREFIX_BYTES > self._end.data_end or len(prefix) < PREFIX_BYTES:
             return None, self._broken(position, "the data ends within a record's first bytes", "record")
         opcode, length = RECORD_PREFIX.unpack(prefix)
@@ -150,6 +166,12 @@ class DataSection:
         if opcode in _SINGLE:
             return None, end
         return self._bare(position, opcode, end)
+
+    def _read_along(self, listed: ChunkIndex) -> None:
+        """Read a chunk, its indexes and the next header in one go: many small reads cost more than bytes."""
+        size = listed.length + listed.index_length + CHUNK_HEADER_BYTES
+        if size <= _READ_ALONG_BYTES and not self._channel_ids.isdisjoint(listed.channel_ids):
+            self._window.load(listed.offset, size)
 
     def _bound(self, position: int) -> int:
         """Return where a record that starts at ``position`` has to end at the latest."""
@@ -202,11 +224,14 @@ class DataSection:
         cut = end > self._end.data_end and not self._end.has_footer
         if end > self._bound(position) and not cut:
             return None, self._does_not_fit(position, Opcode.CHUNK, end)
+        # Reading the indexes may move the window.
+        data = self._window.view_if_loaded(header.data_offset, header.compressed_size)
         index, position_behind = ((), self._end.data_end) if cut else self._indexes(end, header)
         segment = ChunkSegment(
             offset=position,
             header=header,
             index=index,
+            data=data,
             listed=listed,
             agrees=listed is not None and agrees(header, listed),
             cut=cut,
@@ -284,7 +309,7 @@ class DataSection:
         segment = BareSegment(
             offset=position,
             buffer=buffer,
-            starts=split_starts(buffer, walk.starts, end=walk.end),
+            table=table_from_walk(buffer, walk),
             in_chunked_log=self._chunks_seen,
         )
         return segment, position + walk.end

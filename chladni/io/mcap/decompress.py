@@ -9,11 +9,14 @@ _BELIEVED_BYTES = 16 * 1024 * 1024
 _BELIEVED_RATIO = 256
 
 
+Compressed = bytes | memoryview
+
+
 class DecompressError(ValueError):
     """Compressed data that can't be decoded; never leaves this package."""
 
 
-def decompress(data: bytes, compression: str, *, size: int) -> bytes:
+def decompress(data: Compressed, compression: str, *, size: int) -> Compressed:
     """Decompress a whole chunk.
 
     Parameters
@@ -38,7 +41,7 @@ def decompress(data: bytes, compression: str, *, size: int) -> bytes:
     return result
 
 
-def decompress_start(data: bytes, compression: str, *, size: int) -> bytes:
+def decompress_start(data: Compressed, compression: str, *, size: int) -> bytes:
     """Decompress as much as there is of a chunk that was cut off.
 
     Raises
@@ -65,15 +68,15 @@ def _believable(compressed: int, size: int) -> bool:
     return size <= max(_BELIEVED_BYTES, _BELIEVED_RATIO * compressed)
 
 
-def _plain(data: bytes, _size: int) -> bytes:
+def _plain(data: Compressed, _size: int) -> Compressed:
     return data
 
 
-def _plain_steps(data: bytes) -> Iterator[bytes]:
+def _plain_steps(data: Compressed) -> Iterator[Compressed]:
     yield data
 
 
-def _zstd(data: bytes, size: int) -> bytes:
+def _zstd(data: Compressed, size: int) -> bytes:
     import zstandard
 
     try:
@@ -86,7 +89,7 @@ def _zstd(data: bytes, size: int) -> bytes:
         raise DecompressError(f"zstd: {error}") from error
 
 
-def _zstd_steps(data: bytes) -> Iterator[bytes]:
+def _zstd_steps(data: Compressed) -> Iterator[bytes]:
     import zstandard
 
     with zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True) as reader:
@@ -97,7 +100,7 @@ def _zstd_steps(data: bytes) -> Iterator[bytes]:
             raise DecompressError(f"zstd: {error}") from error
 
 
-def _lz4(data: bytes, size: int) -> bytes:
+def _lz4(data: Compressed, size: int) -> bytes:
     import lz4.frame
 
     if not _believable(len(data), size):
@@ -112,7 +115,7 @@ def _lz4(data: bytes, size: int) -> bytes:
     return decompress_start(data, "lz4", size=size)
 
 
-def _lz4_steps(data: bytes) -> Iterator[bytes]:
+def _lz4_steps(data: Compressed) -> Iterator[bytes]:
     import lz4.frame
 
     decompressor = lz4.frame.LZ4FrameDecompressor()
@@ -128,8 +131,8 @@ def _lz4_steps(data: bytes) -> Iterator[bytes]:
         raise DecompressError(f"lz4: {error}") from error
 
 
-_WHOLE: dict[str, Callable[[bytes, int], bytes]] = {"": _plain, "zstd": _zstd, "lz4": _lz4}
-_STEPS: dict[str, Callable[[bytes], Iterator[bytes]]] = {
+_WHOLE: dict[str, Callable[[Compressed, int], Compressed]] = {"": _plain, "zstd": _zstd, "lz4": _lz4}
+_STEPS: dict[str, Callable[[Compressed], Iterator[Compressed]]] = {
     "": _plain_steps,
     "zstd": _zstd_steps,
     "lz4": _lz4_steps,

@@ -8,7 +8,7 @@ from pathlib import Path
 from chladni.io.mcap.records import MAGIC
 from chladni.signals.errors import LogError
 
-_WINDOW_BYTES = 64 * 1024
+_WINDOW_BYTES = 4 * 1024
 # What people open by mistake, by the first bytes, and what helps.
 _OTHER_FORMATS = (
     (b"#ROSBAG", "a ROS 1 bag; convert it with 'mcap convert in.bag out.mcap'"),
@@ -97,6 +97,23 @@ class Window:
         """Return ``size`` bytes at ``offset``, fewer only where the file ends."""
         start = offset - self._offset
         if start < 0 or start + size > len(self._bytes):
-            self._bytes = self._file.read(offset, max(size, _WINDOW_BYTES))
-            self._offset, start = offset, 0
+            self.load(offset, max(size, _WINDOW_BYTES))
+            start = 0
         return self._bytes[start : start + size]
+
+    def load(self, offset: int, size: int) -> None:
+        """Read a stretch ahead."""
+        self._bytes = self._file.read(offset, size)
+        self._offset = offset
+
+    def view_if_loaded(self, offset: int, size: int) -> memoryview | None:
+        """Return ``size`` bytes at ``offset`` without copying, None unless all were read ahead."""
+        start = offset - self._offset
+        if start < 0 or start + size > len(self._bytes):
+            return None
+        return memoryview(self._bytes)[start : start + size]
+
+    def peek(self, offset: int, size: int) -> bytes:
+        """Return a few bytes like `read` and keep what was read ahead."""
+        view = self.view_if_loaded(offset, size)
+        return self._file.read(offset, size) if view is None else bytes(view)

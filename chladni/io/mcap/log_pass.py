@@ -2,11 +2,12 @@
 
 import os
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 
 from chladni.io.mcap.channel_registry import ChannelRegistry
-from chladni.io.mcap.chunk import ChunkRules, decode_chunk, refuse_chunk
+from chladni.io.mcap.chunk import ChunkRules, OpenedChunk, chunk_content, open_chunk
 from chladni.io.mcap.damage import DamageList
 from chladni.io.mcap.data_crc import DataCrc
 from chladni.io.mcap.data_section import BareSegment, ChunkSegment, DataSection, Segment
@@ -20,6 +21,9 @@ from chladni.io.mcap.summary import LogEnd
 
 _MOST_THREADS = 4
 _BYTES_AHEAD = 64 * MIB
+
+# Finishes what was started in a thread.
+_Task = Callable[[], StretchContent]
 
 
 class LogPass:
@@ -76,21 +80,28 @@ class LogPass:
 
     def batches(self) -> Iterator[MessageBatch]:
         """Yield the batches in file order; the books are complete at the end."""
-        section = DataSection(self._file, self._end, self._damage, self._limits)
-        threads = min(_MOST_THREADS, os.cpu_count() or 1)
+        section = DataSection(
+            self._file,
+            self._end,
+            self._damage,
+            self._limits,
+            channel_ids=self._selection.channel_ids,
+        )
+        # One core is left to whoever decodes what comes out.
+        threads = max(1, min(_MOST_THREADS, (os.cpu_count() or 2) - 1))
         pool = ThreadPoolExecutor(threads, thread_name_prefix="mcap")
-        ahead: deque[tuple[int, Future[StretchContent]]] = deque()
+        ahead: deque[tuple[int, _Task]] = deque()
         try:
             for segment in section.segments():
                 size = _size(segment)
                 while ahead and (len(ahead) > threads or size + sum(n for n, _ in ahead) > _BYTES_AHEAD):
-                    yield from self._enter(ahead.popleft()[1].result())
+                    yield from self._enter(ahead.popleft()[1]())
                 task = self._start(pool, segment)
                 if task is not None:
                     ahead.append((size, task))
                 self._advance_crc(pool, segment)
             while ahead:
-                yield from self._enter(ahead.popleft()[1].result())
+                yield from self._enter(ahead.popleft()[1]())
             self._check_data_crc()
         finally:
             pool.shutdown(cancel_futures=True)
@@ -115,10 +126,10 @@ class LogPass:
 
     # ---------------------------------------------------------------- one segment
 
-    def _start(self, pool: ThreadPoolExecutor, segment: Segment) -> Future[StretchContent] | None:
-        """Start decoding a segment in a thread; None when nothing in it is asked for."""
+    def _start(self, pool: ThreadPoolExecutor, segment: Segment) -> _Task | None:
+        """Start decompressing a segment in a thread; None when nothing in it is asked for."""
         if isinstance(segment, BareSegment):
-            return pool.submit(_bare_content, segment, self._selection, self._check_crc)
+            return partial(_bare_content, segment, self._selection, self._check_crc)
         if self._can_skip(segment):
             self._skipped_any = True
             self.found.update({one.channel_id: len(one.entries) for one in segment.index})
@@ -127,11 +138,15 @@ class LogPass:
         for size in (header.compressed_size, header.uncompressed_size):
             excess = self._limits.excess("chunk_bytes", size)
             if excess is not None:
-                return pool.submit(_refused_content, segment, f"the chunk {excess}")
+                refused = OpenedChunk(buffer=None, flaw=f"the chunk {excess}")
+                return partial(chunk_content, segment, refused, self._selection)
         rules = ChunkRules(check_crc=self._check_crc, checksum_expected=self._checksum_seen)
         self._checksum_seen |= header.uncompressed_crc != 0
-        data = self._file.read(header.data_offset, header.compressed_size)
-        return pool.submit(decode_chunk, segment, data, self._selection, rules)
+        data: bytes | memoryview | None = segment.data
+        if data is None:
+            data = self._file.read(header.data_offset, header.compressed_size)
+        opened = pool.submit(open_chunk, header, data, rules)
+        return lambda: chunk_content(segment, opened.result(), self._selection)
 
     def _can_skip(self, segment: ChunkSegment) -> bool:
         """Tell whether a chunk surely holds nothing that is asked for.
@@ -146,12 +161,14 @@ class LogPass:
             return False
         if {one.channel_id for one in segment.index} != listed.channel_ids:
             return False
-        wanted = [one.entries for one in segment.index if one.channel_id in self._selection.channel_ids]
-        return not any(
-            self._selection.touches(int(entries["log_time"].min()), int(entries["log_time"].max()))
-            for entries in wanted
-            if len(entries)
-        )
+        wanted = [
+            one.entries["log_time"]
+            for one in segment.index
+            if one.channel_id in self._selection.channel_ids and len(one.entries)
+        ]
+        if wanted and self._selection.covers(segment.header.start_time_ns, segment.header.end_time_ns):
+            return False
+        return not any(self._selection.touches(int(times.min()), int(times.max())) for times in wanted)
 
     def _enter(self, content: StretchContent) -> list[MessageBatch]:
         """Enter a decoded stretch into the books and return those of its batches that can be given out."""
@@ -240,13 +257,7 @@ def _size(segment: Segment) -> int:
 
 def _bare_content(segment: BareSegment, selection: Selection, check_crc: bool) -> StretchContent:
     content = StretchContent(offset=segment.offset, unprotected=segment.in_chunked_log and check_crc)
-    fill_content(content, segment.buffer, segment.starts, selection)
-    return content
-
-
-def _refused_content(segment: ChunkSegment, why: str) -> StretchContent:
-    content = StretchContent(offset=segment.offset)
-    refuse_chunk(content, segment, why)
+    fill_content(content, segment.buffer, segment.table, selection)
     return content
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.mcap.record_walk import walk_records
+from chladni.io.mcap.record_walk import RecordWalk, walk_records
 from chladni.io.mcap.records import (
     MESSAGE_FIELDS_BYTES,
     PREFIX_BYTES,
@@ -25,32 +25,26 @@ MESSAGE_HEADER = np.dtype(
     ]
 )
 MESSAGE_HEADER_BYTES = MESSAGE_HEADER.itemsize
-# More stretches between indexed messages than this, and the walk is faster than looking at each.
+# With more stretches between indexed messages than this, the walk is faster than looking at each.
 _MOST_STRETCHES = 256
+_NO_STARTS: NDArray[np.int64] = np.empty(0, np.int64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class RecordStarts:
-    """Starts of the messages and of all other records of a stretch, and where its sound part ends."""
+class MessageTable:
+    """Starts and headers of a stretch's messages, starts of its other records, end of its sound part."""
 
-    messages: NDArray[np.int64]
+    starts: NDArray[np.int64]
+    headers: NDArray[np.void]
     others: NDArray[np.int64]
     end: int
-
-
-def split_starts(buffer: NDArray[np.uint8], starts: NDArray[np.int64], *, end: int) -> RecordStarts:
-    """Tell messages from other records."""
-    is_message = buffer[starts] == Opcode.MESSAGE
-    if is_message.all():
-        return RecordStarts(messages=starts, others=starts[:0], end=end)
-    return RecordStarts(messages=starts[is_message], others=starts[~is_message], end=end)
 
 
 def message_headers(buffer: NDArray[np.uint8], starts: NDArray[np.int64]) -> NDArray[np.void]:
     """Return the headers of the messages at ``starts`` (which must lie inside), a view when equally spaced."""
     if len(starts) == 0:
         return np.empty(0, MESSAGE_HEADER)
-    stride = constant_stride(starts)
+    stride = _constant_stride(starts)
     if stride is not None:
         return np.ndarray(len(starts), MESSAGE_HEADER, buffer, offset=int(starts[0]), strides=(stride,))
     # A header at every byte, overlapping; indexing then copies one header a message.
@@ -60,58 +54,81 @@ def message_headers(buffer: NDArray[np.uint8], starts: NDArray[np.int64]) -> NDA
     return everywhere[starts]
 
 
-def constant_stride(starts: NDArray[np.int64]) -> int | None:
-    """Return the distance of equally spaced starts, None when they are not."""
+def _constant_stride(starts: NDArray[np.int64]) -> int | None:
     if len(starts) < 2:
         return MESSAGE_HEADER_BYTES
     stride = int(starts[1]) - int(starts[0])
-    evenly = starts[0] + stride * (len(starts) - 1) == starts[-1] and (np.diff(starts) == stride).all()
-    return stride if evenly else None
+    # Most stretches that are not evenly spaced show it here already.
+    if starts[0] + stride * (len(starts) - 1) != starts[-1]:
+        return None
+    return stride if (starts[1:] - starts[:-1] == stride).all() else None
 
 
-def starts_from_index(buffer: NDArray[np.uint8], index: Sequence[MessageIndex]) -> RecordStarts | None:
-    """Find the records of a chunk through its message indexes, which are not trusted.
+def table_from_walk(buffer: NDArray[np.uint8], walk: RecordWalk) -> MessageTable:
+    """Tell the messages that a walk has found from other records."""
+    is_message = buffer[walk.starts] == Opcode.MESSAGE
+    messages, others = walk.starts[is_message], walk.starts[~is_message]
+    return MessageTable(starts=messages, headers=message_headers(buffer, messages), others=others, end=walk.end)
+
+
+def table_from_index(buffer: NDArray[np.uint8], index: Sequence[MessageIndex]) -> MessageTable | None:
+    """Find the messages of a chunk through its message indexes, which are not trusted.
 
     Returns
     -------
-    RecordStarts or None
+    MessageTable or None
         None unless every entry points to a message of its channel and log time inside the chunk,
         and these messages together with other records tile the chunk exactly.
     """
-    entries = [one.entries for one in index]
-    offsets = np.concatenate([one["offset"] for one in entries])
-    if len(offsets) == 0 or int(offsets.max()) > len(buffer) - MESSAGE_HEADER_BYTES:
+    starts, log_time, channel_id = _merge(index)
+    if len(starts) == 0 or starts[0] < 0 or starts[-1] > len(buffer) - MESSAGE_HEADER_BYTES:
         return None
-    log_time = np.concatenate([one["log_time"] for one in entries])
-    channel_id = np.repeat([one.channel_id for one in index], [len(one) for one in entries])
-    starts = offsets.astype(np.int64)
-    if not (np.diff(starts) > 0).all():
-        order = np.argsort(starts, kind="stable")
-        starts, log_time, channel_id = starts[order], log_time[order], channel_id[order]
     headers = message_headers(buffer, starts)
+    lengths = headers["length"].astype(np.int64)
     agrees = (headers["channel_id"] == channel_id) & (headers["log_time"] == log_time)
     agrees &= headers["opcode"] == Opcode.MESSAGE
-    lengths = headers["length"]
-    agrees &= (lengths >= MESSAGE_FIELDS_BYTES) & (lengths <= len(buffer))
-    if not agrees.all():
+    # As int64, a length of 2^63 and more is negative.
+    if not agrees.all() or lengths.min() < MESSAGE_FIELDS_BYTES or lengths.max() > len(buffer):
         return None
-    others = _tile_between(buffer, starts, starts + PREFIX_BYTES + lengths.astype(np.int64))
-    return None if others is None else RecordStarts(messages=starts, others=others, end=len(buffer))
+    lengths += PREFIX_BYTES
+    lengths += starts
+    others = _others_between(buffer, starts, lengths)
+    if others is None:
+        return None
+    return MessageTable(starts=starts, headers=headers, others=others, end=len(buffer))
 
 
-def _tile_between(
+def _merge(
+    index: Sequence[MessageIndex],
+) -> tuple[NDArray[np.int64], NDArray[np.uint64], NDArray[np.uint16] | int]:
+    """Return offset, log time and channel of all indexed messages, by offset."""
+    if len(index) == 1:
+        entries, channel_id = index[0].entries, index[0].channel_id
+        starts = entries["offset"].astype(np.int64)
+        if (starts[1:] > starts[:-1]).all():
+            return starts, entries["log_time"], channel_id
+    starts = np.concatenate([one.entries["offset"] for one in index]).astype(np.int64)
+    order = np.argsort(starts, kind="stable")
+    log_time = np.concatenate([one.entries["log_time"] for one in index])
+    ids = np.array([one.channel_id for one in index], np.uint16)
+    channel_ids = np.repeat(ids, [len(one.entries) for one in index])
+    return starts[order], log_time[order], channel_ids[order]
+
+
+def _others_between(
     buffer: NDArray[np.uint8], starts: NDArray[np.int64], ends: NDArray[np.int64]
 ) -> NDArray[np.int64] | None:
     """Return the records other than messages between messages, None when these don't tile the buffer."""
-    stretch_starts = np.concatenate([[0], ends])
-    stretch_ends = np.concatenate([starts, [len(buffer)]])
-    gaps = np.flatnonzero(stretch_starts != stretch_ends)
+    gaps = np.flatnonzero(ends[:-1] != starts[1:])
     if len(gaps) > _MOST_STRETCHES:
         return None
-    found = [np.empty(0, np.int64)]
-    for start, stop in zip(stretch_starts[gaps].tolist(), stretch_ends[gaps].tolist(), strict=True):
-        walk = walk_records(buffer, start=start, stop=stop, until=frozenset([Opcode.MESSAGE]))
-        if walk.end != stop:
-            return None
-        found.append(walk.starts)
+    stretches = [(0, int(starts[0])), (int(ends[-1]), len(buffer))]
+    stretches += zip(ends[gaps].tolist(), starts[gaps + 1].tolist(), strict=True)
+    found = [_NO_STARTS]
+    for start, stop in stretches:
+        if start != stop:
+            walk = walk_records(buffer, start=start, stop=stop, until=frozenset([Opcode.MESSAGE]))
+            if walk.end != stop:
+                return None
+            found.append(walk.starts)
     return np.concatenate(found)

@@ -18,8 +18,10 @@ FOOTER_BYTES = PREFIX_BYTES + 20
 DATA_END_BYTES = PREFIX_BYTES + 4
 MESSAGE_FIELDS_BYTES = 22
 LONGEST_COMPRESSION_NAME = 64
+# Prefix, start and end time, uncompressed size and checksum, length of the compression's name.
+_CHUNK_START = struct.Struct("<BQQQQII")
 # Enough bytes to parse the header of any chunk that names its compression in a sane way.
-CHUNK_HEADER_BYTES = PREFIX_BYTES + 28 + 4 + LONGEST_COMPRESSION_NAME + 8
+CHUNK_HEADER_BYTES = _CHUNK_START.size + LONGEST_COMPRESSION_NAME + 8
 INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 
 
@@ -148,21 +150,22 @@ def parse_chunk_header(prefix: bytes, *, offset: int) -> ChunkHeader:
     MalformedRecordError
         When the lengths inside contradict the record's length: then none of them can be trusted.
     """
-    opcode, length = RECORD_PREFIX.unpack_from(prefix.ljust(PREFIX_BYTES, b"\0"))
-    fields = FieldReader(prefix[PREFIX_BYTES:])
-    times = fields.uint64(), fields.uint64()
-    size, crc = fields.uint64(), fields.uint32()
-    compression = fields.string()
-    compressed_size = fields.uint64()
-    if opcode != Opcode.CHUNK or length != fields.position + compressed_size:
-        raise MalformedRecordError("the lengths in the chunk's header contradict each other")
+    if len(prefix) < _CHUNK_START.size:
+        raise MalformedRecordError("the chunk's header is cut off")
+    opcode, length, start_ns, end_ns, size, crc, name_bytes = _CHUNK_START.unpack_from(prefix)
+    data_at = _CHUNK_START.size + name_bytes + 8
+    name = prefix[_CHUNK_START.size : data_at - 8]
+    compressed_size = int.from_bytes(prefix[data_at - 8 : data_at], "little")
+    lengths_agree = PREFIX_BYTES + length == data_at + compressed_size
+    if opcode != Opcode.CHUNK or data_at > len(prefix) or not lengths_agree or not name.isascii():
+        raise MalformedRecordError("the fields of the chunk's header contradict each other")
     return ChunkHeader(
-        start_time_ns=times[0],
-        end_time_ns=times[1],
+        start_time_ns=start_ns,
+        end_time_ns=end_ns,
         uncompressed_size=size,
         uncompressed_crc=crc,
-        compression=compression,
-        data_offset=offset + PREFIX_BYTES + fields.position,
+        compression=name.decode("ascii"),
+        data_offset=offset + data_at,
         compressed_size=compressed_size,
     )
 

@@ -14,11 +14,6 @@ class Selection:
     start_time_ns: int | None = None
     end_time_ns: int | None = None
 
-    @property
-    def has_times(self) -> bool:
-        """Whether the time is bounded at all."""
-        return self.start_time_ns is not None or self.end_time_ns is not None
-
     def touches(self, first_ns: int, last_ns: int) -> bool:
         """Tell whether some time from ``first_ns`` to ``last_ns``, both included, is asked for.
 
@@ -28,6 +23,12 @@ class Selection:
         starts_late = self.end_time_ns is not None and first_ns >= self.end_time_ns
         ends_early = self.start_time_ns is not None and last_ns < self.start_time_ns
         return not (starts_late or ends_early)
+
+    def covers(self, first_ns: int, last_ns: int) -> bool:
+        """Tell whether all times from ``first_ns`` to ``last_ns``, both included, are asked for."""
+        starts_before = self.start_time_ns is None or first_ns >= self.start_time_ns
+        ends_behind = self.end_time_ns is None or last_ns < self.end_time_ns
+        return starts_before and ends_behind
 
     def mask(self, log_time_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return which of these times are asked for."""

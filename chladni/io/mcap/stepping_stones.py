@@ -19,6 +19,7 @@ class SteppingStones:
         self._listed = {stone.offset: stone for stone in listed}
         self._ahead = list(listed)
         self._window = window
+        self._checked = -1
         self._passed = 0
 
     def __len__(self) -> int:
@@ -32,14 +33,15 @@ class SteppingStones:
         """Return the next listed chunk behind ``offset`` that really is there; offsets must not fall."""
         while self._passed < len(self._ahead):
             stone = self._ahead[self._passed]
-            if stone.offset > offset and self._is_there(stone):
+            if stone.offset > offset and (self._checked == self._passed or self._is_there(stone)):
+                self._checked = self._passed
                 return stone
             self._passed += 1
         return None
 
     def _is_there(self, stone: ChunkIndex) -> bool:
         try:
-            start = self._window.read(stone.offset, CHUNK_HEADER_BYTES)
+            start = self._window.peek(stone.offset, CHUNK_HEADER_BYTES)
             return agrees(parse_chunk_header(start, offset=stone.offset), stone)
         except MalformedRecordError:
             return False

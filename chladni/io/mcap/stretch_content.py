@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chladni.io.mcap.damage import Damage
 from chladni.io.mcap.message_batch import MessageBatch
-from chladni.io.mcap.message_table import RecordStarts, message_headers
+from chladni.io.mcap.message_table import MessageTable, message_headers
 from chladni.io.mcap.records import (
     MESSAGE_FIELDS_BYTES,
     PREFIX_BYTES,
@@ -17,8 +17,6 @@ from chladni.io.mcap.records import (
     Opcode,
 )
 from chladni.io.mcap.selection import Selection
-
-_LATEST_NS = np.iinfo(np.int64).max
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,21 +48,21 @@ class StretchContent:
 
 
 def fill_content(
-    content: StretchContent, buffer: NDArray[np.uint8], starts: RecordStarts, selection: Selection
+    content: StretchContent, buffer: NDArray[np.uint8], table: MessageTable, selection: Selection
 ) -> None:
-    """Split the records at ``starts`` into batches by channel, and definitions."""
-    content.definitions.extend(_definitions(buffer, starts.others))
-    for channel_id, positions in _by_channel(buffer, starts.messages):
-        headers = message_headers(buffer, positions)
-        content.found[channel_id] += len(positions)
-        sound = (headers["log_time"] <= _LATEST_NS) & (headers["publish_time"] <= _LATEST_NS)
-        if not sound.all():
-            _report_times(content, channel_id, int(len(sound) - sound.sum()))
-            headers, positions = headers[sound], positions[sound]
-        if len(positions):
-            _note_times(content, headers["log_time"])
-            if channel_id in selection.channel_ids:
-                _add_batch(content, channel_id, buffer, positions, headers, selection)
+    """Split the messages in ``table`` into batches by channel, and collect definitions."""
+    content.definitions.extend(_definitions(buffer, table.others))
+    for channel_id, starts, headers in _by_channel(buffer, table):
+        batch = MessageBatch(
+            channel_id=channel_id,
+            buffer=buffer,
+            offsets=starts + (PREFIX_BYTES + MESSAGE_FIELDS_BYTES),
+            lengths=headers["length"].astype(np.int64) - MESSAGE_FIELDS_BYTES,
+            log_time_ns=headers["log_time"].astype(np.int64),
+            publish_time_ns=headers["publish_time"].astype(np.int64),
+            sequence=headers["sequence"].astype(np.uint32),
+        )
+        _add_batch(content, batch, selection)
 
 
 def _definitions(buffer: NDArray[np.uint8], starts: NDArray[np.int64]) -> Iterator[Definition]:
@@ -77,62 +75,64 @@ def _definitions(buffer: NDArray[np.uint8], starts: NDArray[np.int64]) -> Iterat
         yield Definition(opcode=opcode, content=content, position=start)
 
 
-def _by_channel(buffer: NDArray[np.uint8], starts: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.int64]]]:
-    """Group message starts by channel, in file order within each."""
-    if len(starts) == 0:
+def _by_channel(
+    buffer: NDArray[np.uint8], table: MessageTable
+) -> Iterator[tuple[int, NDArray[np.int64], NDArray[np.void]]]:
+    """Group messages by channel, in file order within each."""
+    if len(table.starts) == 0:
         return
-    ids = message_headers(buffer, starts)["channel_id"]
+    ids = table.headers["channel_id"]
     if (ids == ids[0]).all():
-        yield int(ids[0]), starts
+        yield int(ids[0]), table.starts, table.headers
         return
     order = np.argsort(ids, kind="stable")
-    ids = ids[order]
-    borders = np.flatnonzero(np.diff(ids)) + 1
+    borders = np.flatnonzero(np.diff(ids[order])) + 1
     for group in np.split(order, borders):
-        yield int(message_headers(buffer, starts[group[:1]])["channel_id"][0]), starts[group]
+        starts = table.starts[group]
+        yield int(ids[group[0]]), starts, message_headers(buffer, starts)
+
+
+def _add_batch(content: StretchContent, batch: MessageBatch, selection: Selection) -> None:
+    log_time = batch.log_time_ns
+    first, last = int(log_time.min()), int(log_time.max())
+    # As int64, times of 2^63 ns and more are negative.
+    if first < 0 or batch.publish_time_ns.min() < 0:
+        sound = (log_time >= 0) & (batch.publish_time_ns >= 0)
+        _report_times(content, batch.channel_id, int(len(sound) - sound.sum()))
+        batch = _chosen(batch, sound)
+        if len(batch) == 0:
+            return
+        first, last = int(batch.log_time_ns.min()), int(batch.log_time_ns.max())
+    content.found[batch.channel_id] += len(batch)
+    content.first_time_ns = first if content.first_time_ns is None else min(first, content.first_time_ns)
+    content.last_time_ns = last if content.last_time_ns is None else max(last, content.last_time_ns)
+    if batch.channel_id not in selection.channel_ids or not selection.touches(first, last):
+        return
+    if not selection.covers(first, last):
+        batch = _chosen(batch, selection.mask(batch.log_time_ns))
+    if len(batch):
+        content.batches.append(batch)
+
+
+def _chosen(batch: MessageBatch, mask: NDArray[np.bool_]) -> MessageBatch:
+    return MessageBatch(
+        channel_id=batch.channel_id,
+        buffer=batch.buffer,
+        offsets=batch.offsets[mask],
+        lengths=batch.lengths[mask],
+        log_time_ns=batch.log_time_ns[mask],
+        publish_time_ns=batch.publish_time_ns[mask],
+        sequence=batch.sequence[mask],
+    )
 
 
 def _report_times(content: StretchContent, channel_id: int, count: int) -> None:
     content.lost[channel_id] += count
-    content.found[channel_id] -= count
     content.damage.append(
         Damage(
             what=f"{count} messages of channel {channel_id} have a time beyond 2^63 ns and are left out",
             offset=content.offset,
             record="Message",
             lost_messages=count,
-        )
-    )
-
-
-def _note_times(content: StretchContent, log_time: NDArray[np.uint64]) -> None:
-    first, last = int(log_time.min()), int(log_time.max())
-    content.first_time_ns = first if content.first_time_ns is None else min(first, content.first_time_ns)
-    content.last_time_ns = last if content.last_time_ns is None else max(last, content.last_time_ns)
-
-
-def _add_batch(
-    content: StretchContent,
-    channel_id: int,
-    buffer: NDArray[np.uint8],
-    positions: NDArray[np.int64],
-    headers: NDArray[np.void],
-    selection: Selection,
-) -> None:
-    log_time = headers["log_time"].astype(np.int64)
-    if selection.has_times:
-        chosen = selection.mask(log_time)
-        positions, headers, log_time = positions[chosen], headers[chosen], log_time[chosen]
-    if len(positions) == 0:
-        return
-    content.batches.append(
-        MessageBatch(
-            channel_id=channel_id,
-            buffer=buffer,
-            offsets=positions + (PREFIX_BYTES + MESSAGE_FIELDS_BYTES),
-            lengths=headers["length"].astype(np.int64) - MESSAGE_FIELDS_BYTES,
-            log_time_ns=log_time,
-            publish_time_ns=headers["publish_time"].astype(np.int64),
-            sequence=headers["sequence"].astype(np.uint32),
         )
     )
