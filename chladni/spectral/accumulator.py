@@ -85,7 +85,7 @@ class CrossSpectraAccumulator:
         self.segmentation = segmentation
         self.averaging = averaging
         self.time_constant_s = time_constant_s
-        _require_fitting_result(len(self.channels), segmentation.samples)
+        require_fitting_result(len(self.channels), segmentation.samples)
         self._window = window_samples(segmentation.window, segmentation.samples)
         decay = _decay(averaging, time_constant_s, segmentation.hop / self.sample_rate_hz)
         lines = segmentation.samples // 2 + 1
@@ -116,7 +116,7 @@ class CrossSpectraAccumulator:
         """
         self._require_agreement(block)
         runs = valid_runs(block)
-        _require_finite(block, runs)
+        require_finite(block, runs)
         with _threads() as executor:
             if self.stretch.breaks_at(block.start_time_ns, block.sample_rate_hz):
                 self._end_run(executor)
@@ -287,7 +287,8 @@ def _decay(averaging: SegmentAveraging, time_constant_s: float | None, hop_s: fl
     return exp(-hop_s / time_constant_s)
 
 
-def _require_fitting_result(channels: int, samples: int) -> None:
+def require_fitting_result(channels: int, samples: int) -> None:
+    """Raise `EstimateError` when the matrix of cross-spectra would take more than `MOST_RESULT_BYTES`."""
     size = 16 * channels**2 * (samples // 2 + 1)
     if size > MOST_RESULT_BYTES:
         raise EstimateError(
@@ -296,7 +297,8 @@ def _require_fitting_result(channels: int, samples: int) -> None:
         )
 
 
-def _require_finite(block: TimeSeries, runs: Sequence[tuple[int, int]]) -> None:
+def require_finite(block: TimeSeries, runs: Sequence[tuple[int, int]]) -> None:
+    """Raise `EstimateError` naming channel and time when a sample within the runs isn't finite."""
     for first, last in runs:
         # One sum a channel is many times cheaper than asking each sample; an overflow is infinite too, and found.
         with np.errstate(over="ignore", invalid="ignore"):

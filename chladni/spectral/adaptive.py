@@ -1,0 +1,115 @@
+"""Averages in the way that suits the excitation: whole periods where it repeats, windowed segments elsewhere."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.time_series import TimeSeries
+from chladni.spectral.blocks import Source, leading_part
+from chladni.spectral.cross_spectra import cross_spectra
+from chladni.spectral.period import Period, find_period
+from chladni.spectral.periodic import periodic_cross_spectra
+from chladni.spectral.segmentation import Detrend
+from chladni.spectral.windows import Window
+
+DEFAULT_WINDOW = "hann"
+DEFAULT_OVERLAP = 0.5
+# A period is looked for in the first samples of a log; three of them must fit.
+SAMPLES_EXAMINED = 1 << 19
+
+
+def adaptive_cross_spectra(
+    source: Source,
+    *,
+    references: str | Sequence[str] | None = None,
+    resolution_hz: float | None = None,
+    window: Window | None = None,
+    overlap: float | None = None,
+    detrend: Detrend = "constant",
+) -> CrossSpectra:
+    """Average cross-spectra as the excitation asks for, unless told how.
+
+    A reference that repeats (`find_period`) is averaged over whole periods without window, in which nothing leaks,
+    unless `resolution_hz`, `window` or `overlap` is given: then that is done, with a note that says what it costs.
+    All else is averaged after Welch.
+
+    Parameters
+    ----------
+    source
+        A series, or consecutive blocks of one; the period is looked for in the leading part.
+    references
+        Names of the excitations; None looks at the channels whose role is reference, or at all when none is.
+    resolution_hz, window, overlap, detrend
+        See `cross_spectra`; None leaves the choice to this function.
+
+    Raises
+    ------
+    EstimateError
+        When a channel is missing, or there is nothing to average.
+    SetupError
+        When an option is out of its range.
+    """
+    lead, blocks = leading_part(source, SAMPLES_EXAMINED)
+    period = _first_period(_joined(lead), references)
+    chosen = resolution_hz is None and window is None and overlap is None
+    if period is not None and period.whole and chosen:
+        return periodic_cross_spectra(blocks, period)
+    spectra = cross_spectra(
+        source if isinstance(source, TimeSeries) else blocks,
+        resolution_hz=resolution_hz,
+        window=DEFAULT_WINDOW if window is None else window,
+        overlap=DEFAULT_OVERLAP if overlap is None else overlap,
+        detrend=detrend,
+    )
+    if period is None:
+        return spectra
+    return replace(spectra, provenance=spectra.provenance.with_notes(_price(period, spectra)))
+
+
+def _first_period(series: TimeSeries, references: str | Sequence[str] | None) -> Period | None:
+    for name in _excitations(series, references):
+        period = find_period(series, channel=name)
+        if period is not None:
+            return period
+    return None
+
+
+def _excitations(series: TimeSeries, references: str | Sequence[str] | None) -> tuple[str, ...]:
+    if references is not None:
+        return (references,) if isinstance(references, str) else tuple(references)
+    marked = tuple(channel.name for channel in series.channels if channel.role == "reference")
+    return marked or tuple(channel.name for channel in series.channels)
+
+
+def _joined(lead: tuple[TimeSeries, ...]) -> TimeSeries:
+    """Join consecutive blocks up to the first break in time; a period is looked for in one stretch only."""
+    joined, length = [lead[0]], lead[0].samples
+    for block in lead[1:]:
+        expected = round((block.start_time_ns - lead[0].start_time_ns) * 1e-9 * lead[0].sample_rate_hz)
+        if expected != length or block.channels != lead[0].channels:
+            break
+        joined.append(block)
+        length += block.samples
+    if len(joined) == 1:
+        return lead[0]
+    valid = None
+    if any(block.valid is not None for block in joined):
+        parts = [np.ones(block.values.shape, bool) if block.valid is None else block.valid for block in joined]
+        valid = np.concatenate(parts, axis=1)
+    return replace(lead[0], values=np.concatenate([block.values for block in joined], axis=1), valid=valid)
+
+
+def _price(period: Period, spectra: CrossSpectra) -> str:
+    account = spectra.provenance
+    repeats = f"{period.channel} repeats every {period.period_s:.6g} s"
+    if not period.whole:
+        return (
+            f"{repeats}, which is no whole number of samples ({period.period_s:.9g} s, {period.drift_samples:.2g} "
+            f"samples of drift over the record): averaged with a window; resample to average whole periods"
+        )
+    return (
+        f"{repeats}; a {account.window} window over {account.segment_s:g} s reads sharp peaks low: leave window, "
+        "resolution and overlap out to average whole periods"
+    )

@@ -1,0 +1,196 @@
+"""Averages whole periods of a repeating excitation: mean, and scatter from period to period."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.errors import EstimateError
+from chladni.signals.provenance import Provenance
+from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.spectral.accumulator import (
+    line_frequencies_hz,
+    one_sided_weights,
+    require_finite,
+    require_fitting_result,
+)
+from chladni.spectral.blocks import Source, leading_part
+from chladni.spectral.period import LARGEST_RESIDUAL, Period, find_period
+from chladni.spectral.stretches import valid_runs
+
+__all__ = ["Period", "find_period", "periodic_cross_spectra"]
+
+
+def periodic_cross_spectra(source: Source, period: Period) -> CrossSpectra:
+    """Average the cross-spectra of whole periods, without window.
+
+    Each period is one segment, freed of its mean; nothing leaks, and lines between those of the excitation hold noise
+    only. Periods that touch an invalid sample, or in which the excitation doesn't repeat, are skipped and counted.
+
+    Parameters
+    ----------
+    source
+        A series, or consecutive blocks of one, beginning where the series began in which the period was found.
+    period
+        From `find_period`.
+
+    Returns
+    -------
+    CrossSpectra
+        ``density`` is the mean over M periods of conj(X_i) X_j, so that Parseval holds; ``noise_density`` the
+        covariance of one period about the mean period, divided by M - 1. What repeats is
+        ``density - noise_density (M - 1)/M`` (Pintelon & Schoukens 2012, chapter 2).
+
+    Raises
+    ------
+    EstimateError
+        When the period is no whole number of samples, or fewer than two whole periods are there.
+
+    Examples
+    --------
+    >>> from chladni.signals.channel import Channel
+    >>> one = np.random.default_rng(1).standard_normal(500)
+    >>> series = TimeSeries(values=np.tile(one, 6)[np.newaxis], sample_rate_hz=1e3, channels=(Channel(name="x"),))
+    >>> spectra = periodic_cross_spectra(series, find_period(series, channel="x"))
+    >>> float(spectra.frequency_hz[1]), spectra.provenance.averages
+    (2.0, 6)
+    """
+    if not period.whole:
+        raise EstimateError(
+            f"the period {period.period_s:.9g} s of {period.channel} drifts by {period.drift_samples:.2g} samples "
+            "over the record; average with a window, or resample so that it is a whole number of samples"
+        )
+    (first, *_), blocks = leading_part(source, 1)
+    require_fitting_result(len(first.channels), period.samples)
+    scatter = _PeriodScatter(row=first.index(period.channel))
+    for cut in _periods(blocks, period):
+        scatter.add(cut)
+    if scatter.count < 2:
+        raise EstimateError(
+            f"{scatter.count} whole periods of {period.period_s:g} s repeat; their scatter needs two, so take a "
+            "longer record or average with a window"
+        )
+    return _spectra(first, period, scatter)
+
+
+@dataclass(slots=True, kw_only=True)
+class _PeriodScatter:
+    """Running mean of period spectra ``[channel, frequency]`` and sum of products about it (Welford 1962)."""
+
+    row: int
+    count: int = 0
+    skipped: int = 0
+    mean: NDArray[np.complex128] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.complex128))
+    products: NDArray[np.complex128] = field(default_factory=lambda: np.zeros((0, 0, 0), dtype=np.complex128))
+
+    def add(self, period: NDArray[np.float64] | None) -> None:
+        if period is None:
+            self.skipped += 1
+            return
+        spectra = fft.rfft(period - period.mean(axis=-1, keepdims=True), axis=-1)
+        if self.count == 0:
+            self.mean = np.zeros_like(spectra)
+            self.products = np.zeros((len(spectra), *spectra.shape), dtype=np.complex128)
+        elif self._differs(spectra[self.row]):
+            self.skipped += 1
+            return
+        self.count += 1
+        before = spectra - self.mean
+        self.mean += before / self.count
+        # One row at a time: the whole outer product would double the memory of the largest array.
+        after = spectra - self.mean
+        for row, conjugate in enumerate(before.conj()):
+            self.products[row] += conjugate * after
+
+    def _differs(self, excitation: NDArray[np.complex128]) -> bool:
+        residual = np.sum(np.abs(excitation[1:] - self.mean[self.row, 1:]) ** 2)
+        return bool(residual > 2 * LARGEST_RESIDUAL * np.sum(np.abs(self.mean[self.row, 1:]) ** 2))
+
+
+def _spectra(first: TimeSeries, period: Period, scatter: _PeriodScatter) -> CrossSpectra:
+    samples, rate, count = period.samples, first.sample_rate_hz, scatter.count
+    scale = one_sided_weights(samples) / (rate * samples)
+    products = scatter.products
+    # The sum is Hermitian but for rounding; the lower triangle is made exactly so.
+    for row in range(len(products)):
+        products[row, row].imag = 0.0
+        products[row + 1 :, row] = products[row, row + 1 :].conj()
+    products *= scale
+    density = scatter.mean.conj()[:, np.newaxis] * scatter.mean[np.newaxis] * scale
+    density += products / count
+    products /= count - 1
+    return CrossSpectra(
+        frequency_hz=line_frequencies_hz(samples, rate),
+        density=density,
+        channels=first.channels,
+        bandwidth_hz=rate / samples,
+        noise_density=products,
+        provenance=Provenance(
+            window="boxcar",
+            segment_s=samples / rate,
+            averages=count,
+            effective_averages=float(count),
+            averaging="periodic",
+            detrend="constant",
+            skipped=scatter.skipped,
+            notes=_notes(period, scatter),
+        ),
+    )
+
+
+def _notes(period: Period, scatter: _PeriodScatter) -> tuple[str, ...]:
+    transient = f", {period.dropped} transient left out" if period.dropped else ""
+    repeats = f"{period.channel} repeats every {period.period_s:.6g} s"
+    notes = [f"{repeats}: {scatter.count} whole periods averaged without window{transient}"]
+    if scatter.skipped:
+        notes.append(
+            f"{scatter.skipped} periods skipped: samples are missing, or the excitation doesn't repeat there"
+        )
+    return tuple(notes)
+
+
+def _periods(blocks: Iterator[TimeSeries], period: Period) -> Iterator[NDArray[np.float64] | None]:
+    """Cut a stream into periods; None stands for one with missing samples.
+
+    The grid of periods is counted in time from the first block on: the source of the excitation goes on while the
+    recorder has a gap.
+    """
+    start_ns: int | None = None
+    held: NDArray[np.floating[Any]] = np.empty((0, 0))
+    good = np.empty(0, dtype=bool)
+    position = 0
+    for block in blocks:
+        require_finite(block, valid_runs(block))
+        start_ns = block.start_time_ns if start_ns is None else start_ns
+        begins = round((block.start_time_ns - start_ns) * block.sample_rate_hz / NS_PER_S)
+        if position + good.size != begins:
+            _require_later(begins - position - good.size, block)
+            if good.size:
+                yield None
+            held, good, position = held[:, :0], good[:0], begins
+        fresh = np.ones(block.samples, dtype=bool) if block.valid is None else block.valid.all(axis=0)
+        held = np.concatenate([held, block.values], axis=1) if good.size else block.values
+        good = np.concatenate([good, fresh])
+        wait = _samples_to_start(position, period)
+        while good.size >= wait + period.samples:
+            cut = slice(wait, wait + period.samples)
+            yield np.asarray(held[:, cut], dtype=np.float64) if good[cut].all() else None
+            held, good, position = held[:, cut.stop :], good[cut.stop :], position + cut.stop
+            wait = 0
+
+
+def _samples_to_start(position: int, period: Period) -> int:
+    ahead = period.first_sample - position
+    return ahead if ahead >= 0 else ahead % period.samples
+
+
+def _require_later(gap: int, block: TimeSeries) -> None:
+    if gap < 0:
+        raise EstimateError(
+            f"a block starts {-gap / block.sample_rate_hz:g} s before the last one ended; give blocks in time order, "
+            "none twice (TimeSeries.window keeps the time of a part)"
+        )
