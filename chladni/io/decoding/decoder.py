@@ -20,6 +20,9 @@ SUPPORTED: Final = (
 )
 """Pairs of message encoding and schema encoding that can be decoded."""
 
+MAX_SCHEMA_BYTES: Final = 4 << 20
+"""Longest schema that is read; the longest of ROS have some 50 kB."""
+
 
 def make_decoder(*, message_encoding: str, schema_name: str, schema_encoding: str, schema_data: bytes) -> Decoder:
     """Make the decoder of a channel.
@@ -42,17 +45,28 @@ def make_decoder(*, message_encoding: str, schema_name: str, schema_encoding: st
     LogError
         If the encoding isn't supported, or the schema is malformed or unreasonably large.
     """
+    if len(schema_data) > MAX_SCHEMA_BYTES:
+        raise LogError(f"schema {schema_name!r}: {len(schema_data)} bytes; a definition may have {MAX_SCHEMA_BYTES}")
     match message_encoding, schema_encoding:
         case "cdr", "ros2msg":
             from chladni.io.decoding.binary import BinaryDecoder
             from chladni.io.decoding.message_text import parse_ros2_text
 
             return BinaryDecoder(parse_ros2_text(schema_name, _text(schema_data, schema_name)), encapsulated=True)
+        case "cdr", "ros2idl" | "omgidl":
+            from chladni.io.decoding.binary import BinaryDecoder
+            from chladni.io.decoding.idl import parse_idl
+
+            return BinaryDecoder(parse_idl(schema_name, _text(schema_data, schema_name)), encapsulated=True)
         case "ros1", "ros1msg":
             from chladni.io.decoding.binary import BinaryDecoder
             from chladni.io.decoding.message_text import parse_ros1_text
 
             return BinaryDecoder(parse_ros1_text(schema_name, _text(schema_data, schema_name)), encapsulated=False)
+        case "protobuf", "protobuf":
+            from chladni.io.decoding.protobuf_messages import ProtobufDecoder
+
+            return ProtobufDecoder.of_schema(schema_name, schema_data)
         case "json", "jsonschema" | "":
             from chladni.io.decoding.json_messages import JsonDecoder
 

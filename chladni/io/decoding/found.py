@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from chladni.io.decoding.assemble import dense_if_even
 from chladni.io.decoding.columns import Column, Strings
+from chladni.io.decoding.schema import Array
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from chladni.io.decoding.columns import StringValue
+    from chladni.io.decoding.schema import Leaf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,6 +47,36 @@ def interned(values: Iterable[StringValue]) -> Strings:
     known: dict[StringValue, int] = {}
     codes = np.array([known.setdefault(value, len(known)) for value in values], np.int32)
     return Strings(codes=codes, table=tuple(known))
+
+
+def found_of(leaf: Leaf, rows: Sequence[Sequence[object]]) -> Found:
+    """Collect values that were read message by message.
+
+    Parameters
+    ----------
+    leaf : Leaf
+    rows : sequence [message] of sequences
+        Values of the leaf in each sound message, several where lists lie on the way; where the leaf is an array of
+        numbers, each is a sequence of them.
+    """
+    values = [value for row in rows for value in row]
+    counts = np.array([len(row) for row in rows], np.int64) if any(leaf.lists) else None
+    if leaf.info.kind == "string":
+        return Found(values=interned(cast("list[StringValue]", values)), counts=counts)
+    if not isinstance(leaf.type, Array):
+        return Found(values=np.array(values, leaf.info.dtype), counts=counts)
+    # Elements of all arrays of a message belong to it.
+    arrays = cast("Sequence[Sequence[Sequence[float]]]", rows)
+    counts = np.array([sum(map(len, row)) for row in arrays], np.int64)
+    parts = [np.asarray(one, leaf.info.dtype) for row in arrays for one in row]
+    return Found(values=np.concatenate([np.empty(0, leaf.info.dtype), *parts]), counts=counts)
+
+
+def nothing(leaf: Leaf) -> NDArray[np.generic] | Strings:
+    """No values, of the kind that a leaf has."""
+    if leaf.info.kind == "string":
+        return Strings(codes=np.empty(0, np.int32), table=())
+    return np.empty(0, leaf.info.dtype)
 
 
 def joined_column(found: Sequence[Found], bad: NDArray[np.bool_], *, empty: NDArray[np.generic] | Strings) -> Column:

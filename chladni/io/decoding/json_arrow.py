@@ -24,19 +24,23 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
+    from chladni.io.decoding.json_stream import Span
     from chladni.io.decoding.schema import Tree
+
+BLOCK_BYTES: Final = 1 << 20
+"""Bytes that one thread parses at a time."""
 
 LARGEST_TIME_S: Final = 9_000_000_000
 """Seconds (the year 2255) beyond which nanoseconds come near the end of 64 bits; left to exact arithmetic."""
 
 
-def read_by_arrow(contents: Sequence[bytes], leaves: Sequence[Leaf]) -> list[Found] | None:
+def read_by_arrow(span: Span, leaves: Sequence[Leaf]) -> list[Found] | None:
     """Read leaves of messages that are all sound.
 
     Parameters
     ----------
-    contents : sequence of bytes
-        Messages, surrounding white space stripped.
+    span : Span
+        The messages.
     leaves : sequence of Leaf
 
     Returns
@@ -44,23 +48,24 @@ def read_by_arrow(contents: Sequence[bytes], leaves: Sequence[Leaf]) -> list[Fou
     list of Found or None
         One for each leaf; None where any message, or a leaf's type, is beyond this path.
     """
-    stream = b"\n".join(contents)
-    if not all(_is_plain(leaf) for leaf in leaves) or not _is_safe(stream, contents):
+    stream = span.lines() if all(_is_plain(leaf) for leaf in leaves) else None
+    if stream is None:
         return None
     import pyarrow as pa
     from pyarrow import json as arrow_json
 
+    longest = int((span.ends - span.starts).max())
     try:
         table = arrow_json.read_json(
             pa.BufferReader(stream),
-            read_options=arrow_json.ReadOptions(use_threads=False, block_size=len(stream) + 1),
+            read_options=arrow_json.ReadOptions(use_threads=True, block_size=max(BLOCK_BYTES, 2 * longest)),
             parse_options=arrow_json.ParseOptions(
                 explicit_schema=pa.schema(_arrow_fields(tree_of(leaves), pa)), unexpected_field_behavior="ignore"
             ),
         )
     except pa.ArrowInvalid:
         return None
-    if table.num_rows != len(contents):
+    if table.num_rows != len(span):
         return None
     found = [_found(table, leaf) for leaf in leaves]
     complete = [one for one in found if one is not None]
@@ -70,17 +75,6 @@ def read_by_arrow(contents: Sequence[bytes], leaves: Sequence[Leaf]) -> list[Fou
 def _is_plain(leaf: Leaf) -> bool:
     scalar = leaf.type.element if isinstance(leaf.type, Array) else leaf.type
     return not any(leaf.lists) and (isinstance(scalar, Primitive) or isinstance(leaf.type, Stamp | Text))
-
-
-def _is_safe(stream: bytes, contents: Sequence[bytes]) -> bool:
-    # Arrow doesn't look at the encoding of what it skips; the rules do.
-    if b"\0" in stream or stream.count(b"\n") != len(contents) - 1:
-        return False
-    try:
-        stream.isascii() or stream.decode("utf-8")
-    except UnicodeDecodeError:
-        return False
-    return all(content.startswith(b"{") and content.endswith(b"}") for content in contents)
 
 
 def _arrow_fields(tree: Tree, pa: ModuleType) -> list[pa.Field]:

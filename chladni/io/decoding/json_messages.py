@@ -5,24 +5,25 @@ from __future__ import annotations
 import json
 import sys
 from collections import Counter
-from typing import TYPE_CHECKING, Final, cast
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from chladni.io.decoding.columns import Decoded, Strings, outside_buffer, require_known
-from chladni.io.decoding.found import Found, interned, joined_column
+from chladni.io.decoding.columns import Decoded, outside_buffer, require_known
+from chladni.io.decoding.found import Found, found_of, joined_column, nothing
 from chladni.io.decoding.json_arrow import read_by_arrow
 from chladni.io.decoding.json_schema import discovered_record, parse_json_schema
+from chladni.io.decoding.json_stream import Span
 from chladni.io.decoding.json_values import extract, load_message
-from chladni.io.decoding.schema import Array, leaves
+from chladni.io.decoding.schema import leaves
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from chladni.io.decoding.columns import EncodedMessages, StringValue
-    from chladni.io.decoding.json_values import Scalar, Value
+    from chladni.io.decoding.columns import EncodedMessages
+    from chladni.io.decoding.json_values import Value
     from chladni.io.decoding.schema import FieldInfo, Leaf, Record
 
 FIRST_MESSAGES: Final = 32
@@ -33,9 +34,6 @@ FEW_MESSAGES: Final = 2048
 
 SMALLEST_SPLIT: Final = 256
 """Where a block can't be read as a whole, blocks of this size and less are read message by message."""
-
-WHITE_SPACE: Final = b" \t\r\n"
-"""What JSON counts as white space; `bytes.strip` alone would take more."""
 
 LARGEST_STREAM: Final = 1 << 28
 """Most bytes that are parsed at once: Arrow's blocks have 31-bit sizes, and its arrays come on top."""
@@ -71,9 +69,9 @@ class JsonDecoder:
             return self
         outside = outside_buffer(messages)
         first = []
-        for index in np.flatnonzero(~outside)[:FIRST_MESSAGES].tolist():
+        for content in _span(messages, np.flatnonzero(~outside)[:FIRST_MESSAGES]).contents():
             try:
-                first.append(load_message(_content(messages, index)))
+                first.append(load_message(content))
             except ValueError:
                 continue  # `columns` reports it; a damaged first message must not hide the fields of the others
         return JsonDecoder(self.name, discovered_record(self.name, first))
@@ -86,11 +84,11 @@ class JsonDecoder:
         if outside.any():
             block.reasons["the message lies outside the data"] += int(outside.sum())
         inside = np.flatnonzero(~outside)
-        block.read(_contents(messages, inside))
+        block.read(_span(messages, inside))
         bad = outside.copy()
         bad[inside] = np.concatenate([np.empty(0, np.bool_), *block.bad])
         columns = {
-            leaf.info.path: joined_column(found, bad, empty=_nothing(leaf))
+            leaf.info.path: joined_column(found, bad, empty=nothing(leaf))
             for leaf, found in zip(block.leaves, block.found, strict=True)
         }
         return Decoded(columns=columns, bad=bad, reasons=dict(block.reasons))
@@ -105,20 +103,20 @@ class _Block:
         self.bad: list[NDArray[np.bool_]] = []
         self.reasons: Counter[str] = Counter()
 
-    def read(self, contents: list[bytes]) -> None:
+    def read(self, span: Span) -> None:
         """Read messages: all at once where they are sound, the fewer at once the nearer an unsound one."""
-        arrow = len(contents) >= FEW_MESSAGES or ("pyarrow" in sys.modules and len(contents) > SMALLEST_SPLIT)
-        if not arrow:
-            self._one_by_one(contents)
+        least = SMALLEST_SPLIT if "pyarrow" in sys.modules else FEW_MESSAGES
+        if len(span) < least:
+            self._one_by_one(span.contents())
             return
-        if sum(map(len, contents)) < LARGEST_STREAM:
-            found = read_by_arrow(contents, self.leaves)
-            if found is not None:
-                self._add(found, np.zeros(len(contents), np.bool_))
-                return
-        quarter = -(-len(contents) // 4)
-        for first in range(0, len(contents), quarter):
-            self.read(contents[first : first + quarter])
+        small = int((span.ends - span.starts).sum()) < LARGEST_STREAM
+        found = read_by_arrow(span, self.leaves) if small else None
+        if found is not None:
+            self._add(found, np.zeros(len(span), np.bool_))
+            return
+        quarter = -(-len(span) // 4)
+        for first in range(0, len(span), quarter):
+            self.read(span.part(first, first + quarter))
 
     def _one_by_one(self, contents: Sequence[bytes]) -> None:
         bad = np.zeros(len(contents), np.bool_)
@@ -129,7 +127,7 @@ class _Block:
             except ValueError as error:
                 bad[index] = True
                 self.reasons["not JSON" if isinstance(error, _SYNTAX) else str(error)] += 1
-        self._add([_found(leaf, [row[i] for row in rows]) for i, leaf in enumerate(self.leaves)], bad)
+        self._add([found_of(leaf, [row[i] for row in rows]) for i, leaf in enumerate(self.leaves)], bad)
 
     def _add(self, found: Sequence[Found], bad: NDArray[np.bool_]) -> None:
         for column, one in zip(self.found, found, strict=True):
@@ -137,40 +135,6 @@ class _Block:
         self.bad.append(bad)
 
 
-def _found(leaf: Leaf, rows: Sequence[Sequence[Value]]) -> Found:
-    """Values of one leaf: `rows` has the values of each message, several where lists lie on the way."""
-    values = [value for row in rows for value in row]
-    counts = np.array([len(row) for row in rows], np.int64) if any(leaf.lists) else None
-    if leaf.info.kind == "string":
-        return Found(values=interned(cast("list[StringValue]", values)), counts=counts)
-    if isinstance(leaf.type, Array):
-        # Elements of all lists of a message belong to it.
-        lists = cast("Sequence[Sequence[tuple[Scalar, ...]]]", rows)
-        counts = np.array([sum(map(len, row)) for row in lists], np.int64)
-        values = [element for row in lists for one in row for element in one]
-    return Found(values=np.array(values, leaf.info.dtype), counts=counts)
-
-
-def _nothing(leaf: Leaf) -> NDArray[np.generic] | Strings:
-    if leaf.info.kind == "string":
-        return Strings(codes=np.empty(0, np.int32), table=())
-    return np.empty(0, leaf.info.dtype)
-
-
-def _content(messages: EncodedMessages, index: int) -> bytes:
-    start, length = int(messages.offsets[index]), int(messages.lengths[index])
-    return messages.buffer[start : start + length].tobytes().strip(WHITE_SPACE)
-
-
-def _contents(messages: EncodedMessages, index: NDArray[np.intp]) -> list[bytes]:
-    """Messages as bytes, from one copy of the stretch of buffer that they lie in."""
-    if not len(index):
-        return []
+def _span(messages: EncodedMessages, index: NDArray[np.intp]) -> Span:
     starts = messages.offsets[index]
-    ends = starts + messages.lengths[index]
-    first = int(starts.min())
-    stretch = messages.buffer[first : int(ends.max())].tobytes()
-    return [
-        stretch[start:end].strip(WHITE_SPACE)
-        for start, end in zip((starts - first).tolist(), (ends - first).tolist(), strict=True)
-    ]
+    return Span(buffer=messages.buffer, starts=starts, ends=starts + messages.lengths[index])

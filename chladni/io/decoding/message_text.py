@@ -119,6 +119,9 @@ class _Parser:
         self.padding = padding
         self.main, self.definitions = _split(text)
         self.definitions = {**implied, **self.definitions}
+        self.by_ending: dict[str, list[str]] = {}
+        for full in self.definitions:
+            self.by_ending.setdefault(full.rpartition("/")[2], []).append(full)
         self.done: dict[str, Record] = {}
 
     def root(self) -> Record:
@@ -180,7 +183,7 @@ class _Parser:
         for candidate in candidates:
             if candidate in self.definitions or candidate in self.known:
                 return candidate
-        endings = [name for name in self.definitions if name.rpartition("/")[2] == short]
+        endings = self.by_ending.get(short, [])
         if len(endings) == 1:
             return endings[0]
         raise LogError(f"schema {self.name}: {owner} uses {base!r}, which the schema doesn't define")

@@ -1,0 +1,191 @@
+"""Protobuf messages to columns, against the messages that were written."""
+
+import struct
+
+import numpy as np
+import pytest
+from google.protobuf import descriptor_pb2, duration_pb2, message_factory, struct_pb2, timestamp_pb2
+from google.protobuf.descriptor_pool import DescriptorPool
+
+from chladni.io.decoding import make_decoder
+from chladni.signals.errors import LogError
+from tests.io.decoding.encoded import batch_of, decode_all, values_of
+
+Field = descriptor_pb2.FieldDescriptorProto
+
+
+def descriptor_set() -> descriptor_pb2.FileDescriptorSet:
+    """demo.Sample: scalars of every width, packed arrays, nested messages, a map, times."""
+    file = descriptor_pb2.FileDescriptorProto(name="demo.proto", package="demo", syntax="proto3")
+    file.dependency.extend(["google/protobuf/timestamp.proto", "google/protobuf/duration.proto"])
+    vector = file.message_type.add(name="Vector")
+    for number, name in enumerate("xyz", 1):
+        vector.field.add(name=name, number=number, type=Field.TYPE_DOUBLE, label=Field.LABEL_OPTIONAL)
+    sample = file.message_type.add(name="Sample")
+    entry = sample.nested_type.add(name="GainsEntry")
+    entry.options.map_entry = True
+    entry.field.add(name="key", number=1, type=Field.TYPE_STRING, label=Field.LABEL_OPTIONAL)
+    entry.field.add(name="value", number=2, type=Field.TYPE_DOUBLE, label=Field.LABEL_OPTIONAL)
+    one, many = Field.LABEL_OPTIONAL, Field.LABEL_REPEATED
+    for name, kind, label, type_name in [
+        ("stamp", Field.TYPE_MESSAGE, one, ".google.protobuf.Timestamp"),
+        ("age", Field.TYPE_MESSAGE, one, ".google.protobuf.Duration"),
+        ("accel", Field.TYPE_MESSAGE, one, ".demo.Vector"),
+        ("f", Field.TYPE_FLOAT, one, ""),
+        ("i", Field.TYPE_INT32, one, ""),
+        ("s", Field.TYPE_SINT64, one, ""),
+        ("u", Field.TYPE_UINT64, one, ""),
+        ("x", Field.TYPE_FIXED32, one, ""),
+        ("b", Field.TYPE_BOOL, one, ""),
+        ("name", Field.TYPE_STRING, one, ""),
+        ("raw", Field.TYPE_BYTES, one, ""),
+        ("samples", Field.TYPE_FLOAT, many, ""),
+        ("counts", Field.TYPE_INT64, many, ""),
+        ("names", Field.TYPE_STRING, many, ""),
+        ("points", Field.TYPE_MESSAGE, many, ".demo.Vector"),
+        ("stamps", Field.TYPE_MESSAGE, many, ".google.protobuf.Timestamp"),
+        ("gains", Field.TYPE_MESSAGE, many, ".demo.Sample.GainsEntry"),
+    ]:
+        sample.field.add(name=name, number=len(sample.field) + 1, type=kind, label=label, type_name=type_name or None)
+    found = descriptor_pb2.FileDescriptorSet()
+    found.file.append(file)  # before what it imports: the order isn't guaranteed
+    for module in (timestamp_pb2, duration_pb2):
+        module.DESCRIPTOR.CopyToProto(found.file.add())
+    return found
+
+
+def sample_class():
+    files = descriptor_set().file
+    pool = DescriptorPool()
+    for file in (*files[1:], files[0]):
+        pool.Add(file)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName("demo.Sample"))
+
+
+def decoder_of(data: bytes, name: str = "demo.Sample"):
+    return make_decoder(message_encoding="protobuf", schema_name=name, schema_encoding="protobuf", schema_data=data)
+
+
+def filled(index: int):
+    sample = sample_class()()
+    sample.stamp.seconds, sample.stamp.nanos = 1_700_000_000 + index, 5
+    sample.age.seconds, sample.age.nanos = -1, -500_000_000
+    sample.accel.x, sample.accel.z = 0.1 + index, -1e-300
+    sample.f, sample.i, sample.s, sample.u, sample.x = 0.1, -7 - index, -(2**40), 2**64 - 1, 2**32 - 1
+    sample.b, sample.name, sample.raw = True, "wrist é", bytes([0, 255, index])
+    sample.samples.extend([0.5, index, 2.5][: 2 + index % 2])
+    sample.counts.extend([-1, 2**40])
+    sample.names.extend(["a", "b"])
+    sample.points.add(x=1.0 + index)
+    sample.points.add(y=2.0)
+    sample.stamps.add(seconds=index)
+    sample.gains["k"] = 2.0
+    return sample
+
+
+def test_every_kind_of_field_is_read_with_its_wire_type() -> None:
+    decoder = decoder_of(descriptor_set().SerializeToString())
+    encoded = batch_of([filled(index).SerializeToString() for index in range(4)])
+    decoded = decode_all(decoder, encoded)
+    assert not decoded.bad.any()
+    expected = {
+        "stamp": [(1_700_000_000 + i) * 10**9 + 5 for i in range(4)],
+        "age": [-1_500_000_000] * 4,
+        "accel.x": [0.1 + i for i in range(4)],
+        "accel.y": [0.0] * 4,
+        "accel.z": [-1e-300] * 4,
+        "f": [float(np.float32(0.1))] * 4,
+        "i": [-7 - i for i in range(4)],
+        "s": [-(2**40)] * 4,
+        "u": [2**64 - 1] * 4,
+        "x": [2**32 - 1] * 4,
+        "b": [True] * 4,
+        "name": ["wrist é"] * 4,
+        "raw": [[0, 255, i] for i in range(4)],
+        "samples": [[0.5, float(i), 2.5][: 2 + i % 2] for i in range(4)],
+        "counts": [[-1, 2**40]] * 4,
+        "names": [("a", "b")] * 4,
+        "points[].x": [[1.0 + i, 0.0] for i in range(4)],
+        "points[].y": [[0.0, 2.0]] * 4,
+        "points[].z": [[0.0, 0.0]] * 4,
+        "stamps": [[i * 10**9] for i in range(4)],
+        "gains[].key": [["k"]] * 4,
+        "gains[].value": [[2.0]] * 4,
+    }
+    assert {info.path for info in decoder.fields} == set(expected)
+    for path, values in expected.items():
+        assert values_of(decoded, path) == values, path
+    assert {info.path: info.dtype for info in decoder.fields}["f"] == np.float32
+    assert decoded.columns["samples"].counts is not None
+    assert decoded.columns["raw"].counts is None
+    assert len(decoded.columns["names"].strings.table) == 1
+
+
+def test_what_a_message_leaves_out_is_zero() -> None:
+    decoded = decode_all(decoder_of(descriptor_set().SerializeToString()), batch_of([b"", b""]))
+    assert not decoded.bad.any()
+    assert values_of(decoded, "accel.x") == [0.0, 0.0]
+    assert values_of(decoded, "stamp") == [0, 0]
+    assert values_of(decoded, "samples") == [[], []]
+    assert values_of(decoded, "name") == ["", ""]
+
+
+def test_malformed_messages_are_marked_and_the_others_read() -> None:
+    good = filled(0).SerializeToString()
+    too_late = sample_class()()
+    too_late.stamp.seconds = 2**62
+    decoder = decoder_of(descriptor_set().SerializeToString())
+    encoded = batch_of([good, good[:-1], b"\x0a\xff\xff\xff\xff\x0f", too_late.SerializeToString(), good])
+    decoded = decoder.columns(encoded, ["stamp", "f", "samples"])
+    assert decoded.bad.tolist() == [False, True, True, True, False]
+    assert sum(decoded.reasons.values()) == 3
+    assert decoded.columns["f"].numbers[~decoded.bad].tolist() == [float(np.float32(0.1))] * 2
+    assert decoded.columns["samples"].select(~decoded.bad).numbers.tolist() == [[0.5, 0.0]] * 2
+
+
+def test_messages_outside_the_buffer_are_marked() -> None:
+    encoded = batch_of([filled(0).SerializeToString()] * 2)
+    encoded.lengths[1] = 10**9
+    decoded = decoder_of(descriptor_set().SerializeToString()).columns(encoded, ["f"])
+    assert decoded.bad.tolist() == [False, True]
+
+
+def test_a_type_that_holds_itself_keeps_its_finite_fields() -> None:
+    files = descriptor_pb2.FileDescriptorSet()
+    struct_pb2.DESCRIPTOR.CopyToProto(files.file.add())
+    decoder = decoder_of(files.SerializeToString(), "google.protobuf.Value")
+    assert "number_value" in {info.path for info in decoder.fields}
+    value = struct_pb2.Value(number_value=2.5)
+    assert values_of(decoder.columns(batch_of([value.SerializeToString()]), ["number_value"]), "number_value") == [
+        2.5
+    ]
+
+
+@pytest.mark.parametrize(
+    ("data", "name", "told"),
+    [
+        (b"\xff\xff", "demo.Sample", "not a protobuf FileDescriptorSet"),
+        (b"", "demo.Sample", "can't be used"),
+        (descriptor_set().SerializeToString(), "demo.Other", "can't be used"),
+        (struct.pack("<BB", 0x0A, 0x7F), "demo.Sample", "not a protobuf FileDescriptorSet"),
+    ],
+)
+def test_malformed_descriptor_sets_are_refused(data: bytes, name: str, told: str) -> None:
+    with pytest.raises(LogError, match=told):
+        decoder_of(data, name)
+
+
+def test_files_that_import_each_other_are_refused() -> None:
+    files = descriptor_pb2.FileDescriptorSet()
+    files.file.add(name="a.proto", dependency=["b.proto"])
+    files.file.add(name="b.proto", dependency=["a.proto"])
+    with pytest.raises(LogError, match="imports itself"):
+        decoder_of(files.SerializeToString())
+
+
+def test_too_many_files_are_refused() -> None:
+    files = descriptor_pb2.FileDescriptorSet()
+    for index in range(2001):
+        files.file.add(name=f"{index}.proto")
+    with pytest.raises(LogError, match="more than 2000"):
+        decoder_of(files.SerializeToString())
