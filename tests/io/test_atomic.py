@@ -22,9 +22,14 @@ def test_the_file_is_whole_and_alone(tmp_path: Path) -> None:
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, SystemExit])
 def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path, error: type[BaseException]) -> None:
     (tmp_path / "a.bin").write_bytes(b"old")
-    with pytest.raises(error), atomic_write(tmp_path / "a.bin") as file:
-        file.write(b"half")
-        raise error
+
+    def interrupted() -> None:
+        with atomic_write(tmp_path / "a.bin") as file:
+            file.write(b"half")
+            raise error
+
+    with pytest.raises(error):
+        interrupted()
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("a.bin", b"old")]
 
 
@@ -63,9 +68,14 @@ def test_data_reaches_the_disk_before_the_name(tmp_path: Path, monkeypatch: pyte
 
 
 def test_a_file_that_appears_meanwhile_is_kept_unless_told(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="exists already"), atomic_write(tmp_path / "a", overwrite=False) as file:
-        file.write(b"mine")
-        (tmp_path / "a").write_bytes(b"theirs")
+
+    def overtaken() -> None:
+        with atomic_write(tmp_path / "a", overwrite=False) as file:
+            file.write(b"mine")
+            (tmp_path / "a").write_bytes(b"theirs")
+
+    with pytest.raises(LogError, match="exists already"):
+        overtaken()
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("a", b"theirs")]
 
 

@@ -1,0 +1,136 @@
+"""What a data file holds, and the way of its columns to SI."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError, LogError, SetupError
+from chladni.signals.time_series import NS_PER_S, TimeSeries
+
+MAX_BYTES = 8 * 2**30
+"""Most memory that the arrays of one file may take unless the caller allows more."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FileContents:
+    """The time series of a data file.
+
+    Attributes
+    ----------
+    series
+        One for each sample rate, start and length.
+    notes
+        Sentences on what was inferred or left out.
+    """
+
+    series: tuple[TimeSeries, ...]
+    notes: tuple[str, ...] = ()
+
+
+def in_si(values: NDArray[np.floating[Any]], unit: str) -> tuple[NDArray[np.floating[Any]], str]:
+    """Give the values in SI and their unit; values already in SI are given back untouched, to the bit."""
+    from chladni.signals.units import si_factor
+
+    factor, si_unit = si_factor(unit)
+    return (values if factor == 1.0 else values * factor), si_unit
+
+
+def _channel_in_si(values: NDArray[np.floating[Any]], channel: Channel) -> tuple[NDArray[np.floating[Any]], str]:
+    try:
+        return in_si(values, channel.unit)
+    except SetupError as error:
+        raise SetupError(f"channel {channel.name!r}: {error}; or state its unit yourself") from error
+
+
+def unit_of(name: str, found: str | None, units: Mapping[str, str] | None) -> str:
+    """Give the unit that the caller states for a column, else the one `found` in the file, else ``1``."""
+    return (units or {}).get(name, found or "1")
+
+
+def series_of_rows(
+    rows: Sequence[NDArray[np.floating[Any]]],
+    channels: Sequence[Channel],
+    *,
+    sample_rate_hz: float,
+    start_time_ns: int = 0,
+) -> TimeSeries:
+    """Stack rows whose units are any into one series in SI; samples that are no finite numbers count as missing."""
+    converted = [_channel_in_si(row, channel) for row, channel in zip(rows, channels, strict=True)]
+    values = np.stack([row for row, _ in converted])
+    return TimeSeries(
+        values=values,
+        sample_rate_hz=sample_rate_hz,
+        start_time_ns=start_time_ns,
+        channels=tuple(replace(channel, unit=unit) for channel, (_, unit) in zip(channels, converted, strict=True)),
+        valid=finite_mask(values),
+    )
+
+
+def finite_mask(values: NDArray[np.floating[Any]]) -> NDArray[np.bool_] | None:
+    """Mark the finite values; None when all are."""
+    finite = np.isfinite(values)
+    return None if finite.all() else finite
+
+
+def placed_rows(
+    stamps_ns: NDArray[np.int64],
+    rows: Sequence[NDArray[np.floating[Any]]],
+    channels: Sequence[Channel],
+    *,
+    where: str,
+) -> FileContents:
+    """Put rows sampled at the given times on a uniform grid, in SI; what's missing in between becomes a gap.
+
+    Raises
+    ------
+    LogError
+        When the times have no rate, or are too few to tell one.
+    """
+    from chladni.signals.time_base import fit_time_base
+    from chladni.signals.uniform import place
+
+    try:
+        base = fit_time_base(stamps_ns)
+        grid = place(stamps_ns, np.stack(rows), base, channels=tuple(channels))
+    except EstimateError as error:
+        raise LogError(f"{where}: the times don't make a sampled signal: {error}") from error
+    series = series_of_rows(
+        list(grid.values), channels, sample_rate_hz=grid.sample_rate_hz, start_time_ns=grid.start_time_ns
+    )
+    notes = () if base.verdict == "regular" else (f"{where}: the times are {base.verdict}: {base.advice}",)
+    return FileContents(series=(series,), notes=notes)
+
+
+def one_series(series: Iterable[TimeSeries], kind: str) -> TimeSeries:
+    """Give the only series of a file kind that holds one rate; `LogError` naming the rates when there are more."""
+    parts = tuple(series)
+    if len(parts) != 1:
+        rates = ", ".join(f"{part.sample_rate_hz:g} Hz from {part.start_time_ns} ns" for part in parts) or "none"
+        raise LogError(
+            f"{kind} holds channels of one rate and start, here are {len(parts)} groups ({rates}); choose channels "
+            "of one group, or have them brought to one sample rate"
+        )
+    return parts[0]
+
+
+def require_no_gaps(series: TimeSeries, kind: str) -> None:
+    """Raise `LogError` when a sample is missing and the file kind has no way to say so."""
+    missing = ~np.isfinite(series.values)
+    if series.valid is not None:
+        missing |= ~series.valid
+    for row, channel in enumerate(series.channels):
+        if missing[row].any():
+            first_s = int(np.argmax(missing[row])) / series.sample_rate_hz
+            raise LogError(
+                f"{channel.name}: {int(missing[row].sum())} samples are missing, the first at {first_s:g} s, and "
+                f"{kind} can't mark a gap; choose a stretch without one, or convert to mcap, csv, mat or npz"
+            )
+
+
+def seconds_to_ns(seconds: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Round times in seconds to whole nanoseconds."""
+    return np.rint(seconds * NS_PER_S).astype(np.int64)

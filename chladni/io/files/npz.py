@@ -1,0 +1,123 @@
+"""NumPy ``.npz`` files, never unpickled."""
+
+import zipfile
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.io.atomic import atomic_write
+from chladni.io.files.contents import MAX_BYTES, FileContents
+from chladni.io.files.named_arrays import series_of_arrays
+from chladni.io.files.series_fields import SERIES_FORMAT, series_fields, series_of_fields
+from chladni.signals.errors import LogError
+from chladni.signals.time_series import TimeSeries
+
+_MAX_HEADER = 10_000
+
+
+def read_npz(
+    path: Path | str,
+    *,
+    sample_rate_hz: float | None = None,
+    units: Mapping[str, str] | None = None,
+    max_bytes: int = MAX_BYTES,
+) -> FileContents:
+    """Read our own layout (`chladni.io.files.series_fields`), or any arrays with a rate or a time vector.
+
+    Parameters
+    ----------
+    sample_rate_hz
+        Rate of foreign arrays when nothing in the file says it.
+    units
+        Unit by array name, for foreign arrays.
+    max_bytes
+        Most memory that the arrays may take together; their headers are checked before anything is unpacked.
+
+    Raises
+    ------
+    LogError
+        When the file is damaged, too large, holds Python objects, or no signal.
+    SetupError
+        When nothing says the sample rate, or a unit is unknown.
+    """
+    path = Path(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            _require_bounded(path, archive, max_bytes)
+        with np.load(path, allow_pickle=False) as arrays:
+            content = {name: arrays[name] for name in arrays.files}
+    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, NotImplementedError, KeyError) as error:
+        raise LogError(f"{path}: this npz file can't be read: {error}") from error
+    if str(content.get("format", "")) != SERIES_FORMAT:
+        return series_of_arrays(content, where=str(path), sample_rate_hz=sample_rate_hz, units=units)
+    groups = _groups(content)
+    return FileContents(
+        series=tuple(series_of_fields(fields, where=f"{path}, {name}") for name, fields in groups.items())
+    )
+
+
+def write_npz(
+    series: TimeSeries | Sequence[TimeSeries], path: Path | str, *, overwrite: bool = True
+) -> tuple[str, ...]:
+    """Write all there is of the series, compressed; see `chladni.io.files.series_fields` for the names.
+
+    Returns
+    -------
+    losses
+        Empty: nothing is lost.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from chladni.signals.channel import Channel
+    >>> x = TimeSeries(values=np.ones((1, 4)), sample_rate_hz=8.0, channels=(Channel(name="a", unit="N"),))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = write_npz(x, Path(folder) / "x.npz")
+    ...     read_npz(Path(folder) / "x.npz").series[0].channels[0].unit
+    'N'
+    """
+    parts = (series,) if isinstance(series, TimeSeries) else tuple(series)
+    content: dict[str, NDArray[Any]] = {"format": np.array(SERIES_FORMAT)}
+    for number, part in enumerate(parts, start=1):
+        content |= {f"series_{number}.{name}": array for name, array in series_fields(part).items()}
+    with atomic_write(path, overwrite=overwrite) as file:
+        np.savez_compressed(file, allow_pickle=False, **content)
+    return ()
+
+
+def _groups(content: Mapping[str, NDArray[Any]]) -> dict[str, dict[str, NDArray[Any]]]:
+    groups: dict[str, dict[str, NDArray[Any]]] = {}
+    for name, array in content.items():
+        group, dot, field = name.partition(".")
+        if dot:
+            groups.setdefault(group, {})[field] = array
+    return groups
+
+
+def _require_bounded(path: Path, archive: zipfile.ZipFile, max_bytes: int) -> None:
+    """Add up what the array headers announce, without unpacking the arrays."""
+    total = 0
+    for entry in archive.infolist():
+        with archive.open(entry) as file:
+            shape, dtype = _header(file)
+        if dtype.hasobject:
+            raise LogError(f"{path}: {entry.filename} holds Python objects, which are never loaded; store numbers")
+        size = dtype.itemsize * int(np.prod([int(length) for length in shape], dtype=object))
+        if size > entry.file_size:
+            raise LogError(f"{path}: {entry.filename} announces {size} bytes and holds {entry.file_size}")
+        total += entry.file_size
+    if total > max_bytes:
+        raise LogError(
+            f"{path}: its arrays take {total} bytes, {max_bytes} are allowed; raise max_bytes to read them"
+        )
+
+
+def _header(file: Any) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(file, max_header_size=_MAX_HEADER)
+    return shape, dtype

@@ -1,0 +1,132 @@
+"""A time series as named arrays without objects, the layout of our ``.mat`` and ``.npz`` files.
+
+``format`` is ``chladni.series/1``; beside it are ``series_1``, ``series_2``, ..., one for each rate, each with
+
+===================  ==================================================================
+``fs``               sample rate in Hz
+``start_time_ns``    time of the first sample, ns since 1970, 64 bit integer
+``names``, ``units``  one text for each channel
+``points``           measurement points, empty text where unknown
+``directions``       ``[channel, 3]``, NaN where unknown
+``roles``            ``response`` or ``reference``
+``overloads``        largest magnitude that the sensor can tell, NaN where unknown
+``values``           ``[sample, channel]``, columns as MATLAB likes them
+``valid``            ``[sample, channel]``, false where nothing was measured; left out when all is valid
+===================  ==================================================================
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.channel import Channel, Role, Vector
+from chladni.signals.errors import ChladniError, LogError
+from chladni.signals.time_series import TimeSeries
+
+SERIES_FORMAT = "chladni.series/1"
+
+
+def series_fields(series: TimeSeries) -> dict[str, NDArray[Any]]:
+    """Give a series as arrays of numbers and texts."""
+    unknown = (np.nan, np.nan, np.nan)
+    channels = series.channels
+    fields: dict[str, NDArray[Any]] = {
+        "fs": np.array(series.sample_rate_hz),
+        "start_time_ns": np.array(series.start_time_ns, dtype=np.int64),
+        "names": np.array([channel.name for channel in channels]),
+        "units": np.array([channel.unit for channel in channels]),
+        "points": np.array([channel.point or "" for channel in channels]),
+        "directions": np.array([channel.direction or unknown for channel in channels]),
+        "roles": np.array([channel.role for channel in channels]),
+        "overloads": np.array([np.nan if channel.overload is None else channel.overload for channel in channels]),
+        "values": series.values.T,
+    }
+    if series.valid is not None:
+        fields["valid"] = series.valid.T
+    return fields
+
+
+def series_of_fields(fields: Mapping[str, Any], *, where: str) -> TimeSeries:
+    """Make the series again; `LogError` naming the field that is missing or has the wrong shape."""
+    names = _texts(fields, "names", where)
+    count = len(names)
+    values = _rows(fields, "values", count, where)
+    if values.dtype.kind != "f":
+        values = values.astype(np.float64)
+    channels = _channels(fields, names, where)
+    valid = _rows(fields, "valid", count, where).astype(np.bool_) if "valid" in fields else None
+    try:
+        return TimeSeries(
+            values=values,
+            sample_rate_hz=float(_number(fields, "fs", where)),
+            start_time_ns=int(_number(fields, "start_time_ns", where)),
+            channels=channels,
+            valid=valid,
+        )
+    except ChladniError as error:
+        raise LogError(f"{where}: {error}") from error
+
+
+def _channels(fields: Mapping[str, Any], names: list[str], where: str) -> tuple[Channel, ...]:
+    count = len(names)
+    units, points, roles = (_texts(fields, field, where, count) for field in ("units", "points", "roles"))
+    directions = _rows(fields, "directions", 3, where).T if count else np.empty((0, 3))
+    overloads = _rows(fields, "overloads", count, where)[:, 0] if count else np.empty(0)
+    if len(directions) != count:
+        raise LogError(f"{where}: directions of {len(directions)} channels, names of {count}")
+    return tuple(
+        Channel(
+            name=names[row],
+            unit=units[row],
+            point=points[row] or None,
+            direction=_direction(directions[row]),
+            role=_role(roles[row], where),
+            overload=float(overloads[row]) if np.isfinite(overloads[row]) else None,
+        )
+        for row in range(count)
+    )
+
+
+def _field(fields: Mapping[str, Any], name: str, where: str) -> Any:
+    if name not in fields:
+        raise LogError(f"{where}: has no {name!r}, which {SERIES_FORMAT} asks for")
+    return fields[name]
+
+
+def _number(fields: Mapping[str, Any], name: str, where: str) -> Any:
+    content = np.asarray(_field(fields, name, where))
+    if content.size != 1 or content.dtype.kind not in "fiu":
+        raise LogError(f"{where}: {name!r} must be one number, found {content.dtype} {content.shape}")
+    return content.reshape(())[()]
+
+
+def _texts(fields: Mapping[str, Any], name: str, where: str, count: int | None = None) -> list[str]:
+    # MATLAB turns a cell of one text into a text, and an empty text into an empty array.
+    texts = [text if isinstance(text, str) else "" for text in np.atleast_1d(_field(fields, name, where)).tolist()]
+    if count is not None and len(texts) != count:
+        raise LogError(f"{where}: {len(texts)} {name} for {count} channels")
+    return texts
+
+
+def _rows(fields: Mapping[str, Any], name: str, columns: int, where: str) -> NDArray[Any]:
+    """Give ``[column, sample]`` of an array whose trailing axis of length one may have been squeezed away."""
+    array = np.asarray(_field(fields, name, where))
+    if array.dtype.kind not in "fiub" or columns == 0 or array.size % columns or array.ndim > 2:
+        raise LogError(f"{where}: {name!r} is {array.dtype} {array.shape}, not numbers in {columns} columns")
+    return array.reshape(-1, columns).T
+
+
+def _direction(components: NDArray[Any]) -> Vector | None:
+    if not np.isfinite(components).all():
+        return None
+    return (float(components[0]), float(components[1]), float(components[2]))
+
+
+def _role(text: str, where: str) -> Role:
+    if text == "reference":
+        return "reference"
+    if text != "response":
+        raise LogError(f"{where}: role {text!r} is neither response nor reference")
+    return "response"

@@ -1,0 +1,202 @@
+"""What the header of a dataset 58 says of a channel: place, direction, unit, rate and start."""
+
+import re
+from datetime import UTC, datetime
+from math import ceil, floor, isfinite, log10
+from typing import Any
+
+from chladni.signals.channel import AXES, Channel, Vector
+from chladni.signals.time_series import NS_PER_S, TimeSeries
+
+TIME_RESPONSE = 1
+FUNCTION_TYPES = {
+    0: "general function",
+    1: "time response",
+    2: "auto spectrum",
+    3: "cross spectrum",
+    4: "frequency response function",
+    5: "transmissibility",
+    6: "coherence",
+    7: "auto correlation",
+    8: "cross correlation",
+    9: "power spectral density",
+    10: "energy spectral density",
+    12: "spectrum",
+    26: "multiple coherence",
+}
+"""Names of the function types, for messages."""
+
+_DIRECTIONS: dict[int, Vector] = {
+    code + turn: AXES[axis]
+    for code, axis in ((1, "+x"), (-1, "-x"), (2, "+y"), (-2, "-y"), (3, "+z"), (-3, "-z"))
+    for turn in (0, 3 if code > 0 else -3)
+}
+# Ordinate type: SI unit, and the powers of length and force in it.
+_QUANTITIES = {
+    8: ("m", 1, 0),
+    9: ("N", 0, 1),
+    11: ("m/s", 1, 0),
+    12: ("m/s^2", 1, 0),
+    13: ("N", 0, 1),
+    15: ("Pa", -2, 1),
+}
+_TYPE_OF_UNIT = {"m": 8, "m/s": 11, "m/s^2": 12, "Pa": 15}
+_EXACT = re.compile(r"^start_time_ns=(?P<start>-?\d+) sample_rate_hz=(?P<rate>[0-9.e+-]+)$")
+_EXCITATION_FORCE = 13
+_ID_LENGTH = 80
+_LABEL_LENGTH = 20
+_ENTITY_LENGTH = 10
+_INCREMENT_DIGITS = 6
+
+
+def channel_of_header(header: dict[str, Any], name: str, unit: str) -> Channel:
+    """Describe the channel of a record: its point is the response node, its direction the response direction."""
+    entity, node = str(header["rsp_ent_name"]).strip(), int(header["rsp_node"])
+    named = entity not in ("", "NONE")
+    point = " ".join(text for text in (entity if named else "", str(node) if node else "") if text)
+    return Channel(
+        name=name,
+        unit=unit,
+        point=point or None,
+        direction=_DIRECTIONS.get(int(header["rsp_dir"])),
+        role="reference" if int(header["ordinate_spec_data_type"]) == _EXCITATION_FORCE else "response",
+    )
+
+
+def unit_of_header(header: dict[str, Any], system: dict[str, Any] | None) -> tuple[str, float]:
+    """Give the unit of a record and a factor to it.
+
+    The label of the ordinate is the unit, where there is one. Else the type of the ordinate gives an SI unit, and the
+    factor comes from dataset 164, `system`, which says by what to divide to get SI.
+
+    Examples
+    --------
+    >>> unit_of_header({"ordinate_axis_units_lab": "g", "ordinate_spec_data_type": 12}, None)
+    ('g', 1.0)
+    >>> millimetres = {"length": 1000.0, "force": 1.0}
+    >>> unit_of_header({"ordinate_axis_units_lab": "NONE", "ordinate_spec_data_type": 12}, millimetres)
+    ('m/s^2', 0.001)
+    """
+    label = str(header["ordinate_axis_units_lab"]).strip()
+    if label not in ("", "NONE"):
+        return label, 1.0
+    unit, lengths, forces = _QUANTITIES.get(int(header["ordinate_spec_data_type"]), ("1", 0, 0))
+    if system is None:
+        return unit, 1.0
+    return unit, float(system["length"]) ** -lengths * float(system["force"]) ** -forces
+
+
+def rate_of_header(header: dict[str, Any]) -> float | None:
+    """Give the sample rate in Hz, None when the increment is no interval.
+
+    The field of the increment holds six digits, 1.52588e-05 s where 1/65536 s is meant. Of all rates that round to
+    it the one with the fewest digits is taken, unless the record says the rate in full, as ours do.
+
+    Examples
+    --------
+    >>> rate_of_header({"abscissa_inc": 1.52588e-05, "id5": "NONE"})
+    65536.0
+    """
+    increment = float(header["abscissa_inc"])
+    if not (isfinite(increment) and 1e-15 < increment < 1e15):
+        return None
+    half = 0.5 * 10.0 ** (floor(log10(increment)) - _INCREMENT_DIGITS + 1)
+    lowest, highest = 1 / (increment + half), 1 / (increment - half)
+    exact = _EXACT.match(str(header["id5"]).strip())
+    if exact is not None and lowest <= float(exact["rate"]) <= highest:
+        return float(exact["rate"])
+    return _shortest(lowest, highest, 1.0 / increment)
+
+
+def says_rate(header: dict[str, Any]) -> bool:
+    """Whether the record says its rate and start in full, as those that chladni writes do."""
+    return _EXACT.match(str(header["id5"]).strip()) is not None
+
+
+def start_of_header(header: dict[str, Any]) -> int:
+    """Give the time of the first sample in ns since 1970: the date of line three, taken as UTC, and the abscissa.
+
+    0 plus the abscissa when line three holds no date.
+    """
+    exact = _EXACT.match(str(header["id5"]).strip())
+    if exact is not None:
+        return int(exact["start"])
+    offset_s = float(header["abscissa_min"]) if header["abscissa_spacing"] != 0 else 0.0
+    try:
+        date = datetime.strptime(str(header["id3"]).strip(), "%d-%b-%y %H:%M:%S").replace(tzinfo=UTC)
+    except ValueError:
+        return round(offset_s * NS_PER_S)
+    return max(0, round(date.timestamp())) * NS_PER_S + round(offset_s * NS_PER_S)
+
+
+def header_of_channel(channel: Channel, series: TimeSeries) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Give the header fields of a record, and sentences on what doesn't fit them."""
+    losses = []
+    name = channel.name.encode("ascii", "replace").decode()[:_ID_LENGTH]
+    entity, node = _place(channel.point)
+    direction = _direction_code(channel)
+    if name != channel.name:
+        losses.append(f"{channel.name}: the name became {name!r}; a universal file holds 80 ASCII characters.")
+    if channel.point and entity not in (channel.point, "NONE"):
+        losses.append(f"{channel.name}: the point {channel.point!r} became {entity!r}.")
+    if channel.direction is not None and direction == 0:
+        losses.append(f"{channel.name}: the direction {channel.direction} is along no axis and isn't stored.")
+    if channel.overload is not None:
+        losses.append(f"{channel.name}: the overload limit isn't stored.")
+    if len(channel.unit) > _LABEL_LENGTH:
+        losses.append(f"{channel.name}: the unit {channel.unit!r} has more than 20 characters and isn't stored.")
+    header = {
+        "id1": name or "NONE",
+        "id3": _date(series.start_time_ns),
+        "id5": f"start_time_ns={series.start_time_ns} sample_rate_hz={series.sample_rate_hz!r}",
+        "rsp_ent_name": entity,
+        "rsp_node": node,
+        "rsp_dir": direction,
+        "ref_node": 0,
+        "ref_dir": 0,
+        "abscissa_spec_data_type": 17,
+        "abscissa_axis_lab": "Time",
+        "abscissa_axis_units_lab": "s",
+        "ordinate_spec_data_type": _quantity_code(channel),
+        "ordinate_axis_lab": "NONE",
+        "ordinate_axis_units_lab": channel.unit if len(channel.unit) <= _LABEL_LENGTH else "NONE",
+        "orddenom_spec_data_type": 0,
+    }
+    return header, tuple(losses)
+
+
+def _shortest(lowest: float, highest: float, middle: float) -> float:
+    """Give the number between the bounds that needs the fewest decimal digits, the nearest to the middle of those."""
+    for digits in range(-15, 16):
+        step = 10.0**-digits
+        first, last = ceil(lowest / step), floor(highest / step)
+        if first <= last:
+            return float(f"{min(max(round(middle / step), first), last)}e{-digits}")
+    return middle
+
+
+def _place(point: str | None) -> tuple[str, int]:
+    if point is None:
+        return "NONE", 0
+    if point.isdecimal() and point.isascii() and 0 < int(point) < 10**9 and str(int(point)) == point:
+        return "NONE", int(point)
+    entity = re.sub(r"[^ -~]", "_", point.strip())[:_ENTITY_LENGTH]
+    return entity, 0
+
+
+def _direction_code(channel: Channel) -> int:
+    turn = channel.unit.startswith("rad") or channel.unit == "N m"
+    for code in (1, -1, 2, -2, 3, -3):
+        if channel.direction == _DIRECTIONS[code]:
+            return code + ((3 if code > 0 else -3) if turn else 0)
+    return 0
+
+
+def _quantity_code(channel: Channel) -> int:
+    if channel.unit == "N":
+        return _EXCITATION_FORCE if channel.role == "reference" else 9
+    return _TYPE_OF_UNIT.get(channel.unit, 0)
+
+
+def _date(start_time_ns: int) -> str:
+    return datetime.fromtimestamp(start_time_ns // NS_PER_S, tz=UTC).strftime("%d-%b-%y %H:%M:%S")

@@ -1,0 +1,240 @@
+"""``.mat`` and ``.npz`` files: round trips, foreign layouts, and files meant to harm."""
+
+import io
+import pickle
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.io import loadmat, savemat
+
+from chladni.io.files.mat import read_mat, write_mat
+from chladni.io.files.npz import read_npz, write_npz
+from chladni.signals.channel import Channel
+from chladni.signals.errors import LogError, SetupError
+from chladni.signals.testing import assert_close
+from chladni.signals.time_series import TimeSeries
+
+KINDS = {"mat": (read_mat, write_mat), "npz": (read_npz, write_npz)}
+CHANNELS = (
+    Channel(name="/wrist.accel.linear.z", unit="m/s^2", point="wrist", direction=(0.0, 0.6, 0.8), overload=500.0),
+    Channel(name="Kraft µ", unit="N", role="reference"),
+    Channel(name="x"),
+)
+
+
+def series_of(count: int = 3, samples: int = 20, **fields: object) -> TimeSeries:
+    values = np.random.default_rng(5).standard_normal((count, samples))
+    options = {"values": values, "sample_rate_hz": 1e3 / 3, "start_time_ns": 1_700_000_000_123_456_789}
+    return TimeSeries(**(options | {"channels": CHANNELS[:count]} | fields))
+
+
+def save(path: Path, **arrays: object) -> Path:
+    if path.suffix == ".mat":
+        savemat(path, arrays)
+    else:
+        np.savez(path, **arrays)
+    return path
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    kind=st.sampled_from(list(KINDS)),
+    shape=st.tuples(st.integers(1, 3), st.integers(1, 5)),
+    dtype=st.sampled_from([np.float32, np.float64]),
+    gaps=st.booleans(),
+    seed=st.integers(0, 99),
+)
+def test_all_comes_back(
+    tmp_path_factory: pytest.TempPathFactory, kind: str, shape: tuple[int, int], dtype: type, gaps: bool, seed: int
+) -> None:
+    read, write = KINDS[kind]
+    rng = np.random.default_rng(seed)
+    values = rng.standard_normal(shape).astype(dtype)
+    series = series_of(*shape, values=values, valid=rng.random(shape) > 0.3 if gaps else None)
+    path = tmp_path_factory.mktemp(kind) / f"a.{kind}"
+    assert write(series, path) == ()
+    (again,) = read(path).series
+    if values.size > 1:  # a lone number has no precision of its own in a mat file
+        assert again.values.dtype == dtype
+    assert_close(again, series, rtol=0.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_several_rates(tmp_path: Path, kind: str) -> None:
+    read, write = KINDS[kind]
+    parts = [series_of(), series_of(count=1, sample_rate_hz=50.0, samples=7)]
+    write(parts, tmp_path / f"a.{kind}")
+    for found, expected in zip(read(tmp_path / f"a.{kind}").series, parts, strict=True):
+        assert_close(found, expected, rtol=0.0)
+
+
+def test_the_layout_is_what_the_manual_says(tmp_path: Path) -> None:
+    series = series_of()
+    write_mat(series, tmp_path / "a.mat")
+    found = loadmat(tmp_path / "a.mat", simplify_cells=True)["series_1"]
+    assert (found["fs"], list(found["units"])) == (1e3 / 3, ["m/s^2", "N", "1"])
+    np.testing.assert_array_equal(found["values"], series.values.T)
+    write_npz(series, tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as arrays:
+        assert str(arrays["format"]) == "chladni.series/1"
+        np.testing.assert_array_equal(arrays["series_1.values"], series.values.T)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("rate", [{"fs": 200.0}, {"Sample_Rate": np.int32(200)}, {"dt": 0.005}])
+def test_foreign_arrays_with_a_rate(tmp_path: Path, kind: str, rate: dict[str, object]) -> None:
+    matrix = np.arange(80.0).reshape(40, 2)
+    path = save(tmp_path / f"a.{kind}", acc=matrix, force=np.arange(40), cal=np.arange(3.0), **rate)
+    contents = KINDS[kind][0](path, units={"force": "kN"})
+    (series,) = contents.series
+    assert series.sample_rate_hz == pytest.approx(200.0, rel=1e-15)
+    assert [channel.name for channel in series.channels] == ["acc[0]", "acc[1]", "force"]
+    np.testing.assert_array_equal(series.values, [*matrix.T, np.arange(40) * 1000.0])
+    assert series.channels[2].unit == "N"
+    assert contents.notes == (f"{path}: cal left out, being of other length than 40 samples.",)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_foreign_arrays_with_times(tmp_path: Path, kind: str) -> None:
+    path = save(tmp_path / f"a.{kind}", t=np.arange(60) * 0.01, acc=np.arange(60.0))
+    (series,) = KINDS[kind][0](path).series
+    assert series.sample_rate_hz == pytest.approx(100.0, rel=1e-9)
+    np.testing.assert_array_equal(series.values, [np.arange(60.0)])
+    with pytest.raises(SetupError, match="has a time vector"):
+        KINDS[kind][0](path, sample_rate_hz=3.0)
+
+
+def test_foreign_structs(tmp_path: Path) -> None:
+    savemat(tmp_path / "a.mat", {"run": {"fs": 100.0, "sensor": {"acc": np.arange(5.0)}, "who": "me"}})
+    (series,) = read_mat(tmp_path / "a.mat").series
+    assert (series.channels[0].name, series.sample_rate_hz) == ("run.sensor.acc", 100.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("arrays", "options", "error", "match"),
+    [
+        ({"acc": np.arange(9.0)}, {}, SetupError, r"nothing says the sample rate.*acc"),
+        ({"acc": np.arange(9.0), "fs": -5.0}, {}, SetupError, "nothing says the sample rate"),
+        ({"acc": np.arange(9.0), "fs": 5.0}, {"sample_rate_hz": 6.0}, SetupError, "says 5 Hz, 6 Hz was given"),
+        ({"acc": np.arange(9.0), "fs": 5.0}, {"units": {"b": "N"}}, SetupError, "no channel 'b'"),
+        ({"fs": 5.0}, {}, LogError, "no vector of numbers"),
+        ({"t": np.array([0.0, np.nan]), "a": np.zeros(2)}, {}, LogError, "no times in seconds"),
+    ],
+)
+def test_what_is_missing_is_said(
+    tmp_path: Path,
+    kind: str,
+    arrays: dict[str, object],
+    options: dict[str, object],
+    error: type[Exception],
+    match: str,
+) -> None:
+    path = save(tmp_path / f"a.{kind}", **arrays)
+    with pytest.raises(error, match=match):
+        KINDS[kind][0](path, **options)
+
+
+def edited(path: Path, change: Callable[[dict[str, object]], object]) -> Path:
+    write_npz(series_of(), path)
+    with np.load(path) as arrays:
+        content = dict(arrays)
+    change(content)
+    np.savez(path, **content)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        (lambda c: c.pop("series_1.fs"), "has no 'fs'"),
+        (lambda c: c.update({"series_1.fs": np.arange(2.0)}), "'fs' must be one number"),
+        (lambda c: c.update({"series_1.fs": np.array(-1.0)}), "must be finite and positive"),
+        (lambda c: c.update({"series_1.units": np.array(["N"])}), "1 units for 3 channels"),
+        (lambda c: c.update({"series_1.values": np.zeros(7)}), "'values' is float64"),
+        (lambda c: c.update({"series_1.directions": np.zeros((2, 3))}), "directions of 2 channels"),
+        (lambda c: c.update({"series_1.roles": np.array(["king"] * 3)}), "role 'king'"),
+        (lambda c: c.update({"series_1.valid": np.zeros((3, 3))}), "valid has shape"),
+    ],
+)
+def test_a_broken_layout_names_the_field(tmp_path: Path, change: Callable[..., object], match: str) -> None:
+    with pytest.raises(LogError, match=match):
+        read_npz(edited(tmp_path / "a.npz", change))
+
+
+def test_objects_are_never_unpickled(tmp_path: Path) -> None:
+    raw = io.BytesIO()
+    np.lib.format.write_array_header_1_0(raw, {"descr": "|O", "fortran_order": False, "shape": (1,)})
+    raw.write(pickle.dumps([1]))
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("a.npy", raw.getvalue())
+    with pytest.raises(LogError, match="holds Python objects"):
+        read_npz(tmp_path / "a.npz")
+
+
+def test_an_array_that_announces_more_than_it_holds(tmp_path: Path) -> None:
+    raw = io.BytesIO()
+    np.lib.format.write_array_header_1_0(raw, {"descr": "<f8", "fortran_order": False, "shape": (10**15,)})
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("a.npy", raw.getvalue())
+    with pytest.raises(LogError, match="announces 8000000000000000 bytes"):
+        read_npz(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_bombs_are_refused_before_they_unpack(tmp_path: Path, kind: str) -> None:
+    read, write = KINDS[kind]
+    write(series_of(1, 200_000, values=np.zeros((1, 200_000))), tmp_path / f"a.{kind}")
+    assert (tmp_path / f"a.{kind}").stat().st_size < 20_000
+    with pytest.raises(LogError, match="raise max_bytes"):
+        read(tmp_path / f"a.{kind}", max_bytes=1_000_000)
+    assert read(tmp_path / f"a.{kind}", max_bytes=2_000_000).series[0].samples == 200_000
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_garbage_is_one_line(tmp_path: Path, kind: str) -> None:
+    (tmp_path / f"a.{kind}").write_bytes(b"not at all " * 30)
+    with pytest.raises(LogError, match=r"can't be read|no mat file"):
+        KINDS[kind][0](tmp_path / f"a.{kind}")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_cut_is_told_or_harmless(tmp_path: Path, kind: str) -> None:
+    read, write = KINDS[kind]
+    write(series_of(), tmp_path / f"a.{kind}")
+    raw = (tmp_path / f"a.{kind}").read_bytes()
+    for length in range(0, len(raw) - 1, 37):
+        (tmp_path / f"cut.{kind}").write_bytes(raw[:length])
+        with pytest.raises(LogError):
+            read(tmp_path / f"cut.{kind}")
+
+
+@pytest.mark.parametrize(
+    ("content", "match"),
+    [
+        (b"MATLAB 7.3 MAT-file".ljust(600), "save it in MATLAB with save\\('a.mat', '-v7'\\)"),
+        (b"MATLAB 5.0".ljust(126) + b"IM" + struct.pack("<II", 14, 10**6), "claims 1000000 bytes"),
+        (b"MATLAB 5.0".ljust(126) + b"IM" + struct.pack("<II", 15, 4) + b"junk", "is damaged"),
+        (b"MATLAB 5.0".ljust(126) + b"IM" + struct.pack("<II", 14, 8) + bytes(8), "can't be read"),
+    ],
+)
+def test_bad_mat_files(tmp_path: Path, content: bytes, match: str) -> None:
+    (tmp_path / "a.mat").write_bytes(content)
+    with pytest.raises(LogError, match=match):
+        read_mat(tmp_path / "a.mat")
+
+
+def test_a_compressed_variable_cut_inside_is_told(tmp_path: Path) -> None:
+    packed = zlib.compress(bytes(1000))[:-6]
+    (tmp_path / "a.mat").write_bytes(
+        b"MATLAB".ljust(124) + b"\x00\x01IM" + struct.pack("<II", 15, len(packed)) + packed
+    )
+    with pytest.raises(LogError):
+        read_mat(tmp_path / "a.mat")
