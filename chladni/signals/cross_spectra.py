@@ -1,7 +1,8 @@
 """The averaged matrix of cross-spectra, from which every estimate is derived."""
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,17 @@ class CrossSpectra(Value):
         if self.noise_density is not None:
             require_shape("noise_density", self.noise_density, expected, "channels x channels x frequencies")
         self._freeze()
+
+    def select(self, names: Sequence[str]) -> Self:
+        """Give the spectra of the named channels and their pairs, in the order asked for."""
+        rows = [self.index(name) for name in names]
+        pairs = np.ix_(rows, rows)
+        return replace(
+            self,
+            density=self.density[pairs],
+            noise_density=None if self.noise_density is None else self.noise_density[pairs],
+            channels=tuple(self.channels[row] for row in rows),
+        )
 
     def index(self, name: str) -> int:
         """Row of the named channel; `EstimateError` naming those there are when it's missing."""
