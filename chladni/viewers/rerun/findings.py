@@ -1,0 +1,76 @@
+"""The page of findings: what was found, in words and tables."""
+
+import re
+from collections.abc import Iterator, Sequence
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from chladni.signals.peak import Peak
+from chladni.signals.study import Study
+from chladni.viewers.labels import printed_unit, value_with_deviation
+from chladni.viewers.style import Style
+
+PATH = "/findings"
+HOW_TO_READ = (
+    "Frequency plots are drawn on a time axis: **1 ms is 1 Hz**, so 100 ms reads 100 Hz and 1 s reads 1 kHz.",
+    "Click or drag in a waveform: the spectrum of that moment is drawn beside the waterfall.",
+    "Click or drag in a frequency response: the deflection shape and the dots in the Nyquist plot follow.",
+    "For frequency alone, choose the timeline *frequency* at the bottom.",
+)
+
+
+def draw_findings(recording: rr.RecordingStream, study: Study, style: Style) -> rrb.View:
+    """Write the findings as Markdown and give their view."""
+    text = "\n".join(_page(study, style))
+    recording.log(PATH, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+    return rrb.TextDocumentView(origin=PATH, name="Findings")
+
+
+def escaped(text: str) -> str:
+    r"""Make a text that came from a log inert in Markdown: no emphasis, no links, no images to fetch.
+
+    Examples
+    --------
+    >>> escaped("![x](http://a/b.png)")
+    '\\!\\[x\\]\\(http\\:\\/\\/a\\/b.png\\)'
+    """
+    printable = "".join(character if character.isprintable() else " " for character in text)
+    return re.sub(r"([!-,/:-@\[-`{-~])", r"\\\1", printable)
+
+
+def _page(study: Study, style: Style) -> Iterator[str]:
+    yield f"# {escaped(study.title)}\n"
+    yield from (f"- {escaped(finding)}" for finding in study.findings)
+    yield from _peaks("Peaks of the spectra", study.peaks, style)
+    yield from _peaks("Peaks of the frequency responses", study.response_peaks, style)
+    yield from _method(study)
+    yield "\n## How to read the plots\n"
+    yield from (f"- {sentence}" for sentence in HOW_TO_READ)
+
+
+def _peaks(title: str, peaks: Sequence[Peak], style: Style) -> Iterator[str]:
+    if not peaks:
+        return
+    yield f"\n## {title}\n"
+    yield "| Hz | height | unit | channels |"
+    yield "|---|---|---|---|"
+    for peak in peaks:
+        frequency = value_with_deviation(peak.frequency_hz, peak.frequency_std_hz)
+        height = value_with_deviation(peak.height, peak.height_std)
+        channels = ", ".join(escaped(style.labels.get(name, name)) for name in peak.channels)
+        yield f"| {frequency} | {height} | {printed_unit(peak.unit)} | {channels} |"
+
+
+def _method(study: Study) -> Iterator[str]:
+    accounts = [density.provenance for density in study.densities]
+    accounts += [] if study.response is None else [study.response.provenance]
+    if accounts:
+        yield "\n## Method\n"
+    for account in accounts:
+        yield (
+            f"- {escaped(account.estimator)}: window {escaped(account.window)}, segments of {account.segment_s:g} s,"
+            f" overlap {account.overlap:.0%}, {account.averages} averages"
+            f" ({account.effective_averages:.3g} effective), {account.skipped} segments left out"
+        )
+        yield from (f"  - {escaped(note)}" for note in account.notes)

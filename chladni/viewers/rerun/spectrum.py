@@ -1,0 +1,70 @@
+"""The spectrum of the moment under the time cursor, on a real frequency axis."""
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from chladni.signals.study import Study
+from chladni.signals.time_series import NS_PER_S
+from chladni.signals.waterfall import Waterfall
+from chladni.viewers.drawing import block_maximum
+from chladni.viewers.labels import amplitude_density_unit, reduction
+from chladni.viewers.rerun.entities import channel_entity, folder
+from chladni.viewers.rerun.timelines import TIME
+from chladni.viewers.style import Style
+
+# A bar narrower than a pixel can't be seen; a chart is rarely wider than this.
+BARS = 1024
+SLICES = 1024
+
+
+def draw_spectra(recording: rr.RecordingStream, study: Study, style: Style) -> list[rrb.View]:
+    """Write each slice of each waterfall as a bar chart at its time and give a view for each channel.
+
+    The bars are the square root of the density, a linear scale that starts at zero as bars must.
+    """
+    return [
+        _draw_channel(recording, waterfall, row, style, place)
+        for place, waterfall in enumerate(study.waterfalls, start=1)
+        for row in range(len(waterfall.channels))
+    ]
+
+
+def _draw_channel(
+    recording: rr.RecordingStream, waterfall: Waterfall, row: int, style: Style, place: int
+) -> rrb.View:
+    channel = waterfall.channels[row]
+    path = channel_entity(folder("spectrum", str(place)), channel)
+    slices, times = block_maximum(waterfall.values[row], axis=0, limit=SLICES)
+    slices, lines = block_maximum(slices, axis=1, limit=BARS)
+    amplitude = np.sqrt(slices).astype(np.float32)
+    # A run of lines is drawn as one bar in the middle of the run.
+    abscissa = waterfall.frequency_hz[::lines] + (lines - 1) / 2 * _step(waterfall.frequency_hz)
+    widths = np.full(abscissa.size, lines * _step(waterfall.frequency_hz), dtype=np.float32)
+    for start_ns, bars in zip(_starts_ns(waterfall, style)[::times], amplitude, strict=True):
+        recording.set_time(TIME, duration=np.timedelta64(int(start_ns), "ns"))
+        if np.isnan(bars).any():
+            recording.log(path, rr.Clear(recursive=False))
+        else:
+            chart = rr.BarChart(bars, abscissa=abscissa, widths=widths, color=style.on_dark(channel))
+            recording.log(path, chart)
+    recording.reset_time()
+    return rrb.BarChartView(
+        origin=path,
+        name=f"{style.labels[channel.name]} at the time cursor [{amplitude_density_unit(channel.unit)}] over Hz"
+        + reduction(times, lines),
+        plot_legend=rrb.PlotLegend(visible=False),
+    )
+
+
+def _starts_ns(waterfall: Waterfall, style: Style) -> NDArray[np.int64]:
+    """Times from which each slice is the nearest to the cursor; the viewer shows the latest before it."""
+    hop_s = _step(waterfall.time_s)
+    since_origin_ns = waterfall.start_time_ns - style.origin_ns
+    starts_s = np.maximum(waterfall.time_s - hop_s / 2, 0.0)
+    return np.asarray(np.rint(starts_s * NS_PER_S).astype(np.int64) + since_origin_ns)
+
+
+def _step(axis: NDArray[np.float64]) -> float:
+    return float(axis[1] - axis[0]) if axis.size > 1 else 1.0

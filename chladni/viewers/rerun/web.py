@@ -1,0 +1,72 @@
+"""A study served to a browser on this computer."""
+
+from subprocess import Popen
+from types import TracebackType
+from typing import Self
+from urllib.parse import quote
+
+from chladni.signals.study import Study
+from chladni.viewers.rerun.process import LOOPBACK, free_port, send, start, stop
+
+
+class WebViewer:
+    """A running web viewer; close it, or use it as a context manager, to end it.
+
+    Attributes
+    ----------
+    address
+        What to open in a browser on this computer; nobody else can reach it.
+    """
+
+    def __init__(self, address: str, process: Popen[bytes]) -> None:
+        self.address = address
+        self._process = process
+
+    def wait(self) -> None:
+        """Wait until the server ends by itself."""
+        self._process.wait()
+
+    def close(self) -> None:
+        """End the server; closing twice is fine."""
+        stop(self._process)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def serve_web(study: Study, *, port: int = 0) -> WebViewer:
+    """Serve a study to a browser on this computer, bound to loopback only.
+
+    Parameters
+    ----------
+    study
+        What to draw.
+    port
+        Port of the page; 0 takes a free one.
+
+    Returns
+    -------
+    WebViewer
+        With the address to open. The server runs until it's closed.
+
+    Raises
+    ------
+    SetupError
+        When the server doesn't start, as when `port` is taken.
+    """
+    data_port = free_port()
+    page_port = port or free_port()
+    options = ["--serve-web", "--port", str(data_port), "--web-viewer-port", str(page_port)]
+    process = start(options, ports=[data_port, page_port], detached=False)
+    data = quote(f"rerun+http://{LOOPBACK}:{data_port}/proxy", safe="")
+    try:
+        send(study, data_port)
+    except BaseException:
+        stop(process)
+        raise
+    return WebViewer(f"http://{LOOPBACK}:{page_port}/?url={data}", process)

@@ -1,0 +1,93 @@
+"""What all pictures of one study share: a label and a colour for each channel, and the start of its clock."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Self
+
+from chladni.signals.channel import Channel
+from chladni.signals.study import Study
+from chladni.viewers.labels import short_names
+
+Colour = tuple[int, int, int]
+
+# Okabe and Ito's colours, told apart with any colour vision; the dark set is the same hues, lightened until they
+# read on a black ground, the light set darkened until they read on paper.
+ON_LIGHT: tuple[Colour, ...] = (
+    (0, 114, 178),
+    (213, 94, 0),
+    (0, 145, 106),
+    (188, 92, 150),
+    (200, 134, 0),
+    (64, 156, 214),
+    (112, 84, 62),
+    (96, 96, 96),
+)
+ON_DARK: tuple[Colour, ...] = (
+    (86, 180, 233),
+    (240, 125, 50),
+    (40, 195, 150),
+    (225, 145, 190),
+    (235, 190, 60),
+    (140, 160, 255),
+    (205, 170, 140),
+    (190, 190, 190),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Style:
+    """Label and colour number of each channel of a study, by channel name.
+
+    Attributes
+    ----------
+    labels
+        Short unambiguous label.
+    numbers
+        Place in the palette, 0 to 7: the same in every picture, and different for channels of one unit that are
+        drawn together.
+    origin_ns
+        Nanoseconds since the Unix epoch that pictures call second 0.
+    """
+
+    labels: dict[str, str]
+    numbers: dict[str, int]
+    origin_ns: int
+
+    @classmethod
+    def of(cls, study: Study) -> Self:
+        """Give the style of all pictures of `study`."""
+        channels = {channel.name: channel for channel in _channels(study)}
+        units: dict[str, list[str]] = {}
+        for channel in channels.values():
+            units.setdefault(channel.unit, []).append(channel.name)
+        # Units one after another, so that neighbours in a plot of one unit are neighbours in the palette.
+        ordered = [name for names in units.values() for name in names]
+        return cls(
+            labels=short_names(channels),
+            numbers={name: place % len(ON_DARK) for place, name in enumerate(ordered)},
+            origin_ns=min(_starts(study), default=0),
+        )
+
+    def on_dark(self, channel: Channel) -> Colour:
+        """Give the channel's colour on a dark ground."""
+        return ON_DARK[self.numbers[channel.name]]
+
+    def on_light(self, channel: Channel) -> Colour:
+        """Give the channel's colour on paper."""
+        return ON_LIGHT[self.numbers[channel.name]]
+
+
+def _channels(study: Study) -> Iterator[Channel]:
+    for series in study.series:
+        yield from series.channels
+    for density in study.densities:
+        yield from density.channels
+    for waterfall in study.waterfalls:
+        yield from waterfall.channels
+    if study.response is not None:
+        yield from (*study.response.references, *study.response.responses)
+
+
+def _starts(study: Study) -> Iterator[int]:
+    yield from (series.start_time_ns for series in study.series)
+    yield from (waterfall.start_time_ns for waterfall in study.waterfalls)

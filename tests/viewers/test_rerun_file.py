@@ -1,0 +1,279 @@
+"""A study in a .rrd file: read back by rerun's own reader, value by value."""
+
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rerun as rr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chladni.signals.channel import Channel
+from chladni.signals.errors import LogError
+from chladni.signals.geometry import Geometry
+from chladni.signals.study import Study
+from chladni.signals.time_series import TimeSeries
+from chladni.viewers.rerun import waterfall as waterfall_module
+from chladni.viewers.rerun import waveforms, write_rrd
+from chladni.viewers.rerun.entities import channel_entity, folder
+from tests.viewers import synthetic
+from tests.viewers.headless import EXECUTABLE
+from tests.viewers.rrd import Contents
+
+
+@pytest.fixture(autouse=True)
+def strict() -> Any:
+    rr.set_strict_mode(True)
+    yield
+    rr.set_strict_mode(False)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_rrd(synthetic.study(), tmp_path_factory.mktemp("rrd") / "arm.rrd")
+
+
+@pytest.fixture(scope="module")
+def arm(written: Path) -> Contents:
+    return Contents(written)
+
+
+def test_rerun_verifies_the_file(written: Path) -> None:
+    outcome = subprocess.run([EXECUTABLE, "rrd", "verify", written], capture_output=True, text=True, check=False)
+    assert outcome.returncode == 0, outcome.stderr
+    assert "without error" in outcome.stderr + outcome.stdout
+
+
+def test_waveform_samples_come_back_bit_for_bit(arm: Contents) -> None:
+    series = synthetic.time_series()
+    for row, channel in enumerate(series.channels):
+        quantity = "force" if channel.unit == "N" else "acceleration"
+        entity = channel_entity(f"/waveforms/1/{quantity}", channel)
+        np.testing.assert_array_equal(arm.scalars(entity)[:, 0], series.values[row])
+        expected = np.rint(np.arange(series.samples) / series.sample_rate_hz * 1e9).astype(np.int64)
+        np.testing.assert_array_equal(arm.times(entity, "time"), expected)
+
+
+def test_waveforms_keep_extremes_when_zoomed_out(arm: Contents) -> None:
+    look = arm.static(channel_entity("/waveforms/1/force", synthetic.FORCE))
+    assert look["SeriesLines:names"] == ["hammer.x"]
+    assert look["SeriesLines:aggregation_policy"] == [rr.components.AggregationPolicy.MinMax.value]
+
+
+def test_density_is_written_in_decibels_at_one_millisecond_a_hertz(arm: Contents) -> None:
+    density = synthetic.density()
+    entity = channel_entity("/density/1/acceleration", synthetic.RESPONSES[2])
+    ticks = arm.times(entity, "frequency")
+    np.testing.assert_array_equal(ticks, np.rint(density.frequency_hz * 1e6))
+    np.testing.assert_array_equal(arm.times(entity, "time"), ticks)
+    level = arm.scalars(entity)[1:, 0]
+    np.testing.assert_allclose(level, 10 * np.log10(density.values[3, 1:]), rtol=1e-14)
+    peak = ticks[1:][np.where(ticks[1:] < 20e6, level, -np.inf).argmax()]
+    assert peak == synthetic.PEAK_HZ * 1e6
+
+
+def test_density_of_nothing_is_a_gap_not_minus_infinity(arm: Contents) -> None:
+    assert np.isnan(arm.scalars(channel_entity("/density/1/acceleration", synthetic.RESPONSES[2]))[0, 0])
+
+
+def test_density_band_is_one_sigma(arm: Contents) -> None:
+    density = synthetic.density()
+    entity = channel_entity("/density/1/force", synthetic.FORCE) + "/band"
+    bounds = 10 ** (arm.scalars(entity) / 10)
+    np.testing.assert_allclose(bounds[:, 1] - bounds[:, 0], 2 * density.std[0], rtol=1e-12)
+
+
+def test_only_excited_lines_of_a_response_are_written(arm: Contents) -> None:
+    response = synthetic.frequency_response()
+    entity = channel_entity("/magnitude/reference_1/acceleration", synthetic.RESPONSES[1])
+    np.testing.assert_array_equal(
+        arm.times(entity, "frequency"), np.rint(response.frequency_hz[response.excited] * 1e6)
+    )
+    expected = 20 * np.log10(np.abs(response.values[1, 0, response.excited]))
+    np.testing.assert_allclose(arm.scalars(entity)[:, 0], expected, rtol=1e-13)
+
+
+def test_phase_is_in_degrees_and_broken_where_it_wraps(arm: Contents) -> None:
+    response = synthetic.frequency_response()
+    entity = channel_entity("/phase/reference_1/acceleration", synthetic.RESPONSES[2])
+    phase = arm.scalars(entity)[:, 0]
+    expected = np.angle(response.values[2, 0, response.excited], deg=True)
+    np.testing.assert_allclose(phase[~np.isnan(phase)], expected, rtol=1e-12)
+    jumps = np.abs(np.diff(phase))
+    assert np.nanmax(jumps) <= 180
+
+
+def test_coherence_is_between_nothing_and_one(arm: Contents) -> None:
+    response = synthetic.frequency_response()
+    entity = channel_entity("/coherence/reference_1/acceleration", synthetic.RESPONSES[0])
+    np.testing.assert_array_equal(arm.scalars(entity)[:, 0], response.coherence[0, response.excited])
+
+
+def test_nyquist_points_are_real_and_negated_imaginary_parts(arm: Contents) -> None:
+    response = synthetic.frequency_response()
+    entity = channel_entity("/nyquist/reference_1/acceleration", synthetic.RESPONSES[0]) + "/cursor"
+    points = np.array([row[0] for row in arm.column(entity, "Points2D:positions")])
+    value = response.values[0, 0, response.excited]
+    np.testing.assert_allclose(points[:, 0], value.real, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(points[:, 1], -value.imag, rtol=1e-6, atol=1e-6)
+
+
+def test_deflection_shape_at_the_first_peak_is_the_first_mode(arm: Contents) -> None:
+    ticks = arm.times("/deflection/reference_1/moved/arrows", "frequency")
+    line = int(np.flatnonzero(ticks == synthetic.PEAK_HZ * 1e6)[0])
+    vectors = np.array(arm.column("/deflection/reference_1/moved/arrows", "Arrows3D:vectors")[line])
+    shape = vectors[:, 0] / vectors[2, 0]
+    # The second mode adds a share of about twice the damping ratio to what the first does alone.
+    np.testing.assert_allclose(shape, synthetic.SHAPES[:, 0], atol=0.02)
+    np.testing.assert_array_equal(vectors[:, 1:], 0)
+
+
+def test_deflection_goes_back_to_rest_after_the_band(arm: Contents) -> None:
+    entity = "/deflection/reference_1/moved/points"
+    assert arm.times(entity, "frequency")[-1] == (100 + 1 / synthetic.SEGMENT_S) * 1e6
+    assert arm.column(entity, "Clear:is_recursive")[-1] == [False]
+    assert arm.column(entity, "Points3D:positions")[-1] is None
+
+
+def test_waterfall_is_a_tensor_in_decibels(arm: Contents) -> None:
+    waterfall = synthetic.waterfall()
+    look = arm.static(channel_entity("/waterfall/1", synthetic.RESPONSES[2]))
+    tensor = look["Tensor:data"][0]
+    assert tensor["shape"] == [waterfall.time_s.size, waterfall.frequency_hz.size]
+    assert tensor["names"] == ["time 2–38 s", "frequency 0–128 Hz"]
+    level = np.array(tensor["buffer"]).reshape(tensor["shape"])
+    # float32 carries 24 bits of the decibels.
+    np.testing.assert_allclose(level[:, 1:], 10 * np.log10(waterfall.values[3, :, 1:]), rtol=1e-6)
+
+
+def test_spectrum_under_the_cursor_is_the_nearest_slice(arm: Contents) -> None:
+    waterfall = synthetic.waterfall()
+    entity = channel_entity("/spectrum/1", synthetic.RESPONSES[2])
+    np.testing.assert_array_equal(arm.times(entity, "time"), np.arange(10) * 4_000_000_000)
+    bars = arm.column(entity, "BarChart:values")[3][0]["buffer"]
+    np.testing.assert_allclose(bars, np.sqrt(waterfall.values[3, 3]), rtol=1e-6)
+    abscissa = arm.column(entity, "BarChart:abscissa")[3][0]["buffer"]
+    np.testing.assert_array_equal(abscissa, waterfall.frequency_hz)
+
+
+def test_a_slice_with_missing_samples_clears_the_spectrum(tmp_path: Path) -> None:
+    waterfall = synthetic.waterfall()
+    values = waterfall.values.copy()
+    values[:, 4] = np.nan
+    path = write_rrd(Study(title="gap", waterfalls=(replace(waterfall, values=values),)), tmp_path / "gap.rrd")
+    entity, contents = channel_entity("/spectrum/1", synthetic.FORCE), Contents(path)
+    assert contents.times(entity, "time")[4] == 16_000_000_000
+    assert contents.column(entity, "Clear:is_recursive")[4] == [False]
+    assert contents.column(entity, "BarChart:values")[4] is None
+    assert contents.column(entity, "BarChart:values")[5] is not None
+
+
+def test_findings_hold_peaks_and_advice(arm: Contents) -> None:
+    (text,) = arm.static("/findings")["TextDocument:text"]
+    assert "12.500 ± 0.021" in text
+    assert "Two resonances stand out" in text
+    assert "H1" in text
+
+
+def test_blueprint_shows_every_part_and_chooses_nothing_by_itself(arm: Contents) -> None:
+    names = arm.view_names()
+    assert "Acceleration [m/s²]" in names
+    assert "Acceleration PSD [dB re 1 (m/s²)²/Hz] · 1 ms = 1 Hz" in names
+    assert "Accelerance |H| to hammer.x [dB re 1 (m/s²)/N] · H1 · 1 ms = 1 Hz" in names
+    assert "Phase [deg] · H = Y/X, e^{+jωt}" in names
+    # Findings, two groups of waveforms and densities, five plots of responses, three a channel.
+    assert len(names) == 1 + 2 * 2 + 5 + 3 * 4
+    flags = {key: row[key] for row in arm.blueprint for key in row if key.startswith("ViewportBlueprint:auto_")}
+    assert set(flags) == {"ViewportBlueprint:auto_layout", "ViewportBlueprint:auto_views"}
+    assert all(value == [False] for value in flags.values())
+
+
+def test_gaps_break_the_line_and_are_not_filled(tmp_path: Path) -> None:
+    valid = np.ones((1, 100), dtype=np.bool_)
+    valid[0, 40:60] = False
+    channel = Channel(name="/a.x", unit="V")
+    series = TimeSeries(values=np.ones((1, 100)), sample_rate_hz=100.0, channels=(channel,), valid=valid)
+    path = write_rrd(Study(title="gap", series=(series,)), tmp_path / "gap.rrd")
+    written = Contents(path).scalars(channel_entity("/waveforms/1/voltage", channel))[:, 0]
+    # 80 good samples and one NaN, which is what breaks the line.
+    assert written.size == 81
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(written)), [40])
+
+
+def test_a_series_too_long_for_a_viewer_keeps_its_extremes_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(waveforms, "ROWS_OF_A_CHANNEL", 300)
+    values = np.zeros((1, 100_000))
+    values[0, 77_777], values[0, 12_345] = 9.0, -7.0
+    channel = Channel(name="/a.x", unit="V")
+    series = TimeSeries(values=values, sample_rate_hz=1000.0, channels=(channel,))
+    path = write_rrd(Study(title="long", series=(series,)), tmp_path / "long.rrd")
+    entity = channel_entity("/waveforms/1/voltage", channel)
+    written, ticks = Contents(path).scalars(entity)[:, 0], Contents(path).times(entity, "time")
+    assert written.size <= 300
+    assert ticks[written.argmax()] == 77_777_000_000
+    assert ticks[written.argmin()] == 12_345_000_000
+    assert "Voltage [V] · least and greatest of every 1000 samples" in Contents(path).view_names()
+
+
+def test_a_waterfall_too_large_for_a_screen_keeps_its_peaks_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(waterfall_module, "PIXELS", 100)
+    path = write_rrd(Study(title="large", waterfalls=(synthetic.waterfall(),)), tmp_path / "large.rrd")
+    tensor = Contents(path).static(channel_entity("/waterfall/1", synthetic.RESPONSES[2]))["Tensor:data"][0]
+    assert tensor["shape"] == [10, 86]
+    expected = 10 * np.log10(synthetic.waterfall().values[3].max())
+    assert any(name.endswith("greatest of every 6 lines") for name in Contents(path).view_names())
+    assert max(tensor["buffer"]) == pytest.approx(expected, rel=1e-6)
+
+
+def test_names_that_try_to_break_paths_come_back_whole(tmp_path: Path) -> None:
+    path = write_rrd(synthetic.hostile_study(), tmp_path / "hostile.rrd")
+    found = Contents(path).entities()
+    for place, channel in enumerate(synthetic.hostile_study().series[0].channels):
+        assert channel_entity(folder("waveforms", "1", f"Acceleration {1 + place // 4}/2"), channel) in found
+
+
+@settings(max_examples=200)
+@given(names=st.sets(st.text(min_size=1), min_size=2, max_size=2))
+def test_no_two_channels_share_a_path(names: set[str]) -> None:
+    paths = {channel_entity("/waveforms", Channel(name=name)) for name in names}
+    assert len(paths) == 2
+
+
+def test_an_empty_study_is_a_page_of_findings(tmp_path: Path) -> None:
+    path = write_rrd(Study(title="nothing", findings=("no channel",)), tmp_path / "empty.rrd")
+    assert "/findings" in Contents(path).entities()
+
+
+def test_without_geometry_there_is_no_deflection(tmp_path: Path) -> None:
+    path = write_rrd(replace(synthetic.study(), geometry=Geometry()), tmp_path / "plain.rrd")
+    assert not [entity for entity in Contents(path).entities() if entity.startswith("/deflection")]
+
+
+def test_a_response_that_nothing_excites_is_left_out(tmp_path: Path) -> None:
+    response = synthetic.frequency_response()
+    silent = replace(response, excited=np.zeros_like(response.excited))
+    path = write_rrd(replace(synthetic.study(), response=silent), tmp_path / "silent.rrd")
+    assert not [entity for entity in Contents(path).entities() if entity.startswith(("/magnitude", "/nyquist"))]
+
+
+def test_a_folder_that_is_not_there_is_told_and_nothing_is_left(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="folder"):
+        write_rrd(synthetic.study(), tmp_path / "missing" / "arm.rrd")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_old_file_survives_a_failure(tmp_path: Path) -> None:
+    path = tmp_path / "arm.rrd"
+    path.write_bytes(b"old")
+    broken = replace(synthetic.study(), title=7)  # type: ignore[arg-type]
+    with pytest.raises((TypeError, AttributeError, ValueError)):
+        write_rrd(broken, path)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
