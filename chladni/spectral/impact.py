@@ -23,7 +23,7 @@ from chladni.spectral.force_pulses import (
 WEAK_SHARE = 0.25
 # Widths of the pulse after the trigger during which the force window is one, and then falls to zero.
 FORCE_WINDOW_PULSES = 4
-# A softer blow lasts longer (Hertz: as its speed to the power of -1/5); what's much shorter than the first pulse is the
+# A softer blow lasts longer (Hertz: as its speed to the power of -1/5); what's much shorter than the first is the
 # ringing of an anti-alias filter.
 LIKE_THE_FIRST = 0.75
 # A response whose last tenth still holds this share of its energy has not died away: its record is cut off.

@@ -11,6 +11,7 @@ from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.impact import find_impacts, impact_cross_spectra, is_impact_test
+from tests.spectral.measured_logs import hammer
 
 RATE_HZ = 10_000.0
 FORCE = Channel(name="/hammer", unit="N", role="reference")
@@ -300,14 +301,7 @@ def test_other_excitations_are_no_impact_test():
 
 @pytest.fixture(scope="module")
 def measured(shared_data):
-    from mcap.reader import make_reader
-    from mcap_ros2.decoder import DecoderFactory
-
-    with (shared_data / "hammer.mcap").open("rb") as file:
-        reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        blocks = [np.reshape(message.samples, (2, -1)) for *_, message in reader.iter_decoded_messages()]
-    channels = (Channel(name="/daq.hammer", unit="N"), Channel(name="/daq.response", unit="m/s^2"))
-    return TimeSeries(values=np.concatenate(blocks, axis=1), sample_rate_hz=51_200.0, channels=channels)
+    return hammer(shared_data)
 
 
 def test_of_the_measured_hits_exactly_the_overload_and_the_double_hit_are_rejected(measured):
@@ -338,7 +332,7 @@ def test_h1_of_the_measured_hits_is_that_of_pyfrf(measured):
     spectra = impact_cross_spectra(measured, impacts, force_window=False)
     length = round(0.9 * 51_200)
     starts = [round((hit.time_s - impacts.pretrigger_s) * 51_200) for hit in impacts.accepted]
-    records = np.stack([measured.values[:, start : start + length] for start in starts])
+    records = np.stack([measured.values[:, start : start + length] for start in starts]).astype(float)
     peer = FRF(51_200, exc=records[:, :1], resp=records[:, 1:], window="none", fft_len=length)
     # Double precision sums over 46 000 samples; 0 Hz is left out since we take offsets off.
     np.testing.assert_allclose(h1(spectra)[1:], peer.get_FRF(frf_form="accelerance")[0, 0, 1:], rtol=1e-7)

@@ -1,0 +1,393 @@
+"""Named peaks of spectra and frequency responses: where, how high, how sure, on which channels."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.ndimage
+import scipy.special
+from numpy.typing import NDArray
+
+from chladni.signals.errors import EstimateError
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.peak import Peak
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.provenance import Provenance
+from chladni.spectral.leakage import leakage, line_correlation, named_window
+from chladni.spectral.windows import noise_bandwidth_bins
+
+# The floor around a line is the median of a tenth of the spectrum, of this many lines at least.
+FLOOR_SHARE = 0.1
+FLOOR_LINES = 51
+# Interpolation between lines is never better than this share of a line: windows and resonances are not parabolas.
+INTERPOLATION_LINES = 0.02
+# Estimates said to be exact still scatter by rounding and by the slow change of any machine.
+SMALLEST_RELATIVE_STD = 1e-3
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Curve:
+    """Power over frequency, of one function, with what is needed to judge a maximum of it."""
+
+    frequency_hz: Floats
+    power: Floats
+    relative_std: Floats
+    spacing_hz: float
+    first_hz: float
+    line_sampled: bool
+    window: Floats
+    tonal: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Found:
+    """A significant maximum of a curve; `over_floor` is its power over the local floor."""
+
+    frequency_hz: float
+    frequency_std_hz: float
+    power: float
+    relative_std: float
+    over_floor: float
+
+
+def find_peaks(
+    density: PowerSpectralDensity,
+    *,
+    count: int = 10,
+    min_prominence_db: float = 3.0,
+    false_alarm: float = 0.01,
+) -> tuple[Peak, ...]:
+    """Name the peaks of power spectral densities.
+
+    Parameters
+    ----------
+    density
+        Of one or more channels; peaks that several channels show within the resolution get one name.
+    count
+        Most peaks to give, at least 1.
+    min_prominence_db
+        How far a peak must stand above the higher of the valleys beside it.
+    false_alarm
+        Chance that the scatter of a peakless spectrum gives a channel any peak, 0 to 1.
+
+    Returns
+    -------
+    tuple of Peak
+        The highest first (channels of different units are ranked by height over the local floor). Heights are
+        densities; of a tone, what its line would show were the tone on it. For periodic excitation the spectrum
+        exists at its lines only: frequency and height are those of the line.
+
+    Raises
+    ------
+    EstimateError
+        When an argument is out of its range.
+
+    Notes
+    -----
+    A line is a peak when all of these hold, with nu = 2 (G/std)^2 degrees of freedom:
+
+    1. its power over the local floor (running median) exceeds chi^2(nu)/nu at `false_alarm` over the number of lines;
+    2. its ratio to the deepest line on either side, up to a higher peak, exceeds F(nu, nu) at `false_alarm` over the
+       number of pairs of lines that were compared to find it;
+    3. that ratio is `min_prominence_db` or more;
+    4. it lies above two noise bandwidths, where an offset or a trend leaks.
+
+    The frequency comes from the three highest lines by the window's own main lobe, when the peak is as narrow as
+    that; otherwise from a fit of 1/G = a + b f + c f^2 (a resonance near its top) to the lines above half the peak.
+
+    Examples
+    --------
+    >>> from chladni.signals.channel import Channel
+    >>> frequency_hz = np.arange(200.0)
+    >>> resonance = 1e-3 + 1 / ((1 - (frequency_hz / 80.3) ** 2) ** 2 + (0.05 * frequency_hz / 80.3) ** 2)
+    >>> psd = PowerSpectralDensity(
+    ...     frequency_hz=frequency_hz, values=resonance[None], std=0.1 * resonance[None], bandwidth_hz=1.5,
+    ...     channels=(Channel(name="a", unit="m/s^2"),), provenance=Provenance(window="hann"),
+    ... )
+    >>> [round(peak.frequency_hz, 1) for peak in find_peaks(psd)]
+    [80.2]
+    """
+    _require(count, false_alarm)
+    curves = [_density_curve(density, row) for row in range(len(density.channels))]
+    found = [_significant(curve, min_prominence_db, false_alarm) for curve in curves]
+    named = [
+        (peak, channel.name, unit)
+        for peaks, channel, unit in zip(found, density.channels, density.units, strict=True)
+        for peak in peaks
+    ]
+    resolution_hz = max((curve.spacing_hz for curve in curves), default=0.0)
+    return _merged(named, max(density.bandwidth_hz, resolution_hz), count)
+
+
+def find_response_peaks(
+    response: FrequencyResponse,
+    *,
+    count: int = 10,
+    min_prominence_db: float = 3.0,
+    false_alarm: float = 0.01,
+) -> tuple[Peak, ...]:
+    """Name the peaks of the magnitude of frequency responses, on lines that the references excite.
+
+    Parameters
+    ----------
+    response
+        Functions in any form.
+    count
+        Most peaks to give for each function, at least 1.
+    min_prominence_db, false_alarm
+        See `find_peaks`.
+
+    Returns
+    -------
+    tuple of Peak
+        The highest first; ``channels`` are the response and its reference. Heights are magnitudes.
+
+    Raises
+    ------
+    EstimateError
+        When an argument is out of its range.
+    """
+    _require(count, false_alarm)
+    peaks = []
+    for row, answer in enumerate(response.responses):
+        for column, reference in enumerate(response.references):
+            found = _significant(_response_curve(response, row, column), min_prominence_db, false_alarm)
+            found.sort(key=lambda peak: -peak.power)
+            unit, names = response.unit(row, column), (answer.name, reference.name)
+            peaks += [_peak(peak, unit, names, magnitude=True) for peak in found[:count]]
+    return tuple(sorted(peaks, key=lambda peak: -peak.height))
+
+
+def _density_curve(density: PowerSpectralDensity, row: int) -> _Curve:
+    power, std = density.values[row], density.std[row]
+    line_sampled = density.provenance.averaging == "periodic"
+    usable = np.isfinite(power) & (power > 0)
+    if line_sampled:
+        # A comb has lines only where the excitation has them; between them is scatter as large as its own std.
+        usable &= power > 4 * std
+    return _curve(
+        density.frequency_hz[usable],
+        power[usable],
+        std[usable] / power[usable],
+        provenance=density.provenance,
+        bandwidth_hz=density.bandwidth_hz,
+        tonal=True,
+    )
+
+
+def _response_curve(response: FrequencyResponse, row: int, column: int) -> _Curve:
+    magnitude, std = np.abs(response.values[row, column]), response.std[row, column]
+    usable = response.excited & np.isfinite(magnitude) & (magnitude > 0)
+    spacing_hz = _spacing(response.frequency_hz)
+    # A magnitude wrong by 1 % is a power wrong by 2 %.
+    return _curve(
+        response.frequency_hz[usable],
+        magnitude[usable] ** 2,
+        2 * std[usable] / magnitude[usable],
+        provenance=response.provenance,
+        bandwidth_hz=spacing_hz * noise_bandwidth_bins(named_window(response.provenance.window)),
+        tonal=False,
+    )
+
+
+def _curve(
+    frequency_hz: Floats,
+    power: Floats,
+    relative_std: Floats,
+    *,
+    provenance: Provenance,
+    bandwidth_hz: float,
+    tonal: bool,
+) -> _Curve:
+    line_sampled = provenance.averaging == "periodic"
+    # Whole periods don't leak, and a transient that has died away has no trend: only the offset itself is excluded.
+    first_hz = 0.0 if line_sampled or provenance.averaging == "impact" else 2 * bandwidth_hz
+    return _Curve(
+        frequency_hz=frequency_hz,
+        power=power,
+        relative_std=np.maximum(relative_std, SMALLEST_RELATIVE_STD),
+        spacing_hz=_spacing(frequency_hz),
+        first_hz=first_hz,
+        line_sampled=line_sampled,
+        window=named_window(provenance.window),
+        tonal=tonal,
+    )
+
+
+def _significant(curve: _Curve, min_prominence_db: float, false_alarm: float) -> list[_Found]:
+    """Every maximum of a curve that the scatter of its lines doesn't explain."""
+    power = curve.power
+    if power.size < 5:
+        return []
+    over_floor = power / _floor(curve)
+    freedom = 2 / curve.relative_std**2
+    # Half of the false alarms for each of the two tests.
+    chance = false_alarm / (2 * power.size)
+    loud = scipy.special.chdtrc(freedom, freedom * over_floor) <= chance
+    found = []
+    for line in np.flatnonzero(loud & _maxima(curve)):
+        valley = _valley(power, int(line))
+        ratio, pairs = power[line] / power[valley], abs(int(line) - valley)
+        surprise = scipy.special.fdtrc(freedom[line], freedom[valley], ratio)
+        if surprise * pairs <= chance and 10 * np.log10(ratio) >= min_prominence_db:
+            found.append(_located(curve, int(line), float(over_floor[line])))
+    return found
+
+
+def _maxima(curve: _Curve) -> NDArray[np.bool_]:
+    power, frequency_hz = curve.power, curve.frequency_hz
+    inner = (power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])
+    # Lines on the other side of a gap in the excitation are no neighbours.
+    near = np.diff(frequency_hz) < 4 * curve.spacing_hz
+    inner &= near[1:] & near[:-1] & (frequency_hz[1:-1] > curve.first_hz)
+    return np.concatenate([[False], inner, [False]])
+
+
+def _floor(curve: _Curve) -> Floats:
+    """Level that the lines around would have without peaks: their running median, freed of its bias."""
+    lines = min(max(FLOOR_LINES, int(FLOOR_SHARE * curve.power.size)), curve.power.size) | 1
+    median = scipy.ndimage.median_filter(curve.power, size=lines, mode="reflect")
+    freedom = 2 / curve.relative_std**2
+    return np.asarray(median * freedom / scipy.special.chdtri(freedom, 0.5), dtype=np.float64)
+
+
+def _valley(power: Floats, line: int) -> int:
+    """Deepest line between a peak and the next higher one, on the side where that is less deep."""
+    higher = np.flatnonzero(power > power[line])
+    left, right = higher[higher < line], higher[higher > line]
+    first = int(left[-1]) if left.size else 0
+    last = int(right[0]) if right.size else power.size - 1
+    before = first + int(np.argmin(power[first : line + 1]))
+    after = line + int(np.argmin(power[line : last + 1]))
+    return before if power[before] > power[after] else after
+
+
+def _located(curve: _Curve, line: int, over_floor: float) -> _Found:
+    """Frequency and height between the lines, as the kind of curve allows."""
+    frequency_hz, power = float(curve.frequency_hz[line]), float(curve.power[line])
+    relative_std = float(curve.relative_std[line])
+    if curve.line_sampled:
+        # Somewhere within the line: a uniform distribution over the spacing.
+        std_hz = curve.spacing_hz / np.sqrt(12)
+    else:
+        run = _above_half(curve, line)
+        narrow = run.size <= 2 * noise_bandwidth_bins(curve.window) + 1
+        frequency_hz, std_hz, power = _from_three(curve, line) if narrow else _from_resonance(curve, line, run)
+    return _Found(
+        frequency_hz=frequency_hz,
+        frequency_std_hz=float(np.hypot(std_hz, INTERPOLATION_LINES * curve.spacing_hz)),
+        power=power,
+        relative_std=relative_std,
+        over_floor=over_floor,
+    )
+
+
+def _above_half(curve: _Curve, line: int) -> NDArray[np.int64]:
+    """Lines around a peak that stay above half of it, seen through their scatter."""
+    # So many neighbours averaged scatter by a seventh, and a dip to half of the peak is no accident any more.
+    lines = min(int((7 * curve.relative_std[line]) ** 2), 8) // 2
+    start, stop = max(line - 64 * (lines + 1), 0), line + 64 * (lines + 1) + 1
+    smooth = scipy.ndimage.uniform_filter1d(curve.power[start:stop], 2 * lines + 1, mode="nearest")
+    at = line - start
+    low = np.flatnonzero(smooth < smooth[at] / 2)
+    left, right = low[low < at], low[low > at]
+    return start + np.arange(left[-1] + 1 if left.size else 0, right[0] if right.size else smooth.size)
+
+
+def _from_three(curve: _Curve, line: int) -> tuple[float, float, float]:
+    """Vertex of the parabola through the logarithms of three lines, mended by what the window makes of a tone."""
+    before, top, after = np.log(curve.power[line - 1 : line + 2])
+    bend = before - 2 * top + after
+    vertex = 0.5 * (before - after) / bend
+    # Each logarithm has the line's relative error.
+    spread = np.hypot(np.hypot(0.5 - vertex, 0.5 + vertex), 2 * vertex) / abs(bend)
+    std_hz = float(spread * curve.relative_std[line] * curve.spacing_hz)
+    if not curve.tonal:
+        height = np.exp(top - (before - after) ** 2 / (8 * bend))
+        return float(curve.frequency_hz[line] + vertex * curve.spacing_hz), std_hz, float(height)
+    offset, slope = _tone_offset(curve.window, float(vertex))
+    shown = leakage(curve.window, np.array([offset]))[0]
+    return curve.frequency_hz[line] + offset * curve.spacing_hz, slope * std_hz, float(curve.power[line] / shown)
+
+
+def _tone_offset(window: Floats, vertex: float) -> tuple[float, float]:
+    """Where between lines a tone lies whose three highest lines give this vertex of a parabola, and the slope."""
+    offsets = np.linspace(-0.5, 0.5, 41)
+    tiny = np.finfo(float).tiny
+    before, top, after = (np.log(leakage(window, offsets - line) + tiny) for line in (-1, 0, 1))
+    vertices = 0.5 * (before - after) / (before - 2 * top + after)
+    slope = np.interp(vertex, vertices, np.gradient(offsets, vertices))
+    return float(np.interp(vertex, vertices, offsets)), float(slope)
+
+
+def _from_resonance(curve: _Curve, line: int, run: NDArray[np.int64]) -> tuple[float, float, float]:
+    """Fit of 1/G by a parabola to the lines above half the peak.
+
+    Averaged spectra follow a gamma distribution, whose canonical link is 1/G: one step of scoring from a parabola in
+    log G (McCullagh & Nelder 1989, section 8.4) is the fit of 1/G without the bias that inverting noisy lines has.
+    """
+    x = (curve.frequency_hz[run] - curve.frequency_hz[line]) / curve.spacing_hz
+    power, relative_std = curve.power[run], float(np.median(curve.relative_std[run]))
+    basis = np.vander(x, 3, increasing=True)
+    expected = np.exp(basis @ np.linalg.lstsq(basis, np.log(power), rcond=None)[0])
+    weighted = basis * expected[:, np.newaxis]
+    target = expected * (1 / expected - (power - expected) / expected**2)
+    a, b, c = np.linalg.lstsq(weighted, target, rcond=None)[0]
+    top = -b / (2 * c) if c > 0 else np.nan
+    if not (x[0] <= top <= x[-1] and a + b * top / 2 > 0):
+        # No maximum inside: so flat and noisy a top lies anywhere above half of it.
+        return float(curve.frequency_hz[line]), float(np.ptp(x) * curve.spacing_hz / np.sqrt(12)), float(power.max())
+    covariance = np.linalg.inv(weighted.T @ weighted) * relative_std**2 * line_correlation(curve.window)
+    gradient = np.array([0.0, -1 / (2 * c), -top / c])
+    std = np.sqrt(gradient @ covariance @ gradient)
+    height = 1 / (a + b * top / 2)
+    return float(curve.frequency_hz[line] + top * curve.spacing_hz), float(std * curve.spacing_hz), float(height)
+
+
+def _merged(named: list[tuple[_Found, str, str]], resolution_hz: float, count: int) -> tuple[Peak, ...]:
+    """Gather peaks of several channels under one name, the strongest channel first."""
+    one_unit = len({unit for _, _, unit in named}) == 1
+
+    def strength(entry: tuple[_Found, str, str]) -> float:
+        return entry[0].power if one_unit else entry[0].over_floor
+
+    groups: list[list[tuple[_Found, str, str]]] = []
+    for entry in sorted(named, key=strength, reverse=True):
+        peak, channel, _ = entry
+        for group in groups:
+            first = group[0][0]
+            apart = abs(peak.frequency_hz - first.frequency_hz)
+            within = max(resolution_hz, 3 * float(np.hypot(peak.frequency_std_hz, first.frequency_std_hz)))
+            if apart <= within and channel not in {name for _, name, _ in group}:
+                group.append(entry)
+                break
+        else:
+            groups.append([entry])
+    peaks = [_peak(group[0][0], group[0][2], tuple(name for _, name, _ in group)) for group in groups]
+    return tuple(peaks[:count])
+
+
+def _peak(found: _Found, unit: str, channels: tuple[str, ...], *, magnitude: bool = False) -> Peak:
+    height, relative_std = found.power, found.relative_std
+    if magnitude:
+        height, relative_std = float(np.sqrt(height)), relative_std / 2
+    return Peak(
+        frequency_hz=float(found.frequency_hz),
+        frequency_std_hz=found.frequency_std_hz,
+        height=height,
+        height_std=height * relative_std,
+        unit=unit,
+        channels=channels,
+    )
+
+
+def _spacing(frequency_hz: Floats) -> float:
+    return float(np.median(np.diff(frequency_hz))) if frequency_hz.size > 1 else 0.0
+
+
+def _require(count: int, false_alarm: float) -> None:
+    if count < 1:
+        raise EstimateError(f"count is {count}; ask for at least one peak")
+    if not 0 < false_alarm < 1:
+        raise EstimateError(f"false_alarm is {false_alarm}; it must lie between 0 and 1")
