@@ -1,11 +1,11 @@
 """A channel: one measured quantity at one place in one direction."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, sqrt
 from typing import Literal, Self
 
-from chladni.signals.errors import SetupError
+from chladni.signals.errors import EstimateError, SetupError
 
 Role = Literal["response", "reference"]
 Vector = tuple[float, float, float]
@@ -50,6 +50,14 @@ class Channel:
     def with_name(self, name: str) -> Self:
         """Give the same channel under another name."""
         return replace(self, name=name)
+
+
+def find_channel(channels: Sequence[Channel], name: str, *, role: str = "channel") -> int:
+    """Row of the named channel; `EstimateError` naming those there are when it's missing."""
+    for row, channel in enumerate(channels):
+        if channel.name == name:
+            return row
+    raise EstimateError(f"no {role} {name!r}; {role}s: {', '.join(channel.name for channel in channels)}")
 
 
 def unit_direction(direction: str | Iterable[float]) -> Vector:

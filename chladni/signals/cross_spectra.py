@@ -7,8 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.channel import Channel
-from chladni.signals.errors import EstimateError
+from chladni.signals.channel import Channel, find_channel
 from chladni.signals.provenance import Provenance
 from chladni.signals.value import Value, require_frequency_axis, require_shape
 
@@ -64,7 +63,4 @@ class CrossSpectra(Value):
 
     def index(self, name: str) -> int:
         """Row of the named channel; `EstimateError` naming those there are when it's missing."""
-        for row, channel in enumerate(self.channels):
-            if channel.name == name:
-                return row
-        raise EstimateError(f"no channel {name!r}; channels: {', '.join(channel.name for channel in self.channels)}")
+        return find_channel(self.channels, name)

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.channel import Channel
-from chladni.signals.errors import EstimateError
+from chladni.signals.channel import Channel, find_channel
 from chladni.signals.provenance import Provenance
 from chladni.signals.units import quotient
 from chladni.signals.value import Value, require_frequency_axis, require_shape
@@ -61,11 +60,7 @@ class FrequencyResponse(Value):
 
     def function(self, response: str, reference: str) -> tuple[int, int]:
         """Indices of the function between two named channels; `EstimateError` when it isn't there."""
-        return _find(self.responses, response, "response"), _find(self.references, reference, "reference")
-
-
-def _find(channels: tuple[Channel, ...], name: str, role: str) -> int:
-    for row, channel in enumerate(channels):
-        if channel.name == name:
-            return row
-    raise EstimateError(f"no {role} {name!r}; {role}s: {', '.join(channel.name for channel in channels)}")
+        return (
+            find_channel(self.responses, response, role="response"),
+            find_channel(self.references, reference, role="reference"),
+        )

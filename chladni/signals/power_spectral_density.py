@@ -1,11 +1,13 @@
 """Power spectral densities of channels, each with its random error."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.channel import Channel
+from chladni.signals.channel import Channel, find_channel
 from chladni.signals.provenance import Provenance
 from chladni.signals.units import power_density_unit
 from chladni.signals.value import Value, require_frequency_axis, require_shape
@@ -50,3 +52,13 @@ class PowerSpectralDensity(Value):
     def units(self) -> tuple[str, ...]:
         """Unit of each row, such as ``(m/s^2)^2/Hz``."""
         return tuple(power_density_unit(channel.unit) for channel in self.channels)
+
+    def select(self, names: Sequence[str]) -> Self:
+        """Give the densities of the named channels; `EstimateError` naming those there are when one is missing."""
+        rows = [find_channel(self.channels, name) for name in names]
+        return replace(
+            self,
+            values=self.values[rows],
+            std=self.std[rows],
+            channels=tuple(self.channels[row] for row in rows),
+        )

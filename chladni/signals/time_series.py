@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.channel import Channel
+from chladni.signals.channel import Channel, find_channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value, require_shape
 
@@ -93,10 +93,7 @@ class TimeSeries(Value):
 
     def index(self, name: str) -> int:
         """Row of the named channel; `EstimateError` naming the channels there are when it's missing."""
-        for row, channel in enumerate(self.channels):
-            if channel.name == name:
-                return row
-        raise EstimateError(f"no channel {name!r}; channels: {', '.join(channel.name for channel in self.channels)}")
+        return find_channel(self.channels, name)
 
     def select(self, names: Sequence[str]) -> Self:
         """Give the named channels, in the order asked for."""
