@@ -59,6 +59,7 @@ class _SchemaReader:
     def __init__(self, name: str, root: object) -> None:
         self.name = name
         self.root = root
+        self.done: dict[str, FieldType | None] = {}
 
     def type_of(self, schema: object, depth: int) -> FieldType | None:
         """Type that a part of the schema describes; None where it doesn't say."""
@@ -67,7 +68,7 @@ class _SchemaReader:
         if not isinstance(schema, dict):
             return None
         if isinstance(schema.get("$ref"), str):
-            return self.type_of(self._referred(schema["$ref"]), depth + 1)
+            return self._referred_type(schema["$ref"], depth)
         kind = _first_type(schema)
         if kind == "array":
             element = self.type_of(schema.get("items"), depth + 1)
@@ -85,11 +86,17 @@ class _SchemaReader:
             return DURATION if schema.get("title") == "duration" else TIME
         return _record(self.name, members)
 
+    def _referred_type(self, reference: str, depth: int) -> FieldType | None:
+        # Each part is read once: one that refers to the next one twice, and so on, would otherwise take 2**n steps.
+        if reference not in self.done:
+            self.done[reference] = self.type_of(self._referred(reference), depth + 1)
+        return self.done[reference]
+
     def _referred(self, reference: str) -> object:
         if not reference.startswith("#"):
             return None  # other documents aren't in the log
         place = self.root
-        for name in reference.lstrip("#").strip("/").split("/"):
+        for name in filter(None, reference.lstrip("#").split("/")):
             key = name.replace("~1", "/").replace("~0", "~")
             place = place.get(key) if isinstance(place, dict) else None
         return place

@@ -1,0 +1,273 @@
+"""JSON messages to columns: the same rules on the fast path and message by message, against `json.loads`."""
+
+import json
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+
+from chladni.io.decoding import json_messages as module
+from chladni.io.decoding import make_decoder
+from chladni.signals.errors import LogError
+from tests.io.decoding.encoded import batch_of, decode_all, values_of
+
+SCHEMA = {
+    "type": "object",
+    "properties": {
+        "timestamp": {"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}},
+        "value": {"type": "number"},
+        "count": {"type": ["null", "integer"]},
+        "on": {"type": "boolean"},
+        "name": {"type": "string"},
+        "pose": {"$ref": "#/$defs/vector"},
+        "samples": {"type": "array", "items": {"type": "number"}},
+        "points": {"type": "array", "items": {"$ref": "#/$defs/vector"}},
+    },
+    "$defs": {"vector": {"type": "object", "properties": {"x": {"type": "number"}, "y.z": {"type": "number"}}}},
+}
+
+
+def decoder_of(schema: object = SCHEMA):
+    data = b"" if schema is None else json.dumps(schema).encode()
+    encoding = "" if schema is None else "jsonschema"
+    return make_decoder(message_encoding="json", schema_name="demo", schema_encoding=encoding, schema_data=data)
+
+
+def message(index: int) -> dict[str, object]:
+    return {
+        "timestamp": {"sec": 1_700_000_000 + index, "nsec": 5},
+        "value": 0.1 * index,
+        "count": index,
+        "on": index % 2 == 0,
+        "name": f"sensor é {index % 3}",
+        "pose": {"x": 1e-300 * index, "y.z": -0.5},
+        "samples": [0.5] * (index % 3),
+        "points": [{"x": 1.0, "y.z": float(index)}] * 2,
+    }
+
+
+@pytest.fixture(params=["arrow", "one by one"])
+def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Both ways through the decoder; the results must not tell which was taken."""
+    limit = 2 if request.param == "arrow" else 10**9
+    monkeypatch.setattr(module, "FEW_MESSAGES", limit)
+    monkeypatch.setattr(module, "SMALLEST_SPLIT", limit)
+    return request.param
+
+
+def test_the_schema_tells_the_fields() -> None:
+    fields = {info.path: info for info in decoder_of().fields}
+    assert list(fields) == [
+        "timestamp", "value", "count", "on", "name", "pose.x", "pose.y.z", "samples", "points[].x", "points[].y.z",
+    ]  # fmt: skip
+    assert fields["timestamp"].kind == "time"
+    assert fields["value"].dtype == np.float64
+    assert fields["count"].dtype == np.int64
+    assert fields["on"].kind == "bool"
+    assert fields["samples"].array == "dynamic"
+
+
+def test_without_a_schema_the_first_messages_tell_the_fields() -> None:
+    first = [json.dumps({**message(index), "value": index, "empty": [], "none": None}).encode() for index in range(3)]
+    decoder = decoder_of(None)
+    assert decoder.fields == ()
+    informed = decoder.informed_by(batch_of([b"broken", *first]))
+    kinds = {info.path: (info.kind, info.dtype) for info in informed.fields}
+    assert kinds["timestamp"] == ("time", np.int64)
+    assert kinds["value"] == ("number", np.float64), "a later message may hold a fraction"
+    assert kinds["points[].x"] == ("number", np.float64)
+    assert "empty" not in kinds
+    assert informed.informed_by(batch_of([])) is informed
+    with pytest.raises(LogError, match="no field 'value'"):
+        decoder.columns(batch_of(first), ["value"])
+
+
+@pytest.mark.parametrize("gaps", [(31,), (31, 7), (0,)])
+def test_every_kind_of_field_is_read(way: str, gaps: tuple[int, ...]) -> None:
+    messages = [message(index) for index in range(20)]
+    encoded = batch_of([json.dumps(one, ensure_ascii=False).encode() for one in messages], gaps=gaps)
+    decoder = decoder_of()
+    for chosen in (decoder.fields, [info for info in decoder.fields if "[]" not in info.path]):
+        decoded = decoder.columns(encoded, [info.path for info in chosen])
+        assert not decoded.bad.any()
+        assert values_of(decoded, "timestamp") == [(1_700_000_000 + i) * 10**9 + 5 for i in range(20)]
+        assert values_of(decoded, "value") == [0.1 * i for i in range(20)]
+        assert values_of(decoded, "count") == list(range(20))
+        assert values_of(decoded, "on") == [i % 2 == 0 for i in range(20)]
+        assert values_of(decoded, "name") == [f"sensor é {i % 3}" for i in range(20)]
+        assert len(decoded.columns["name"].strings.table) == 3
+        assert values_of(decoded, "pose.y.z") == [-0.5] * 20
+        assert values_of(decoded, "samples") == [[0.5] * (i % 3) for i in range(20)]
+    assert values_of(decode_all(decoder, encoded), "points[].y.z") == [[float(i)] * 2 for i in range(20)]
+
+
+BAD_VALUES = [
+    b"{}", b'{"value": null}', b'{"value": "5"}', b'{"value": true}', b'{"value": NaN}', b'{"value": Infinity}',
+    b'{"value": 1e400}', b'{"value": ' + b"1" * 400 + b"}", b'{"value": [1]}', b'{"value": {"x": 1}}',
+    b'{"value": 1', b"", b"7", b"[1]", b'{"value": 01}', b'{"value": 1.}', b'{"value": 1,}', b'{"value": 1} x',
+    b'{"value": 1}{"value": 2}', b'{"value": 1}\n{"value": 2}', b'{"value": 1}\x00}', b'{"value": 1, "w": "\xff"}',
+    b'{"value": 1, "w": "a\nb"}', b"\xff\xfe{\x00}\x00", b'\xef\xbb\xbf{"value": 1}',
+    b'{"value": 1, "w": ' + b"[" * 200_000 + b"]" * 200_001 + b"}",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("bad", BAD_VALUES, ids=range(len(BAD_VALUES)))
+def test_a_bad_message_is_marked_and_its_neighbours_are_read(way: str, bad: bytes) -> None:
+    good = [json.dumps({"value": index}).encode() for index in range(6)]
+    decoded = decoder_of().columns(batch_of([*good[:3], bad, *good[3:]], gaps=(31,)), ["value"])
+    assert decoded.bad.tolist() == [False] * 3 + [True] + [False] * 3
+    assert decoded.columns["value"].numbers[~decoded.bad].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    assert sum(decoded.reasons.values()) == 1
+
+
+def test_messages_that_together_look_like_others_are_not_mistaken(way: str) -> None:
+    # One message with two objects and one with none would keep the count of objects right.
+    messages = [b'{"value": 1}{"value": 2}', b" ", b'{"value": 3}']
+    decoded = decoder_of().columns(batch_of(messages), ["value"])
+    assert decoded.bad.tolist() == [True, True, False]
+    assert decoded.columns["value"].numbers[2] == 3.0
+
+
+@pytest.mark.parametrize(
+    ("field", "text"),
+    [
+        ("timestamp", '{"sec": 1, "nsec": 2, "nanosec": 3}'), ("timestamp", '{"sec": 1.5, "nsec": 2}'),
+        ("timestamp", '{"sec": 1}'), ("timestamp", '{"nsec": 1}'), ("timestamp", '{"sec": 10000000000, "nsec": 1}'),
+        ("timestamp", "7"), ("count", "1.5"), ("count", "9223372036854775808"), ("count", "1e400"),
+        ("on", "1"), ("name", '"\\ud800"'), ("name", "5"), ("samples", "[1, null]"), ("samples", "5"),
+        ("samples", '["a"]'), ("points[].x", "[{}]"), ("points[].x", "{}"), ("pose.x", "5"),
+        ("samples", "[1, NaN]"), ("samples", "[[1]]"),
+    ],
+)  # fmt: skip
+def test_values_of_another_type_make_the_message_bad(way: str, field: str, text: str) -> None:
+    name = field.partition(".")[0].removesuffix("[]")
+    good = json.dumps(message(4)).encode()
+    bad = json.dumps({**message(4), name: "HERE"}).replace('"HERE"', text).encode()
+    decoded = decoder_of().columns(batch_of([good, bad, good]), [field])
+    assert decoded.bad.tolist() == [False, True, False], decoded.reasons
+
+
+def test_unusual_but_sound_messages_are_read(way: str) -> None:
+    messages = [
+        b'{"value": 1, "w": NaN}', b'{"value": 9, "value": 2}', b'\r\n {"value":\n3}\n\t', b'{"\\u0076alue": 4e0}',
+        b'{"value": 9007199254740993}', b'{"w": {"value": 7}, "value": -0}',
+    ]  # fmt: skip
+    decoded = decoder_of().columns(batch_of(messages), ["value"])
+    assert not decoded.bad.any(), decoded.reasons
+    assert decoded.columns["value"].numbers.tolist() == [1.0, 2.0, 3.0, 4.0, 9007199254740992.0, 0.0]
+
+
+def test_both_names_of_nanoseconds_are_known(way: str) -> None:
+    one = b'{"timestamp": {"sec": 2, "nanosec": 7}}'
+    assert values_of(decoder_of().columns(batch_of([one] * 3), ["timestamp"]), "timestamp") == [2_000_000_007] * 3
+    mixed = [one, b'{"timestamp": {"sec": 2, "nsec": 8}}', one]
+    decoded = decoder_of().columns(batch_of(mixed), ["timestamp"])
+    assert values_of(decoded, "timestamp") == [2_000_000_007, 2_000_000_008, 2_000_000_007]
+
+
+def test_a_whole_float_is_an_integer(way: str) -> None:
+    decoded = decoder_of().columns(batch_of([b'{"count": 5.0}', b'{"count": 7}']), ["count"])
+    assert values_of(decoded, "count") == [5, 7]
+
+
+def test_messages_outside_the_buffer_are_marked(way: str) -> None:
+    encoded = batch_of([b'{"value": 1}'] * 3)
+    encoded.offsets[1] = 10**15
+    decoded = decoder_of().columns(encoded, ["value"])
+    assert decoded.bad.tolist() == [False, True, False]
+
+
+def test_no_messages_give_no_values(way: str) -> None:
+    decoded = decode_all(decoder_of(), batch_of([]))
+    assert values_of(decoded, "value") == []
+    assert values_of(decoded, "name") == []
+
+
+@given(values=st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=3, max_size=30))
+@settings(max_examples=40, deadline=None)
+def test_floats_are_rounded_as_json_rounds_them(values: list[float]) -> None:
+    texts = [text for value in values for text in (repr(value), f"{value:.25e}", f"{value:.17g}")]
+    messages = [b'{"value": ' + text.encode() + b"}" for text in texts]
+    expected = np.array([json.loads(one)["value"] for one in messages], np.float64)
+    span = module._span(batch_of(messages), np.arange(len(messages)))
+    (found,) = module.read_by_arrow(span, [decoder_of()._leaves["value"]]) or [None]
+    if not np.isfinite(expected).all():
+        assert found is None  # a number beyond the largest double
+        return
+    assert found.values.tobytes() == expected.tobytes() or (found.values == expected).all()
+
+
+@given(
+    content=st.lists(st.binary(max_size=12), min_size=3, max_size=8),
+    at=st.integers(0, 200),
+    cut=st.integers(0, 12),
+)
+@settings(max_examples=80, deadline=None)
+def test_damaged_bytes_give_what_the_rules_give(content: list[bytes], at: int, cut: int) -> None:
+    messages = [json.dumps({"value": index, "samples": [index] * 2}).encode() for index in range(len(content))]
+    damaged = []
+    for one, junk in zip(messages, content, strict=True):
+        place = at % len(one)
+        damaged.append(one[:place] + junk + one[place + cut :])
+    block = module._Block([decoder_of()._leaves[path] for path in ("value", "samples")])
+    block._one_by_one(damaged)
+    span = module._span(batch_of(damaged), np.arange(len(damaged)))
+    found = module.read_by_arrow(span, block.leaves)
+    if found is None:
+        return
+    assert not block.bad[0].any(), "the fast path may refuse more than the rules, never less"
+    for fast, slow in zip(found, (column[0] for column in block.found), strict=True):
+        assert np.array_equal(fast.values, slow.values)
+
+
+@pytest.mark.parametrize(
+    ("schema", "told"),
+    [
+        (b"{", "isn't readable JSON"),
+        (b"\xff", "isn't readable JSON"),
+        (b"[" * 100_000, "isn't readable JSON"),
+        (json.dumps({"type": "object", "properties": {"a": {"$ref": "#"}}}).encode(), "in a circle"),
+    ],
+)
+def test_malformed_schemas_are_refused(schema: bytes, told: str) -> None:
+    with pytest.raises(LogError, match=told):
+        make_decoder(message_encoding="json", schema_name="d", schema_encoding="jsonschema", schema_data=schema)
+
+
+def test_parts_that_refer_to_the_next_one_twice_are_refused_in_time() -> None:
+    parts = {f"p{n}": {"properties": {k: {"$ref": f"#/$defs/p{n + 1}"} for k in "ab"}} for n in range(25)}
+    schema = {"$defs": {**parts, "p25": {"type": "number"}}, "$ref": "#/$defs/p0"}
+    with pytest.raises(LogError, match="more than"):
+        decoder_of(schema)
+
+
+@pytest.mark.parametrize("schema", [{}, {"type": "object"}, {"properties": {"a": {}}}, True, {"$ref": "other.json"}])
+def test_schemas_that_tell_nothing_leave_it_to_the_messages(schema: object) -> None:
+    decoder = decoder_of(schema)
+    assert decoder.fields == ()
+    informed = decoder.informed_by(batch_of([b'{"a": [1]}']))
+    assert [(info.path, info.array) for info in informed.fields] == [("a", "dynamic")]
+
+
+def test_a_list_of_unknown_things_is_no_field() -> None:
+    parts = {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}
+    schema = {"properties": {"a": {"type": "array"}, "b": {"title": "duration", "properties": parts}}}
+    assert [(info.path, info.kind) for info in decoder_of(schema).fields] == [("b", "duration")]
+
+
+@pytest.mark.parametrize(("file", "topic"), [("silverbox.mcap", "/input"), ("json_plc.mcap", "/eip/level")])
+def test_measured_logs_read_as_json_reads_them(shared_data: Path, file: str, topic: str) -> None:
+    with (shared_data / file).open("rb") as stream:
+        first = islice(make_reader(stream).iter_messages(topics=[topic]), 4000)
+        schemas, messages = zip(*((schema, record.data) for schema, _, record in first), strict=True)
+    schema = schemas[0]
+    decoder = make_decoder(
+        message_encoding="json", schema_name=schema.name, schema_encoding=schema.encoding, schema_data=schema.data
+    )
+    decoded = decoder.columns(batch_of(messages), ["value"])
+    assert not decoded.bad.any()
+    assert decoded.columns["value"].numbers.tolist() == [json.loads(one)["value"] for one in messages]
