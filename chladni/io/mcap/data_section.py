@@ -20,6 +20,7 @@ from chladni.io.mcap.records import (
     CHUNK_HEADER_BYTES,
     DATA_END_BYTES,
     INDEX_ENTRY,
+    KNOWN_COMPRESSIONS,
     MAGIC,
     MESSAGE_FIELDS_BYTES,
     PREFIX_BYTES,
@@ -152,7 +153,7 @@ class DataSection:
         if position + PREFIX_BYTES > self._end.data_end or len(prefix) < PREFIX_BYTES:
             return None, self._broken(position, "the data ends within a record's first bytes", "record")
         opcode, length = RECORD_PREFIX.unpack(prefix)
-        if opcode == Opcode.CHUNK or listed is not None:
+        if opcode == Opcode.CHUNK or listed is not None or self._is_disguised_chunk(position, opcode):
             return self._chunk(position, listed)
         if opcode == 0:
             return None, self._zeros(position)
@@ -163,9 +164,32 @@ class DataSection:
             return None, self._data_end(position)
         if opcode == Opcode.FOOTER:
             return None, self._broken(position, "a footer lies within the data", "Footer")
+        if opcode == Opcode.MESSAGE_INDEX:
+            return None, self._orphan_index(position, end)
         if opcode in _SINGLE:
             return None, end
         return self._bare(position, opcode, end)
+
+    def _is_disguised_chunk(self, position: int, opcode: int) -> bool:
+        """Tell whether all but the opcode makes this record a chunk; else a wrong bit there would hide it."""
+        start = self._window.read(position, CHUNK_HEADER_BYTES)
+        try:
+            header = parse_chunk_header(bytes([Opcode.CHUNK]) + start[1:], offset=position)
+        except MalformedRecordError:
+            return False
+        # Where only the checksum can prove it, there has to be one.
+        if header.uncompressed_crc == 0 or header.compression not in KNOWN_COMPRESSIONS:
+            return False
+        what = f"a chunk has the opcode of a {record_name(opcode)}; it is read as chunk"
+        self._damage.add(what, offset=position, record="Chunk", lost_messages=0)
+        return True
+
+    def _orphan_index(self, position: int, end: int) -> int:
+        fields_bytes = PREFIX_BYTES + 6
+        lost = max(end - position - fields_bytes, 0) // INDEX_ENTRY.itemsize
+        what = "a message index without a chunk before it"
+        self._damage.add(what, offset=position, record="MessageIndex", lost_messages=lost)
+        return end
 
     def _read_along(self, listed: ChunkIndex) -> None:
         """Read a chunk, its indexes and the next header in one go: many small reads cost more than bytes."""
@@ -240,7 +264,7 @@ class DataSection:
 
     def _chunk_header(self, position: int, listed: ChunkIndex | None) -> ChunkHeader | None:
         """Parse the chunk's header; where it is damaged, the summary's entry replaces it."""
-        start = self._window.read(position, CHUNK_HEADER_BYTES)
+        start = bytes([Opcode.CHUNK]) + self._window.read(position + 1, CHUNK_HEADER_BYTES - 1)
         try:
             own = parse_chunk_header(start, offset=position)
         except MalformedRecordError:

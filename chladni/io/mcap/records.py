@@ -17,6 +17,7 @@ PREFIX_BYTES = RECORD_PREFIX.size
 FOOTER_BYTES = PREFIX_BYTES + 20
 DATA_END_BYTES = PREFIX_BYTES + 4
 MESSAGE_FIELDS_BYTES = 22
+KNOWN_COMPRESSIONS = frozenset(["", "lz4", "zstd"])
 LONGEST_COMPRESSION_NAME = 64
 # Prefix, start and end time, uncompressed size and checksum, length of the compression's name.
 _CHUNK_START = struct.Struct("<BQQQQII")
