@@ -16,6 +16,7 @@ from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.spectral.averaging import PeakHold, SegmentAverage, WeightedSum
+from chladni.spectral.held_samples import HeldSamples
 from chladni.spectral.segment_spectra import segment_spectra
 from chladni.spectral.segmentation import Segmentation
 from chladni.spectral.stretches import Stretch, valid_runs
@@ -97,13 +98,13 @@ class CrossSpectraAccumulator:
         self.count = EffectiveAverages(self._window, segmentation.hop, decay)
         self.stretch = Stretch(segmentation)
         # Samples of the unbroken run that later segments still need, and the number its next segment has in the run.
-        self._held: NDArray[np.floating[Any]] = np.empty((len(self.channels), 0))
+        self._held = HeldSamples()
         self._position = 0
 
     @property
     def averages(self) -> int:
         """Segments averaged so far."""
-        return self.count.segments + self.segmentation.count(self._held.shape[1])
+        return self.count.segments + self.segmentation.count(self._held.samples)
 
     def update(self, block: TimeSeries) -> None:
         """Take in the next block.
@@ -175,18 +176,19 @@ class CrossSpectraAccumulator:
         # grouped in the same way however the blocks are cut, and the result is the same to the last bit.
         batch = self._segments_together()
         step, length = batch * self.segmentation.hop, self.segmentation.length_of(batch)
-        while self._held.shape[1] and self._held.shape[1] + values.shape[1] >= length:
-            missing = max(0, length - self._held.shape[1])
-            self._average_batch(np.concatenate([self._held, values[:, :missing]], axis=1), executor)
-            used = step - self._held.shape[1]
-            self._held = self._held[:, step:]
-            if used >= 0:
-                values = values[:, used:]
-        if self._held.shape[1] == 0:
+        while self._held.samples and self._held.samples + values.shape[1] >= length:
+            missing = max(0, length - self._held.samples)
+            joined = self._held.joined(values[:, :missing])
+            self._average_batch(joined[:, :length], executor)
+            # What the next batch needs starts in what was held, or beyond it in the new samples.
+            used = step - self._held.samples
+            self._held.replace(joined[:, step : joined.shape[1] - missing] if used < 0 else joined[:, :0])
+            values = values[:, max(used, 0) :]
+        if not self._held.samples:
             while values.shape[1] >= length:
                 self._average_batch(values[:, :length], executor)
                 values = values[:, step:]
-        self._held = np.concatenate([self._held, values], axis=1)
+        self._held.append(values)
 
     def _average_batch(self, values: NDArray[np.floating[Any]], executor: Executor | None) -> None:
         self.average.add(segment_spectra(values, self.segmentation, self._window, executor), executor)
@@ -196,14 +198,15 @@ class CrossSpectraAccumulator:
 
     def average_held(self, executor: Executor | None = None) -> None:
         """Average now the whole segments that wait for their batch to fill."""
-        count = self.segmentation.count(self._held.shape[1])
+        count = self.segmentation.count(self._held.samples)
         if count:
-            self._average_batch(self._held[:, : self.segmentation.length_of(count)], executor)
-            self._held = self._held[:, count * self.segmentation.hop :]
+            joined = self._held.joined()
+            self._average_batch(joined[:, : self.segmentation.length_of(count)], executor)
+            self._held.replace(joined[:, count * self.segmentation.hop :])
 
     def _end_run(self, executor: Executor) -> None:
         self.average_held(executor)
-        self._held, self._position = self._held[:, :0], 0
+        self._held, self._position = HeldSamples(), 0
 
     def _segments_together(self) -> int:
         bytes_each = 16 * len(self.channels) * (self.segmentation.samples // 2 + 1)
@@ -213,7 +216,11 @@ class CrossSpectraAccumulator:
         """Give an independent copy in which every whole segment has been averaged."""
         twin = type(self).__new__(type(self))
         twin.__dict__.update(
-            self.__dict__, average=self.average.copy(), count=self.count.copy(), stretch=self.stretch.copy()
+            self.__dict__,
+            average=self.average.copy(),
+            count=self.count.copy(),
+            stretch=self.stretch.copy(),
+            _held=self._held.copy(),
         )
         twin.average_held(executor)
         return twin
