@@ -16,7 +16,7 @@ class Peak:
     unit
         Unit of the height.
     channels
-        Names of the channels that show it, the strongest first; for a frequency response, the response and its reference.
+        Names of the channels that show it, the strongest first; for a frequency response, response and reference.
     """
 
     frequency_hz: float

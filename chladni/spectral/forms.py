@@ -29,7 +29,7 @@ def form(response: FrequencyResponse) -> Form:
     Notes
     -----
     Acceleration per force is accelerance, velocity per force mobility, displacement per force receptance
-    (ISO 7626-1:2011, 3.1); rotations follow their time derivative in the same way.
+    (ISO 7626-1:2011); rotations follow their time derivative in the same way.
     """
     orders = {_motion_order(channel) for channel in response.responses}
     if len(orders) != 1:
@@ -61,7 +61,7 @@ def convert_form(response: FrequencyResponse, form: Form) -> FrequencyResponse:
 
     Notes
     -----
-    v = j omega x, a = j omega v for x(t) = X e^{+j omega t} (ISO 7626-1:2011, annex A).
+    v = j omega x, a = j omega v for x(t) = X e^{+j omega t} (ISO 7626-1:2011).
     """
     if form not in get_args(Form):
         raise EstimateError(f"form {form!r} is none of {', '.join(get_args(Form))}")

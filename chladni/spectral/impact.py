@@ -224,8 +224,8 @@ def impact_cross_spectra(
 
     Notes
     -----
-    G_ij = 2/(M T) sum over hits of conj(X_i) X_j with X the Fourier integral of the record (Bendat & Piersol 2010,
-    section 12.3; windows after Fladung & Brown, IMAC 1993, and Halvorsen & Brown 1977).
+    G_ij = 2/(M T) sum over hits of conj(X_i) X_j with X the Fourier integral of the record. Windows after Halvorsen &
+    Brown (1977), the correction of damping after Fladung & Rost (1997).
     """
     if not impacts.accepted:
         reasons = "; ".join(f"record {r.record}: {r.reason}" for r in impacts.rejected) or "no hit was found"

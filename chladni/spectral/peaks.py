@@ -325,7 +325,7 @@ def _from_resonance(curve: _Curve, line: int, run: NDArray[np.int64]) -> tuple[f
     """Fit of 1/G by a parabola to the lines above half the peak.
 
     Averaged spectra follow a gamma distribution, whose canonical link is 1/G: one step of scoring from a parabola in
-    log G (McCullagh & Nelder 1989, section 8.4) is the fit of 1/G without the bias that inverting noisy lines has.
+    log G (McCullagh & Nelder 1989, chapter 8) is the fit of 1/G without the bias that inverting noisy lines has.
     """
     x = (curve.frequency_hz[run] - curve.frequency_hz[line]) / curve.spacing_hz
     power, relative_std = curve.power[run], float(np.median(curve.relative_std[run]))

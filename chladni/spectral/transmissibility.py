@@ -1,0 +1,83 @@
+"""Transmissibility: the motion of one point over the motion of another."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.errors import EstimateError
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.spectral.frequency_response import frequency_response
+
+
+def transmissibility(
+    spectra: CrossSpectra, *, reference: str, responses: str | Sequence[str] | None = None
+) -> FrequencyResponse:
+    """Estimate how motion passes from one point to others, T = response/reference.
+
+    Parameters
+    ----------
+    spectra
+        Averaged cross-spectra that hold the motions.
+    reference
+        Name of the channel at the point where the motion comes from.
+    responses
+        Names of the channels it goes to; None takes every other channel in the reference's unit.
+
+    Returns
+    -------
+    FrequencyResponse
+        Estimator ``T1``, in unit 1, with one sigma and coherence as for H1. Where the coherence is below 1 for want
+        of a single path of excitation, T depends on where the structure is excited; noise at the reference makes it
+        too small.
+
+    Raises
+    ------
+    EstimateError
+        When a channel is missing, or units differ: their ratio is no transmissibility.
+
+    Notes
+    -----
+    T1 = G_ref,resp / G_ref,ref: H1 with a motion as its reference, and with the random error of H1.
+    """
+    unit = spectra.channels[spectra.index(reference)].unit
+    if responses is None:
+        chosen = [c.name for c in spectra.channels if c.unit == unit and c.name != reference]
+    else:
+        chosen = [responses] if isinstance(responses, str) else list(responses)
+    if not chosen:
+        raise EstimateError(f"no channel but {reference!r} is in {unit}; transmissibility needs two in one unit")
+    for name in chosen:
+        other = spectra.channels[spectra.index(name)].unit
+        if other != unit:
+            raise EstimateError(
+                f"{name!r} is in {other}, {reference!r} in {unit}: transmissibility needs one unit; "
+                "integrate or differentiate one of them, or ask for a frequency response"
+            )
+    response = frequency_response(spectra, references=reference, responses=chosen)
+    return replace(response, provenance=response.provenance.with_estimator("T1"))
+
+
+def transmissibility_along(spectra: CrossSpectra, *, path: Sequence[str]) -> tuple[FrequencyResponse, ...]:
+    """Estimate how motion passes from each point of a path to the next.
+
+    Parameters
+    ----------
+    spectra
+        Averaged cross-spectra that hold the motions.
+    path
+        Names of two or more channels, from the source outwards, such as base, column, arm, wrist.
+
+    Returns
+    -------
+    tuple of FrequencyResponse
+        One a step, each as `transmissibility` gives it.
+
+    Raises
+    ------
+    EstimateError
+        When the path has less than two channels, and as for `transmissibility`.
+    """
+    if len(path) < 2:
+        raise EstimateError(f"a path needs two channels or more, got {len(path)}")
+    return tuple(transmissibility(spectra, reference=near, responses=far) for near, far in pairwise(path))
