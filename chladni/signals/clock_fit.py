@@ -1,0 +1,127 @@
+"""Fit of a sampling clock: the period as the slope of time over index, and how the clock departs from it.
+
+Each stretch between gaps has an intercept of its own, because a source that paused rarely resumes on the old grid.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from chladni.signals.sample_count import WINDOW, Count, Floats, Ints, robust_std
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Clock:
+    """The straight line through time over index.
+
+    Attributes
+    ----------
+    period_ns, period_std_ns
+        Slope and one sigma of it, with the correlation of the scatter over time; infinite when nothing bounds it.
+    start_ns
+        Time of index 0, since the first stamp.
+    shift
+        ``[stretch]`` what to add to a stretch's indices so that all share one grid, 0 for the first, rising.
+    residual_ns
+        ``[item]`` time off the line of the item's own stretch.
+    """
+
+    period_ns: float
+    period_std_ns: float
+    start_ns: float
+    shift: Ints
+    residual_ns: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Wander:
+    """How a clock departs from its straight line.
+
+    Attributes
+    ----------
+    jitter_ns
+        Root mean square of the stamps about the slow wander.
+    span_ns
+        Peak to peak of the slow wander, means of windows; 0 when it doesn't stand out of the jitter.
+    line_ns
+        ``[item]`` where each item would be without jitter.
+    pieces
+        First item of each piece over which `line_ns` is straight.
+    """
+
+    jitter_ns: float
+    span_ns: float
+    line_ns: Floats
+    pieces: Ints
+
+
+def fit_clock(count: Count, period_ns: float) -> Clock:
+    """Fit time = start + period * index with a start for each stretch, outliers left out once.
+
+    With a single item in every stretch the period given is kept, with infinite sigma.
+    """
+    everything = np.ones(count.time.size)
+    slope, starts, residual = _fit_stretches(count, everything, period_ns)
+    limit = max(6 * robust_std(residual), 1.0)
+    kept = (np.abs(residual) <= limit).astype(np.float64)
+    if not kept.all() and np.bincount(count.stretch, kept).min() > 0:
+        slope, starts, residual = _fit_stretches(count, kept, slope)
+    # Stretches share one grid to the nearest index; what is left of a period stays as an error of the placing.
+    shift = np.maximum.accumulate(np.rint((starts - starts[0]) / slope).astype(np.int64))
+    return Clock(
+        period_ns=slope,
+        period_std_ns=_slope_std(count, residual * kept),
+        start_ns=float(starts[0]),
+        shift=shift,
+        residual_ns=residual,
+    )
+
+
+def measure_wander(count: Count, clock: Clock) -> Wander:
+    """Part the residual into slow wander and jitter; wander that jitter explains leaves the line straight."""
+    slow = np.add.reduceat(clock.residual_ns, count.starts) / count.sizes
+    full = count.sizes >= WINDOW // 2
+    # A short window's mean is mostly jitter.
+    slow = np.where(full, slow, 0.0)
+    span = float(slow[full].max() - slow[full].min()) if full.any() else 0.0
+    # Means of white jitter span up to six times the scatter of neighbours' differences, in any log that fits a disk.
+    straight = span <= max(0.1 * clock.period_ns, 8 * robust_std(np.diff(slow[full])))
+    if straight:
+        slow, span = np.zeros_like(slow), 0.0
+    jitter = clock.residual_ns - slow[count.window]
+    return Wander(
+        jitter_ns=float(np.sqrt(np.mean(jitter**2))),
+        span_ns=span,
+        line_ns=count.time - jitter,
+        pieces=np.flatnonzero(np.diff(count.stretch, prepend=-1)) if straight else count.starts,
+    )
+
+
+def _fit_stretches(count: Count, kept: Floats, period_ns: float) -> tuple[float, Floats, Floats]:
+    # About each stretch's own mean and the slope guessed, so that large numbers cost no digits.
+    weight = np.bincount(count.stretch, kept)
+    reduced = count.time - period_ns * count.index
+    mean_index = np.bincount(count.stretch, kept * count.index) / weight
+    mean_time = np.bincount(count.stretch, kept * reduced) / weight
+    run = count.index - mean_index[count.stretch]
+    rise = reduced - mean_time[count.stretch]
+    leverage = float((kept * run) @ run)
+    correction = float((kept * run) @ rise) / leverage if leverage else 0.0
+    return period_ns + correction, mean_time - correction * mean_index, rise - correction * run
+
+
+def _slope_std(count: Count, residual: Floats) -> float:
+    stretches = int(count.stretch[-1]) + 1
+    mean = np.bincount(count.stretch, count.index) / np.bincount(count.stretch)
+    run = count.index - mean[count.stretch]
+    leverage = float(run @ run)
+    freedom = residual.size - stretches - 1
+    if not leverage or freedom < 1:
+        return float("inf")
+    variance = float(residual @ residual) / freedom * leverage
+    # Scores summed over ever longer blocks see correlation that single items don't, up to an eighth of the log.
+    scores = np.add.reduceat(residual * run, count.starts)
+    while scores.size >= 8:
+        variance = max(variance, float(scores @ scores))
+        scores = np.add.reduceat(scores, np.arange(0, scores.size, 2))
+    return float(np.sqrt(variance)) / leverage

@@ -1,0 +1,94 @@
+"""What a time base is worth: a word for it, a sentence of advice, and the rate it may be rounded to."""
+
+from dataclasses import replace
+from math import floor, log10, pi
+from typing import TYPE_CHECKING
+
+from chladni.signals.clock_count import SHORT, Counted
+
+if TYPE_CHECKING:
+    from chladni.signals.time_base import TimeBase, Verdict
+
+# Scatter, relative to the period, above which samples placed on a grid deserve a warning.
+JITTERED = 0.05
+
+
+def verdict(counted: Counted, *, relative_jitter: float) -> "Verdict":
+    """Give the word for a clock that has a grid; `relative_jitter` in periods of messages."""
+    if counted.burst_size > 1:
+        return "bursts"
+    if counted.count.time.size < SHORT and counted.item_size == 1:
+        return "short"
+    return "jittered" if relative_jitter > JITTERED else "regular"
+
+
+def advice(base: "TimeBase") -> str:
+    """Give one sentence on what the verdict means for spectra."""
+    if base.verdict == "short":
+        return f"{base.samples} samples are too few to judge the clock; state the rate if you know it"
+    if base.verdict == "bursts":
+        return (
+            f"messages come in bursts of about {base.burst_size}, so samples are counted in order and a lost one "
+            "shifts those after it; log the sensor's own stamps"
+        )
+    if base.verdict == "jittered":
+        limit_hz = 0.1 / (2 * pi * base.jitter_s)
+        return (
+            f"stamps scatter by {base.jitter_s * 1e3:.3g} ms RMS; if the sampling does, amplitudes are 10 % "
+            f"uncertain at {limit_hz:.3g} Hz, more above"
+        )
+    if base.wander_s * base.rate_hz > 1:
+        return f"the clock wanders by {base.wander_s * 1e3:.3g} ms; long averages smear sharp peaks"
+    if base.gap_count:
+        return f"{base.missing} samples are missing in {base.gap_count} gaps; averages leave out what touches them"
+    return "the clock is sound"
+
+
+def round_rate(rate_hz: float, std_hz: float) -> float | None:
+    """Give a round rate or a round period within two sigma of the fit, None when there is none.
+
+    Round means so few digits that hitting the interval by chance has odds under 1 in 25; a rate of 99.993 Hz known
+    to 1 mHz stays what it is.
+
+    Examples
+    --------
+    >>> round_rate(99.99998, 1e-4)
+    100.0
+    >>> round_rate(99.993, 1e-3) is None
+    True
+    >>> round_rate(1 / 3 + 1e-9, 1e-8) == 1 / 3
+    True
+    """
+    return _round_number(rate_hz, std_hz) or _inverse(_round_number(1 / rate_hz, std_hz / rate_hz**2))
+
+
+def _round_number(value: float, std: float) -> float | None:
+    within = max(2 * std, 4e-16 * value)
+    for digits in range(8):
+        decimals = digits - floor(log10(value))
+        if 10.0**-decimals < 100 * within:
+            return None
+        if abs(round(value, decimals) - value) <= within:
+            return round(value, decimals)
+    return None
+
+
+def _inverse(period: float | None) -> float | None:
+    return 1 / period if period else None
+
+
+def with_nominal(base: "TimeBase", nominal_hz: float) -> "TimeBase":
+    """Take the stated rate where the stamps agree with it or can't judge; else say that they differ."""
+    off = base.rate_hz - nominal_hz
+    if abs(off) <= max(3 * base.rate_std_hz, 1e-9 * nominal_hz):
+        return replace(base, rate_hz=nominal_hz, snapped=True)
+    told = f"messages state {nominal_hz:.9g} Hz but their stamps advance at {base.rate_hz:.9g} Hz, which is used"
+    return replace(base, advice=f"{told}; {base.advice}")
+
+
+def with_round_rate(base: "TimeBase") -> "TimeBase":
+    """Round the rate where the fit allows; a short log's scatter proves nothing."""
+    if base.verdict == "short":
+        return base
+    rounded = round_rate(base.rate_hz, base.rate_std_hz)
+    return base if rounded is None else replace(base, rate_hz=rounded, snapped=True)

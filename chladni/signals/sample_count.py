@@ -1,0 +1,187 @@
+"""Counting of samples: which grid index each stamp has.
+
+Two ways. Where stamps scatter by less than about a third of a period, their phase exp(2 pi j t/T) tells each
+sample's index by itself, whatever is missing (`count_by_phase`). Where messages come in bursts or late by several
+periods, only their order tells, and gaps are what exceeds the scatter (`count_by_order`).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Items whose mean is taken as one point of the clock's slow wander.
+WINDOW = 256
+#: Items that a clock is fitted to; of more, every n-th is as good.
+MAX_ITEMS = 1_000_000
+# Below this relative scatter an interval of 3.5 periods is a gap and no accident.
+_TIGHT = 0.1
+_BLOCK = 1024
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Count:
+    """Grid indices of items: messages, bursts of them, or batches.
+
+    Attributes
+    ----------
+    time
+        ``[item]`` nanoseconds since the first, rising.
+    index
+        ``[item]`` whole index, on a grid that is common within a stretch.
+    stretch
+        ``[item]`` number of the stretch between gaps, from 0, rising.
+    window
+        ``[item]`` number of a window of about 256 items that spans no gap.
+    starts, sizes
+        ``[window]`` first item and number of items.
+    resumed
+        ``[stretch]`` where each stretch begins in the list counted, of which `time` may hold only a part.
+    coherence
+        0 to 1: how well the stamps agree with a grid of the period; 1 when counted by order.
+    """
+
+    time: Floats
+    index: Ints
+    stretch: Ints
+    window: Ints
+    starts: Ints
+    sizes: Ints
+    resumed: Ints
+    coherence: float = 1.0
+
+
+def count_by_phase(time_ns: Ints, steps: Ints, period_ns: float) -> Count:
+    """Give each stamp the index that its phase tells.
+
+    Parameters
+    ----------
+    time_ns, steps
+        ``[message]`` rising, at least 2; and their differences.
+    period_ns
+        First guess: the median interval.
+    """
+    scatter = _phase_scatter(steps, period_ns)
+    period = _refined_period(time_ns, period_ns, scatter)
+    resumed = _resumed(steps > (3.5 if scatter < _TIGHT else 64) * period)
+    item, stretch = _chosen(time_ns.size, resumed)
+    window, starts = _windows(stretch)
+    time = time_ns[item].astype(np.float64)
+    cycles = time / period
+    sums = np.add.reduceat(np.exp(2j * np.pi * np.mod(cycles, 1.0)), starts)
+    offset = np.unwrap(np.angle(sums)) / (2 * np.pi)
+    return Count(
+        time=time,
+        index=np.rint(cycles - offset[window]).astype(np.int64),
+        stretch=stretch,
+        window=window,
+        starts=starts,
+        sizes=np.diff(starts, append=time.size),
+        resumed=resumed,
+        coherence=float(np.abs(sums).sum() / time.size),
+    )
+
+
+def count_by_order(
+    time_ns: Ints, steps: Ints, counts: Ints, period_ns: float, *, pause_ns: float | None = None
+) -> Count:
+    """Number samples in the order in which they came; an interval far beyond the scatter is a gap.
+
+    Parameters
+    ----------
+    time_ns, steps
+        ``[item]`` time of the first sample of each item, rising, at least 2; and its differences.
+    counts
+        ``[item]`` samples of each item, at least 1.
+    period_ns
+        First guess; at most a few percent off.
+    pause_ns
+        What an interval must exceed its samples by to be a gap; by default eight times the scatter.
+    """
+    excess = steps - counts[:-1] * period_ns
+    centre = float(np.median(excess))
+    # A guess that is a little off shifts every interval; one that is far off is a pause after every item.
+    if abs(centre) < 0.1 * float(np.median(counts)) * period_ns:
+        excess -= centre
+    pause = 8 * robust_std(excess) if pause_ns is None else pause_ns
+    resumed = _resumed(excess > max(0.5 * period_ns, pause))
+    item, stretch = _chosen(time_ns.size, resumed)
+    window, starts = _windows(stretch)
+    return Count(
+        time=time_ns[item].astype(np.float64),
+        index=(np.cumsum(counts) - counts)[item],
+        stretch=stretch,
+        window=window,
+        starts=starts,
+        sizes=np.diff(starts, append=item.size),
+        resumed=resumed,
+    )
+
+
+def order_fano(count: Count, period_ns: float) -> float:
+    """Variance of the time that many items take, over that of as many random arrivals: 1 is chance, 0 a clock."""
+    items = count.time.size
+    lag = int(np.clip(items // 16, 1, 512))
+    same = np.flatnonzero(count.stretch[lag:] == count.stretch[:-lag])
+    if not same.size:
+        return 0.0
+    late = count.time - period_ns * count.index
+    mean = float(count.time[-1] - count.time[0]) / (items - 1)
+    interval = max(float(np.median(np.diff(count.time))), 0.5 * mean)
+    spread = robust_std(late[same + lag] - late[same])
+    return spread**2 / (lag * interval**2)
+
+
+def robust_std(values: Floats) -> float:
+    """Scatter by the median absolute deviation, on at most 400 000 of the values; 0 of none."""
+    part = values[:: max(1, values.size // 200_000)]
+    return float(1.4826 * np.median(np.abs(part - np.median(part)))) if part.size else 0.0
+
+
+def _refined_period(time_ns: Ints, period_ns: float, scatter: float) -> float:
+    """Find the period whose phases agree best over blocks of 1024, near the guess."""
+    block = min(_BLOCK, time_ns.size)
+    # Reach: the median's own error, a bias of missing samples under scatter, and rounding to whole nanoseconds.
+    reach = min(0.08, 4 * scatter / np.sqrt(time_ns.size) + 0.1 * scatter + 2 / period_ns)
+    half = int(np.ceil(reach * 4 * block))
+    trial = 1 + np.arange(-half, half + 1) / (4 * block)
+    power = np.zeros(trial.size)
+    for start in np.unique(np.linspace(0, time_ns.size - block, 8).astype(np.int64)):
+        part = time_ns[start : start + block]
+        phase = np.mod(np.outer((part - part[0]) / period_ns, trial), 1.0)
+        power += np.abs(np.exp(2j * np.pi * phase).sum(axis=0)) ** 2
+    return period_ns / float(trial[np.argmax(power)])
+
+
+def _phase_scatter(steps: Ints, period_ns: float) -> float:
+    """Robust scatter of intervals about whole periods, relative to the period."""
+    turns = steps[:: max(1, steps.size // 200_000)] / period_ns
+    turns = turns[turns < 8]
+    return robust_std(turns - np.rint(turns))
+
+
+def _resumed(gaps: NDArray[np.bool_]) -> Ints:
+    return np.concatenate((np.zeros(1, dtype=np.int64), np.flatnonzero(gaps) + 1))
+
+
+def _chosen(items: int, resumed: Ints) -> tuple[Ints, Ints]:
+    """Items to fit, with both ends of each stretch, and the stretch of each."""
+    every = -(-items // MAX_ITEMS)
+    chosen = np.arange(0, items, every)
+    if every > 1:
+        chosen = np.unique(np.concatenate((chosen, resumed, resumed[1:] - 1, [items - 1])))
+    return chosen, np.searchsorted(resumed, chosen, side="right") - 1
+
+
+def _windows(stretch: Ints) -> tuple[Ints, Ints]:
+    """Cut each stretch into near-equal windows of about 256; number of the window of each item, and the starts."""
+    first = np.flatnonzero(np.diff(stretch, prepend=-1))
+    sizes = np.diff(first, append=stretch.size)
+    pieces = np.maximum(1, np.rint(sizes / WINDOW).astype(np.int64))
+    before = np.cumsum(pieces) - pieces
+    local = np.arange(stretch.size) - first[stretch]
+    window = before[stretch] + local * pieces[stretch] // sizes[stretch]
+    return window, np.flatnonzero(np.diff(window, prepend=-1))

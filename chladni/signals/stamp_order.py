@@ -1,0 +1,152 @@
+"""Untangling of message stamps: clock jumps undone, order restored, repeats counted."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.errors import EstimateError
+
+# A message later than this many periods that the others don't follow is late; when they do, the clock was set back.
+NEIGHBOURS = 16
+# A log with more candidates than this has no clock worth untangling.
+MAX_CANDIDATES = 1000
+_SAMPLE = 200_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClockJump:
+    """A step of the clock between two neighbouring messages.
+
+    Attributes
+    ----------
+    before_ns, after_ns
+        Stamps on either side.
+    shift_ns
+        What to add to every later stamp so that time runs on; 0 for a step forward, which may as well be a pause.
+    """
+
+    before_ns: int
+    after_ns: int
+    shift_ns: int
+
+    @property
+    def step_s(self) -> float:
+        """Size of the step, negative when the clock was set back."""
+        return (self.after_ns - self.before_ns) * 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Untangled:
+    """Stamps on one clock that only runs forward.
+
+    Attributes
+    ----------
+    time_ns
+        ``[message]`` nanoseconds since the first message to arrive, in rising order.
+    steps
+        Differences of `time_ns`.
+    order
+        ``[message]`` place of arrival of each, None when none came late.
+    jumps
+        Steps back that were undone.
+    out_of_order
+        Messages that came after a later one.
+    duplicates
+        Messages with the stamp of another.
+    """
+
+    time_ns: NDArray[np.int64]
+    steps: NDArray[np.int64]
+    order: NDArray[np.int64] | None
+    jumps: tuple[ClockJump, ...]
+    out_of_order: int
+    duplicates: int
+
+
+def require_stamps(stamps_ns: NDArray[Any]) -> NDArray[np.int64]:
+    """Give the stamps as int64; `EstimateError` when they are no whole nanoseconds in one dimension."""
+    if stamps_ns.ndim != 1 or stamps_ns.dtype.kind not in "iu":
+        raise EstimateError(
+            f"stamps_ns must be whole nanoseconds in one dimension, got {stamps_ns.dtype} {stamps_ns.shape}"
+        )
+    if stamps_ns.size and (int(stamps_ns.min()) < 0 or int(stamps_ns.max()) >= 2**62):
+        raise EstimateError("stamps_ns must lie between 0 and 2^62 (year 2116); a stamp outside is no time")
+    return stamps_ns.astype(np.int64, copy=False)
+
+
+def untangle(stamps_ns: NDArray[np.int64]) -> Untangled:
+    """Undo steps back of the clock, sort what came late, and count both.
+
+    Parameters
+    ----------
+    stamps_ns
+        ``[message]`` int64 nanoseconds, in the order of arrival, at least one.
+    """
+    time_ns = stamps_ns - stamps_ns[0]
+    steps = np.diff(time_ns)
+    backward = steps < 0
+    if not backward.any():
+        repeats = int(np.count_nonzero(steps == 0))
+        return Untangled(time_ns=time_ns, steps=steps, order=None, jumps=(), out_of_order=0, duplicates=repeats)
+    jumps = find_jumps(stamps_ns)
+    if jumps:
+        time_ns = run_on(stamps_ns, jumps)[0] - stamps_ns[0]
+    order = np.argsort(time_ns, kind="stable")
+    time_ns = time_ns[order]
+    steps = np.diff(time_ns)
+    return Untangled(
+        time_ns=time_ns,
+        steps=steps,
+        order=order,
+        jumps=jumps,
+        out_of_order=int(np.count_nonzero(backward)) - len(jumps),
+        duplicates=int(np.count_nonzero(steps == 0)),
+    )
+
+
+def find_jumps(stamps_ns: NDArray[np.int64]) -> tuple[ClockJump, ...]:
+    """Find where the clock was set back: the messages after stay behind those before."""
+    period_ns = typical_period(stamps_ns)
+    candidates = np.flatnonzero(np.diff(stamps_ns) < -NEIGHBOURS * period_ns)
+    if candidates.size > MAX_CANDIDATES:
+        return ()
+    jumps = []
+    for last in candidates:
+        before = stamps_ns[max(0, last + 1 - NEIGHBOURS) : last + 1]
+        after = stamps_ns[last + 1 : last + 1 + NEIGHBOURS]
+        # One or two messages at an end can't show whether the clock was set or they were late.
+        if min(before.size, after.size) > 2 and np.median(after) < np.median(before):
+            at, to = int(stamps_ns[last]), int(stamps_ns[last + 1])
+            jumps.append(ClockJump(before_ns=at, after_ns=to, shift_ns=at - to + round(period_ns)))
+    return tuple(jumps)
+
+
+def run_on(
+    stamps_ns: NDArray[np.int64], jumps: tuple[ClockJump, ...], *, done: int = 0
+) -> tuple[NDArray[np.int64], int]:
+    """Add the shifts of the jumps that occur among the stamps, and of the `done` first ones before them.
+
+    Returns
+    -------
+    time_ns, done
+        Stamps on a clock that runs on, and how many jumps lie behind it.
+    """
+    time_ns = stamps_ns + sum(jump.shift_ns for jump in jumps[:done])
+    place = 0
+    for jump in jumps[done:]:
+        here = np.flatnonzero((stamps_ns[place:-1] == jump.before_ns) & (stamps_ns[place + 1 :] == jump.after_ns))
+        if not here.size:
+            break
+        place += int(here[0]) + 1
+        time_ns[place:] += jump.shift_ns
+        done += 1
+    return time_ns, done
+
+
+def typical_period(time_ns: NDArray[np.int64]) -> float:
+    """Median over the log of the mean interval of 32 messages: right for bursts, at least 1 ns."""
+    lag = max(1, min(2 * NEIGHBOURS, (time_ns.size - 1) // 2))
+    starts = np.arange(0, time_ns.size - lag, max(1, time_ns.size // _SAMPLE))
+    return max(1.0, float(np.median(np.abs(time_ns[starts + lag] - time_ns[starts]))) / lag)

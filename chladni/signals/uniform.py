@@ -1,0 +1,268 @@
+"""Placing of stamped samples on the grid of their time base, whole or block by block."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError
+from chladni.signals.grid_index import grid_index
+from chladni.signals.stamp_order import ClockJump, require_stamps, run_on
+from chladni.signals.time_base import TimeBase
+from chladni.signals.time_series import NS_PER_S, TimeSeries
+
+# Messages that wait for late ones before them.
+_HELD = 64
+
+
+def place(
+    stamps_ns: NDArray[Any],
+    values: NDArray[Any],
+    time_base: TimeBase,
+    channels: Sequence[Channel],
+    *,
+    counts: NDArray[Any] | None = None,
+    max_samples: int = 1 << 28,
+) -> TimeSeries:
+    """Put samples on the grid of their time base; grid points without a sample are NaN and not valid.
+
+    Each sample goes to the nearest grid point (as the time base tells it, drift and late delivery allowed for), and
+    keeps its value: what it was sampled early or late is an error of about `TimeBase.amplitude_error`. Of several
+    samples on one grid point the earliest stays.
+
+    Parameters
+    ----------
+    stamps_ns
+        ``[message]`` integer nanoseconds, in the order of arrival: those that the time base was fitted to.
+    values
+        ``[channel, sample]`` numbers; whole numbers become float64.
+    time_base
+        From `fit_time_base` or `fit_batch_time_base`.
+    channels
+        One for each row of `values`.
+    counts
+        ``[message]`` samples of each batch message; None for one sample a message.
+    max_samples
+        Largest grid, in values; a gap of years isn't filled.
+
+    Raises
+    ------
+    EstimateError
+        When the time base has no grid, shapes don't fit together, or the grid would be too large.
+
+    Examples
+    --------
+    >>> from chladni.signals.time_base import fit_time_base
+    >>> stamps = np.array([0, 10, 20, 40, 50, 60, 70, 80, 90]) * 1_000_000
+    >>> series = place(stamps, np.ones((1, 9)), fit_time_base(stamps), [Channel(name="a")])
+    >>> series.values[0]
+    array([ 1.,  1.,  1., nan,  1.,  1.,  1.,  1.,  1.,  1.])
+    """
+    series = Placer(time_base, channels, max_samples=max_samples).push(stamps_ns, values, counts=counts, last=True)
+    if series is None:
+        raise EstimateError("there are no samples to place on a grid")
+    return series
+
+
+def message_index(
+    stamps_ns: NDArray[Any], time_base: TimeBase, *, counts: NDArray[Any] | None = None
+) -> NDArray[np.int64]:
+    """Give each message's grid index (of its first sample), in the order of arrival, index 0 at `start_ns`.
+
+    Parameters
+    ----------
+    stamps_ns, counts
+        ``[message]`` as the time base was fitted to.
+
+    Raises
+    ------
+    EstimateError
+        When the time base has no grid.
+    """
+    clock = _clock(time_base)
+    time_ns, _ = run_on(require_stamps(stamps_ns), _steps_back(time_base))
+    order = np.argsort(time_ns, kind="stable")
+    sizes = np.ones_like(time_ns) if counts is None else np.asarray(counts, dtype=np.int64)[order]
+    index = np.empty_like(time_ns)
+    index[order] = clock(time_ns[order], np.cumsum(sizes) - sizes)
+    return index
+
+
+class Placer:
+    """Places a stream of blocks; the blocks given back, one after the other, are what `place` gives for the whole.
+
+    Parameters
+    ----------
+    time_base
+        Fitted to the stamps of the whole stream.
+    channels
+        One for each row of the values to come.
+    max_samples
+        Largest grid of one block, in values.
+
+    Attributes
+    ----------
+    left_out
+        Samples left out so far because an earlier one had their grid point or that part was already given.
+    """
+
+    def __init__(self, time_base: TimeBase, channels: Sequence[Channel], *, max_samples: int = 1 << 28) -> None:
+        self.left_out = 0
+        self._base = time_base
+        self._clock = _clock(time_base)
+        self._channels = tuple(channels)
+        self._max_samples = max_samples
+        self._hold = max(_HELD, time_base.smoothing)
+        self._jumps = _steps_back(time_base)
+        self._jumps_done = 0
+        self._last_stamp = np.empty(0, dtype=np.int64)
+        self._waiting = _Messages.none(len(self._channels))
+        # Placed already, but still weighing in the running median of those that wait.
+        self._behind = _Messages.none(0)
+        self._order = 0
+        self._next: int | None = None
+
+    def push(
+        self,
+        stamps_ns: NDArray[Any],
+        values: NDArray[Any],
+        *,
+        counts: NDArray[Any] | None = None,
+        last: bool = False,
+    ) -> TimeSeries | None:
+        """Take the next messages and give the next block of the grid; None while too few are there to be sure.
+
+        Arguments and errors are those of `place`. About 64 messages are held back for late ones, unless this is the
+        `last` block.
+        """
+        stamps = require_stamps(stamps_ns)
+        sizes = np.ones_like(stamps) if counts is None else np.asarray(counts, dtype=np.int64)
+        expected = (len(self._channels), int(sizes.sum()))
+        if sizes.shape != stamps.shape or values.shape != expected:
+            raise EstimateError(
+                f"values have shape {values.shape}, but {len(self._channels)} channels and {expected[1]} samples "
+                f"in {stamps.size} messages ask for {expected}"
+            )
+        floating = values if values.dtype.kind == "f" else values.astype(np.float64)
+        self._waiting = self._waiting.followed_by(_Messages(self._run_on(stamps), sizes, floating)).in_order()
+        ready = self._waiting.time_ns.size - (0 if last else self._hold)
+        return self._release(ready) if ready > 0 else None
+
+    def finish(self) -> TimeSeries | None:
+        """Give what was held back."""
+        return self.push(self._last_stamp[:0], self._waiting.values[:, :0], last=True)
+
+    def _run_on(self, stamps: NDArray[np.int64]) -> NDArray[np.int64]:
+        # The last stamp before comes along, because a jump may lie between two blocks.
+        known = self._last_stamp.size
+        joined = np.concatenate((self._last_stamp, stamps))
+        time_ns, self._jumps_done = run_on(joined, self._jumps, done=self._jumps_done)
+        self._last_stamp = joined[-1:]
+        return time_ns[known:]
+
+    def _release(self, ready: int) -> TimeSeries | None:
+        now, self._waiting = self._waiting.split(ready)
+        # The waiting ones take part in the median too.
+        sizes = np.concatenate((self._behind.sizes, now.sizes, self._waiting.sizes))
+        time_ns = np.concatenate((self._behind.time_ns, now.time_ns, self._waiting.time_ns))
+        index = self._clock(time_ns, self._order + np.cumsum(sizes) - sizes)
+        index = index[self._behind.sizes.size : self._behind.sizes.size + ready]
+        block = self._filled(_expanded(index, now.sizes), now.values)
+        kept = max(0, self._behind.sizes.size + ready - self._hold)
+        placed = slice(kept, self._behind.sizes.size + ready)
+        self._order += int(sizes[:kept].sum())
+        self._behind = _Messages(time_ns[placed], sizes[placed], self._behind.values)
+        return block
+
+    def _filled(self, index: NDArray[np.int64], values: NDArray[Any]) -> TimeSeries | None:
+        first = int(index[0]) if self._next is None else self._next
+        reached = np.maximum.accumulate(np.concatenate(([first - 1], index)))
+        fresh = index > reached[:-1]
+        self.left_out += int(index.size - np.count_nonzero(fresh))
+        length = int(reached[-1]) + 1 - first
+        if not length:
+            return None
+        if length * max(1, len(self._channels)) > self._max_samples:
+            raise EstimateError(
+                f"the grid from {first} would hold {length} samples of {len(self._channels)} channels, more than "
+                f"{self._max_samples} values; read a shorter time, or correct stamps that leap"
+            )
+        self._next = first + length
+        whole = np.full((values.shape[0], length), np.nan, dtype=values.dtype)
+        whole[:, index[fresh] - first] = values[:, fresh]
+        valid = np.isfinite(whole)
+        return TimeSeries(
+            values=whole,
+            sample_rate_hz=self._base.rate_hz,
+            start_time_ns=self._base.start_ns + round(first / self._base.rate_hz * NS_PER_S),
+            channels=self._channels,
+            valid=None if valid.all() else valid,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Messages:
+    """Messages with their times (jumps undone), samples of each, and the samples."""
+
+    time_ns: NDArray[np.int64]
+    sizes: NDArray[np.int64]
+    values: NDArray[Any]
+
+    @classmethod
+    def none(cls, channels: int) -> Self:
+        nothing = np.empty(0, dtype=np.int64)
+        # The narrowest type, so that the first block decides.
+        return cls(nothing, nothing, np.empty((channels, 0), dtype=np.float16))
+
+    def followed_by(self, other: "_Messages") -> "_Messages":
+        if not self.time_ns.size:
+            return other
+        return _Messages(
+            np.concatenate((self.time_ns, other.time_ns)),
+            np.concatenate((self.sizes, other.sizes)),
+            np.concatenate((self.values, other.values), axis=1),
+        )
+
+    def in_order(self) -> "_Messages":
+        if not np.any(self.time_ns[1:] < self.time_ns[:-1]):
+            return self
+        order = np.argsort(self.time_ns, kind="stable")
+        samples = _expanded((np.cumsum(self.sizes) - self.sizes)[order], self.sizes[order])
+        return _Messages(self.time_ns[order], self.sizes[order], self.values[:, samples])
+
+    def split(self, place: int) -> tuple["_Messages", "_Messages"]:
+        sample = int(self.sizes[:place].sum())
+        return (
+            _Messages(self.time_ns[:place], self.sizes[:place], self.values[:, :sample]),
+            _Messages(self.time_ns[place:], self.sizes[place:], self.values[:, sample:]),
+        )
+
+
+def _expanded(first: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Give first, first + 1, ... for each message, as many as it has samples."""
+    if first.size == sizes.sum():
+        return first
+    run: NDArray[np.int64] = np.repeat(first - (np.cumsum(sizes) - sizes), sizes) + np.arange(sizes.sum())
+    return run
+
+
+def _clock(base: TimeBase) -> Callable[[NDArray[np.int64], NDArray[np.int64]], NDArray[np.int64]]:
+    if not base.uniform:
+        raise EstimateError(f"samples can't be placed on a grid: {base.advice}")
+    return partial(
+        grid_index,
+        knots_ns=base.knots_ns,
+        knots_index=base.knots_index,
+        rate_hz=base.rate_hz,
+        smoothing=base.smoothing,
+        resumed_ns=base.resumed_ns,
+        resumed_shift=base.resumed_shift,
+    )
+
+
+def _steps_back(base: TimeBase) -> tuple[ClockJump, ...]:
+    return tuple(jump for jump in base.jumps if jump.shift_ns)
