@@ -1,7 +1,7 @@
 """Arguments and options that several commands share."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -11,7 +11,8 @@ Setup = Annotated[
     typer.Option(metavar="FILE", help="Setup file: points, directions, units, sensitivities.", show_default=False),
 ]
 Stamp = Annotated[
-    str, typer.Option(metavar="auto|header|publish|log", help="Which time stamp of a message is its sample time.")
+    Literal["auto", "header", "publish", "log"],
+    typer.Option(help="Which time of a message is its sample time: its own stamp, when published, when logged."),
 ]
 Json = Annotated[
     str | None,

@@ -5,12 +5,15 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
+
+if TYPE_CHECKING:
+    from chladni.signals.study import Study
 
 Progress = Callable[[float], None]
 
@@ -45,6 +48,19 @@ class Output:
             table.add_row(*(escape(cell) for cell in row))
         self.console.print(table)
 
+    def pictures(self, study: "Study", *, figures: Path | None, report: Path | None) -> None:
+        """Save figures and report where they were asked for, and say where they are."""
+        if figures is not None:
+            from chladni.viewers.figures import save_figures
+
+            for path in save_figures(study, figures):
+                self.line(f"figure: {path}")
+        if report is not None:
+            from chladni.viewers.report import write_report
+
+            write_report(study, report)
+            self.line(f"report: {report}")
+
     def json(self, content: Mapping[str, Any]) -> None:
         """Write `content` where ``--json`` said; nothing when it wasn't given."""
         if self.json_target is None:
@@ -53,9 +69,10 @@ class Output:
         if self.json_target == "-":
             sys.stdout.write(text)
             return
-        from chladni.io.atomic import write_text
+        from chladni.io.atomic import atomic_write
 
-        write_text(Path(self.json_target), text)
+        with atomic_write(Path(self.json_target)) as file:
+            file.write(text.encode())
 
     @contextmanager
     def progress(self, title: str) -> Iterator[Progress]:

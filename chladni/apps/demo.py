@@ -1,0 +1,143 @@
+"""The tour: make a robot arm's log with known truth, analyse it, and set what was found beside the truth."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from chladni.apps.analyse import analyse
+from chladni.apps.demo_log import LOST_FROM_S, LOST_SENSOR, LOST_TO_S, SHAKEN, DemoLog, make_demo_log, setup_text
+from chladni.apps.sources import Progress, no_progress
+from chladni.io.atomic import atomic_write
+from chladni.io.log import open_log
+from chladni.io.mcap.writer import write_mcap
+from chladni.signals.errors import LogError
+from chladni.signals.peak import Peak
+from chladni.signals.study import Study
+
+RESOLUTION_HZ = 0.25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """One found number beside its truth; `std` is its own one sigma."""
+
+    what: str
+    found: float | None
+    std: float
+    truth: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tour:
+    """What the tour made.
+
+    Attributes
+    ----------
+    study
+        The analysis.
+    comparisons
+        Found beside true.
+    files
+        Everything written, in the order of interest.
+    """
+
+    study: Study
+    comparisons: tuple[Comparison, ...]
+    files: tuple[Path, ...]
+
+
+def run_tour(folder: Path, *, progress: Progress = no_progress) -> Tour:
+    """Run the tour and write log, setup, recording, report and figures to `folder`, which is made if needed.
+
+    Raises
+    ------
+    LogError
+        When the folder can't be made or written to.
+    """
+    from chladni.viewers.figures import save_figures
+    from chladni.viewers.report import write_report
+    from chladni.viewers.rerun import write_rrd
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise LogError(f"{folder}: can't make this folder ({error.strerror}); name another with --out") from None
+    made = make_demo_log()
+    progress(0.1)
+    log_path, setup_path = folder / "arm.mcap", folder / "setup.toml"
+    write_mcap(made.series, log_path, metadata={"truth": _truth(made)})
+    with atomic_write(setup_path) as file:
+        file.write(setup_text(made.structure).encode())
+    progress(0.4)
+    with open_log(log_path, setup=setup_path) as log:
+        study = analyse(log, resolution_hz=RESOLUTION_HZ)
+        gaps = next(one.gaps for one in log.info().channels if one.channel.name == _name(LOST_SENSOR))
+    progress(0.6)
+    recording = write_rrd(study, folder / "arm.rrd")
+    progress(0.7)
+    report = write_report(study, folder / "report.html")
+    progress(0.8)
+    figures = save_figures(study, folder / "figures")
+    progress(1.0)
+    return Tour(
+        study=study,
+        comparisons=(*_peaks_beside_truth(study, made), *_gap_beside_truth(gaps)),
+        files=(recording, report, log_path, setup_path, *figures),
+    )
+
+
+def _truth(made: DemoLog) -> dict[str, str]:
+    modes = zip(made.modes.frequency_hz, made.modes.damping_ratio, strict=True)
+    told = {f"mode_{number}": f"{f:.6f} Hz, damping ratio {zeta:.6f}" for number, (f, zeta) in enumerate(modes, 1)}
+    return told | {"lost": f"{LOST_SENSOR} from {LOST_FROM_S} s to {LOST_TO_S} s"}
+
+
+def _name(body: str) -> str:
+    return f"/{body}.accel.linear.x"
+
+
+def _peaks_beside_truth(study: Study, made: DemoLog) -> list[Comparison]:
+    """Set the driving point's peaks beside those of the exact accelerance."""
+    fine_hz = np.linspace(5.0, 300.0, 59_001)
+    exact = np.abs(made.accelerance(SHAKEN, fine_hz))
+    tops = np.flatnonzero((exact[1:-1] > exact[:-2]) & (exact[1:-1] > exact[2:])) + 1
+    found = [peak for peak in study.response_peaks if peak.channels[0] == _name(SHAKEN)]
+    rows = []
+    for top in tops:
+        nearest = min(found, key=lambda peak: abs(peak.frequency_hz - fine_hz[top]), default=None)
+        rows += _beside(nearest, float(fine_hz[top]), float(exact[top]))
+    return rows
+
+
+def _beside(peak: Peak | None, frequency_hz: float, height: float) -> list[Comparison]:
+    """Compare frequency and height; a peak further off than 2 % is another peak."""
+    if peak is None or abs(peak.frequency_hz - frequency_hz) > 0.02 * frequency_hz:
+        peak = None
+    what = f"tool over shaker, peak near {frequency_hz:.0f} Hz"
+    return [
+        Comparison(
+            what=f"{what}: frequency",
+            found=None if peak is None else peak.frequency_hz,
+            std=0.0 if peak is None else peak.frequency_std_hz,
+            truth=frequency_hz,
+            unit="Hz",
+        ),
+        Comparison(
+            what=f"{what}: height",
+            found=None if peak is None else peak.height,
+            std=0.0 if peak is None else peak.height_std,
+            truth=height,
+            unit="(m/s^2)/N",
+        ),
+    ]
+
+
+def _gap_beside_truth(gaps: tuple[tuple[float, float], ...]) -> list[Comparison]:
+    start, end = gaps[0] if gaps else (None, None)
+    what = f"messages of the {LOST_SENSOR}'s sensor lost"
+    return [
+        Comparison(what=f"{what}, from", found=start, std=0.0, truth=LOST_FROM_S, unit="s"),
+        Comparison(what=f"{what}, to", found=end, std=0.0, truth=LOST_TO_S, unit="s"),
+    ]

@@ -1,0 +1,125 @@
+"""Results as the JSON documents that programs rely on; NaN and infinity become null."""
+
+from collections.abc import Sequence
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.peak import Peak
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.spectral.bands import band_rms
+from chladni.spectral.peaks import find_peaks
+
+Document = dict[str, Any]
+
+
+def plain(array: NDArray[Any]) -> list[Any]:
+    """Turn a one-dimensional array into a list, with None where a number isn't finite.
+
+    Examples
+    --------
+    >>> plain(np.array([1.0, np.nan]))
+    [1.0, None]
+    """
+    numbers: list[Any] = array.tolist()
+    if array.dtype.kind != "f" or bool(np.isfinite(array).all()):
+        return numbers
+    return [number if isfinite(number) else None for number in numbers]
+
+
+def psd_document(densities: Sequence[PowerSpectralDensity]) -> Document:
+    """Document of ``chladni psd``.
+
+    The axis and averages of the first sampling grid stand at the top; channels of other grids carry their own under
+    the same keys.
+    """
+    first = densities[0]
+    channels = []
+    for density in densities:
+        own_axis = {} if density is first else _axis(density)
+        channels += [_channel_density(density, channel.name) | own_axis for channel in density.channels]
+    notes = [note for density in densities for note in density.provenance.notes]
+    return {"format": "chladni.psd/1", **_axis(first), "channels": channels, "notes": notes}
+
+
+def frf_document(response: FrequencyResponse, peaks: Sequence[Peak]) -> Document:
+    """Document of ``chladni frf``."""
+    return {
+        "format": "chladni.frf/1",
+        **_axis(response),
+        "estimator": response.provenance.estimator,
+        "window_decay_per_s": response.provenance.window_decay_per_s,
+        "functions": [
+            _function(response, row, column, peaks)
+            for row in range(len(response.responses))
+            for column in range(len(response.references))
+        ],
+        "notes": list(response.provenance.notes),
+    }
+
+
+def _axis(estimate: PowerSpectralDensity | FrequencyResponse) -> Document:
+    account = estimate.provenance
+    return {
+        "frequency_hz": plain(estimate.frequency_hz),
+        "averages": account.averages,
+        "effective_averages": account.effective_averages,
+        "window": account.window,
+        "segment_s": account.segment_s,
+        "averaging": account.averaging,
+    }
+
+
+def _channel_density(density: PowerSpectralDensity, name: str) -> Document:
+    alone = density.select([name])
+    top_hz = float(density.frequency_hz[-1])
+    return {
+        "name": name,
+        "channel_unit": alone.channels[0].unit,
+        "psd_unit": alone.units[0],
+        "psd": plain(alone.values[0]),
+        "std": plain(alone.std[0]),
+        "peaks": [
+            {
+                "frequency_hz": peak.frequency_hz,
+                "frequency_std_hz": finite(peak.frequency_std_hz),
+                "psd": peak.height,
+                "psd_std": finite(peak.height_std),
+            }
+            for peak in find_peaks(alone)
+        ],
+        "rms": float(band_rms(alone, [(0.0, top_hz)]).values[0, 0]),
+    }
+
+
+def _function(response: FrequencyResponse, row: int, column: int, peaks: Sequence[Peak]) -> Document:
+    names = (response.responses[row].name, response.references[column].name)
+    values = response.values[row, column]
+    return {
+        "response": names[0],
+        "reference": names[1],
+        "unit": response.unit(row, column),
+        "real": plain(values.real),
+        "imag": plain(values.imag),
+        "std": plain(response.std[row, column]),
+        "coherence": plain(response.coherence[row]),
+        "excited": plain(response.excited),
+        "peaks": [
+            {
+                "frequency_hz": peak.frequency_hz,
+                "frequency_std_hz": finite(peak.frequency_std_hz),
+                "magnitude": peak.height,
+                "magnitude_std": finite(peak.height_std),
+            }
+            for peak in peaks
+            if peak.channels == names
+        ],
+    }
+
+
+def finite(number: float) -> float | None:
+    """Give the number, or None when it isn't finite."""
+    return number if isfinite(number) else None

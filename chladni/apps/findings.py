@@ -1,0 +1,51 @@
+"""What was found in a log, in sentences."""
+
+from collections.abc import Sequence
+
+from chladni.io.log_info import LogInfo, some_of
+from chladni.io.loss import Loss
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.peak import Peak
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+
+MOST_PEAKS_TOLD = 5
+
+
+def damage_sentences(losses: Sequence[Loss]) -> tuple[str, ...]:
+    """Say what was lost, where, and how much."""
+    return tuple(_damage_sentence(loss) for loss in losses)
+
+
+def _damage_sentence(loss: Loss) -> str:
+    where = "" if loss.offset is None else f" at byte {loss.offset} ({loss.record})"
+    lost = "an unknown number of messages" if loss.lost_messages is None else f"{loss.lost_messages} messages"
+    return f"Damage{where}: {loss.what}; {lost} lost."
+
+
+def soundness_sentences(info: LogInfo) -> tuple[str, ...]:
+    """Say whether the log is sound: its length, damage, and every trouble of its clocks and sensors."""
+    rates = sorted({one["rate_hz"] for one in info.to_json()["channels"] if one["rate_hz"]}, reverse=True)
+    told = some_of([f"{rate:.6g} Hz" for rate in rates])
+    summary = f"{info.duration_s:.6g} s, {len(info.channels)} channels" + (f" at {told}" if told else "")
+    troubles = damage_sentences(info.damage) + info.findings
+    return (f"{summary}. {'No trouble found.' if not troubles else ''}".rstrip(), *troubles)
+
+
+def peak_sentences(density: PowerSpectralDensity, peaks: Sequence[Peak]) -> tuple[str, ...]:
+    """Say which frequencies are in the channels."""
+    if not peaks:
+        return (f"No peak stands out of the scatter in {some_of([one.name for one in density.channels])}.",)
+    told = [f"{peak.frequency_hz:.5g} Hz ({some_of(peak.channels, count=1)})" for peak in peaks[:MOST_PEAKS_TOLD]]
+    return (f"Strongest frequencies: {', '.join(told)}.",)
+
+
+def response_sentences(response: FrequencyResponse, peaks: Sequence[Peak]) -> tuple[str, ...]:
+    """Say where the transfer functions peak."""
+    reference = some_of([one.name for one in response.references])
+    if not peaks:
+        return (f"No transfer function from {reference} has a peak on its excited lines.",)
+    told = [
+        f"{peak.frequency_hz:.5g} Hz ({peak.channels[0]}, {peak.height:.3g} {peak.unit})"
+        for peak in peaks[:MOST_PEAKS_TOLD]
+    ]
+    return (f"Highest peaks over {reference}: {', '.join(told)}.",)

@@ -1,0 +1,74 @@
+"""Show results in rerun."""
+
+from dataclasses import replace
+
+from chladni.apps.analyse import analyse
+from chladni.io.log import Log
+from chladni.signals.errors import SetupError
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.study import Study
+from chladni.signals.time_series import TimeSeries
+from chladni.signals.waterfall import Waterfall
+from chladni.spectral.peaks import find_peaks, find_response_peaks
+
+Shown = Log | Study | TimeSeries | PowerSpectralDensity | FrequencyResponse | Waterfall
+
+
+def show(*items: Shown) -> None:
+    """Open the rerun viewer with logs, series, spectra and transfer functions side by side.
+
+    Parameters
+    ----------
+    items
+        A log is analysed first; all else is shown as it is.
+
+    Raises
+    ------
+    SetupError
+        When there is nothing to show, or the viewer doesn't start, as on a computer without a display.
+    """
+    from chladni.viewers.rerun import spawn
+
+    spawn(gather(*items))
+
+
+def gather(*items: Shown) -> Study:
+    """Put items into one study; a later transfer function replaces an earlier one."""
+    if not items:
+        raise SetupError("nothing to show; give a log, a series, a spectrum or a transfer function")
+    study = Study(title="chladni")
+    for item in items:
+        study = _with(study, item)
+    return study
+
+
+def _with(study: Study, item: Shown) -> Study:
+    match item:
+        case Log():
+            return _joined(study, analyse(item))
+        case Study():
+            return _joined(study, item)
+        case TimeSeries():
+            return replace(study, series=(*study.series, item))
+        case PowerSpectralDensity():
+            peaks = (*study.peaks, *find_peaks(item))
+            return replace(study, densities=(*study.densities, item), peaks=peaks)
+        case Waterfall():
+            return replace(study, waterfalls=(*study.waterfalls, item))
+        case FrequencyResponse():
+            return replace(study, response=item, response_peaks=find_response_peaks(item))
+
+
+def _joined(first: Study, second: Study) -> Study:
+    return Study(
+        title=second.title if first.title == "chladni" else f"{first.title}, {second.title}",
+        series=first.series + second.series,
+        densities=first.densities + second.densities,
+        waterfalls=first.waterfalls + second.waterfalls,
+        response=second.response or first.response,
+        peaks=first.peaks + second.peaks,
+        response_peaks=second.response_peaks if second.response is not None else first.response_peaks,
+        geometry=second.geometry if second.geometry.points else first.geometry,
+        findings=first.findings + second.findings,
+    )

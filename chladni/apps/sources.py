@@ -1,0 +1,81 @@
+"""Samples of a log for averaging: whole when they fit in memory, block by block when they don't."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from chladni.io.log import Log
+from chladni.signals.time_series import TimeSeries
+
+Progress = Callable[[float], None]
+
+# A compressed log of this size holds at most some tens of millions of samples.
+IN_MEMORY_BYTES = 48 << 20
+VALUES_IN_A_BLOCK = 1 << 21
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Span:
+    """Part of a log, in seconds from its start; None for its ends."""
+
+    start_s: float | None = None
+    end_s: float | None = None
+
+
+def is_small(log: Log) -> bool:
+    """Whether all samples of a log may be held in memory at once."""
+    return log.path.stat().st_size <= IN_MEMORY_BYTES
+
+
+def no_progress(share: float) -> None:
+    """Tell nobody how far it is."""
+
+
+class Watched:
+    """Passes blocks on, and remembers which channels moved at all and how far it is."""
+
+    def __init__(
+        self, names: Sequence[str], blocks: Iterable[TimeSeries], *, duration_s: float, progress: Progress
+    ) -> None:
+        self.names = tuple(names)
+        self._blocks = blocks
+        self._duration_s = duration_s
+        self._progress = progress
+        self._lowest: dict[str, float] = {}
+        self._highest: dict[str, float] = {}
+
+    def __iter__(self) -> Iterator[TimeSeries]:
+        done_s = 0.0
+        for block in self._blocks:
+            self._watch(block)
+            yield block
+            done_s += block.duration_s
+            self._progress(min(1.0, done_s / max(self._duration_s, 1e-9)))
+
+    def constant(self) -> tuple[str, ...]:
+        """Names of the channels that showed one value only."""
+        return tuple(name for name in self._lowest if not self._lowest[name] < self._highest[name])
+
+    def _watch(self, block: TimeSeries) -> None:
+        # fmin and fmax look past the NaN of missing samples.
+        lowest = np.fmin.reduce(block.values, axis=1, initial=np.inf)
+        highest = np.fmax.reduce(block.values, axis=1, initial=-np.inf)
+        for channel, low, high in zip(block.channels, lowest.tolist(), highest.tolist(), strict=True):
+            self._lowest[channel.name] = min(low, self._lowest.get(channel.name, np.inf))
+            self._highest[channel.name] = max(high, self._highest.get(channel.name, -np.inf))
+
+
+def watched_grids(
+    log: Log, channels: Sequence[str] | None, span: Span, *, progress: Progress = no_progress
+) -> Iterator[Watched]:
+    """Give the log's channels, one stream of blocks for each sampling grid."""
+    if is_small(log):
+        for series in log.read_groups(channels, start_s=span.start_s, end_s=span.end_s):
+            names = tuple(channel.name for channel in series.channels)
+            yield Watched(names, (series,), duration_s=series.duration_s, progress=progress)
+        return
+    for grid in log.grids(channels, start_s=span.start_s, end_s=span.end_s):
+        seconds = max(1.0, VALUES_IN_A_BLOCK / (len(grid.names) * grid.sample_rate_hz))
+        blocks = log.blocks(grid.names, seconds=seconds, start_s=span.start_s, end_s=span.end_s)
+        yield Watched(grid.names, blocks, duration_s=grid.duration_s, progress=progress)

@@ -1,0 +1,268 @@
+"""Power spectral densities and transfer functions of a log or a series, in one call each."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from chladni.apps.sources import Progress, Span, Watched, no_progress, watched_grids
+from chladni.io.log import Log
+from chladni.io.log_info import some_of
+from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.errors import EstimateError
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.time_series import TimeSeries
+from chladni.spectral.adaptive import adaptive_cross_spectra
+from chladni.spectral.blocks import Source
+from chladni.spectral.frequency_response import Estimator, frequency_response
+from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.windows import Window
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Averaging:
+    """How to average; None leaves the choice to the excitation, see `adaptive_cross_spectra`."""
+
+    resolution_hz: float | None = None
+    window: Window | None = None
+    overlap: float | None = None
+
+    def spectra(self, source: Source, references: Sequence[str] | None) -> CrossSpectra:
+        """Average the source's cross-spectra so."""
+        return adaptive_cross_spectra(
+            source,
+            references=references,
+            resolution_hz=self.resolution_hz,
+            window=self.window,
+            overlap=self.overlap,
+        )
+
+
+def psd(
+    source: Log | TimeSeries,
+    *,
+    channels: Sequence[str] | None = None,
+    resolution_hz: float | None = None,
+    window: Window | None = None,
+    overlap: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> PowerSpectralDensity:
+    """Estimate averaged power spectral densities.
+
+    Parameters
+    ----------
+    source
+        A log (read block by block when it's large) or a series.
+    channels
+        Message paths or names; None for all that share one sampling grid. Channels of a log that never change are
+        left out, with a note.
+    resolution_hz
+        Distance of the lines; None chooses by the length of the record.
+    window
+        As in `scipy.signal.get_window`. None takes whole periods without window where the excitation is periodic,
+        else Hann.
+    overlap
+        Share of a segment that the next one repeats, 0 <= overlap < 1; None for 0.5.
+    start_s, end_s
+        Only samples with ``start_s <= t < end_s``, seconds from the start.
+
+    Returns
+    -------
+    PowerSpectralDensity
+        ``.values[channel, frequency]`` in unit^2/Hz.
+
+    Raises
+    ------
+    LogError
+        When there is no such channel, or the channels have different sampling grids.
+    EstimateError
+        When there is too little to average.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from chladni.signals.channel import Channel
+    >>> noise = np.random.default_rng(1).standard_normal((1, 2**16))
+    >>> series = TimeSeries(values=noise, sample_rate_hz=2.0, channels=(Channel(name="a", unit="m/s^2"),))
+    >>> density = psd(series)  # white noise of variance 1 up to 1 Hz: density 1
+    >>> density.units, bool(abs(density.values.mean() - 1) < 0.02)
+    (('(m/s^2)^2/Hz',), True)
+    """
+    averaging = Averaging(resolution_hz=resolution_hz, window=window, overlap=overlap)
+    span = Span(start_s=start_s, end_s=end_s)
+    if isinstance(source, TimeSeries):
+        return _density(_of_series(source, channels, span), averaging)
+    grids = list(watched_grids(source, channels, span))
+    if len(grids) > 1:
+        # The log's own error names the grids and the remedies.
+        source.read(channels, start_s=start_s, end_s=end_s)
+    return _density(grids[0], averaging)
+
+
+def densities(
+    log: Log,
+    *,
+    channels: Sequence[str] | None = None,
+    averaging: Averaging | None = None,
+    span: Span | None = None,
+    progress: Progress = no_progress,
+) -> tuple[PowerSpectralDensity, ...]:
+    """Estimate the densities of a log's channels, one value for each sampling grid.
+
+    Grids on which nothing moves, or that are too short to average, are left out; a note on the first value says so.
+
+    Raises
+    ------
+    EstimateError
+        When no grid gives a spectrum.
+    """
+    found: list[PowerSpectralDensity] = []
+    left_out: list[str] = []
+    for grid in watched_grids(log, channels, span or Span(), progress=progress):
+        try:
+            found.append(_density(grid, averaging or Averaging()))
+        except EstimateError as error:
+            left_out.append(str(error))
+    if not found:
+        raise EstimateError(f"{log.path.name}: no spectrum could be made: {'; '.join(left_out)}")
+    noted = replace(found[0], provenance=found[0].provenance.with_notes(*left_out))
+    return (noted, *found[1:])
+
+
+def frf(
+    source: Log | TimeSeries,
+    *,
+    reference: str | Sequence[str],
+    response: str | Sequence[str] | None = None,
+    estimator: Estimator = "H1",
+    resolution_hz: float | None = None,
+    window: Window | None = None,
+    overlap: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> FrequencyResponse:
+    """Estimate transfer functions and coherence.
+
+    A hammer test is recognised: its hits are cut out, overloads and double hits rejected with a note each. So is
+    periodic excitation, which is averaged over whole periods. Everything else is averaged after Welch.
+
+    Parameters
+    ----------
+    source
+        A log (read block by block when it's large) or a series.
+    reference
+        Message path of the excitation, or several.
+    response
+        Message paths of the responses; None for all other channels that share the reference's sampling grid and
+        change at all.
+    estimator
+        ``H1``, ``H2`` or ``Hv``, see `frequency_response`.
+    resolution_hz, window, overlap, start_s, end_s
+        See `psd`. For a hammer test the resolution sets the length of a record.
+
+    Returns
+    -------
+    FrequencyResponse
+        ``.values[response, reference, frequency]``.
+
+    Raises
+    ------
+    LogError
+        When there is no such channel, or the channels named have different sampling grids.
+    EstimateError
+        When there is too little to average.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from chladni.signals.channel import Channel
+    >>> force = np.random.default_rng(1).standard_normal(2**14)
+    >>> series = TimeSeries(
+    ...     values=np.stack([force, 0.5 * force]),
+    ...     sample_rate_hz=100.0,
+    ...     channels=(Channel(name="f", unit="N"), Channel(name="a", unit="m/s^2")),
+    ... )
+    >>> response = frf(series, reference="f", resolution_hz=1.0)
+    >>> response.unit(0, 0), float(abs(response.values[0, 0, 10]).round(12))
+    ('(m/s^2)/N', 0.5)
+    """
+    references = (reference,) if isinstance(reference, str) else tuple(reference)
+    responses = (response,) if isinstance(response, str) else response
+    averaging = Averaging(resolution_hz=resolution_hz, window=window, overlap=overlap)
+    return transfer(
+        source,
+        references,
+        responses,
+        estimator=estimator,
+        averaging=averaging,
+        span=Span(start_s=start_s, end_s=end_s),
+    )
+
+
+def transfer(
+    source: Log | TimeSeries,
+    references: Sequence[str],
+    responses: Sequence[str] | None,
+    *,
+    estimator: Estimator,
+    averaging: Averaging,
+    span: Span,
+    progress: Progress = no_progress,
+) -> FrequencyResponse:
+    """Do the work of `frf`, with progress."""
+    if not references:
+        raise EstimateError("no reference is given; name the channel of the excitation")
+    names = None if responses is None else tuple(dict.fromkeys((*references, *responses)))
+    if isinstance(source, TimeSeries):
+        spectra = averaging.spectra(_of_series(source, names, span), references)
+        return frequency_response(spectra, references=references, responses=responses, estimator=estimator)
+    # A path may be written in more than one way; the channels that come back have one name each.
+    references = source.names(references)
+    grid = _grid_of(source, references, names, span, progress)
+    spectra = _without_constant(averaging.spectra(grid, references), grid, keep=(*references, *(responses or ())))
+    return frequency_response(
+        spectra,
+        references=references,
+        responses=None if responses is None else source.names(responses),
+        estimator=estimator,
+    )
+
+
+def _density(source: TimeSeries | Watched, averaging: Averaging) -> PowerSpectralDensity:
+    spectra = averaging.spectra(source, None)
+    if isinstance(source, Watched):
+        spectra = _without_constant(spectra, source, keep=())
+    return power_spectral_density(spectra)
+
+
+def _of_series(series: TimeSeries, names: Sequence[str] | None, span: Span) -> TimeSeries:
+    chosen = series if names is None else series.select(list(names))
+    if span == Span():
+        return chosen
+    return chosen.window(start_s=span.start_s, end_s=span.end_s)
+
+
+def _grid_of(
+    log: Log, references: Sequence[str], names: Sequence[str] | None, span: Span, progress: Progress
+) -> Watched:
+    """Find the stream that holds the references, and the responses when they were named."""
+    wanted = set(references if names is None else log.names(names))
+    for grid in watched_grids(log, names, span, progress=progress):
+        if wanted <= set(grid.names):
+            return grid
+    # Not on one grid: the log's own error names the grids and the remedies.
+    log.read(sorted(wanted), start_s=span.start_s, end_s=span.end_s)
+    raise EstimateError(f"{log.path.name}: no sampling grid holds all of {', '.join(sorted(wanted))}")
+
+
+def _without_constant(spectra: CrossSpectra, watched: Watched, *, keep: Sequence[str]) -> CrossSpectra:
+    """Leave out channels that never changed: their spectra are zero, and a table of zeros hides the rest."""
+    constant = [name for name in watched.constant() if name not in keep]
+    if not constant:
+        return spectra
+    moving = [channel.name for channel in spectra.channels if channel.name not in constant]
+    if not moving:
+        raise EstimateError(f"no channel changes: {some_of(constant)}; nothing to make a spectrum of")
+    note = f"{len(constant)} channels never change and are left out: {some_of(constant)}"
+    chosen = spectra.select(moving)
+    return replace(chosen, provenance=chosen.provenance.with_notes(note))

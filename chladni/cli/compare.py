@@ -1,0 +1,5 @@
+"""Command."""
+
+
+def compare() -> None:
+    """Wait."""

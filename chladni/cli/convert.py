@@ -1,0 +1,102 @@
+"""``chladni convert``: files of other programs to MCAP and back."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from chladni.cli import options
+from chladni.cli.output import Output
+from chladni.cli.words import count, number
+
+Option = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=VALUE", help="Option of the file's reader or writer; may be repeated.", show_default=False
+    ),
+]
+
+
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="mcap, csv, txt, wav, mat, npz, uff or unv.")],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="The same kinds, told by the suffix.")],
+    *,
+    channel: options.Channels = None,
+    start: options.Start = None,
+    end: options.End = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Bring all channels to this rate; of a file without times: its rate."),
+    ] = None,
+    layout: Annotated[
+        Literal["messages", "batches"] | None,
+        typer.Option(help="Of a log: a message a sample, or blocks of samples.", show_default=False),
+    ] = None,
+    read: Option = None,
+    write: Option = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")] = False,
+    json: options.Json = None,
+) -> None:
+    """Convert csv, wav, mat, npz and universal files to MCAP and back.
+
+    For example --read time_unit=ms of a csv file, or --write binary=false of a universal file.
+    """
+    from chladni.io.convert import convert as convert_file
+
+    out = Output(json)
+    written = convert_file(
+        source,
+        target,
+        channels=channel,
+        start_s=start,
+        end_s=end,
+        sample_rate_hz=rate,
+        layout=layout,
+        overwrite=overwrite,
+        reading=parse_options(read or (), "--read"),
+        writing=parse_options(write or (), "--write"),
+    )
+    out.line(
+        f"wrote {written.target}: {len(written.channels)} channels, {count(written.samples)} samples, "
+        f"{number(written.duration_s, digits=6)} s"
+    )
+    out.lines((*written.notes, *written.losses))
+    out.json(
+        {
+            "format": "chladni.convert/1",
+            "source": str(written.source),
+            "target": str(written.target),
+            "channels": list(written.channels),
+            "samples": written.samples,
+            "duration_s": written.duration_s,
+            "notes": list(written.notes),
+            "losses": list(written.losses),
+        }
+    )
+
+
+def parse_options(texts: Sequence[str], flag: str) -> dict[str, str | float | bool]:
+    """Read ``name=value`` pairs; values that look like numbers or truth values are those.
+
+    Examples
+    --------
+    >>> parse_options(["time_unit=ms", "binary=false"], "--read")
+    {'time_unit': 'ms', 'binary': False}
+    """
+    pairs: dict[str, str | float | bool] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals or not name.isidentifier():
+            raise typer.BadParameter(f"{flag} {text!r} is not of the form NAME=VALUE")
+        pairs[name] = _value(value)
+    return pairs
+
+
+def _value(text: str) -> str | float | bool:
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    try:
+        return float(text)
+    except ValueError:
+        return text

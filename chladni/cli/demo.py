@@ -1,0 +1,66 @@
+"""``chladni demo``: the tour on data made on the spot."""
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from chladni.cli import options
+from chladni.cli.output import Output
+from chladni.cli.words import number, with_error
+
+if TYPE_CHECKING:
+    from chladni.apps.demo import Comparison
+
+
+def demo(
+    *,
+    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where everything is written.")] = Path(
+        "chladni-demo"
+    ),
+    open_viewer: Annotated[
+        bool, typer.Option("--open/--no-open", help="Open the viewer where there is a display.")
+    ] = True,
+    json: options.Json = None,
+) -> None:
+    """Make a robot arm's log with known truth, analyse it, and show what was found beside the truth."""
+    from chladni.apps.demo import run_tour
+
+    to = Output(json)
+    with to.progress("tour") as progress:
+        tour = run_tour(out, progress=progress)
+    to.line("A robot arm shaken at its tool for a minute; five accelerometers, one with lost messages.", style="bold")
+    to.lines(tour.study.findings)
+    to.table("Found beside the truth", ["what", "found", "truth", "unit"], [_row(one) for one in tour.comparisons])
+    for path in tour.files:
+        to.line(f"wrote {path}")
+    to.json(
+        {
+            "format": "chladni.demo/1",
+            "comparisons": [
+                {"what": one.what, "found": one.found, "std": one.std, "truth": one.truth, "unit": one.unit}
+                for one in tour.comparisons
+            ],
+            "files": [str(path) for path in tour.files],
+        }
+    )
+    if open_viewer and has_display():
+        from chladni.viewers.rerun import spawn
+
+        spawn(tour.study)
+    else:
+        to.line(f"look at it with: chladni view {tour.files[2]} --setup {tour.files[3]} --web")
+
+
+def has_display() -> bool:
+    """Whether a window can be opened here."""
+    if sys.platform in ("win32", "darwin"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _row(one: "Comparison") -> list[str]:
+    found = "not found" if one.found is None else with_error(one.found, one.std)
+    return [one.what, found, number(one.truth, digits=5), one.unit]

@@ -1,0 +1,107 @@
+"""``chladni frf``: how points relate."""
+
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from chladni.cli import options
+from chladni.cli.output import Output
+from chladni.cli.words import number, with_error
+
+if TYPE_CHECKING:
+    from chladni.signals.frequency_response import FrequencyResponse
+    from chladni.signals.peak import Peak
+
+
+def frf(
+    log: options.Log,
+    *,
+    reference: Annotated[
+        list[str],
+        typer.Option(metavar="PATH", help="Channel of the excitation; may be repeated.", show_default=False),
+    ],
+    response: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PATH", help="Only this response; may be repeated.", show_default=False),
+    ] = None,
+    estimator: Annotated[
+        Literal["H1", "H2", "Hv"],
+        typer.Option(help="H1: noise on the response; H2: noise on the reference; Hv: on both."),
+    ] = "H1",
+    resolution: options.Resolution = None,
+    window: options.Window = None,
+    overlap: options.Overlap = None,
+    start: options.Start = None,
+    end: options.End = None,
+    setup: options.Setup = None,
+    stamp: options.Stamp = "auto",
+    json: options.Json = None,
+    figures: options.Figures = None,
+    report: options.Report = None,
+) -> None:
+    """Transfer functions and coherence, with their uncertainty."""
+    from chladni.apps.documents import frf_document
+    from chladni.apps.findings import damage_sentences
+    from chladni.apps.sources import Span
+    from chladni.apps.spectra import Averaging, transfer
+    from chladni.io.log import open_log
+    from chladni.signals.study import Study
+    from chladni.spectral.peaks import find_response_peaks
+
+    out = Output(json)
+    with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name) as progress:
+        found = transfer(
+            opened,
+            reference,
+            response,
+            estimator=estimator,
+            averaging=Averaging(resolution_hz=resolution, window=window, overlap=overlap),
+            span=Span(start_s=start, end_s=end),
+            progress=progress,
+        )
+        damage = damage_sentences(opened.damage)
+        geometry = opened.geometry
+    peaks = find_response_peaks(found)
+    _print_account(out, found)
+    _print_peaks(out, found, peaks)
+    findings = damage + found.provenance.notes
+    out.lines(findings)
+    study = Study(title=log.name, response=found, response_peaks=peaks, geometry=geometry, findings=findings)
+    out.pictures(study, figures=figures, report=report)
+    out.json(frf_document(found, peaks))
+
+
+def _print_account(out: Output, response: "FrequencyResponse") -> None:
+    account = response.provenance
+    spacing_hz = float(response.frequency_hz[1] - response.frequency_hz[0])
+    how = {"periodic": "whole periods", "impact": "hits"}.get(account.averaging, "averages")
+    out.line(
+        f"{account.estimator}: {account.averages} {how} of {account.segment_s:.6g} s ("
+        f"{account.effective_averages:.1f} effective), window {account.window}, lines {number(spacing_hz)} Hz apart",
+        style="bold",
+    )
+
+
+def _print_peaks(out: Output, response: "FrequencyResponse", peaks: "tuple[Peak, ...]") -> None:
+    if not peaks:
+        out.line("No peak stands out of the scatter on the excited lines.")
+        return
+    out.table(
+        "Peaks of the magnitude, the highest first",
+        ["response / reference", "frequency [Hz]", "magnitude", "unit", "phase [deg]", "coherence"],
+        [[" / ".join(peak.channels), *_at_peak(response, peak)] for peak in peaks],
+    )
+
+
+def _at_peak(response: "FrequencyResponse", peak: "Peak") -> list[str]:
+    import numpy as np
+
+    row, column = response.function(*peak.channels)
+    line = int(np.argmin(np.abs(response.frequency_hz - peak.frequency_hz)))
+    return [
+        with_error(peak.frequency_hz, peak.frequency_std_hz),
+        with_error(peak.height, peak.height_std),
+        peak.unit,
+        f"{np.angle(response.values[row, column, line], deg=True):.0f}",
+        f"{response.coherence[row, line]:.3f}",
+    ]

@@ -1,0 +1,101 @@
+"""``chladni psd``: which frequencies, how strong."""
+
+from typing import TYPE_CHECKING
+
+from chladni.cli import options
+from chladni.cli.output import Output
+from chladni.cli.words import number, with_error
+
+if TYPE_CHECKING:
+    from chladni.apps.documents import Document
+    from chladni.signals.peak import Peak
+    from chladni.signals.power_spectral_density import PowerSpectralDensity
+
+
+def psd(
+    log: options.Log,
+    *,
+    channel: options.Channels = None,
+    resolution: options.Resolution = None,
+    window: options.Window = None,
+    overlap: options.Overlap = None,
+    start: options.Start = None,
+    end: options.End = None,
+    setup: options.Setup = None,
+    stamp: options.Stamp = "auto",
+    json: options.Json = None,
+    figures: options.Figures = None,
+    report: options.Report = None,
+) -> None:
+    """Averaged power spectral densities with named peaks."""
+    from chladni.apps.documents import psd_document
+    from chladni.apps.findings import damage_sentences
+    from chladni.apps.sources import Span
+    from chladni.apps.spectra import Averaging, densities
+    from chladni.io.log import open_log
+    from chladni.signals.study import Study
+    from chladni.spectral.peaks import find_peaks
+
+    out = Output(json)
+    with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name) as progress:
+        found = densities(
+            opened,
+            channels=channel,
+            averaging=Averaging(resolution_hz=resolution, window=window, overlap=overlap),
+            span=Span(start_s=start, end_s=end),
+            progress=progress,
+        )
+        damage = damage_sentences(opened.damage)
+        geometry = opened.geometry
+    document = psd_document(found)
+    peaks = tuple(find_peaks(density) for density in found)
+    for density, named in zip(found, peaks, strict=True):
+        _print_levels(out, density, document)
+        _print_peaks(out, named)
+    notes = tuple(note for density in found for note in density.provenance.notes)
+    out.lines((*damage, *notes))
+    study = Study(title=log.name, densities=found, peaks=sum(peaks, ()), geometry=geometry, findings=damage + notes)
+    out.pictures(study, figures=figures, report=report)
+    out.json(document)
+
+
+def _print_levels(out: Output, density: "PowerSpectralDensity", document: "Document") -> None:
+    account = density.provenance
+    spacing_hz = float(density.frequency_hz[1] - density.frequency_hz[0])
+    names = {channel.name for channel in density.channels}
+    out.table(
+        f"Levels: {account.averages} averages ({account.effective_averages:.1f} effective) of "
+        f"{account.segment_s:.6g} s, window {account.window}, lines {number(spacing_hz)} Hz apart",
+        ["channel", "RMS", "unit", "highest peak [Hz]", "density there", "unit"],
+        [
+            [one["name"], number(one["rms"]), one["channel_unit"], *_highest(one)]
+            for one in document["channels"]
+            if one["name"] in names
+        ],
+    )
+
+
+def _highest(channel: "Document") -> list[str]:
+    if not channel["peaks"]:
+        return ["-", "-", channel["psd_unit"]]
+    peak = channel["peaks"][0]
+    return [number(peak["frequency_hz"], digits=6), number(peak["psd"]), channel["psd_unit"]]
+
+
+def _print_peaks(out: Output, peaks: "tuple[Peak, ...]") -> None:
+    if not peaks:
+        out.line("No peak stands out of the scatter.")
+        return
+    out.table(
+        "Peaks, the highest first",
+        ["channels, the strongest first", "frequency [Hz]", "density", "unit"],
+        [
+            [
+                ", ".join(peak.channels),
+                with_error(peak.frequency_hz, peak.frequency_std_hz),
+                with_error(peak.height, peak.height_std),
+                peak.unit,
+            ]
+            for peak in peaks
+        ],
+    )

@@ -1,0 +1,84 @@
+"""``chladni view``: everything in rerun."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from chladni.cli import options
+from chladni.cli.output import Output
+
+if TYPE_CHECKING:
+    from chladni.signals.study import Study
+
+
+def view(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="One MCAP log or more.", show_default=False)],
+    *,
+    channel: options.Channels = None,
+    reference: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PATH", help="Channel of the excitation; a force is taken if not given.", show_default=False
+        ),
+    ] = None,
+    resolution: options.Resolution = None,
+    start: options.Start = None,
+    end: options.End = None,
+    setup: options.Setup = None,
+    stamp: options.Stamp = "auto",
+    save: Annotated[
+        Path | None,
+        typer.Option(metavar="OUT.rrd", help="Write a recording instead of opening a viewer.", show_default=False),
+    ] = None,
+    web: Annotated[bool, typer.Option("--web", help="Serve to a browser on this computer only.")] = False,
+    json: options.Json = None,
+    figures: options.Figures = None,
+    report: options.Report = None,
+) -> None:
+    """Waveforms, spectra, waterfalls and transfer functions in rerun."""
+    from chladni.apps.analyse import analyse
+    from chladni.apps.show import gather
+    from chladni.io.log import open_log
+    from chladni.signals.errors import SetupError
+
+    if save is not None and web:
+        raise SetupError("--save writes a file and --web serves a page; give one of them")
+    out = Output(json)
+    studies = []
+    for log in logs:
+        with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name) as progress:
+            studies.append(
+                analyse(
+                    opened,
+                    channels=channel,
+                    references=reference,
+                    resolution_hz=resolution,
+                    start_s=start,
+                    end_s=end,
+                    progress=progress,
+                )
+            )
+    study = gather(*studies)
+    out.lines(study.findings)
+    out.pictures(study, figures=figures, report=report)
+    _show(study, out, save=save, web=web)
+
+
+def _show(study: "Study", out: Output, *, save: Path | None, web: bool) -> None:
+    from chladni.viewers.rerun import serve_web, spawn, write_rrd
+
+    document = {"format": "chladni.view/1", "path": None, "address": None, "findings": list(study.findings)}
+    if save is not None:
+        path = str(write_rrd(study, save))
+        out.line(f"recording: {path}")
+        out.json(document | {"path": path})
+    elif web:
+        with serve_web(study) as server:
+            out.line(f"{server.address}")
+            out.line("Open this address in a browser on this computer (nobody else can reach it); Ctrl-C ends.")
+            out.json(document | {"address": server.address})
+            server.wait()
+    else:
+        spawn(study)
+        out.json(document)

@@ -1,0 +1,47 @@
+"""Numbers as people read them in a table."""
+
+from math import isfinite
+
+NOTHING = "-"
+
+
+def number(value: float | None, *, digits: int = 4) -> str:
+    """Give a number to so many significant digits, a dash when there is none.
+
+    Examples
+    --------
+    >>> number(0.00012345), number(None), number(1700.0)
+    ('0.0001234', '-', '1700')
+    """
+    if value is None or not isfinite(value):
+        return NOTHING
+    return f"{value:.{digits}g}"
+
+
+def count(value: int | None) -> str:
+    """Give a count, with a space between thousands, a dash when there is none.
+
+    Examples
+    --------
+    >>> count(1234567), count(0)
+    ('1 234 567', '0')
+    """
+    return NOTHING if value is None else f"{value:,}".replace(",", " ")
+
+
+def with_error(value: float, std: float) -> str:
+    """Give a value to the digits that its one sigma allows.
+
+    Examples
+    --------
+    >>> with_error(7.32441, 0.0021), with_error(0.258, float("inf")), with_error(24.7, 0.0)
+    ('7.3244 ± 0.0021', '0.258 ± ?', '24.7')
+    """
+    if std == 0:
+        return number(value, digits=6)
+    if not isfinite(std):
+        return f"{number(value)} ± ?"
+    # Two digits of the uncertainty, and the value to the same place.
+    rounded = f"{std:.2g}"
+    places = max(0, -int(f"{std:e}".split("e")[1]) + 1)
+    return f"{value:.{places}f} ± {float(rounded):.{places}f}" if places < 8 else f"{value:.4g} ± {rounded}"
