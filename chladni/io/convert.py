@@ -142,14 +142,12 @@ def _read_log(
 ) -> FileContents:
     from chladni.io.log import open_log
 
-    log = _call(open_log, source, options)
-    if sample_rate_hz is None:
-        series = tuple(log.read_groups(channels, start_s=start_s, end_s=end_s))
-    else:
-        series = (log.read(channels, start_s=start_s, end_s=end_s, sample_rate_hz=sample_rate_hz),)
-    if not series:
-        raise LogError(f"{source}: holds no channel of numbers")
-    notes = tuple(f"{source}: the log is damaged: {damage.what}." for damage in log.damage)
+    with _call(open_log, source, options) as log:
+        if sample_rate_hz is None:
+            series = tuple(log.read_groups(channels, start_s=start_s, end_s=end_s))
+        else:
+            series = (log.read(channels, start_s=start_s, end_s=end_s, sample_rate_hz=sample_rate_hz),)
+        notes = tuple(f"{source}: {loss.what}" for loss in log.damage)
     return FileContents(series=series, notes=notes)
 
 

@@ -288,6 +288,10 @@ def _quoted(text: str) -> str:
 def _lines(series: TimeSeries, present: NDArray[np.bool_], part: slice) -> Iterator[str]:
     times = series.times_s()[part].tolist()
     columns = series.values[:, part].T.tolist()
+    if present[:, part].all():
+        for time_s, numbers in zip(times, columns, strict=True):
+            yield f"{time_s!r},{','.join(map(repr, numbers))}\r\n"
+        return
     for time_s, numbers, good in zip(times, columns, present[:, part].T.tolist(), strict=True):
         if any(good):
             cells = [repr(number) if ok else "" for number, ok in zip(numbers, good, strict=True)]

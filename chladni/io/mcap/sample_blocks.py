@@ -16,8 +16,9 @@ from chladni.signals.time_series import NS_PER_S, TimeSeries
 def block_topic(series: TimeSeries, topic: str, rows: dict[str, int], *, block_s: float) -> LogTopic:
     """Lay out batch messages of about `block_s` seconds.
 
-    A gap in all channels ends a block, and the next one starts with the first sample after it. Where only some
-    channels have a gap they hold NaN. Single precision stays single, everything else is written as double.
+    Missing samples are NaN, and a block without any sample has no message. A block is not cut at a gap: readers
+    forgive the stamps of blocks some jitter, and would close a short gap between two. Single precision stays single,
+    everything else is written as double.
 
     Parameters
     ----------
@@ -26,7 +27,8 @@ def block_topic(series: TimeSeries, topic: str, rows: dict[str, int], *, block_s
     """
     single = series.values.dtype == np.float32
     type_name = "daq_msgs/SampleBlock" if single else "daq_msgs/SampleBlock64"
-    spans = _spans(measured(series, tuple(rows.values())), max(1, round(block_s * series.sample_rate_hz)))
+    length = max(1, round(block_s * series.sample_rate_hz))
+    spans = _spans(measured(series, tuple(rows.values())), length)
     stamps_ns = series.times_ns()[[first for first, _ in spans]]
     layout = cdr_layout(
         type_name, texts={"channel_names": tuple(rows)}, defaults={"sample_rate": series.sample_rate_hz}
@@ -51,14 +53,10 @@ def block_topic(series: TimeSeries, topic: str, rows: dict[str, int], *, block_s
     )
 
 
-def _spans(present: NDArray[np.bool_], longest: int) -> list[tuple[int, int]]:
-    """Cut the runs of True into pieces of at most `longest` samples, ``[first, last)``."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], present, [False])).astype(np.int8)))
-    return [
-        (start, min(start + longest, int(end)))
-        for begin, end in zip(edges[::2], edges[1::2], strict=True)
-        for start in range(int(begin), int(end), longest)
-    ]
+def _spans(present: NDArray[np.bool_], length: int) -> list[tuple[int, int]]:
+    """Cut the samples into blocks ``[first, last)`` and give those that hold any."""
+    blocks = [(first, min(first + length, len(present))) for first in range(0, len(present), length)]
+    return [(first, last) for first, last in blocks if present[first:last].any()]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -57,8 +57,8 @@ def write_mcap(
     ``/imu/wrist`` as ``sensor_msgs/Imu``, ``/shaker.wrench.force.z`` as ``geometry_msgs/WrenchStamped``,
     ``/axis.position[0]`` as ``sensor_msgs/JointState``; what no ROS type holds gets a definition of its own. Fields
     of such a type that were not measured are NaN. Units, points, directions, roles and overload limits go to the
-    channel metadata, see `chladni.io.mcap.channel_metadata`. Gaps stay gaps: an invalid sample has no message, or
-    ends a block, or is NaN when other channels of its topic are valid.
+    channel metadata, see `chladni.io.mcap.channel_metadata`. Gaps stay gaps: a sample that is invalid in all
+    channels of a topic has no message, and neither has a block without any; other invalid samples are NaN.
 
     Parameters
     ----------

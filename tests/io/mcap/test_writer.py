@@ -120,14 +120,16 @@ def test_invalid_samples_have_no_message(tmp_path: Path) -> None:
     assert messages[5][3].vector.x == series.values[0, 7]
 
 
-def test_a_gap_ends_a_block(tmp_path: Path) -> None:
-    valid = np.ones((1, 10), dtype=bool)
-    valid[:, 3:5] = False
-    series = series_of(["/daq.a"], noise(1, 10), valid=valid, sample_rate_hz=4.0)
+def test_gaps_in_batches_are_nan_and_empty_blocks_have_no_message(tmp_path: Path) -> None:
+    valid = np.ones((1, 14), dtype=bool)
+    valid[:, 2:9] = False
+    series = series_of(["/daq.a"], noise(1, 14), valid=valid, sample_rate_hz=4.0)
     write_mcap(series, tmp_path / "a.mcap", layout="batches")
     messages = decoded(tmp_path / "a.mcap")
-    assert [len(message.samples) for *_, message in messages] == [3, 4, 1]
-    assert [ns for _, _, ns, _ in messages] == [int(series.times_ns()[first]) for first in (0, 5, 9)]
+    assert [ns for _, _, ns, _ in messages] == [int(series.times_ns()[first]) for first in (0, 8, 12)]
+    found = np.concatenate([message.samples for *_, message in messages])
+    expected = np.where(valid, series.values, np.nan)[0]
+    np.testing.assert_array_equal(found, np.delete(expected, [4, 5, 6, 7]))
 
 
 def test_topics_of_several_series_are_interleaved_in_time(tmp_path: Path) -> None:
