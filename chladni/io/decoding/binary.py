@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 HEADER_BYTES: Final = 4
 """Bytes of the CDR encapsulation header; alignment counts from its end."""
 
+COMPACT_BYTES: Final = 256
+"""Bytes a message for each column asked for, up to which irregular messages are first copied side by side."""
+
 _CDR: Final = WireRules(max_alignment=8, terminated=True)
 _ROS1: Final = WireRules(max_alignment=1, terminated=False)
 
@@ -50,15 +53,14 @@ class _Batch:
         if self.bad.any():
             self.reasons["the message lies outside the data"] += int(self.bad.sum())
 
-    def cursor(self, rows: NDArray[np.int64], *, skip: int, byte_order: Literal["<", ">"]) -> Cursor:
-        """Cursor `skip` bytes into the messages of these rows."""
-        every = len(rows) == len(self.bad)
-        offsets = self.messages.offsets if every else self.messages.offsets[rows]
-        lengths = self.messages.lengths if every else self.messages.lengths[rows]
+    def cursor(self, *, byte_order: Literal["<", ">"]) -> Cursor:
+        """Cursor at the first byte of all messages that lie inside the data."""
+        offsets, lengths = self.messages.offsets, self.messages.lengths
+        rows = np.flatnonzero(~self.bad) if self.reasons else np.arange(len(self.bad))
         return Cursor(
             buffer=self.messages.buffer,
-            base=offsets + skip,
-            size=lengths - skip,
+            base=offsets[rows] if self.reasons else offsets,
+            size=lengths[rows] if self.reasons else lengths,
             rows=rows,
             bad=self.bad,
             reasons=self.reasons,
@@ -67,6 +69,7 @@ class _Batch:
 
     def strings(
         self,
+        buffer: NDArray[np.uint8],
         blocks: NDArray[np.generic],
         counts: NDArray[np.int64] | None,
         decode: Callable[[bytes], StringValue],
@@ -76,17 +79,13 @@ class _Batch:
         owner = np.arange(len(self.bad)).repeat(len(places) // max(1, len(self.bad)) if counts is None else counts)
         codes = np.zeros(len(places), np.int32)
         sound = ~self.bad[owner]
-        strings, malformed = intern_blocks(self.messages.buffer, places[sound], decode)
+        strings, malformed = intern_blocks(buffer, places[sound], decode)
         codes[sound] = strings.codes
         wrong = np.unique(owner[sound][malformed])
         self.bad[wrong] = True
         if len(wrong):
             self.reasons["a string isn't UTF-8"] += len(wrong)
         return Strings(codes=codes.reshape(blocks.shape[:-1]), table=strings.table)
-
-    def sound(self) -> NDArray[np.int64]:
-        """Rows not found bad so far."""
-        return np.flatnonzero(~self.bad) if self.bad.any() else np.arange(len(self.bad))
 
 
 class BinaryDecoder:
@@ -123,19 +122,17 @@ class BinaryDecoder:
         require_known(paths, self.fields, schema_name=self.record.name)
         batch = _Batch(messages)
         cursor = self._cursor(batch)
+        cursor.compacted(COMPACT_BYTES * len(paths))
         walk = Walk(cursor, rules=self._rules, layouts=self._layouts)
         walk.record(self.record, tree_of([self._leaves[path] for path in paths]), last=True)
-        columns = {
-            path: self._column(self._leaves[path], walk.pieces.get(path, []), batch, cursor.byte_order)
-            for path in paths
-        }
+        columns = {path: self._column(self._leaves[path], walk.pieces.get(path, []), batch, cursor) for path in paths}
         return Decoded(columns=columns, bad=batch.bad, reasons=dict(batch.reasons))
 
     def _cursor(self, batch: _Batch) -> Cursor:
         """Cursor on the bodies of all messages that have one."""
         if not self._encapsulated:
-            return batch.cursor(batch.sound(), skip=0, byte_order="<")
-        header = batch.cursor(batch.sound(), skip=0, byte_order=">")
+            return batch.cursor(byte_order="<")
+        header = batch.cursor(byte_order=">")
         header.claim(HEADER_BYTES, "the CDR header")
         forms = header.take(np.dtype(np.uint16)).astype(np.int64)
         if len(forms) and (forms == forms[0]).all() and int(forms[0]) in _OTHER_FORMS:
@@ -148,9 +145,10 @@ class BinaryDecoder:
         # One writer has one byte order: a message that differs from most is damaged, not foreign.
         order = 1 if 2 * np.count_nonzero(forms) >= len(forms) else 0
         header.drop(forms != order, "the byte order differs from most messages")
-        return batch.cursor(header.rows, skip=HEADER_BYTES, byte_order="<" if order else ">")
+        header.enter(HEADER_BYTES, "<" if order else ">")
+        return header
 
-    def _column(self, leaf: Leaf, pieces: list[Piece], batch: _Batch, byte_order: str) -> Column:
+    def _column(self, leaf: Leaf, pieces: list[Piece], batch: _Batch, cursor: Cursor) -> Column:
         info, bad = leaf.info, batch.bad
         if info.kind != "string":
             if info.array is None:
@@ -162,10 +160,9 @@ class BinaryDecoder:
             blocks, counts = joined(pieces, bad, empty=np.empty((0, 2), np.int64))
         else:
             blocks, counts = scattered(pieces, len(bad)), None
-        listed = partial(_decoded_list, byte_order=byte_order, rules=self._rules)
-        return Column(
-            values=batch.strings(blocks, counts, listed if isinstance(leaf.type, Array) else _decoded), counts=counts
-        )
+        listed = partial(_decoded_list, byte_order=cursor.byte_order, rules=self._rules)
+        decode = listed if isinstance(leaf.type, Array) else _decoded
+        return Column(values=batch.strings(cursor.buffer, blocks, counts, decode), counts=counts)
 
 
 def _decoded(content: bytes) -> str:

@@ -77,6 +77,29 @@ class Cursor:
     def __len__(self) -> int:
         return len(self.rows)
 
+    def enter(self, width: int, byte_order: Literal["<", ">"]) -> None:
+        """Count places from `width` bytes on, behind a header that has been claimed."""
+        self.base = self.base + width
+        self.size = self.size - width
+        self.shortest -= width
+        self.byte_order = byte_order
+
+    def compacted(self, most_bytes: int) -> None:
+        """Copy messages of one length that lie irregularly side by side, so that columns become strided views.
+
+        Parameters
+        ----------
+        most_bytes : int
+            Longest message for which that pays; a gather a column is cheaper for longer ones.
+        """
+        length = self.shortest
+        if self.stride is not None or not 0 < length <= most_bytes or (self.size != length).any():
+            return
+        everywhere = np.lib.stride_tricks.sliding_window_view(self.buffer, length)
+        self.buffer = everywhere[self.base].reshape(-1)
+        base = np.arange(len(self), dtype=np.int64) * length
+        self._place(base=base, size=self.size, rows=self.rows, position=self.position)
+
     def subset(self, index: NDArray[np.intp]) -> Cursor:
         """Give a cursor on some of the rows, at the same place."""
         return Cursor(
@@ -249,4 +272,4 @@ def _constant_step(base: NDArray[np.int64]) -> int | None:
         return 1
     step = int(base[1]) - int(base[0])
     # Falling offsets would need a view that ends before it starts; the gather serves them as well.
-    return step if step > 0 and (np.diff(base) == step).all() else None
+    return step if step > 0 and (base[1:] - base[:-1] == step).all() else None
