@@ -10,6 +10,7 @@ from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import TimeSeries
+from chladni.spectral.accumulator import line_frequencies_hz, one_sided_weights
 from chladni.spectral.force_pulses import (
     LONGEST_PULSE_S,
     NOISE_SIGMAS,
@@ -239,11 +240,9 @@ def impact_cross_spectra(
     for hit in impacts.accepted:
         spectrum = scipy.fft.rfft(_record(series, impacts, hit, length) * windows) / rate_hz
         total += spectrum.conj()[:, np.newaxis] * spectrum
-    # One-sided: every line but 0 Hz and the Nyquist frequency stands for two.
-    total[..., 1 : (length + 1) // 2] *= 2
     return CrossSpectra(
-        frequency_hz=scipy.fft.rfftfreq(length, 1 / rate_hz),
-        density=total / (len(impacts.accepted) * impacts.record_s),
+        frequency_hz=line_frequencies_hz(length, rate_hz),
+        density=total * one_sided_weights(length) / (len(impacts.accepted) * impacts.record_s),
         channels=series.channels,
         bandwidth_hz=1 / impacts.record_s,
         provenance=_provenance(series, impacts, force_window=force_window, decay_per_s=decay_per_s),

@@ -1,0 +1,209 @@
+"""Spectra over time: the waterfall."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.errors import EstimateError
+from chladni.signals.provenance import Provenance
+from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.waterfall import Waterfall
+from chladni.spectral.accumulator import line_frequencies_hz, one_sided_weights
+from chladni.spectral.blocks import Source, leading_part, samples_known
+from chladni.spectral.segment_spectra import segment_spectra
+from chladni.spectral.segmentation import SAMPLES_TO_CHOOSE_FROM, Detrend, Segmentation, plan_segmentation
+from chladni.spectral.windows import Window, noise_bandwidth_bins, window_name, window_samples
+
+# A waterfall is looked at: more lines than a screen has pixels cost time resolution and show nothing.
+DEFAULT_SEGMENT = 2048
+# Samples transformed at once; bounds the memory that a long block takes.
+PORTION = 1 << 20
+# Silence longer than this between two blocks is two measurements.
+LONGEST_GAP_SAMPLES = 100_000_000
+
+Samples = NDArray[np.floating[Any]]
+
+
+def waterfall(
+    source: Source,
+    *,
+    resolution_hz: float | None = None,
+    window: Window = "hann",
+    overlap: float = 0.5,
+    detrend: Detrend = "constant",
+    max_slices: int = 512,
+) -> Waterfall:
+    """Compute spectra over time (STFT).
+
+    Parameters
+    ----------
+    source
+        A series, or consecutive blocks of one (taken one at a time, so memory doesn't grow with the log).
+    resolution_hz
+        Spacing of the lines; None chooses segments of a power of two, 2048 samples or a 16th of the record at most.
+    window, overlap, detrend
+        As for `cross_spectra`.
+    max_slices
+        Most slices to give, at least 2. A longer log is not skipped over: neighbouring segments are averaged in
+        groups of 2, 4, 8, ..., which `provenance` tells.
+
+    Returns
+    -------
+    Waterfall
+        ``[channel, time, frequency]`` in unit^2/Hz, single precision: each slice is the Welch estimate of its
+        segments. NaN in every slice, and of those channels only, that touches an invalid sample or a gap between
+        blocks.
+
+    Raises
+    ------
+    EstimateError
+        When there is no whole segment, blocks don't fit together, or `max_slices` is below 2.
+    SetupError
+        When an option is out of its range.
+
+    Examples
+    --------
+    >>> from chladni.signals.channel import Channel
+    >>> series = TimeSeries(
+    ...     values=np.random.default_rng(1).standard_normal((1, 8000)),
+    ...     sample_rate_hz=1000.0,
+    ...     channels=(Channel(name="a", unit="N"),),
+    ... )
+    >>> waterfall(series, resolution_hz=10.0).values.shape
+    (1, 159, 51)
+    """
+    if max_slices < 2:
+        raise EstimateError(f"max_slices is {max_slices}; a waterfall needs at least 2")
+    lead, blocks = leading_part(source, SAMPLES_TO_CHOOSE_FROM)
+    known = samples_known(source, lead, SAMPLES_TO_CHOOSE_FROM)
+    plan = _plan(lead[0].sample_rate_hz, known, resolution_hz, window=window, overlap=overlap, detrend=detrend)
+    slices = _Slices(most=max_slices - max_slices % 2)
+    shape = window_samples(window, plan.samples)
+    for spectra in _segments(blocks, lead[0], plan, shape):
+        slices.add(spectra)
+    if not slices.count:
+        raise EstimateError(f"there is no whole segment of {plan.samples / lead[0].sample_rate_hz:g} s; shorten it")
+    return _assembled(lead[0], plan, shape, slices)
+
+
+def _plan(rate_hz: float, known: int | None, resolution_hz: float | None, **options: Any) -> Segmentation:
+    plan = plan_segmentation(rate_hz, samples_available=known, resolution_hz=resolution_hz, **options)
+    if resolution_hz is None and plan.samples > DEFAULT_SEGMENT:
+        coarser_hz = rate_hz / DEFAULT_SEGMENT
+        return plan_segmentation(rate_hz, samples_available=known, resolution_hz=coarser_hz, **options)
+    return plan
+
+
+class _Slices:
+    """A bounded list of power spectra, which halves itself by averaging neighbours when it's full."""
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self.group = 1
+        self.count = 0
+        self._means: list[NDArray[np.float64]] = []
+        self._pending: list[NDArray[np.float64]] = []
+
+    def add(self, segments: NDArray[np.float64]) -> None:
+        """Add powers ``[segment, channel, frequency]``, in order."""
+        for power in segments:
+            self.count += 1
+            self._pending.append(power)
+            if len(self._pending) == self.group:
+                self._close()
+
+    def slices(self) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+        """Give ``[channel, slice, frequency]`` and the mean segment number of each slice."""
+        means = [*self._means, *([np.mean(self._pending, axis=0)] if self._pending else [])]
+        first = np.arange(len(means)) * self.group
+        last = np.minimum(first + self.group, self.count) - 1
+        return np.stack(means, axis=1).astype(np.float32), (first + last) / 2
+
+    def _close(self) -> None:
+        if len(self._means) == self.most:
+            pairs = zip(self._means[::2], self._means[1::2], strict=True)
+            self._means = [(one + other) / 2 for one, other in pairs]
+            self.group *= 2
+            return
+        self._means.append(np.mean(self._pending, axis=0))
+        self._pending = []
+
+
+def _segments(
+    blocks: Iterator[TimeSeries], first: TimeSeries, plan: Segmentation, window: NDArray[np.float64]
+) -> Iterator[NDArray[np.float64]]:
+    """Powers ``[segment, channel, frequency]`` of portion after portion, the segments that span two portions too."""
+    held = np.empty((len(first.channels), 0))
+    for values in _portions(blocks, first):
+        held = np.concatenate([held, values], axis=1)
+        count = plan.count(held.shape[1])
+        if not count:
+            continue
+        spectra = segment_spectra(held[:, : plan.length_of(count)], plan, window)
+        yield np.abs(spectra.transpose(1, 2, 0)) ** 2
+        held = held[:, count * plan.hop :]
+
+
+def _portions(blocks: Iterator[TimeSeries], first: TimeSeries) -> Iterator[NDArray[np.float64]]:
+    """Samples in portions of bounded size, NaN where nothing was measured, gaps between blocks included."""
+    size = max(1, PORTION // len(first.channels))
+    position = 0
+    for block in blocks:
+        if block.channels != first.channels or block.sample_rate_hz != first.sample_rate_hz:
+            raise EstimateError(
+                "blocks of a waterfall need the same channels and rate; resample or select them first"
+            )
+        start = round((block.start_time_ns - first.start_time_ns) / NS_PER_S * first.sample_rate_hz)
+        if not 0 <= start - position <= LONGEST_GAP_SAMPLES:
+            raise EstimateError(
+                f"a block starts {(start - position) / first.sample_rate_hz:g} s after the one before ended; give "
+                "consecutive blocks, and measurements far apart one by one"
+            )
+        for missing in range(position, start, size):
+            yield np.full((len(first.channels), min(size, start - missing)), np.nan)
+        for begin in range(0, block.samples, size):
+            yield _marked(block, slice(begin, begin + size))
+        position = start + block.samples
+
+
+def _marked(block: TimeSeries, part: slice) -> NDArray[np.float64]:
+    values = block.values[:, part].astype(np.float64)
+    if block.valid is not None:
+        values[~block.valid[:, part]] = np.nan
+    return values
+
+
+def _assembled(first: TimeSeries, plan: Segmentation, window: NDArray[np.float64], slices: _Slices) -> Waterfall:
+    rate_hz = first.sample_rate_hz
+    power, number = slices.slices()
+    scale = one_sided_weights(plan.samples) / (rate_hz * np.sum(window**2))
+    return Waterfall(
+        time_s=(number * plan.hop + plan.samples / 2) / rate_hz,
+        frequency_hz=line_frequencies_hz(plan.samples, rate_hz),
+        values=power * scale.astype(np.float32),
+        channels=first.channels,
+        start_time_ns=first.start_time_ns,
+        bandwidth_hz=noise_bandwidth_bins(window) * rate_hz / plan.samples,
+        provenance=Provenance(
+            estimator="PSD over time",
+            window=window_name(plan.window),
+            segment_s=plan.samples / rate_hz,
+            overlap=plan.overlap,
+            averages=slices.group,
+            effective_averages=float(slices.group),
+            detrend=plan.detrend,
+            notes=_grouping_note(slices, plan, rate_hz),
+        ),
+    )
+
+
+def _grouping_note(slices: _Slices, plan: Segmentation, rate_hz: float) -> tuple[str, ...]:
+    if slices.group == 1:
+        return ()
+    note = (
+        f"each slice of the waterfall is the average of {slices.group} segments of {plan.samples / rate_hz:g} s, one "
+        f"every {slices.group * plan.hop / rate_hz:g} s, so that {slices.most} slices hold the log"
+    )
+    return (note,)
