@@ -1,0 +1,253 @@
+"""What a log holds: topics, which time each is stamped with, and the channels, as the setup file refines them."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from chladni.io.channel_source import ChannelSource
+from chladni.io.mcap.container import McapContainer
+from chladni.io.message_path import near_matches, parse_message_path
+from chladni.io.setup import ChannelSetup, Setup
+from chladni.io.stamps import (
+    StampChoice,
+    StampRequest,
+    TopicHead,
+    choose_stamp,
+    clock_shifts_ns,
+    find_own_stamp,
+    head_of,
+)
+from chladni.io.stream import Stream
+from chladni.io.topic import Topic, read_heads, topics_of
+from chladni.io.topic_channels import TopicChannels, topic_channels
+from chladni.signals.errors import LogError, SetupError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Catalog:
+    """What can be read from a log.
+
+    Attributes
+    ----------
+    file
+        Name of the file, for messages.
+    topics
+        Topics that can be decoded.
+    choices
+        Which time of a topic's messages is their samples'.
+    refused
+        Why the other topics can't be read.
+    channels
+        Every channel that is listed, in the order of the file.
+    setups
+        What the setup file says, by topic and field.
+    lags_ns
+        Least and most time between a topic's samples and their log time in its first messages; None where the two
+        don't run together, so that a time window can't be found by log time.
+    start_ns
+        Earliest sample of the topics with channels: zero of all times in seconds. 0 for an empty log.
+    """
+
+    file: str
+    topics: Mapping[str, TopicChannels]
+    choices: Mapping[str, StampChoice]
+    refused: Mapping[str, str]
+    channels: tuple[ChannelSource, ...]
+    setups: Mapping[tuple[str, str], ChannelSetup]
+    lags_ns: Mapping[str, tuple[int, int] | None]
+    start_ns: int
+
+    def resolve(self, path: str) -> ChannelSource:
+        """Find the channel that a path names.
+
+        Raises
+        ------
+        LogError
+            When the log has no such channel; near ones are named.
+        """
+        try:
+            source = self._resolved(path)
+        except LogError as error:
+            raise LogError(f"{self.file}: {error}") from None
+        return with_setup(source, self.setups.get((source.topic, source.field)))
+
+    def _resolved(self, path: str) -> ChannelSource:
+        parsed = parse_message_path(path, [*self.topics, *self.refused])
+        if parsed.topic in self.refused:
+            raise LogError(f"{path!r}: messages of {parsed.topic} can't be decoded: {self.refused[parsed.topic]}")
+        if not parsed.steps:
+            names = [one.channel.name for one in self.channels if one.topic == parsed.topic]
+            raise LogError(f"{path!r} is a topic; name a channel of it; {near_matches(path, names)}")
+        return self.topics[parsed.topic].resolve(parsed)
+
+    def streams(self, sources: Sequence[ChannelSource]) -> list[Stream]:
+        """Group channels whose samples come in the same messages.
+
+        Elements that are chosen by name or filter may be missing from some messages, so each choice is a stream.
+        """
+        groups: dict[object, list[ChannelSource]] = {}
+        for source in sources:
+            selector = source.selector
+            key = (source.topic, *((selector.message_filters, selector.element_filters) if selector else ()))
+            groups.setdefault(key, []).append(source)
+        return [self._stream(tuple(group)) for group in groups.values()]
+
+    def _stream(self, sources: tuple[ChannelSource, ...]) -> Stream:
+        channels = self.topics[sources[0].topic]
+        selector = sources[0].selector
+        return Stream(
+            topic=channels.topic,
+            choice=self.choices[channels.topic.name],
+            sources=sources,
+            layout=channels.layout,
+            names=channels.names,
+            filters=selector.message_filters if selector else (),
+        )
+
+
+def read_catalog(container: McapContainer, *, setup: Setup, request: StampRequest) -> Catalog:
+    """Look at the channels of a log and at the first messages of each topic.
+
+    Raises
+    ------
+    SetupError
+        When the setup file names a channel or topic that the log doesn't hold.
+    LogError
+        When the messages' own stamp is asked for and a topic with channels has none.
+    """
+    topics, refused = topics_of(container.channels)
+    topics = read_heads(container, topics)
+    _require_known_batches(setup, topics)
+    readable, unreadable = _channels_of(topics, setup)
+    refused |= unreadable
+    listed = [source for channels in readable.values() for source in channels.listed()]
+    heads = {name: _head(channels.topic) for name, channels in readable.items()}
+    choices = _choices(heads, {source.topic for source in listed}, request)
+    catalog = Catalog(
+        file=container.path.name,
+        topics=readable,
+        choices=choices,
+        refused=refused,
+        channels=(),
+        setups={},
+        lags_ns={topic: None if head is None else head.lag_range_ns(choices[topic]) for topic, head in heads.items()},
+        start_ns=_start_ns(heads, choices, {source.topic for source in listed}),
+    )
+    setups = _setups(catalog, setup, listed)
+    channels = tuple(with_setup(source, setups.get((source.topic, source.field))) for source in listed)
+    return replace(catalog, channels=channels, setups=setups)
+
+
+def _channels_of(topics: Mapping[str, Topic], setup: Setup) -> tuple[dict[str, TopicChannels], dict[str, str]]:
+    readable: dict[str, TopicChannels] = {}
+    refused: dict[str, str] = {}
+    for name, topic in topics.items():
+        try:
+            readable[name] = topic_channels(topic, setup.batches.get(name))
+        except LogError as error:
+            if name in setup.batches:
+                raise SetupError(f"{setup.path}: [[batch]] {name}: {error}") from None
+            refused[name] = str(error)
+    return readable, refused
+
+
+def _head(topic: Topic) -> TopicHead | None:
+    if not topic.head:
+        return None
+    own = find_own_stamp(topic.fields, topic.schema_name)
+    decoded = topic.decode_head(own.leaves) if own is not None else []
+    return head_of(topic.head, own, decoded)
+
+
+def _choices(
+    heads: Mapping[str, TopicHead | None], with_channels: Collection[str], request: StampRequest
+) -> dict[str, StampChoice]:
+    choices: dict[str, StampChoice] = {}
+    for topic, head in heads.items():
+        if head is None:
+            choices[topic] = StampChoice(kind="log", reason="no message was found")
+        elif topic in with_channels or request != "header":
+            choices[topic] = choose_stamp(head, request, topic=topic)
+        else:
+            # Nobody asked for this topic's time; a text topic without stamps must not stop the log from being read.
+            choices[topic] = choose_stamp(head, "auto", topic=topic)
+    signals = {topic: head for topic, head in heads.items() if head is not None and topic in with_channels}
+    shifts = clock_shifts_ns({topic: head for topic, head in signals.items() if len(head.log_ns) > 1}, choices)
+    return choices | {topic: choices[topic].shifted(shift_ns) for topic, shift_ns in shifts.items()}
+
+
+def _start_ns(
+    heads: Mapping[str, TopicHead | None], choices: Mapping[str, StampChoice], with_channels: Collection[str]
+) -> int:
+    signals = {topic: head for topic, head in heads.items() if head is not None and topic in with_channels}
+    # One message samples nothing, and latched ones carry the time of long ago.
+    starts = [head.start_ns(choices[topic]) for topic, head in signals.items() if len(head.log_ns) > 1]
+    return min(starts or [head.start_ns(choices[topic]) for topic, head in signals.items()], default=0)
+
+
+# --- setup -------------------------------------------------------------------------------------------------------
+
+
+def _require_known_batches(setup: Setup, topics: Mapping[str, Topic]) -> None:
+    for name, layout in setup.batches.items():
+        if name not in topics:
+            near = near_matches(name, topics)
+            raise SetupError(f"{setup.path}: [[batch]] topic: the log has no topic {name!r}; {near}")
+        known = {info.path for info in topics[name].fields}
+        for leaf in layout.leaves:
+            if leaf not in known:
+                near = near_matches(leaf, known)
+                raise SetupError(f"{setup.path}: [[batch]] {name}: messages have no field {leaf!r}; {near}")
+
+
+def _setups(catalog: Catalog, setup: Setup, listed: Sequence[ChannelSource]) -> dict[tuple[str, str], ChannelSetup]:
+    """Find the channel of each table; all that the log doesn't hold are told at once."""
+    found: dict[tuple[str, str], ChannelSetup] = {}
+    mistakes: list[str] = []
+    names = [source.channel.name for source in listed]
+    for one in setup.channels:
+        try:
+            source = catalog.resolve(one.path)
+            with_setup(source, one)
+        except LogError:
+            mistakes.append(
+                f"{one.place}: [[channel]] path: {catalog.file} has no channel {one.path!r}; "
+                f"{near_matches(one.path, names)}"
+            )
+        except SetupError as error:
+            mistakes.append(str(error))
+        else:
+            found[source.topic, source.field] = one
+    if mistakes:
+        raise SetupError("\n".join(mistakes))
+    return found
+
+
+def with_setup(source: ChannelSource, setup: ChannelSetup | None) -> ChannelSource:
+    """Refine a channel by what the setup file says of it.
+
+    Raises
+    ------
+    SetupError
+        When sensitivity or range don't fit the channel's unit.
+    """
+    if setup is None:
+        return source
+    factor, unit = setup.si_unit(source.factor, source.channel.unit)
+    channel = source.channel
+    overload = channel.overload
+    if setup.overload is not None:
+        overload, overload_unit = setup.overload
+        if overload_unit != unit:
+            raise SetupError(
+                f"{setup.place}: {setup.path} range: it is in {overload_unit}, the channel in {unit}; "
+                "give the range in the channel's unit, or the channel's unit"
+            )
+    refined = replace(
+        channel,
+        unit=unit,
+        point=setup.point or channel.point,
+        direction=setup.direction or channel.direction,
+        role=setup.role or channel.role,
+        overload=overload,
+    )
+    return replace(source, channel=refined, factor=factor)

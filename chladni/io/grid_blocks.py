@@ -1,0 +1,115 @@
+"""A log's samples on their grid, block by block, in memory that doesn't grow with the log."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.io.grid_buffer import GridBuffer
+from chladni.io.placement import Group
+from chladni.signals.channel import Channel
+from chladni.signals.time_series import TimeSeries
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlacedPiece:
+    """Samples with their places.
+
+    Attributes
+    ----------
+    rows
+        Row of the result of each channel.
+    index
+        ``[sample]``, grid index.
+    values
+        ``[channel, sample]``.
+    """
+
+    rows: tuple[int, ...]
+    index: NDArray[np.int64]
+    values: NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BlockGrid:
+    """A stretch of a grid, cut into blocks.
+
+    Attributes
+    ----------
+    group, channels
+        The grid, and one channel for each row.
+    first, last
+        Grid indices of the stretch.
+    block_samples
+        Samples of a block; the last one may be shorter.
+    dtype
+        Of the samples.
+    """
+
+    group: Group
+    channels: tuple[Channel, ...]
+    first: int
+    last: int
+    block_samples: int
+    dtype: np.dtype[Any]
+
+    @property
+    def count(self) -> int:
+        """Number of blocks."""
+        return -(-(self.last - self.first) // self.block_samples)
+
+    def end(self, number: int) -> int:
+        """Grid index behind the last sample of a block."""
+        return min(self.last, self.first + (number + 1) * self.block_samples)
+
+    def buffer(self, number: int) -> GridBuffer:
+        """An empty block."""
+        start = self.first + number * self.block_samples
+        return GridBuffer(self.group, self.channels, start, self.end(number), self.dtype)
+
+    def inside(self, piece: PlacedPiece) -> PlacedPiece:
+        """Give the samples of a piece that have a place on the stretch."""
+        keep = (piece.index >= self.first) & (piece.index < self.last)
+        return piece if keep.all() else replace(piece, index=piece.index[keep], values=piece.values[:, keep])
+
+    def cut(self, index: NDArray[np.int64]) -> Iterator[tuple[int, slice | NDArray[np.bool_]]]:
+        """Give the blocks that samples of the stretch fall into, and which samples fall into each."""
+        numbers = (index - self.first) // self.block_samples
+        if not numbers.size:
+            return
+        low, high = int(numbers.min()), int(numbers.max())
+        if low == high:
+            yield low, slice(None)
+        elif np.all(np.diff(numbers) >= 0):
+            edges = np.searchsorted(numbers, np.arange(low, high + 2))
+            yield from ((low + n, slice(a, b)) for n, (a, b) in enumerate(pairwise(edges)) if b > a)
+        else:
+            yield from ((int(number), numbers == number) for number in np.unique(numbers))
+
+
+def blocks_of(grid: BlockGrid, pieces: Iterable[PlacedPiece], complete: Sequence[int]) -> Iterator[TimeSeries]:
+    """Lay pieces onto the grid and give each block as soon as nothing more can fall into it.
+
+    Parameters
+    ----------
+    grid
+        Where the samples lie.
+    pieces
+        In the order of the file.
+    complete
+        For each piece the grid index below which no later piece has a sample.
+    """
+    filling: dict[int, GridBuffer] = {}
+    done = 0
+    for whole, below in zip(pieces, complete, strict=True):
+        piece = grid.inside(whole)
+        for number, part in grid.cut(piece.index):
+            if number not in filling:
+                filling[number] = grid.buffer(number)
+            filling[number].put(piece.rows, piece.index[part], piece.values[:, part])
+        while done < grid.count and grid.end(done) <= below:
+            yield (filling.pop(done, None) or grid.buffer(done)).series()
+            done += 1

@@ -1,0 +1,110 @@
+"""Samples laid onto a grid: all at once, or block by block as a log is read."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.io.placement import Group
+from chladni.signals.channel import Channel
+from chladni.signals.time_series import TimeSeries
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GridRows:
+    """Which row of the result each channel of each stream of a group has.
+
+    Attributes
+    ----------
+    channels
+        In the order asked for.
+    rows
+        For each placement of the group the rows of its stream's channels.
+    """
+
+    channels: tuple[Channel, ...]
+    rows: tuple[tuple[int, ...], ...]
+
+
+def grid_rows(group: Group, order: Sequence[Channel]) -> GridRows:
+    """Order the channels of a group as they were asked for."""
+    names = {channel.name for placement in group.placements for channel in placement.stream.channels}
+    channels = tuple(channel for channel in order if channel.name in names)
+    row = {channel.name: index for index, channel in enumerate(channels)}
+    return GridRows(
+        channels=channels,
+        rows=tuple(
+            tuple(row[channel.name] for channel in placement.stream.channels) for placement in group.placements
+        ),
+    )
+
+
+class GridBuffer:
+    """Samples ``[row, sample]`` of one stretch of a grid; what no message fills stays NaN and invalid.
+
+    Parameters
+    ----------
+    group
+        The grid.
+    channels
+        One for each row.
+    first, last
+        Grid indices of the stretch.
+    dtype
+        Of the samples.
+    """
+
+    def __init__(
+        self, group: Group, channels: tuple[Channel, ...], first: int, last: int, dtype: np.dtype[np.floating[Any]]
+    ) -> None:
+        self._group = group
+        self._channels = channels
+        self._first = first
+        self._values = np.full((len(channels), last - first), np.nan, dtype)
+
+    def put(self, rows: Sequence[int], index: NDArray[np.int64], values: NDArray[np.floating[Any]]) -> None:
+        """Lay samples onto the grid; those outside the stretch are left out.
+
+        Parameters
+        ----------
+        rows
+            Row of each channel of `values`.
+        index
+            ``[sample]``, grid index.
+        values
+            ``[channel, sample]``.
+        """
+        places = index - self._first
+        count = self._values.shape[1]
+        if not places.size:
+            return
+        if places[0] >= 0 and places[-1] == places[0] + places.size - 1 and _contiguous(places):
+            stop = min(count, int(places[-1]) + 1)
+            start = int(places[0])
+            if start < stop:
+                for row, samples in zip(rows, values, strict=True):
+                    self._values[row, start:stop] = samples[: stop - start]
+            return
+        inside = (places >= 0) & (places < count)
+        whole = bool(inside.all())
+        for row, samples in zip(rows, values, strict=True):
+            self._values[row, places if whole else places[inside]] = samples if whole else samples[inside]
+
+    def series(self) -> TimeSeries:
+        """Give what has been laid down; what is no finite number counts as not measured."""
+        valid = np.isfinite(self._values)
+        if not valid.all():
+            self._values[~valid] = np.nan
+        return TimeSeries(
+            values=self._values,
+            sample_rate_hz=self._group.rate_hz,
+            start_time_ns=self._group.time_ns(self._first),
+            channels=self._channels,
+            valid=None if valid.all() else valid,
+        )
+
+
+def _contiguous(places: NDArray[np.int64]) -> bool:
+    return bool(np.all(np.diff(places) == 1))

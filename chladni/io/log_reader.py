@@ -1,0 +1,310 @@
+"""Reading of chosen channels of a log: stamps first, then samples, whole or block by block."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.io.gathering import Gathering, LostMessages, gather, windowed
+from chladni.io.grid_blocks import BlockGrid, PlacedPiece, blocks_of
+from chladni.io.grid_buffer import GridBuffer, grid_rows
+from chladni.io.mcap.container import McapContainer
+from chladni.io.placement import Group, Placement, group_placements
+from chladni.io.stream import Piece, Stream, read_pieces
+from chladni.signals.channel import Channel
+from chladni.signals.errors import LogError
+from chladni.signals.time_series import TimeSeries
+
+#: A grid may be this much longer than the samples on it, and this many times as long.
+EMPTY_GRID = 1 << 24
+SPARSE = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Window:
+    """What part of a log is read.
+
+    Attributes
+    ----------
+    start_ns, end_ns
+        Samples with ``start_ns <= time < end_ns``; None is without bound.
+    log_start_ns, log_end_ns
+        Messages with log times in between are looked at, since a log is indexed by them.
+    told
+        The window in words, for messages.
+    """
+
+    start_ns: int | None = None
+    end_ns: int | None = None
+    log_start_ns: int | None = None
+    log_end_ns: int | None = None
+    told: str = "in the log"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampleGrid:
+    """Channels that share sampling rate and sample times.
+
+    Attributes
+    ----------
+    names
+        Of the channels.
+    sample_rate_hz, start_time_ns, samples
+        As the `TimeSeries` of these channels will have them.
+    """
+
+    names: tuple[str, ...]
+    sample_rate_hz: float
+    start_time_ns: int
+    samples: int
+
+    @property
+    def duration_s(self) -> float:
+        """Number of samples over the rate."""
+        return self.samples / self.sample_rate_hz
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FirstPass:
+    """What a pass over the stamps tells.
+
+    Attributes
+    ----------
+    placements
+        One for each stream, in their order.
+    sizes
+        Stream and number of messages of each piece, in the order of the file.
+    dtype
+        That holds the samples.
+    """
+
+    placements: tuple[Placement, ...]
+    sizes: tuple[tuple[int, int], ...]
+    dtype: np.dtype[Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LogReader:
+    """Chosen channels in a window of a log.
+
+    Attributes
+    ----------
+    container
+        The log.
+    streams
+        Of the channels.
+    order
+        The channels in the order asked for.
+    window
+        What part is read.
+    lost
+        Counts messages that can't be used.
+    required
+        Whether every channel was asked for by name, so that one that isn't uniform is an error.
+    """
+
+    container: McapContainer
+    streams: Sequence[Stream]
+    order: Sequence[Channel]
+    window: Window
+    lost: LostMessages
+    required: bool
+
+    def pieces(self) -> Iterator[tuple[int, Piece]]:
+        """What each batch of messages holds of each stream, inside the window, in the order of the file."""
+        found = read_pieces(
+            self.container, self.streams, start_ns=self.window.log_start_ns, end_ns=self.window.log_end_ns
+        )
+        return windowed(self.streams, found, self.lost, window_ns=(self.window.start_ns, self.window.end_ns))
+
+    def series(self) -> tuple[TimeSeries, ...]:
+        """Everything, one series for each grid."""
+        gatherings = gather(self.streams, self.pieces(), with_values=True)
+        groups = self.groups([one.place() for one in gatherings])
+        by_stream = {id(one.stream): one for one in gatherings}
+        series = [self._laid_out(group, by_stream) for group in groups]
+        return self._some([one for one in series if one is not None])
+
+    def first_pass(self) -> "FirstPass":
+        """Read stamps alone and fit the time bases: all that must be known before blocks can be given."""
+        sizes: list[tuple[int, int]] = []
+        gatherings = gather(self.streams, _sized(self.pieces(), sizes), with_values=False)
+        return FirstPass(
+            placements=tuple(one.place() for one in gatherings),
+            sizes=tuple(sizes),
+            dtype=np.result_type(*(one.dtype for one in gatherings)),
+        )
+
+    def blocks(self, known: "FirstPass", seconds: float) -> Iterator[TimeSeries]:
+        """Everything, block by block, in a second pass.
+
+        Raises
+        ------
+        LogError
+            When the channels don't share one grid, besides what `groups` raises.
+        """
+        group = self.one_group(self.groups(known.placements))
+        first, last = group.extent(self.window.start_ns, self.window.end_ns)
+        rows = grid_rows(group, self.order)
+        grid = BlockGrid(
+            group=group,
+            channels=rows.channels,
+            first=first,
+            last=last,
+            block_samples=max(1, round(seconds * group.rate_hz)),
+            dtype=known.dtype,
+        )
+        members = {id(one.stream): number for number, one in enumerate(group.placements)}
+        member_of = [members.get(id(one.stream)) for one in known.placements]
+        lowest = _lowest(known.sizes, member_of, group.placements)
+        return blocks_of(grid, self._placed(member_of, group.placements, rows.rows), _complete(lowest, last))
+
+    def grids(self, known: "FirstPass") -> tuple[SampleGrid, ...]:
+        """What grids the channels lie on; see `groups`."""
+        found = []
+        for group in self.groups(known.placements):
+            first, last = group.extent(self.window.start_ns, self.window.end_ns)
+            if last > first:
+                names = tuple(channel.name for channel in grid_rows(group, self.order).channels)
+                found.append(
+                    SampleGrid(
+                        names=names,
+                        sample_rate_hz=group.rate_hz,
+                        start_time_ns=group.time_ns(first),
+                        samples=last - first,
+                    )
+                )
+        return tuple(found)
+
+    def groups(self, placements: Sequence[Placement]) -> tuple[Group, ...]:
+        """Put streams on their grids; leave out those without one, unless they were asked for by name.
+
+        Raises
+        ------
+        LogError
+            When a channel that was asked for has no samples in the window, or no uniform ones; when none has.
+        """
+        for placement in placements:
+            if self.required:
+                self._require_uniform(placement)
+        groups = group_placements([one for one in placements if one.time_base.uniform and one.index.size])
+        if not groups:
+            raise LogError(f"{self.container.path.name}: no channel has uniform samples {self.window.told}")
+        for group in groups:
+            self._require_filled(group)
+        return groups
+
+    def one_group(self, groups: Sequence[Group]) -> Group:
+        """The only group there is.
+
+        Raises
+        ------
+        LogError
+            When there are several.
+        """
+        if len(groups) > 1:
+            told = [(grid_rows(group, self.order).channels, group.rate_hz) for group in groups]
+            raise LogError(f"{several_grids(self.container.path.name, told)}, or read channels that share one")
+        return groups[0]
+
+    def _require_uniform(self, placement: Placement) -> None:
+        base, label = placement.time_base, placement.stream.label
+        file = self.container.path.name
+        if not base.samples:
+            raise LogError(f"{file}: {label} has no sample {self.window.told}")
+        if not base.uniform:
+            raise LogError(
+                f"{file}: {label} isn't sampled uniformly (by {placement.stream.choice.kind} time): {base.advice}"
+            )
+
+    def _require_filled(self, group: Group) -> None:
+        """Refuse a grid that is nearly all gaps: stamps leap, and it would take memory for years of nothing."""
+        first, last = group.extent(self.window.start_ns, self.window.end_ns)
+        samples = sum(placement.time_base.samples for placement in group.placements)
+        if last - first > EMPTY_GRID + SPARSE * samples:
+            label = group.placements[0].stream.label
+            raise LogError(
+                f"{self.container.path.name}: {label}: {samples} samples lie on a grid of {last - first}; stamps leap, "
+                "or it paused for long: read the parts with start_s= and end_s=, or choose stamp='log'"
+            )
+
+    def _laid_out(self, group: Group, gatherings: dict[int, Gathering]) -> TimeSeries | None:
+        first, last = group.extent(self.window.start_ns, self.window.end_ns)
+        if first == last:
+            return None
+        rows = grid_rows(group, self.order)
+        members = [gatherings[id(placement.stream)] for placement in group.placements]
+        dtype = np.result_type(*(one.dtype for one in members))
+        buffer = GridBuffer(group, rows.channels, first, last, dtype)
+        for placement, gathering, row in zip(group.placements, members, rows.rows, strict=True):
+            start = 0
+            for values, messages in zip(gathering.values, gathering.stamps_ns, strict=True):
+                part = slice(start, start + messages.size)
+                buffer.put(row, placement.samples_index(part), values)
+                start = part.stop
+        return buffer.series()
+
+    def _some(self, series: list[TimeSeries]) -> tuple[TimeSeries, ...]:
+        if not series:
+            raise LogError(f"{self.container.path.name}: no sample {self.window.told}")
+        return tuple(series)
+
+    def _placed(
+        self,
+        member_of: Sequence[int | None],
+        placements: Sequence[Placement],
+        rows: Sequence[tuple[int, ...]],
+    ) -> Iterator[PlacedPiece]:
+        """Read all samples a second time, now with their places."""
+        starts = [0] * len(placements)
+        for stream, piece in self.pieces():
+            member = member_of[stream]
+            if member is None:
+                continue
+            part = slice(starts[member], starts[member] + piece.stamps_ns.size)
+            starts[member] = part.stop
+            yield PlacedPiece(rows=rows[member], index=placements[member].samples_index(part), values=piece.values)
+
+
+def several_grids(file: str, told: Iterable[tuple[Sequence[Channel], float]]) -> str:
+    """Say that channels don't share one grid, and what to do."""
+    grids = [f"{_names(channels)} at {rate_hz:.6g} Hz" for channels, rate_hz in told]
+    return (
+        f"{file}: channels have {len(grids)} different sampling grids: {'; '.join(grids)}; "
+        "bring them to one by band-limited resampling with sample_rate_hz=, take each alone with read_groups()"
+    )
+
+
+def _names(channels: Sequence[Channel]) -> str:
+    more = f" and {len(channels) - 3} more" if len(channels) > 3 else ""
+    return ", ".join(channel.name for channel in channels[:3]) + more
+
+
+def _sized(pieces: Iterable[tuple[int, Piece]], sizes: list[tuple[int, int]]) -> Iterator[tuple[int, Piece]]:
+    """Note the stream and the number of messages of each piece in passing."""
+    for stream, piece in pieces:
+        sizes.append((stream, piece.stamps_ns.size))
+        yield stream, piece
+
+
+def _lowest(
+    sizes: Sequence[tuple[int, int]], member_of: Sequence[int | None], placements: Sequence[Placement]
+) -> NDArray[np.int64]:
+    """Lowest grid index of each piece, in the order of the file."""
+    starts = [0] * len(placements)
+    lowest = []
+    for stream, messages in sizes:
+        member = member_of[stream]
+        if member is not None:
+            part = placements[member].index[starts[member] : starts[member] + messages]
+            starts[member] += messages
+            lowest.append(int(part.min()))
+    return np.array(lowest, np.int64)
+
+
+def _complete(lowest: NDArray[np.int64], last: int) -> list[int]:
+    """For each piece the grid index below which no later piece has a sample."""
+    following = np.append(lowest[1:], last)
+    return [int(below) for below in np.minimum.accumulate(following[::-1])[::-1]]

@@ -1,0 +1,206 @@
+"""Message paths: how a number inside the messages of a topic is named, in Foxglove's syntax."""
+
+import re
+from collections.abc import Collection
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Literal
+
+from chladni.signals.errors import LogError
+
+Operator = Literal["==", "!=", "<", "<=", ">", ">="]
+FilterValue = str | float | bool
+
+_NAME = re.compile(r'\.(?:"((?:[^"\\]|\\.)*)"|([^.\[\]{}"\s]+))')
+_BRACKET = re.compile(r'\[\s*(?:(\d+)|(:)|"((?:[^"\\]|\\.)*)"|([^\[\]:"\s-][^\[\]:"]*?))\s*\]')
+_FILTER = re.compile(
+    r"""\{\s*(?P<field>[^\s=!<>{}"']+)\s*(?P<operator>==|!=|<=|>=|<|>)\s*"""
+    r"""(?:"(?P<double>(?:[^"\\]|\\.)*)"|'(?P<single>(?:[^'\\]|\\.)*)'|(?P<bare>[^\s{}"']+))\s*\}"""
+)
+_PLAIN_NAME = re.compile(r'[^.\[\]{}"\s]+')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FieldStep:
+    """Go into the field called `name`."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IndexStep:
+    """Take element `index` of an array, from 0; None stands for ``[:]``, all that the filter behind it lets pass."""
+
+    index: int | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyStep:
+    """Take the element of an array that the names beside it call `name` (our extension, for JointState)."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilterStep:
+    """Keep messages (or, after an array, elements) whose field compares true.
+
+    Attributes
+    ----------
+    field
+        Field names joined by dots, relative to what the filter follows.
+    operator
+        How the field is compared with `value`.
+    value
+        Text, number or truth value.
+    """
+
+    field: str
+    operator: Operator
+    value: FilterValue
+
+
+Step = FieldStep | IndexStep | KeyStep | FilterStep
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MessagePath:
+    """A topic and the steps from its message down to one number.
+
+    Attributes
+    ----------
+    text
+        The path as it was written.
+    topic
+        Topic of the log.
+    steps
+        From the message down.
+    """
+
+    text: str
+    topic: str
+    steps: tuple[Step, ...]
+
+    @property
+    def rest(self) -> str:
+        """What follows the topic, without the dot."""
+        return self.text.removeprefix('"').removeprefix(self.topic).removeprefix('"').removeprefix(".")
+
+
+def parse_message_path(text: str, topics: Collection[str]) -> MessagePath:
+    """Split a path into topic and steps.
+
+    Parameters
+    ----------
+    text
+        Such as ``/imu/wrist.linear_acceleration.x``, ``/axis.position[0]``, ``/joints.position[elbow]``,
+        ``/log{name=="a"}.value`` or ``/tf.transforms[:]{child_frame_id=="tip"}.transform.translation.x``.
+    topics
+        Topics of the log; the longest one that the path starts with is meant, since topics may hold dots.
+
+    Raises
+    ------
+    LogError
+        When no topic matches (near ones are named), or the rest isn't a path (the place is named).
+
+    Examples
+    --------
+    >>> parse_message_path("/a.b.c", ["/a", "/a.b"]).topic
+    '/a.b'
+    >>> parse_message_path("/a.x[2]", ["/a"]).steps
+    (FieldStep(name='x'), IndexStep(index=2))
+    """
+    topic, position = _topic_of(text, topics)
+    steps: list[Step] = []
+    while position < len(text):
+        step, position = _next_step(text, position)
+        steps.append(step)
+    return MessagePath(text=text, topic=topic, steps=tuple(steps))
+
+
+def quoted(name: str) -> str:
+    r"""Write a field or column name so that it parses back to itself.
+
+    Examples
+    --------
+    >>> quoted("ch1"), quoted("top floor")
+    ('ch1', '"top floor"')
+    """
+    if _PLAIN_NAME.fullmatch(name):
+        return name
+    escaped = name.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+def near_matches(word: str, known: Collection[str], *, count: int = 3) -> str:
+    """Name what comes near `word`, or the first few of what there is.
+
+    Examples
+    --------
+    >>> near_matches("/imu.linear_accel.x", ["/imu.linear_acceleration.x", "/odom.x"])
+    'did you mean /imu.linear_acceleration.x?'
+    """
+    near = get_close_matches(word, dict.fromkeys(known), n=count, cutoff=0.6)
+    if near:
+        return f"did you mean {' or '.join(near)}?"
+    first = sorted(known)[:8]
+    more = f" and {len(known) - len(first)} more" if len(known) > len(first) else ""
+    return f"there are: {', '.join(first)}{more}" if first else "there are none"
+
+
+def _topic_of(text: str, topics: Collection[str]) -> tuple[str, int]:
+    for topic in sorted(topics, key=len, reverse=True):
+        for written in (topic, quoted(topic)):
+            if text.startswith(written) and text[len(written) : len(written) + 1] in ("", ".", "[", "{"):
+                return topic, len(written)
+    wanted = re.split(r"[.\[{]", text, maxsplit=1)[0]
+    raise LogError(f"{text!r}: no topic of the log starts this path; {near_matches(wanted, topics)}")
+
+
+def _next_step(text: str, position: int) -> tuple[Step, int]:
+    if found := _NAME.match(text, position):
+        name = found[2] if found[1] is None else _unescaped(found[1])
+        if name.startswith("@"):
+            raise LogError(f"{text!r}: functions such as .{name} aren't supported in a path; name the field itself")
+        return FieldStep(name=name), found.end()
+    if found := _BRACKET.match(text, position):
+        return _bracket_step(found), found.end()
+    if found := _FILTER.match(text, position):
+        return _filter_step(text, found), found.end()
+    raise LogError(
+        f"{text!r}: {text[position:]!r} isn't understood; after the topic a path has .field, [index], [name] "
+        'or {field=="value"} (one comparison a filter; no slices, no variables)'
+    )
+
+
+def _bracket_step(found: re.Match[str]) -> Step:
+    index, everything, in_quotes, bare = found.groups()
+    if index is not None:
+        return IndexStep(index=int(index))
+    if everything is not None:
+        return IndexStep(index=None)
+    return KeyStep(name=bare if in_quotes is None else _unescaped(in_quotes))
+
+
+def _filter_step(text: str, found: re.Match[str]) -> FilterStep:
+    operator: Operator = found["operator"]  # type: ignore[assignment]  # the pattern admits only these
+    return FilterStep(field=found["field"], operator=operator, value=_filter_value(text, found))
+
+
+def _filter_value(text: str, found: re.Match[str]) -> FilterValue:
+    for group in ("double", "single"):
+        if found[group] is not None:
+            return _unescaped(found[group])
+    bare = found["bare"]
+    if bare in ("true", "false"):
+        return bare == "true"
+    try:
+        return float(bare)
+    except ValueError:
+        raise LogError(
+            f"{text!r}: {bare!r} in the filter is neither a number nor true or false; put text into quotes"
+        ) from None
+
+
+def _unescaped(text: str) -> str:
+    return re.sub(r"\\(.)", r"\1", text)

@@ -1,0 +1,246 @@
+"""A stream: channels of one topic whose samples come in the same messages, and so at the same times."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.io.batch_messages import BatchLayout, expand
+from chladni.io.channel_source import ChannelSource
+from chladni.io.decoding import Decoded
+from chladni.io.field_selector import FieldFilter, kept_messages, select
+from chladni.io.mcap.container import McapContainer
+from chladni.io.mcap.message_batch import MessageBatch
+from chladni.io.stamps import StampChoice, own_stamps_ns
+from chladni.io.topic import Topic
+from chladni.signals.channel import Channel
+
+NS_PER_S = 1e9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Piece:
+    """What one batch of messages holds of a stream.
+
+    Attributes
+    ----------
+    stamps_ns
+        ``[message]``, time of the first sample of each message.
+    counts
+        ``[message]``, samples of each message; None when each has one.
+    period_s
+        Time between the samples of a message, as the messages say; 0 when each has one.
+    values
+        ``[channel, sample]``, SI, messages one after another; NaN where a message doesn't hold the channel.
+    lost
+        Messages that are not in it, by the reason why.
+    """
+
+    stamps_ns: NDArray[np.int64]
+    counts: NDArray[np.int64] | None
+    period_s: float
+    values: NDArray[np.floating[Any]]
+    lost: Mapping[str, int]
+
+    def within(self, start_ns: int | None, end_ns: int | None) -> "Piece":
+        """Give the messages that have a sample with ``start_ns <= time < end_ns``."""
+        if start_ns is None and end_ns is None:
+            return self
+        last = self.stamps_ns
+        if self.counts is not None:
+            last = last + np.rint((self.counts - 1) * (self.period_s * NS_PER_S)).astype(np.int64)
+        keep = np.ones(len(last), np.bool_)
+        if start_ns is not None:
+            keep &= last >= start_ns
+        if end_ns is not None:
+            keep &= self.stamps_ns < end_ns
+        return self if keep.all() else self._kept(keep)
+
+    def _kept(self, keep: NDArray[np.bool_]) -> "Piece":
+        samples = keep if self.counts is None else np.repeat(keep, self.counts)
+        counts = None if self.counts is None else self.counts[keep]
+        return replace(self, stamps_ns=self.stamps_ns[keep], counts=counts, values=self.values[:, samples])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stream:
+    """Channels of one topic that share their sample times.
+
+    Attributes
+    ----------
+    topic
+        Where they come from.
+    choice
+        Which time of a message is its sample's.
+    sources
+        The channels.
+    layout, names
+        Of batch messages; None and empty when a message holds one sample.
+    filters
+        Messages that fail one of them don't belong to the stream.
+    """
+
+    topic: Topic
+    choice: StampChoice
+    sources: tuple[ChannelSource, ...]
+    layout: BatchLayout | None = None
+    names: tuple[str, ...] = ()
+    filters: tuple[FieldFilter, ...] = ()
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The channels, in the order of the rows of a piece."""
+        return tuple(source.channel for source in self.sources)
+
+    @property
+    def label(self) -> str:
+        """What people know the stream by."""
+        return self.topic.name if not self.filters else self.sources[0].channel.name
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """Tells streams of one log apart."""
+        return (self.topic.name, *(f"{source.field} {source.channel.name}" for source in self.sources))
+
+    def leaves(self) -> tuple[str, ...]:
+        """Every leaf that must be decoded."""
+        selected = [leaf for source in self.sources if source.selector is not None for leaf in source.selector.leaves]
+        layout = () if self.layout is None else self.layout.leaves
+        return tuple(dict.fromkeys((*selected, *layout, *self.stamp_leaves())))
+
+    def stamp_leaves(self) -> tuple[str, ...]:
+        """Leaves that the stamps and the filters need."""
+        return tuple(dict.fromkeys((*self.choice.leaves, *(one.leaf for one in self.filters))))
+
+    def piece(self, batch: MessageBatch, decoded: Decoded) -> Piece:
+        """Take the stream's samples out of a batch of its topic."""
+        stamps_ns, usable = self._stamps_ns(batch, decoded)
+        lost = dict(decoded.reasons)
+        unstamped = int(np.count_nonzero(~usable & ~decoded.bad))
+        if unstamped:
+            lost[f"stamp {self.choice.own.name if self.choice.own else ''} is no usable number"] = unstamped
+        if self.layout is not None:
+            return self._blocks(decoded, stamps_ns, usable, lost)
+        return self._single_samples(decoded, stamps_ns, kept_messages(decoded, self.filters) & usable, lost)
+
+    def without(self, messages: int, reason: str) -> Piece:
+        """Give an empty piece that says why `messages` of them are not in it."""
+        return Piece(
+            stamps_ns=np.zeros(0, np.int64),
+            counts=None if self.layout is None else np.zeros(0, np.int64),
+            period_s=0.0,
+            values=np.zeros((len(self.sources), 0), np.float32),
+            lost={reason: messages},
+        )
+
+    def _stamps_ns(self, batch: MessageBatch, decoded: Decoded) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        if self.choice.own is not None:
+            stamps_ns, usable = own_stamps_ns(self.choice.own, decoded)
+            return stamps_ns + self.choice.shift_ns, usable
+        stamps_ns = batch.log_time_ns if self.choice.kind == "log" else batch.publish_time_ns
+        return stamps_ns, ~decoded.bad
+
+    def _single_samples(
+        self, decoded: Decoded, stamps_ns: NDArray[np.int64], keep: NDArray[np.bool_], lost: dict[str, int]
+    ) -> Piece:
+        columns = [_column(decoded, source) for source in self.sources]
+        anywhere = np.zeros(len(keep), np.bool_)
+        for _, present in columns:
+            anywhere |= True if present is None else present
+        keep = keep & anywhere
+        values = np.empty((len(columns), int(np.count_nonzero(keep))), np.result_type(*(v for v, _ in columns)))
+        whole = bool(keep.all())
+        for row, (numbers, present) in enumerate(columns):
+            wanted = numbers if present is None else np.where(present, numbers, np.nan)
+            values[row] = wanted if whole else wanted[keep]
+        return Piece(
+            stamps_ns=stamps_ns if whole else stamps_ns[keep], counts=None, period_s=0.0, values=values, lost=lost
+        )
+
+    def _blocks(
+        self, decoded: Decoded, stamps_ns: NDArray[np.int64], usable: NDArray[np.bool_], lost: dict[str, int]
+    ) -> Piece:
+        if self.layout is None:
+            raise AssertionError("only batch messages hold blocks")
+        part = replace(decoded, bad=~usable)
+        wanted = [source.column for source in self.sources if source.column is not None]
+        expanded = expand(self.layout, part, self.names, wanted)
+        contradictory = int(np.count_nonzero(expanded.bad & usable))
+        if contradictory:
+            lost["number of samples, names of columns or rate contradict the other messages"] = contradictory
+        keep = ~expanded.bad & (expanded.counts > 0)
+        factors = np.array([source.factor for source in self.sources])[:, None]
+        if np.any(factors != 1.0):
+            values = expanded.values * factors.astype(expanded.values.dtype)
+        else:
+            values = expanded.values
+        periods_s = expanded.periods_s[keep]
+        counts = expanded.counts[keep]
+        first_ns = stamps_ns[keep]
+        if self.layout.stamp == "last":
+            first_ns = first_ns - np.rint((counts - 1) * periods_s * NS_PER_S).astype(np.int64)
+        period_s = float(np.median(periods_s)) if periods_s.size else 0.0
+        return Piece(stamps_ns=first_ns, counts=counts, period_s=period_s, values=values, lost=lost)
+
+
+def _column(decoded: Decoded, source: ChannelSource) -> tuple[NDArray[np.floating[Any]], NDArray[np.bool_] | None]:
+    """Floating point and SI; single precision stays single unless a factor calls for more."""
+    if source.selector is None:
+        raise AssertionError("a channel of single samples has a selector")
+    numbers, present = select(decoded, source.selector)
+    floating = numbers if numbers.dtype in (np.float32, np.float64) else numbers.astype(np.float64)
+    if source.factor != 1.0:
+        floating = floating * floating.dtype.type(source.factor)
+    return floating, present
+
+
+def read_pieces(
+    container: McapContainer,
+    streams: Sequence[Stream],
+    *,
+    start_ns: int | None = None,
+    end_ns: int | None = None,
+) -> Iterator[tuple[int, Piece]]:
+    """Read streams in the order of the file.
+
+    Parameters
+    ----------
+    container
+        The log.
+    streams
+        What to read; streams of the same topic are decoded together.
+    start_ns, end_ns
+        Only messages with ``start_ns <= log time < end_ns``.
+
+    Yields
+    ------
+    index : int
+        Of the stream.
+    piece : Piece
+    """
+    users: dict[int, list[int]] = {}
+    for index, stream in enumerate(streams):
+        for channel_id in stream.topic.decoders:
+            users.setdefault(channel_id, []).append(index)
+    leaves = {
+        channel_id: _leaves(channel_id, [streams[index] for index in indices])
+        for channel_id, indices in users.items()
+    }
+    for batch in container.batches(users, start_time_ns=start_ns, end_time_ns=end_ns):
+        indices = users[batch.channel_id]
+        wanted = leaves[batch.channel_id]
+        if isinstance(wanted, str):
+            yield from ((index, streams[index].without(len(batch), wanted)) for index in indices)
+            continue
+        decoded = streams[indices[0]].topic.decode(batch, wanted)
+        yield from ((index, streams[index].piece(batch, decoded)) for index in indices)
+
+
+def _leaves(channel_id: int, streams: Sequence[Stream]) -> tuple[str, ...] | str:
+    """Leaves to decode in the messages of one MCAP channel, or why it can't be read with the others of its topic."""
+    wanted = tuple(dict.fromkeys(leaf for stream in streams for leaf in stream.leaves()))
+    known = {info.path for info in streams[0].topic.decoders[channel_id].fields}
+    absent = [leaf for leaf in wanted if leaf not in known]
+    return f"a second schema on the topic has no field {absent[0]}" if absent else wanted

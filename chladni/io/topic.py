@@ -1,0 +1,186 @@
+"""A topic of a log: its channels in the file, their decoders, and first messages, which tell what no schema does."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import Final
+
+import numpy as np
+
+from chladni.io.decoding import Decoded, Decoder, FieldInfo, make_decoder
+from chladni.io.mcap.channel_registry import McapChannel
+from chladni.io.mcap.container import McapContainer
+from chladni.io.mcap.message_batch import MessageBatch
+from chladni.signals.errors import LogError
+
+HEAD_MESSAGES: Final = 64
+"""Messages of a topic that are looked at before any is read: for stamps that move, lengths of arrays, names."""
+
+_JOINT_BATCHES: Final = 8
+"""Batches a topic that are read to find the heads of all topics together, before rare ones are looked for alone."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Topic:
+    """A topic whose messages can be decoded.
+
+    Attributes
+    ----------
+    name
+        As in the log.
+    schema_name, encoding
+        Message type, and how messages are encoded (``cdr``, ``ros1``, ``protobuf``, ``json``).
+    metadata
+        MCAP channel metadata, of all its channels together.
+    decoders
+        Decoder of each MCAP channel; several channels may share the topic.
+    schema_text
+        Schema as text where it is text, for the units in its comments.
+    head
+        First messages, a few batches of at most `HEAD_MESSAGES` messages together; empty for a silent topic.
+    """
+
+    name: str
+    schema_name: str
+    encoding: str
+    metadata: Mapping[str, str]
+    decoders: Mapping[int, Decoder]
+    schema_text: str
+    head: tuple[MessageBatch, ...] = ()
+
+    @property
+    def fields(self) -> tuple[FieldInfo, ...]:
+        """Leaves of the messages."""
+        return next(iter(self.decoders.values())).fields
+
+    def decode(self, batch: MessageBatch, leaves: Sequence[str]) -> Decoded:
+        """Decode some leaves of one batch."""
+        return self.decoders[batch.channel_id].columns(batch, leaves)
+
+    def decode_head(self, leaves: Sequence[str]) -> list[Decoded]:
+        """Decode some leaves of the first messages."""
+        return [self.decode(batch, leaves) for batch in self.head]
+
+    def with_head(self, head: Sequence[MessageBatch]) -> "Topic":
+        """Give the topic with its first messages, from which decoders without a schema learn their fields."""
+        decoders = dict(self.decoders)
+        for batch in head:
+            decoders[batch.channel_id] = decoders[batch.channel_id].informed_by(batch)
+        return replace(self, head=tuple(head), decoders=decoders)
+
+
+def topics_of(channels: Mapping[int, McapChannel]) -> tuple[dict[str, Topic], dict[str, str]]:
+    """Group the channels of a log by topic and make their decoders.
+
+    Returns
+    -------
+    topics : dict
+        Topics that can be decoded, in the order of the file.
+    refused : dict
+        Why the others can't, by topic.
+    """
+    topics: dict[str, Topic] = {}
+    refused: dict[str, str] = {}
+    for channel in sorted(channels.values(), key=lambda one: one.id):
+        try:
+            decoder = _decoder(channel)
+        except LogError as error:
+            refused[channel.topic] = str(error)
+            continue
+        known = topics.get(channel.topic)
+        topics[channel.topic] = _new_topic(channel, decoder) if known is None else _joined(known, channel, decoder)
+    return topics, refused
+
+
+def _decoder(channel: McapChannel) -> Decoder:
+    schema = channel.schema
+    return make_decoder(
+        message_encoding=channel.message_encoding,
+        schema_name="" if schema is None else schema.name,
+        schema_encoding="" if schema is None else schema.encoding,
+        schema_data=b"" if schema is None else schema.data,
+    )
+
+
+def _new_topic(channel: McapChannel, decoder: Decoder) -> Topic:
+    schema = channel.schema
+    is_text = schema is not None and schema.encoding in ("ros1msg", "ros2msg")
+    return Topic(
+        name=channel.topic,
+        schema_name="" if schema is None else schema.name,
+        encoding=channel.message_encoding,
+        metadata=dict(channel.metadata),
+        decoders={channel.id: decoder},
+        schema_text=schema.data.decode("utf-8", "replace") if schema is not None and is_text else "",
+    )
+
+
+def _joined(topic: Topic, channel: McapChannel, decoder: Decoder) -> Topic:
+    return replace(
+        topic,
+        metadata={**channel.metadata, **topic.metadata},
+        decoders={**topic.decoders, channel.id: decoder},
+    )
+
+
+# --- first messages ----------------------------------------------------------------------------------------------
+
+
+def read_heads(container: McapContainer, topics: Mapping[str, Topic]) -> dict[str, Topic]:
+    """Give the topics with their first messages.
+
+    All topics are looked for together, since most begin in the same few chunks; those that don't are then looked
+    for alone, where an index leads straight to them.
+    """
+    counts = container.message_counts()
+    heads: dict[int, list[MessageBatch]] = {channel: [] for topic in topics.values() for channel in topic.decoders}
+    missing = {channel for channel in heads if counts is None or counts.get(channel, 0) > 0}
+    _fill(heads, missing, container.batches(missing), budget=_JOINT_BATCHES * len(missing), counts=counts)
+    for channel in sorted(missing):
+        if not heads[channel]:
+            _fill(heads, {channel}, container.batches({channel}), budget=_JOINT_BATCHES, counts=counts)
+    return {
+        name: topic.with_head([batch for channel in topic.decoders for batch in heads[channel]])
+        for name, topic in topics.items()
+    }
+
+
+def _fill(
+    heads: dict[int, list[MessageBatch]],
+    missing: set[int],
+    batches: Iterator[MessageBatch],
+    *,
+    budget: int,
+    counts: Mapping[int, int] | None,
+) -> None:
+    """Take first messages until every channel has enough (it leaves `missing`) or the budget of batches is spent."""
+    if not missing:
+        return
+    for batch in islice(batches, budget):
+        head = heads[batch.channel_id]
+        wanted = HEAD_MESSAGES - sum(map(len, head))
+        if wanted > 0 and len(batch):
+            head.append(_first(batch, wanted))
+        enough = HEAD_MESSAGES if counts is None else min(HEAD_MESSAGES, counts.get(batch.channel_id, 0))
+        if sum(map(len, head)) >= enough:
+            missing.discard(batch.channel_id)
+        if not missing:
+            return
+
+
+def _first(batch: MessageBatch, count: int) -> MessageBatch:
+    if len(batch) <= count:
+        return batch
+    part = slice(0, count)
+    # Copies, so that a head of 64 messages doesn't keep a chunk of megabytes alive.
+    end = int(np.max(batch.offsets[part] + batch.lengths[part]))
+    start = int(np.min(batch.offsets[part]))
+    return replace(
+        batch,
+        buffer=batch.buffer[start:end].copy(),
+        offsets=batch.offsets[part] - start,
+        lengths=batch.lengths[part],
+        log_time_ns=batch.log_time_ns[part],
+        publish_time_ns=batch.publish_time_ns[part],
+        sequence=batch.sequence[part],
+    )

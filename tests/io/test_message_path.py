@@ -1,0 +1,115 @@
+"""Message paths, against what Foxglove's syntax says of each."""
+
+from contextlib import suppress
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chladni.io.message_path import (
+    FieldStep,
+    FilterStep,
+    IndexStep,
+    KeyStep,
+    near_matches,
+    parse_message_path,
+    quoted,
+)
+from chladni.signals.errors import LogError
+
+TOPICS = ("/imu", "/imu/wrist", "/a.b", "/a", "/log", "/top floor")
+
+
+def steps(text: str) -> tuple[object, ...]:
+    return parse_message_path(text, TOPICS).steps
+
+
+def test_longest_topic_wins() -> None:
+    assert parse_message_path("/a.b.c", TOPICS).topic == "/a.b"
+    assert parse_message_path("/a.c", TOPICS).topic == "/a"
+    assert parse_message_path("/imu/wrist.x", TOPICS).topic == "/imu/wrist"
+
+
+def test_a_topic_ends_where_a_field_begins() -> None:
+    # "/imu" is a prefix of the text, but "/imux" is another topic.
+    with pytest.raises(LogError, match=r"'/imux\.y': no topic .* did you mean /imu"):
+        parse_message_path("/imux.y", TOPICS)
+
+
+def test_fields_and_elements() -> None:
+    assert steps("/imu.linear_acceleration.x") == (FieldStep(name="linear_acceleration"), FieldStep(name="x"))
+    assert steps("/imu.position[12]") == (FieldStep(name="position"), IndexStep(index=12))
+    assert steps("/imu.position[elbow]") == (FieldStep(name="position"), KeyStep(name="elbow"))
+    assert steps('/imu.position["left elbow"]') == (FieldStep(name="position"), KeyStep(name="left elbow"))
+    assert steps("/imu[3]") == (IndexStep(index=3),)
+    assert steps("/imu") == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "field", "operator", "value"),
+    [
+        ('{name=="a"}', "name", "==", "a"),
+        ("{name=='a b'}", "name", "==", "a b"),
+        ("{field.sub==3}", "field.sub", "==", 3.0),
+        ("{x != -2.5}", "x", "!=", -2.5),
+        ("{x<=1e3}", "x", "<=", 1000.0),
+        ("{x>=1}", "x", ">=", 1.0),
+        ("{x<1}", "x", "<", 1.0),
+        ("{x>1}", "x", ">", 1.0),
+        ("{on==true}", "on", "==", True),
+        ("{on==false}", "on", "==", False),
+        ('{name=="a \\"b\\""}', "name", "==", 'a "b"'),
+    ],
+)
+def test_filters(text: str, field: str, operator: str, value: object) -> None:
+    (found, last) = steps(f"/log{text}.value")
+    assert found == FilterStep(field=field, operator=operator, value=value)  # type: ignore[arg-type]
+    assert type(found.value) is type(value)
+    assert last == FieldStep(name="value")
+
+
+def test_open_slice_before_a_filter() -> None:
+    assert steps('/log.parts[:]{id=="a"}.x')[1] == IndexStep(index=None)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("/imu..x", r"'\.\.x' isn't understood"),
+        ("/imu.x[1:3]", r"'\[1:3\]' isn't understood"),
+        ("/imu.x[-1]", r"'\[-1\]' isn't understood"),
+        ("/imu.x{y}", r"'\{y\}' isn't understood"),
+        ("/imu{a==b}", "'b' in the filter is neither a number nor true or false"),
+        ("/imu{a==$v}", r"'\$v' in the filter"),
+        ("/imu.x.@derivative", "functions such as .@derivative aren't supported"),
+    ],
+)
+def test_what_is_refused_is_named(text: str, told: str) -> None:
+    with pytest.raises(LogError, match=told):
+        parse_message_path(text, TOPICS)
+
+
+def test_quoted_topic() -> None:
+    found = parse_message_path('"/top floor".x', TOPICS)
+    assert (found.topic, found.steps, found.rest) == ("/top floor", (FieldStep(name="x"),), "x")
+
+
+def test_rest_is_what_follows_the_topic() -> None:
+    assert parse_message_path("/a.b.c[2]", TOPICS).rest == "c[2]"
+
+
+@given(st.text(min_size=1, max_size=20).filter(lambda name: not name.startswith("@")))
+def test_a_quoted_name_parses_to_itself(name: str) -> None:
+    assert steps(f"/imu.{quoted(name)}") == (FieldStep(name=name),)
+
+
+@given(st.text(max_size=40))
+def test_any_text_is_parsed_or_refused(text: str) -> None:
+    # Anything but a LogError would end the test.
+    with suppress(LogError):
+        assert parse_message_path(f"/imu{text}", TOPICS).text == f"/imu{text}"
+
+
+def test_near_matches_of_nothing_and_of_far() -> None:
+    assert near_matches("a", []) == "there are none"
+    assert near_matches("qqq", [f"/topic{i}" for i in range(10)]).endswith("/topic7 and 2 more")
