@@ -41,9 +41,6 @@ class DamageList:
         for damage in found:
             self._found.setdefault((damage.offset, damage.record, damage.what), damage)
 
-    def __len__(self) -> int:
-        return len(self._found)
-
     def in_file_order(self) -> tuple[Damage, ...]:
         """Return all damage, from the start of the file to its end."""
         return tuple(self._found[key] for key in sorted(self._found))

@@ -153,7 +153,7 @@ class DataSection:
         if position + PREFIX_BYTES > self._end.data_end or len(prefix) < PREFIX_BYTES:
             return None, self._broken(position, "the data ends within a record's first bytes", "record")
         opcode, length = RECORD_PREFIX.unpack(prefix)
-        if opcode == Opcode.CHUNK or listed is not None or self._is_disguised_chunk(position, opcode):
+        if opcode == Opcode.CHUNK or self._is_disguised_chunk(position, opcode) or listed is not None:
             return self._chunk(position, listed)
         if opcode == 0:
             return None, self._zeros(position)
@@ -161,7 +161,7 @@ class DataSection:
         if end > self._bound(position):
             return None, self._does_not_fit(position, opcode, end)
         if opcode == Opcode.DATA_END:
-            return None, self._data_end(position)
+            return None, self._data_end(position, end)
         if opcode == Opcode.FOOTER:
             return None, self._broken(position, "a footer lies within the data", "Footer")
         if opcode == Opcode.MESSAGE_INDEX:
@@ -209,12 +209,13 @@ class DataSection:
         what = f"the file ends within a record of {end - position} bytes"
         return self._broken(position, what, name, lost=1 if opcode == Opcode.MESSAGE else None)
 
-    def _data_end(self, position: int) -> int:
-        if self._end.has_footer:
-            return self._broken(position, "the data section seems to end here, too early", "DataEnd")
+    def _data_end(self, position: int, end: int) -> int:
+        if self._end.data_end_found or end != position + DATA_END_BYTES:
+            return self._broken(position, "the data seem to end here, too early", "DataEnd")
         self._closed = True
-        what = "the summary is cut off or overwritten; the data before it is whole"
-        self._damage.add(what, offset=position + DATA_END_BYTES, record="Summary", lost_messages=0)
+        if not self._end.has_footer:
+            what = "the summary is cut off or overwritten; the data before it is whole"
+            self._damage.add(what, offset=end, record="Summary", lost_messages=0)
         return self._end.data_end
 
     def _zeros(self, position: int) -> int:
@@ -264,9 +265,10 @@ class DataSection:
 
     def _chunk_header(self, position: int, listed: ChunkIndex | None) -> ChunkHeader | None:
         """Parse the chunk's header; where it is damaged, the summary's entry replaces it."""
-        start = bytes([Opcode.CHUNK]) + self._window.read(position + 1, CHUNK_HEADER_BYTES - 1)
+        start = self._window.read(position, CHUNK_HEADER_BYTES)
         try:
-            own = parse_chunk_header(start, offset=position)
+            # A wrong opcode has been told of where it was found out; it makes nothing else wrong.
+            own = parse_chunk_header(bytes([Opcode.CHUNK]) + start[1:], offset=position)
         except MalformedRecordError:
             own = None
         if listed is None or (own is not None and agrees(own, listed)):
@@ -312,7 +314,8 @@ class DataSection:
 
     def _bare(self, position: int, opcode: int, end: int) -> tuple[Segment | None, int]:
         """Read a stretch of records outside chunks, longer and longer ones while there are only such."""
-        size = self._stretch
+        # No longer than the limit, so that what is longer comes first in a stretch and is seen.
+        size = min(self._stretch, self._limits.record_bytes)
         if end - position > size:
             if opcode not in _READ_BARE:
                 return None, end

@@ -82,8 +82,7 @@ def _zstd(data: Compressed, size: int) -> bytes:
     try:
         # Without this check the library allocates whatever the frame's own header claims.
         if zstandard.frame_content_size(data) == size and _believable(len(data), size):
-            decompressor = zstandard.ZstdDecompressor()
-            return decompressor.decompress(data, allow_extra_data=False)
+            return zstandard.ZstdDecompressor().decompress(data)
         return decompress_start(data, "zstd", size=size)
     except zstandard.ZstdError as error:
         raise DecompressError(f"zstd: {error}") from error

@@ -61,6 +61,8 @@ class LogEnd:
         End of the data section: where DataEnd starts, or the first byte that can't belong to the data.
     has_footer
         Whether the log was closed by its writer.
+    data_end_found
+        Whether ``data_end`` is where a DataEnd record starts; it is to be met on the way otherwise.
     data_crc
         CRC-32 of all bytes before ``data_end``; 0 when there is none.
     chunk_indexes
@@ -75,6 +77,7 @@ class LogEnd:
 
     data_end: int
     has_footer: bool
+    data_end_found: bool = False
     data_crc: int = 0
     chunk_indexes: tuple[ChunkIndex, ...] = ()
     statistics: Statistics | None = None
@@ -109,6 +112,9 @@ def read_log_end(
         return _parse(file, start, content, registry, crc_checked=check_crc and crc != 0)
     except (_UnsoundSummaryError, MalformedRecordError) as problem:
         damage.add(f"{problem}; {_READ_FROM_START}", offset=start, record="Summary", lost_messages=0)
+        before_summary = _with_data_end(file, min(start, footer_offset))
+        if before_summary.data_end_found:
+            return before_summary
         return LogEnd(data_end=footer_offset, has_footer=True)
 
 
@@ -118,7 +124,8 @@ def _with_data_end(file: LogFile, end: int) -> LogEnd:
     record = file.read(max(offset, 0), DATA_END_BYTES)
     if offset < len(MAGIC) or record[:PREFIX_BYTES] != RECORD_PREFIX.pack(Opcode.DATA_END, 4):
         return LogEnd(data_end=end, has_footer=True)
-    return LogEnd(data_end=offset, has_footer=True, data_crc=FieldReader(record[PREFIX_BYTES:]).uint32())
+    crc = FieldReader(record[PREFIX_BYTES:]).uint32()
+    return LogEnd(data_end=offset, has_footer=True, data_end_found=True, data_crc=crc)
 
 
 def _checked_content(file: LogFile, start: int, footer_offset: int, footer: bytes, crc: int, limits: Limits) -> bytes:
@@ -155,6 +162,7 @@ def _parse(file: LogFile, start: int, content: bytes, registry: ChannelRegistry,
     return LogEnd(
         data_end=end.data_end,
         has_footer=True,
+        data_end_found=end.data_end_found,
         data_crc=end.data_crc,
         chunk_indexes=tuple(indexes),
         statistics=statistics,

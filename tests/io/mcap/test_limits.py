@@ -1,0 +1,82 @@
+"""What claims too much is refused by name, and read when the limit is raised."""
+
+from pathlib import Path
+
+import pytest
+
+from chladni.io.mcap.container import McapContainer
+from chladni.io.mcap.damage import Damage
+from chladni.io.mcap.limits import Limits
+from tests.io.mcap import log_bytes as lb
+
+DEFINITIONS = lb.schema() + lb.channel()
+CONTENT = b"".join(lb.message(number) for number in range(100))
+
+
+def damage_of(path: Path, limits: Limits | None = None) -> tuple[int, tuple[Damage, ...]]:
+    with McapContainer.open(path, limits=limits) as log:
+        return len(lb.messages(log)), log.damage
+
+
+@pytest.mark.parametrize("compression", ["", "zstd", "lz4"])
+def test_a_chunk_above_the_limit(tmp_path: Path, compression: str) -> None:
+    data = lb.chunk(CONTENT, compression) + lb.index_of(CONTENT)
+    path = lb.write(tmp_path, lb.log(DEFINITIONS, data, summary=b""))
+    found, (damage,) = damage_of(path, Limits(chunk_bytes=5000))
+    assert found == 0
+    assert damage.what == (
+        "the chunk claims 5100 bytes, above the limit chunk_bytes=5000; raise it with "
+        "open_log(..., limits=Limits(chunk_bytes=...)); none of the chunk's messages are given"
+    )
+    assert damage.lost_messages == 100
+    assert damage_of(path, Limits(chunk_bytes=5100)) == (100, ())
+
+
+@pytest.mark.parametrize("compression", ["", "zstd", "lz4"])
+def test_a_chunk_that_declares_2_to_the_60(tmp_path: Path, compression: str) -> None:
+    data = lb.chunk(CONTENT, compression, size=1 << 60)
+    found, (damage,) = damage_of(lb.write(tmp_path, lb.log(DEFINITIONS, data, summary=b"")))
+    assert found == 0
+    assert f"claims {1 << 60} bytes, above the limit chunk_bytes" in damage.what
+    assert damage.lost_messages is None
+
+
+def test_a_bomb_within_the_limit_of_its_lie(tmp_path: Path) -> None:
+    bomb = lb.compress(bytes(50_000_000), "zstd")
+    data = lb.chunk(b"", "zstd", size=400_000_000, data=bomb, crc=1)
+    found, (damage,) = damage_of(lb.write(tmp_path, lb.log(DEFINITIONS, data, summary=b"")))
+    assert found == 0
+    assert "declares 400000000 bytes but 50000000 were found in it" in damage.what
+
+
+def test_a_message_outside_chunks_above_the_limit(tmp_path: Path) -> None:
+    data = lb.message(1) + lb.message(2, size=200_000) + lb.message(3)
+    path = lb.write(tmp_path, lb.log(DEFINITIONS, data, summary=b""))
+    found, (damage,) = damage_of(path, Limits(record_bytes=100_000))
+    assert found == 2
+    assert "above the limit record_bytes=100000" in damage.what
+    assert (damage.record, damage.lost_messages) == ("Message", 1)
+    assert damage_of(path) == (3, ())
+
+
+def test_large_records_that_nobody_reads_have_no_limit(tmp_path: Path) -> None:
+    data = lb.message(1) + lb.record(9, bytes(200_000)) + lb.record(0x0C, bytes(200_000)) + lb.message(3)
+    path = lb.write(tmp_path, lb.log(DEFINITIONS, data, summary=b""))
+    assert damage_of(path, Limits(record_bytes=1000)) == (2, ())
+
+
+def test_a_summary_above_the_limit_is_not_needed(tmp_path: Path) -> None:
+    found, (damage,) = damage_of(lb.write(tmp_path, lb.sample_log()), Limits(summary_bytes=100))
+    assert found == 203
+    assert "above the limit summary_bytes=100" in damage.what
+    assert (damage.record, damage.lost_messages) == ("Summary", 0)
+
+
+def test_definitions_above_the_limit_are_left_out_with_their_messages(tmp_path: Path) -> None:
+    data = DEFINITIONS + lb.channel(2, "/" + "long" * 1000) + lb.message(1) + lb.message(2, 2)
+    path = lb.write(tmp_path, lb.log(data, summary=b""))
+    found, damage = damage_of(path, Limits(definition_bytes=1000))
+    assert found == 1
+    assert any("above the limit definition_bytes=1000" in one.what for one in damage)
+    assert sum(one.lost_messages or 0 for one in damage) == 1
+    assert damage_of(path) == (2, ())
