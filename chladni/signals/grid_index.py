@@ -43,11 +43,13 @@ def grid_index(
         counted: Ints = order + resumed_shift[np.maximum(stretch, 0)]
         return counted
     reference = knots_ns[0]
-    near = np.clip(time_ns, reference, knots_ns[-1])
-    index = np.interp((near - reference).astype(np.float64), (knots_ns - reference).astype(np.float64), knots_index)
+    elapsed = (time_ns - reference).astype(np.float64)
+    knots = (knots_ns - reference).astype(np.float64)
+    index = np.interp(elapsed, knots, knots_index)
     # Outside the knots the clock runs on at its mean rate.
-    index += (time_ns - near) * (rate_hz * 1e-9)
-    nearest: Ints = np.rint(index).astype(np.int64)
+    index += np.minimum(elapsed, 0.0) * (rate_hz * 1e-9)
+    index += np.maximum(elapsed - knots[-1], 0.0) * (rate_hz * 1e-9)
+    nearest: Ints = np.rint(index, out=index).astype(np.int64)
     if smoothing == 1:
         return nearest
     # Imported here because a log with sound stamps never needs it.

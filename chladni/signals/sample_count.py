@@ -16,7 +16,7 @@ Ints = NDArray[np.int64]
 #: Items whose mean is taken as one point of the clock's slow wander.
 WINDOW = 256
 #: Items that a clock is fitted to; of more, every n-th is as good.
-MAX_ITEMS = 1_000_000
+MAX_ITEMS = 500_000
 # Below this relative scatter an interval of 3.5 periods is a gap and no accident.
 _TIGHT = 0.1
 _BLOCK = 1024
@@ -29,7 +29,7 @@ class Count:
     Attributes
     ----------
     time
-        ``[item]`` nanoseconds since the first, rising.
+        ``[item]`` nanoseconds since the first item, rising.
     index
         ``[item]`` whole index, on a grid that is common within a stretch.
     stretch
@@ -65,11 +65,17 @@ def count_by_phase(time_ns: Ints, steps: Ints, period_ns: float) -> Count:
         First guess: the median interval.
     """
     scatter = _phase_scatter(steps, period_ns)
-    period = _refined_period(time_ns, period_ns, scatter)
+    # Reach: the median's own error, a bias of missing samples under scatter, and rounding to whole nanoseconds.
+    reach = min(0.08, 4 * scatter / np.sqrt(time_ns.size) + 0.1 * scatter + 2 / period_ns)
+    period = _refined_period(time_ns, period_ns, reach)
+    every = -(-time_ns.size // MAX_ITEMS)
+    if every > 1:
+        # Windows of every n-th stamp are longer, so the period must be known better.
+        period = _refined_period(time_ns[::every], period, min(reach, 0.5 / _BLOCK), every=every)
     resumed = _resumed(steps > (3.5 if scatter < _TIGHT else 64) * period)
     item, stretch = _chosen(time_ns.size, resumed)
     window, starts = _windows(stretch)
-    time = time_ns[item].astype(np.float64)
+    time = (time_ns[item] - time_ns[0]).astype(np.float64)
     cycles = time / period
     sums = np.add.reduceat(np.exp(2j * np.pi * np.mod(cycles, 1.0)), starts)
     offset = np.unwrap(np.angle(sums)) / (2 * np.pi)
@@ -111,7 +117,7 @@ def count_by_order(
     item, stretch = _chosen(time_ns.size, resumed)
     window, starts = _windows(stretch)
     return Count(
-        time=time_ns[item].astype(np.float64),
+        time=(time_ns[item] - time_ns[0]).astype(np.float64),
         index=(np.cumsum(counts) - counts)[item],
         stretch=stretch,
         window=window,
@@ -141,13 +147,12 @@ def robust_std(values: Floats) -> float:
     return float(1.4826 * np.median(np.abs(part - np.median(part)))) if part.size else 0.0
 
 
-def _refined_period(time_ns: Ints, period_ns: float, scatter: float) -> float:
-    """Find the period whose phases agree best over blocks of 1024, near the guess."""
+def _refined_period(time_ns: Ints, period_ns: float, reach: float, *, every: int = 1) -> float:
+    """Find the period whose phases agree best over blocks of 1024 stamps, each `every` periods, near the guess."""
     block = min(_BLOCK, time_ns.size)
-    # Reach: the median's own error, a bias of missing samples under scatter, and rounding to whole nanoseconds.
-    reach = min(0.08, 4 * scatter / np.sqrt(time_ns.size) + 0.1 * scatter + 2 / period_ns)
-    half = int(np.ceil(reach * 4 * block))
-    trial = 1 + np.arange(-half, half + 1) / (4 * block)
+    step = 1 / (4 * block * every)
+    half = int(np.ceil(reach / step))
+    trial = 1 + np.arange(-half, half + 1) * step
     power = np.zeros(trial.size)
     for start in np.unique(np.linspace(0, time_ns.size - block, 8).astype(np.int64)):
         part = time_ns[start : start + block]
@@ -172,7 +177,8 @@ def _chosen(items: int, resumed: Ints) -> tuple[Ints, Ints]:
     every = -(-items // MAX_ITEMS)
     chosen = np.arange(0, items, every)
     if every > 1:
-        chosen = np.unique(np.concatenate((chosen, resumed, resumed[1:] - 1, [items - 1])))
+        chosen = np.sort(np.concatenate((chosen, resumed, resumed[1:] - 1, [items - 1])), kind="stable")
+        chosen = chosen[np.diff(chosen, prepend=-1) > 0]
     return chosen, np.searchsorted(resumed, chosen, side="right") - 1
 
 

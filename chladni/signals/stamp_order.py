@@ -44,7 +44,7 @@ class Untangled:
     Attributes
     ----------
     time_ns
-        ``[message]`` nanoseconds since the first message to arrive, in rising order.
+        ``[message]`` stamps in rising order, jumps undone.
     steps
         Differences of `time_ns`.
     order
@@ -84,15 +84,14 @@ def untangle(stamps_ns: NDArray[np.int64]) -> Untangled:
     stamps_ns
         ``[message]`` int64 nanoseconds, in the order of arrival, at least one.
     """
-    time_ns = stamps_ns - stamps_ns[0]
-    steps = np.diff(time_ns)
-    backward = steps < 0
-    if not backward.any():
-        repeats = int(np.count_nonzero(steps == 0))
-        return Untangled(time_ns=time_ns, steps=steps, order=None, jumps=(), out_of_order=0, duplicates=repeats)
+    time_ns, steps = stamps_ns, np.diff(stamps_ns)
+    if steps.size == 0 or steps.min() >= 0:
+        repeats = steps.size - int(np.count_nonzero(steps))
+        return Untangled(time_ns=stamps_ns, steps=steps, order=None, jumps=(), out_of_order=0, duplicates=repeats)
+    backward = int(np.count_nonzero(steps < 0))
     jumps = find_jumps(stamps_ns)
     if jumps:
-        time_ns = run_on(stamps_ns, jumps)[0] - stamps_ns[0]
+        time_ns, _ = run_on(stamps_ns, jumps)
     order = np.argsort(time_ns, kind="stable")
     time_ns = time_ns[order]
     steps = np.diff(time_ns)
@@ -101,8 +100,8 @@ def untangle(stamps_ns: NDArray[np.int64]) -> Untangled:
         steps=steps,
         order=order,
         jumps=jumps,
-        out_of_order=int(np.count_nonzero(backward)) - len(jumps),
-        duplicates=int(np.count_nonzero(steps == 0)),
+        out_of_order=backward - len(jumps),
+        duplicates=steps.size - int(np.count_nonzero(steps)),
     )
 
 

@@ -165,21 +165,22 @@ def _fit(stamps: NDArray[np.int64], counts: NDArray[np.int64] | None, nominal_hz
     tangled = untangle(stamps)
     if _stands_still(tangled.steps):
         return _still(stamps, samples)
-    sizes = np.ones_like(stamps) if counts is None else counts
-    sizes = sizes if tangled.order is None else sizes[tangled.order]
+    sizes = np.ones(1, dtype=np.int64) if counts is None else counts
+    if counts is not None and tangled.order is not None:
+        sizes = counts[tangled.order]
     counted = count_messages(tangled) if counts is None else count_batches(tangled.time_ns, sizes, nominal_hz)
     if counted is None:
         return _irregular(stamps, tangled)
     clock = fit_clock(counted.count, counted.period_ns)
-    base = _measured(int(stamps[0]), tangled, counted, clock, samples)
-    rising = tangled.time_ns + stamps[0]
-    base = _in_order(base, rising, sizes, counted, clock) if counted.in_order else _by_phase(base, rising, tangled)
+    base = _measured(tangled, counted, clock, samples)
+    base = _in_order(base, tangled.time_ns, sizes, counted, clock) if counted.in_order else _by_phase(base, tangled)
     base = replace(base, advice=advice(base))
     return with_round_rate(base) if nominal_hz is None else with_nominal(base, nominal_hz)
 
 
-def _measured(first_ns: int, tangled: Untangled, counted: Counted, clock: Clock, samples: int) -> TimeBase:
+def _measured(tangled: Untangled, counted: Counted, clock: Clock, samples: int) -> TimeBase:
     wander = measure_wander(counted.count, clock)
+    first_ns = int(tangled.time_ns[0])
     index = counted.count.index + clock.shift[counted.count.stretch]
     # Messages of a burst are late, none is early: the last one of a burst is the most punctual.
     early_ns = (counted.burst_size - 1) * clock.period_ns
@@ -211,7 +212,7 @@ def _in_order(
     resumed_ns = rising_ns[first]
     lost = np.diff(clock.shift)
     before = first[1:][lost > 0] - 1
-    gaps = list_gaps(rising_ns, before, sizes[before], clock.period_ns)
+    gaps = list_gaps(rising_ns, before, np.broadcast_to(sizes, rising_ns.shape)[before], clock.period_ns)
     return replace(
         base,
         gaps=gaps.longest,
@@ -223,21 +224,22 @@ def _in_order(
     )
 
 
-def _by_phase(base: TimeBase, rising_ns: NDArray[np.int64], tangled: Untangled) -> TimeBase:
+def _by_phase(base: TimeBase, tangled: Untangled) -> TimeBase:
     """Add the smoothing and the gaps that remain with it."""
+    rising_ns = tangled.time_ns
     clock = partial(grid_index, knots_ns=base.knots_ns, knots_index=base.knots_index, rate_hz=base.rate_hz)
     smoothing = choose_smoothing(rising_ns, clock, repeats=base.duplicates)
     long = np.flatnonzero(tangled.steps > 1.5 * NS_PER_S / base.rate_hz)
-    if smoothing == 1:
-        after, before = (clock(rising_ns[place], place) for place in (long + 1, long))
-        last = clock(rising_ns[-1:], long[:0])
-    else:
-        index = clock(rising_ns, np.arange(rising_ns.size), smoothing=smoothing)
-        after, before, last = index[long + 1], index[long], index[-1:]
-    lost = int(last[0]) + 1 - rising_ns.size
+    end = slice(max(0, rising_ns.size - 4 * smoothing), None)
+    lost = int(clock(rising_ns[end], np.arange(rising_ns.size)[end], smoothing=smoothing)[-1]) + 1 - rising_ns.size
     if smoothing > 1 and lost <= 0 and not base.duplicates:
         # No fewer samples than grid points: their order tells their places better than scattered stamps.
         return replace(base, resumed_ns=rising_ns[:1], resumed_shift=np.zeros(1, dtype=np.int64))
+    if smoothing == 1:
+        after, before = (clock(rising_ns[place], place) for place in (long + 1, long))
+    else:
+        index = clock(rising_ns, np.arange(rising_ns.size), smoothing=smoothing)
+        after, before = index[long + 1], index[long]
     long = long[after - before > 1]
     gaps = list_gaps(rising_ns, long, np.ones_like(long), 0.0)
     return replace(
@@ -299,7 +301,7 @@ def _irregular(stamps: NDArray[np.int64], tangled: Untangled) -> TimeBase:
     return TimeBase(
         rate_hz=(stamps.size - 1) / span_s,
         rate_std_hz=inf,
-        start_ns=int(stamps[0] + tangled.time_ns[0]),
+        start_ns=int(tangled.time_ns[0]),
         samples=stamps.size,
         verdict="irregular",
         advice="messages come at events and not on a grid; a spectrum needs uniform samples",
