@@ -21,7 +21,7 @@ def amplitude_spectrum(spectra: CrossSpectra, *, quantity: Quantity = "rms") -> 
     Parameters
     ----------
     spectra
-        Averaged cross-spectra. A flat-top window keeps a tone between two lines within 0.1 %; Hann reads it up to
+        Averaged cross-spectra. A flat-top window keeps a tone between two lines within 0.2 %; Hann reads it up to
         15 % low.
     quantity
         ``rms``, sqrt(G B) with the noise bandwidth B of a line; ``peak``, sqrt(2) of it except at 0 Hz.

@@ -20,7 +20,8 @@ def power_spectral_density(spectra: CrossSpectra) -> PowerSpectralDensity:
     PowerSpectralDensity
         ``[channel, frequency]`` in unit^2/Hz. One sigma is G / sqrt(n) with n effective averages (Bendat & Piersol
         2010, eq. 8.156; on the first and last line, which are real, the scatter is sqrt(2) times as large). For
-        periodic excitation with power D of the mean period and scatter S of one, it is sqrt((2 D S + S^2) / M).
+        periodic excitation with power R of the mean of M periods and scatter S of one, its square is
+        (2 R S + S^2 (M - 1)(M - 2)/M^2) / M, which is right on average for Gaussian scatter.
 
     Examples
     --------
@@ -55,4 +56,6 @@ def _std(spectra: CrossSpectra, values: NDArray[np.float64]) -> NDArray[np.float
     periods = spectra.provenance.averages
     scatter = auto_densities(spectra.noise_density)
     repeated = np.maximum(values - scatter * (periods - 1) / periods, 0.0)
-    return np.asarray(np.sqrt((2 * repeated * scatter + scatter**2) / periods), dtype=np.float64)
+    # Scatter with itself: E[S^2] is M/(M - 1) of its square, and R holds 1/M of the scatter already.
+    own = scatter**2 * ((periods - 1) * (periods - 2) / periods**2)
+    return np.asarray(np.sqrt((2 * repeated * scatter + own) / periods), dtype=np.float64)

@@ -80,7 +80,7 @@ def _scipy_window(window: Window, samples: int) -> NDArray[np.float64]:
 
     try:
         sampled = np.asarray(get_window(window, samples, fftbins=True), dtype=np.float64)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, IndexError) as error:
         raise SetupError(f"window {window!r} can't be used: {error}{_hint(window)}") from error
     if not np.all(np.isfinite(sampled)) or np.sum(sampled) == 0:
         raise SetupError(f"window {window!r} over {samples} samples has no finite, non-zero sum; choose another")

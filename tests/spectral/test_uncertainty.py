@@ -1,0 +1,98 @@
+"""Effective averages and random errors in closed form."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chladni.signals.errors import EstimateError
+from chladni.spectral.cross_spectra import cross_spectra
+from chladni.spectral.uncertainty import (
+    EffectiveAverages,
+    coherence_std,
+    periodic_response_std,
+    response_std,
+    window_correlation,
+)
+from chladni.spectral.windows import window_samples
+from tests.spectral.made_signals import noise, series
+
+HANN = window_samples("hann", 512)
+
+
+def by_definition(runs, hop, decay, window=HANN):
+    """(sum w)^2 / sum over all pairs of w w rho, each pair for itself."""
+    total = sum(runs)
+    weights = decay ** np.arange(total)[::-1]
+    run = np.repeat(np.arange(len(runs)), runs)
+    start = np.concatenate([np.arange(count) * hop for count in runs])
+    variance = 0.0
+    for k in range(total):
+        for m in range(total):
+            lag = abs(start[k] - start[m])
+            if run[k] == run[m] and lag < window.size:
+                overlap = window[lag:] @ window[: window.size - lag] / (window @ window)
+                variance += weights[k] * weights[m] * overlap**2
+    return weights.sum() ** 2 / variance
+
+
+@given(
+    runs=st.lists(st.integers(1, 9), min_size=1, max_size=4),
+    hop=st.integers(64, 512),
+    decay=st.sampled_from([1.0, 0.9, 0.5]),
+)
+def test_the_count_is_the_double_sum(runs, hop, decay):
+    count = EffectiveAverages(HANN, hop, decay)
+    for run in runs:
+        count.add(0, run // 2)
+        count.add(run // 2, run - run // 2)
+    assert count.value == pytest.approx(by_definition(runs, hop, decay), rel=1e-12)
+
+
+def test_welchs_example():
+    # Hann at 50 %: rho(1) = 1/36, so K segments count as K / (1 + (K - 1)/(18 K)) (Welch 1967).
+    np.testing.assert_allclose(window_correlation(HANN, 256), [1, 1 / 36], rtol=1e-9)
+    count = EffectiveAverages(HANN, 256)
+    count.add(0, 10)
+    assert count.value == pytest.approx(10 / (1 + 9 / 180), rel=1e-9)
+
+
+@given(early=st.integers(1, 6), late=st.integers(1, 6), decay=st.sampled_from([1.0, 0.8]))
+def test_merged_counts_are_those_of_separate_stretches(early, late, decay):
+    first, second = EffectiveAverages(HANN, 128, decay), EffectiveAverages(HANN, 128, decay)
+    first.add(0, early)
+    second.add(0, late)
+    alone = first.copy()
+    first.merge(second)
+    assert first.value == pytest.approx(by_definition([early, late], 128, decay), rel=1e-12)
+    assert alone.segments == early
+
+
+def test_nothing_counted_is_zero():
+    assert EffectiveAverages(HANN, 128).value == 0.0
+
+
+def test_one_reference_is_bendat_and_piersols_error():
+    # eps = sqrt(1 - c) / (sqrt(c) sqrt(2 n)) of |H|, with n - 1 for n.
+    c, g_xx, g_yy, averages = 0.8, 2.0, 5.0, 21.0
+    magnitude = np.sqrt(c * g_yy / g_xx)
+    std = response_std(np.array((1 - c) * g_yy), np.array(1 / g_xx), averages=averages, references=1)
+    assert float(std) / magnitude == pytest.approx(np.sqrt(1 - c) / np.sqrt(c * 2 * 20), rel=1e-12)
+
+
+def test_too_few_averages_leave_the_error_open():
+    one = np.ones(3)
+    assert np.all(np.isinf(response_std(one, one, averages=2.0, references=2)))
+    assert np.all(np.isinf(coherence_std(one, 1.0)))
+
+
+def test_a_coherence_of_one_has_no_error_and_a_middle_one_scatters_as_tabled():
+    np.testing.assert_allclose(
+        coherence_std(np.array([0.0, 0.5, 1.0]), 50.0), [0, np.sqrt(2) * 0.5 * np.sqrt(0.5 / 50), 0], rtol=1e-12
+    )
+
+
+def test_the_scatter_of_periods_needs_periods():
+    spectra = cross_spectra(series(noise(2, 1000)), resolution_hz=10.0)
+    with pytest.raises(EstimateError, match="periodic averages only"):
+        periodic_response_std(spectra, np.ones((1, 51), dtype=complex), 0, [1])
