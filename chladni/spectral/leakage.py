@@ -1,6 +1,7 @@
 """What a window does between spectral lines and to the correlation of neighbouring lines."""
 
 import numpy as np
+import scipy.fft
 from numpy.typing import NDArray
 
 from chladni.signals.errors import SetupError
@@ -8,6 +9,7 @@ from chladni.spectral.windows import window_samples
 
 # The shape of a window's spectrum in lines doesn't depend on its length once that is long against a sample.
 SAMPLES = 512
+STEPS = 64
 
 
 def named_window(name: str) -> NDArray[np.float64]:
@@ -31,14 +33,30 @@ def named_window(name: str) -> NDArray[np.float64]:
 def leakage(window: NDArray[np.float64], offset: NDArray[np.float64]) -> NDArray[np.float64]:
     """Power that a line shows of a tone `offset` lines away, 1 for a tone on the line.
 
+    Further away than half the window's samples it stays at what it is there, an upper bound.
+
     Examples
     --------
     >>> leakage(named_window("hann"), np.array([0.0, 1.0, 2.0])).round(3)
     array([1.  , 0.25, 0.  ])
     """
     at = np.arange(window.size)
-    turn = np.exp(2j * np.pi * np.multiply.outer(offset, at) / window.size)
+    furthest = (window.size - 1) / 2
+    turn = np.exp(2j * np.pi * np.multiply.outer(np.clip(offset, -furthest, furthest), at) / window.size)
     return np.asarray(np.abs(turn @ window) ** 2 / window.sum() ** 2, dtype=np.float64)
+
+
+def coarse_leakage(window: NDArray[np.float64], offset: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give `leakage` for very many offsets, each rounded to a 64th of a line.
+
+    Examples
+    --------
+    >>> coarse_leakage(named_window("hann"), np.array([0.0, 1.0, 0.5])).round(3)
+    array([1.   , 0.25 , 0.721])
+    """
+    fine = np.abs(scipy.fft.rfft(window, STEPS * window.size)) ** 2 / window.sum() ** 2
+    at = np.rint(np.abs(offset) * STEPS).astype(np.int64)
+    return np.asarray(fine[np.minimum(at, STEPS * (window.size - 1) // 2)], dtype=np.float64)
 
 
 def line_correlation(window: NDArray[np.float64]) -> float:

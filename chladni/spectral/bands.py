@@ -1,0 +1,153 @@
+"""RMS levels in frequency bands, from power spectral densities."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.provenance import Provenance
+from chladni.signals.value import Value, require_shape
+from chladni.spectral.leakage import line_correlation, named_window
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BandLevels(Value):
+    """RMS of channels in frequency bands.
+
+    Attributes
+    ----------
+    low_hz, high_hz
+        ``[band]``, edges of each band.
+    rms
+        ``[channel, band]``, at least 0, in each channel's unit; NaN where a band isn't covered.
+    std
+        ``[channel, band]``, one sigma of `rms`.
+    channels
+        One for each row.
+    provenance
+        How it was made.
+    """
+
+    low_hz: NDArray[np.float64]
+    high_hz: NDArray[np.float64]
+    rms: NDArray[np.float64]
+    std: NDArray[np.float64]
+    channels: tuple[Channel, ...]
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        expected = (len(self.channels), self.low_hz.size)
+        require_shape("high_hz", self.high_hz, self.low_hz.shape, "one entry a band")
+        require_shape("rms", self.rms, expected, "channels x bands")
+        require_shape("std", self.std, expected, "channels x bands")
+        self._freeze()
+
+
+def band_rms(density: PowerSpectralDensity, *, bands_hz: Sequence[tuple[float, float]]) -> BandLevels:
+    """Integrate power spectral densities over bands.
+
+    Parameters
+    ----------
+    density
+        Of one or more channels.
+    bands_hz
+        Low and high edge of each band; bands may overlap or leave gaps.
+
+    Returns
+    -------
+    BandLevels
+        NaN, with infinite std and a note, for a band that the spectrum doesn't cover.
+
+    Raises
+    ------
+    EstimateError
+        When an edge is negative or a band is empty, or the spectrum has less than two lines.
+
+    Notes
+    -----
+    A line stands for the power between the middles to its neighbours; the first and last one reach to 0 Hz and to
+    the end of the spectrum. A band that cuts a line gets the share of it that lies inside, so adjoining bands add up
+    to the whole: over all lines the RMS is the root of sum(G) df, which is Parseval's.
+
+    The variance of a band's power is sum of std^2 over its lines times the sum of squared correlations between
+    neighbouring lines, sum(w^4) N / sum(w^2)^2: for white noise about 1/(B T) of the power squared (Bendat & Piersol
+    2010, eq. 8.51). The RMS has half the relative error of the power.
+
+    Examples
+    --------
+    >>> flat = PowerSpectralDensity(
+    ...     frequency_hz=np.arange(101.0), values=np.full((1, 101), 0.04), std=np.full((1, 101), 0.004),
+    ...     channels=(Channel(name="a", unit="m/s^2"),), bandwidth_hz=1.0, provenance=Provenance(),
+    ... )
+    >>> band_rms(flat, bands_hz=[(10, 35), (10.25, 11.25)]).rms.round(6)
+    array([[1. , 0.2]])
+    """
+    edges = np.asarray(bands_hz, dtype=np.float64).reshape(-1, 2)
+    if not np.all(np.isfinite(edges)) or np.any(edges < 0) or np.any(edges[:, 1] <= edges[:, 0]):
+        raise EstimateError(f"bands {list(bands_hz)} must be pairs of rising frequencies, 0 or above")
+    cells = _cell_edges(density.frequency_hz)
+    share = _shares(cells, edges)
+    spacing_hz = _spacings(density.frequency_hz)
+    power = (density.values * spacing_hz) @ share.T
+    variance = (
+        (density.std * spacing_hz) ** 2 @ (share.T**2) * line_correlation(named_window(density.provenance.window))
+    )
+    uncovered = (edges[:, 0] < cells[0] - 1e-9) | (edges[:, 1] > cells[-1] + _tail(density.frequency_hz))
+    rms = np.where(uncovered, np.nan, np.sqrt(power))
+    half = 2 * np.sqrt(np.maximum(power, np.finfo(float).tiny))
+    return BandLevels(
+        low_hz=edges[:, 0],
+        high_hz=edges[:, 1],
+        rms=rms,
+        std=np.where(uncovered, np.inf, np.sqrt(variance) / half),
+        channels=density.channels,
+        provenance=density.provenance.with_estimator("band RMS").with_notes(
+            *_uncovered_note(edges[uncovered], cells)
+        ),
+    )
+
+
+def total_rms(density: PowerSpectralDensity) -> BandLevels:
+    """Give the RMS over the whole spectrum as one band."""
+    cells = _cell_edges(density.frequency_hz)
+    return band_rms(density, bands_hz=[(float(cells[0]), float(cells[-1]))])
+
+
+def _spacings(frequency_hz: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Width in Hz by which each line's density counts: the spacing of the lines, at both ends too."""
+    if frequency_hz.size < 2:
+        raise EstimateError("one line is no spectrum; a band needs two lines or more")
+    steps = np.diff(frequency_hz)
+    return np.asarray((np.append(steps, steps[-1]) + np.append(steps[0], steps)) / 2, dtype=np.float64)
+
+
+def _cell_edges(frequency_hz: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges of the cells over which the power of each line is spread."""
+    spacing_hz = _spacings(frequency_hz)
+    middles = (frequency_hz[1:] + frequency_hz[:-1]) / 2
+    low = 0.0 if frequency_hz[0] < spacing_hz[0] / 2 else frequency_hz[0] - spacing_hz[0] / 2
+    # The last line may be the Nyquist frequency, beyond which there is nothing: its power lies below it.
+    return np.concatenate([[low], middles, [frequency_hz[-1]]])
+
+
+def _tail(frequency_hz: NDArray[np.float64]) -> float:
+    """How far above its last line a spectrum of odd length still reaches."""
+    return float(0.5 * (frequency_hz[-1] - frequency_hz[-2]) * (1 + 1e-9))
+
+
+def _shares(cells: NDArray[np.float64], edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    """``[band, line]``: share of each line's cell that lies in each band."""
+    inside = np.minimum(edges[:, 1:], cells[1:]) - np.maximum(edges[:, :1], cells[:-1])
+    return np.asarray(np.clip(inside, 0.0, None) / np.diff(cells), dtype=np.float64)
+
+
+def _uncovered_note(bands: NDArray[np.float64], cells: NDArray[np.float64]) -> tuple[str, ...]:
+    if not bands.size:
+        return ()
+    named = ", ".join(f"{low:g}-{high:g} Hz" for low, high in bands[:3])
+    more = f" and {len(bands) - 3} more" if len(bands) > 3 else ""
+    return (f"no level for {named}{more}: the spectrum covers {cells[0]:g} to {cells[-1]:g} Hz",)
