@@ -33,6 +33,7 @@ HEADER_BYTES: Final = 4
 COMPACT_BYTES: Final = 256
 """Bytes a message for each column asked for, up to which irregular messages are first copied side by side."""
 
+_BYTE: Final = np.dtype(np.uint8)
 _CDR: Final = WireRules(max_alignment=8, terminated=True)
 _ROS1: Final = WireRules(max_alignment=1, terminated=False)
 
@@ -121,32 +122,31 @@ class BinaryDecoder:
         """Decode the fields named; see `chladni.io.decoding.columns.Decoder`."""
         require_known(paths, self.fields, schema_name=self.record.name)
         batch = _Batch(messages)
-        cursor = self._cursor(batch)
-        cursor.compacted(COMPACT_BYTES * len(paths))
+        cursor = batch.cursor(byte_order="<")
+        cursor.compact(COMPACT_BYTES * len(paths))
+        if self._encapsulated:
+            self._pass_header(cursor)
         walk = Walk(cursor, rules=self._rules, layouts=self._layouts)
         walk.record(self.record, tree_of([self._leaves[path] for path in paths]), last=True)
         columns = {path: self._column(self._leaves[path], walk.pieces.get(path, []), batch, cursor) for path in paths}
         return Decoded(columns=columns, bad=batch.bad, reasons=dict(batch.reasons))
 
-    def _cursor(self, batch: _Batch) -> Cursor:
-        """Cursor on the bodies of all messages that have one."""
-        if not self._encapsulated:
-            return batch.cursor(byte_order="<")
-        header = batch.cursor(byte_order=">")
-        header.claim(HEADER_BYTES, "the CDR header")
-        forms = header.take(np.dtype(np.uint16)).astype(np.int64)
+    def _pass_header(self, cursor: Cursor) -> None:
+        """Move to the bodies of CDR messages; the header gives the byte order."""
+        cursor.claim(HEADER_BYTES, "the CDR header")
+        first, forms = cursor.take_block(_BYTE, 2).astype(np.int64).T
+        forms = forms + 256 * first
         if len(forms) and (forms == forms[0]).all() and int(forms[0]) in _OTHER_FORMS:
             raise LogError(
                 f"{self.record.name}: messages are in {_OTHER_FORMS[int(forms[0])]}; plain CDR (little or big "
                 "endian) is supported, record with a middleware that writes it"
             )
-        kept = header.drop(forms > 1, "the header names no plain CDR")
+        kept = cursor.drop(forms > 1, "the header names no plain CDR")
         forms = forms if kept is None else forms[kept]
         # One writer has one byte order: a message that differs from most is damaged, not foreign.
         order = 1 if 2 * np.count_nonzero(forms) >= len(forms) else 0
-        header.drop(forms != order, "the byte order differs from most messages")
-        header.enter(HEADER_BYTES, "<" if order else ">")
-        return header
+        cursor.drop(forms != order, "the byte order differs from most messages")
+        cursor.enter(HEADER_BYTES, "<" if order else ">")
 
     def _column(self, leaf: Leaf, pieces: list[Piece], batch: _Batch, cursor: Cursor) -> Column:
         info, bad = leaf.info, batch.bad

@@ -84,7 +84,7 @@ class Cursor:
         self.shortest -= width
         self.byte_order = byte_order
 
-    def compacted(self, most_bytes: int) -> None:
+    def compact(self, most_bytes: int) -> None:
         """Copy messages of one length that lie irregularly side by side, so that columns become strided views.
 
         Parameters
@@ -95,8 +95,9 @@ class Cursor:
         length = self.shortest
         if self.stride is not None or not 0 < length <= most_bytes or (self.size != length).any():
             return
-        everywhere = np.lib.stride_tricks.sliding_window_view(self.buffer, length)
-        self.buffer = everywhere[self.base].reshape(-1)
+        # One opaque item a message is copied as a whole; rows of bytes would be copied byte by byte.
+        everywhere = np.ndarray((self.buffer.size - length + 1,), f"V{length}", self.buffer, 0, (1,))
+        self.buffer = everywhere[self.base].view(np.uint8)
         base = np.arange(len(self), dtype=np.int64) * length
         self._place(base=base, size=self.size, rows=self.rows, position=self.position)
 

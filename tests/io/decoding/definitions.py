@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,12 @@ def messages(draw: st.DrawFn, *, ros: int, depth: int = 0, counter: list[int] | 
             written = written if ros == 1 else f"builtin_interfaces/{written.capitalize()}"
         parts.append(Part(base=written, name=f"f{index}", array=array, message=inner))
     return Message(name=name, parts=parts)
+
+
+@cache
+def ros2_types() -> Any:
+    """rosbags' types of a ROS 2 distribution; loading them takes a while."""
+    return get_typestore(Stores.ROS2_JAZZY)
 
 
 class Oracle:

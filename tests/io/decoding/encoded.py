@@ -1,5 +1,6 @@
-"""Messages for the decoders' tests: batches of bytes and a reference serialiser of CDR and ROS 1."""
+"""Messages for the decoders' tests: batches of bytes, and the parts of CDR written by hand."""
 
+import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.decoding import Decoded, Decoder
+from chladni.io.decoding import Decoded, Decoder, make_decoder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,3 +53,35 @@ def values_of(decoded: Decoded, path: str) -> list[Any]:
 
 def decode_all(decoder: Decoder, messages: Encoded) -> Decoded:
     return decoder.columns(messages, [info.path for info in decoder.fields])
+
+
+SEPARATOR = "=" * 80
+HEADER = f"""{SEPARATOR}
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+"""
+JOINT_STATE = f"""
+# This is a message that holds data to describe the state of joints.
+std_msgs/Header header
+
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+{HEADER}"""
+
+
+def decoder_of(text: str, name: str = "demo/msg/Demo", *, encoding: str = "cdr") -> Decoder:
+    schema_encoding = "ros2msg" if encoding == "cdr" else "ros1msg"
+    return make_decoder(
+        message_encoding=encoding, schema_name=name, schema_encoding=schema_encoding, schema_data=text.encode()
+    )
+
+
+def cdr(*parts: bytes, little_endian: bool = True) -> bytes:
+    return bytes([0, little_endian, 0, 0]) + b"".join(parts)
+
+
+def text_of(content: bytes) -> bytes:
+    return struct.pack("<I", len(content) + 1) + content + b"\0"
