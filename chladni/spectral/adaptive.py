@@ -1,4 +1,4 @@
-"""Averages in the way that suits the excitation: whole periods where it repeats, windowed segments elsewhere."""
+"""Averages in the way that suits the excitation: hits of a hammer, whole periods, or windowed segments."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,6 +9,7 @@ from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.blocks import Source, leading_part
 from chladni.spectral.cross_spectra import cross_spectra
+from chladni.spectral.impact import find_impacts, impact_cross_spectra, is_impact_test
 from chladni.spectral.period import Period, find_period
 from chladni.spectral.periodic import periodic_cross_spectra
 from chladni.spectral.segmentation import Detrend
@@ -31,6 +32,9 @@ def adaptive_cross_spectra(
 ) -> CrossSpectra:
     """Average cross-spectra as the excitation asks for, unless told how.
 
+    When the only reference is a hammer (`is_impact_test`) and neither `window` nor `overlap` is given, its accepted
+    hits are averaged (`find_impacts`); all of the source is held in memory for that.
+
     A reference that repeats (`find_period`) is averaged over whole periods without window, in which nothing leaks,
     unless `resolution_hz`, `window` or `overlap` is given: then that is done, with a note that says what it costs.
     All else is averaged after Welch.
@@ -42,7 +46,8 @@ def adaptive_cross_spectra(
     references
         Names of the excitations; None looks at the channels whose role is reference, or at all when none is.
     resolution_hz, window, overlap, detrend
-        See `cross_spectra`; None leaves the choice to this function.
+        See `cross_spectra`; None leaves the choice to this function. For hits, the resolution sets the length of a
+        record.
 
     Raises
     ------
@@ -52,7 +57,13 @@ def adaptive_cross_spectra(
         When an option is out of its range.
     """
     lead, blocks = leading_part(source, SAMPLES_EXAMINED)
-    period = _first_period(_joined(lead), references)
+    start = _joined(lead)
+    hammer = _hammer(start, references)
+    if hammer is not None and window is None and overlap is None:
+        series = _joined(tuple(blocks))
+        record_s = None if resolution_hz is None else 1 / resolution_hz
+        return impact_cross_spectra(series, find_impacts(series, force=hammer, record_s=record_s))
+    period = _first_period(start, references)
     chosen = resolution_hz is None and window is None and overlap is None
     if period is not None and period.whole and chosen:
         return periodic_cross_spectra(blocks, period)
@@ -66,6 +77,15 @@ def adaptive_cross_spectra(
     if period is None:
         return spectra
     return replace(spectra, provenance=spectra.provenance.with_notes(_price(period, spectra)))
+
+
+def _hammer(series: TimeSeries, references: str | Sequence[str] | None) -> str | None:
+    """Name the reference when it's the only one and strikes; a series without references has no hammer."""
+    if references is None:
+        names = [channel.name for channel in series.channels if channel.role == "reference"]
+    else:
+        names = [references] if isinstance(references, str) else list(references)
+    return names[0] if len(names) == 1 and is_impact_test(series, names[0]) else None
 
 
 def _first_period(series: TimeSeries, references: str | Sequence[str] | None) -> Period | None:
