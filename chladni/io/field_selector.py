@@ -110,6 +110,7 @@ class _Walk:
         self._index: int | None = None
         self._in_array = False
         self._open_slice = False
+        self._at_slice = False
         self._names: str | None = None
         self._message_filters: list[FieldFilter] = []
         self._element_filters: list[FieldFilter] = []
@@ -118,10 +119,11 @@ class _Walk:
         match step:
             case FieldStep(name=name):
                 self._prefix = _joined(self._prefix, name)
+                self._at_slice = False
             case IndexStep(index=index):
                 self._enter_array()
                 self._index = index
-                self._open_slice = index is None
+                self._open_slice = self._at_slice = index is None
             case KeyStep(name=name):
                 names = self._names_beside()
                 self._enter_array()
@@ -181,7 +183,7 @@ class _Walk:
             kind = "text: compare it by == or != with a quoted value" if is_text else "a number: leave out the quotes"
             raise LogError(f"{self._path.text!r}: {leaf} in the filter is {kind}")
         comparison = FieldFilter(leaf=leaf, operator=step.operator, value=step.value)
-        if self._open_slice:
+        if self._at_slice:
             self._element_filters.append(comparison)
             self._open_slice = False
         elif self._in_array:
@@ -282,21 +284,33 @@ def _elements(column: Column, index: NDArray[np.int64]) -> tuple[NDArray[Any], N
 def _filtered_index(decoded: Decoded, selector: FieldSelector) -> NDArray[np.int64]:
     """Index of the element that passes all filters, -1 where none does."""
     only = selector.element_filters[0]
-    column = decoded.columns[only.leaf].values
-    if len(selector.element_filters) == 1 and isinstance(column, Strings):
-        lookup = [_index_in(_passing(names, only), selector) for names in column.table]
-        return np.array(lookup, np.int64)[column.codes]
+    column = decoded.columns[only.leaf]
+    if len(selector.element_filters) == 1 and isinstance(column.values, Strings) and _holds_lists(column):
+        # Few distinct lists of names, many messages: each list is searched once.
+        lookup = [_index_in(_passing(names, only), selector) for names in column.values.table]
+        return np.array(lookup, np.int64)[column.values.codes]
     masks = [_element_masks(decoded.columns[one.leaf], one) for one in selector.element_filters]
     together = (np.logical_and.reduce(parts) for parts in zip(*masks, strict=True))
     return np.array([_index_in(mask, selector) for mask in together], np.int64)
 
 
+def _holds_lists(column: Column) -> bool:
+    """Whether each message has one list of strings (an array of text), and not one string an element."""
+    values = column.values
+    return isinstance(values, Strings) and values.codes.ndim == 1 and column.counts is None
+
+
 def _element_masks(column: Column, one: FieldFilter) -> list[NDArray[np.bool_]]:
-    if isinstance(column.values, Strings):
-        passing = [_passing(names, one) for names in column.values.table]
-        return [passing[code] for code in column.values.codes]
-    flat, counts = column.per_message()
-    return np.split(_COMPARISONS[one.operator](flat, one.value), np.cumsum(counts)[:-1])
+    """For each message which of its elements pass."""
+    if not isinstance(column.values, Strings):
+        flat, counts = column.per_message()
+        return np.split(_COMPARISONS[one.operator](flat, one.value), np.cumsum(counts)[:-1])
+    if _holds_lists(column):
+        lists = [_passing(names, one) for names in column.values.table]
+        return [lists[code] for code in column.values.codes]
+    passes = np.array([_COMPARISONS[one.operator](text, one.value) for text in column.values.table], np.bool_)
+    elements: NDArray[np.bool_] = passes[column.values.codes]
+    return list(elements) if column.counts is None else np.split(elements, np.cumsum(column.counts)[:-1])
 
 
 def _passing(names: str | tuple[str, ...], one: FieldFilter) -> NDArray[np.bool_]:

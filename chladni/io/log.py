@@ -5,6 +5,7 @@ from math import isfinite
 from pathlib import Path
 from types import TracebackType
 from typing import Self
+from weakref import finalize
 
 from chladni.io.catalog import Catalog, read_catalog
 from chladni.io.channel_source import ChannelSource
@@ -87,6 +88,7 @@ class Log:
         self._stamp = stamp
         self._catalog: Catalog | None = None
         self._lost = LostMessages()
+        self._close = finalize(self, container.close)
         self._known: tuple[object, FirstPass] | None = None
         self._info: LogInfo | None = None
 
@@ -201,7 +203,7 @@ class Log:
         if not (isfinite(seconds) and seconds > 0):
             raise LogError(f"blocks of {seconds} s: seconds must be finite and positive")
         reader = self._reader(paths, start_s, end_s)
-        return reader.blocks(self._first_pass(reader), seconds)
+        return self._held_open(reader.blocks(self._first_pass(reader), seconds))
 
     def grids(
         self, paths: Sequence[str] | None = None, *, start_s: float | None = None, end_s: float | None = None
@@ -227,8 +229,8 @@ class Log:
         return self._info
 
     def close(self) -> None:
-        """Close the file."""
-        self._container.close()
+        """Close the file; a log that is dropped closes it too."""
+        self._close()
 
     def __enter__(self) -> Self:
         return self
@@ -240,6 +242,10 @@ class Log:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+    def _held_open(self, blocks: Iterator[TimeSeries]) -> Iterator[TimeSeries]:
+        # Whoever iterates over open_log(path).blocks() has no other hold on the log, and a dropped log is closed.
+        yield from blocks
 
     def _first_pass(self, reader: LogReader) -> FirstPass:
         # Whoever asks for the grids reads blocks next, of the same channels.

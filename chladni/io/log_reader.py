@@ -117,7 +117,11 @@ class LogReader:
         found = read_pieces(
             self.container, self.streams, start_ns=self.window.log_start_ns, end_ns=self.window.log_end_ns
         )
-        return windowed(self.streams, found, self.lost, window_ns=(self.window.start_ns, self.window.end_ns))
+        lost = LostMessages()
+        try:
+            yield from windowed(self.streams, found, lost, window_ns=(self.window.start_ns, self.window.end_ns))
+        finally:
+            self.lost.merge(lost)
 
     def series(self) -> tuple[TimeSeries, ...]:
         """Everything, one series for each grid."""
@@ -226,7 +230,7 @@ class LogReader:
         if last - first > EMPTY_GRID + SPARSE * samples:
             label = group.placements[0].stream.label
             raise LogError(
-                f"{self.container.path.name}: {label}: {samples} samples lie on a grid of {last - first}; stamps leap, "
+                f"{self.container.path.name}: {label}: {samples} samples on a grid of {last - first}: stamps leap, "
                 "or it paused for long: read the parts with start_s= and end_s=, or choose stamp='log'"
             )
 
