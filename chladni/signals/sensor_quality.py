@@ -1,0 +1,287 @@
+"""Faults of sensors, noticed in their samples: clipped, dead, dropouts, spikes, not numbers, coarse steps.
+
+Every rule asks for something that no vibration does, so that noise of any length, sines, impacts, sweeps and bursts
+pass: a plateau entered with a kink, a hold left with a leap, a leap there and back within three samples.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.channel import Channel
+from chladni.signals.time_series import TimeSeries
+
+FaultKind = Literal["clipped", "dead", "dropouts", "spikes", "not-a-number", "coarse"]
+Samples = NDArray[np.floating[Any]]
+Ints = NDArray[np.int64]
+
+# A range that is named is reached a little early by offset and gain of a real amplifier.
+_NEAR_OVERLOAD = 0.999
+_SHORTEST_PLATEAU = 3
+_SHORTEST_HOLD = 8
+# A leap is this many medians of the local step; Gaussian noise of 10^7 samples reaches 8.
+_LEAP = 20.0
+_LEAP_BLOCK = 4096
+_WIDEST_SPIKE = 3
+_QUIET_AROUND = 8
+_FEWEST = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorFault:
+    """A fault of one channel.
+
+    Attributes
+    ----------
+    channel
+        Name of the channel.
+    kind
+        ``clipped``, ``dead``, ``dropouts``, ``spikes``, ``not-a-number`` or ``coarse``.
+    count
+        Samples concerned.
+    first_s
+        Time of the first one, seconds from the start of the series.
+    sentence
+        What was found, and what to do.
+    """
+
+    channel: str
+    kind: FaultKind
+    count: int
+    first_s: float
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Record:
+    """Good samples of a channel, with what several rules need of them."""
+
+    channel: Channel
+    samples: Samples
+    still: Ints
+    leaps: Ints
+    typical_step: float
+    smallest_step: float
+    low: float
+    high: float
+
+    def step(self, places: Ints) -> Samples:
+        """Magnitude of the steps from these samples to the next ones; 0 outside."""
+        inside = np.clip(places, 0, self.samples.size - 2)
+        steps = np.abs(self.samples[inside + 1] - self.samples[inside])
+        return np.where(inside == places, steps, 0)
+
+
+def sensor_quality(series: TimeSeries) -> tuple[SensorFault, ...]:
+    """Notice faulty sensors.
+
+    Parameters
+    ----------
+    series
+        Samples; missing ones (not `valid`) are no fault of a sensor and are left out.
+
+    Returns
+    -------
+    faults
+        By channel, in the order of the series; empty when all is well. A channel without a fault here may still be
+        wrong in ways that samples alone don't tell (gain, mounting, direction).
+
+    Notes
+    -----
+    Rules, with q the smallest step seen and m the median step between neighbours:
+
+    - clipped: at or above 99.9 % of the channel's overload; or at least three samples in a row at the very top (or
+      bottom), three times as many there as on the value next to it, reached with a step above 0.1 m and 4 q. A top
+      reached smoothly is where a motion turns or rests.
+    - dead: constant, or two or three values within 0.1 % of the mean or 0.01 % of the overload.
+    - dropouts: the same value for at least eight samples, not at an end of the range, between steps above 0.1 m
+      before and 0.5 m after; in a channel that otherwise moves.
+    - spikes: 20 m and 4 q away and back within three samples (m of the 4096 around), steps of the eight samples
+      before and after below a quarter of that. Force channels are left out, where that's a hit.
+    - not-a-number: NaN or infinite.
+    - coarse: three to sixteen different values, in a channel that keeps changing.
+    """
+    faults: list[SensorFault] = []
+    for row, channel in enumerate(series.channels):
+        valid = None if series.valid is None else series.valid[row]
+        faults += _channel_faults(channel, series.values[row], valid, series.sample_rate_hz)
+    return tuple(faults)
+
+
+def _channel_faults(
+    channel: Channel, values: Samples, valid: NDArray[np.bool_] | None, rate_hz: float
+) -> list[SensorFault]:
+    faults: list[SensorFault] = []
+    if values.size and not (np.isfinite(values.min()) and np.isfinite(values.max())):
+        finite = np.isfinite(values)
+        # NaN marked as missing is how a gap looks; infinity never is.
+        faulty = ~finite if valid is None else np.isinf(values) | (~finite & valid)
+        told = "are no numbers; estimates leave out what touches them"
+        faults += _fault(channel, "not-a-number", np.flatnonzero(faulty), told)
+        valid = finite if valid is None else valid & finite
+    place = None
+    if valid is not None and not valid.all():
+        place = np.flatnonzero(valid)
+        values = values[place]
+    if values.size >= _FEWEST:
+        faults += _faults_of(_record(channel, values), place)
+    return [replace(fault, first_s=fault.first_s / rate_hz) for fault in faults]
+
+
+def _faults_of(record: _Record, place: Ints | None) -> list[SensorFault]:
+    """Apply the rules; `first_s` is an index until the caller knows better."""
+    channel = record.channel
+    if _is_dead(record):
+        everything = np.arange(record.samples.size)
+        span = f"stays between {record.low:.6g} and {record.high:.6g} {channel.unit}"
+        return _fault(channel, "dead", everything, f"{span}; check cable, supply and range", place)
+    faults = _fault(
+        channel,
+        "clipped",
+        _clipped(record),
+        f"are clipped between {record.low:.6g} and {record.high:.6g} {channel.unit}; use a larger range",
+        place,
+    )
+    faults += _fault(
+        channel, "dropouts", _held(record), "are held or zero while the signal moves; check transmission", place
+    )
+    faults += _fault(channel, "spikes", _spikes(record), "leap away and back; check connectors and grounding", place)
+    if _is_coarse(record):
+        told = f"move in coarse steps of {record.smallest_step:.3g} {channel.unit}; use a smaller range"
+        faults += _fault(channel, "coarse", np.arange(record.samples.size), told, place)
+    return faults
+
+
+def _fault(
+    channel: Channel, kind: FaultKind, samples: Ints, told: str, place: Ints | None = None
+) -> list[SensorFault]:
+    if not samples.size:
+        return []
+    first = int(samples[0] if place is None else place[samples[0]])
+    sentence = f"{channel.name}: {told}" if kind == "dead" else f"{channel.name}: {samples.size} samples {told}"
+    return [SensorFault(channel=channel.name, kind=kind, count=samples.size, first_s=float(first), sentence=sentence)]
+
+
+def _record(channel: Channel, samples: Samples) -> _Record:
+    starts = np.unique(np.linspace(0, max(0, samples.size - _LEAP_BLOCK), 64).astype(np.int64))
+    some = np.concatenate([np.abs(np.diff(samples[start : start + _LEAP_BLOCK])) for start in starts])
+    moving = some[some > 0]
+    typical = float(np.median(moving)) if moving.size else 0.0
+    smallest = float(moving.min()) if moving.size else 0.0
+    still, leaps = _scan(samples, floor=max(0.25 * _LEAP * typical, 4 * smallest))
+    return _Record(
+        channel=channel,
+        samples=samples,
+        still=still,
+        leaps=leaps,
+        typical_step=typical,
+        smallest_step=smallest,
+        low=float(samples.min()),
+        high=float(samples.max()),
+    )
+
+
+def _scan(samples: Samples, *, floor: float) -> tuple[Ints, Ints]:
+    """Find steps of zero, and leaps: steps above `floor` and far above the median of their block of 4096."""
+    still, leaps = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
+    for start in range(0, samples.size - 1, _LEAP_BLOCK):
+        # A block at a time stays in the cache.
+        steps = np.abs(np.diff(samples[start : start + _LEAP_BLOCK + 1]))
+        if steps.min() == 0:
+            still.append(np.flatnonzero(steps == 0) + start)
+        if steps.max() > floor:
+            limit = max(_LEAP * float(np.median(steps[::8])), floor)
+            leaps.append(np.flatnonzero(steps > limit) + start)
+    return np.concatenate(still), np.concatenate(leaps)
+
+
+def _is_dead(record: _Record) -> bool:
+    span = record.high - record.low
+    if span == 0:
+        return True
+    middle = abs(record.high + record.low) / 2
+    tiny = span < max(1e-3 * middle, 1e-4 * (record.channel.overload or 0.0))
+    return tiny and np.unique(record.samples).size <= 3
+
+
+def _is_coarse(record: _Record) -> bool:
+    if not 0.3 * record.samples.size < record.still.size < 0.95 * record.samples.size:
+        return False
+    return 3 <= np.unique(record.samples).size <= 16
+
+
+def _clipped(record: _Record) -> Ints:
+    if record.channel.overload is not None:
+        limit = _NEAR_OVERLOAD * record.channel.overload
+        if max(record.high, -record.low) >= limit:
+            return np.flatnonzero(np.abs(record.samples) >= limit)
+    at_top = _plateaus(record, record.high)
+    at_bottom = _plateaus(record, record.low)
+    return np.sort(np.concatenate((at_top, at_bottom)))
+
+
+def _plateaus(record: _Record, level: float) -> Ints:
+    """Give the samples at an end of the range if they're cut off there, else nothing."""
+    there = np.flatnonzero(record.samples == level)
+    starts, lengths = _runs(there)
+    if lengths.size == 0 or lengths.max() < _SHORTEST_PLATEAU or _rests(record, there):
+        return there[:0]
+    beside = _count_beside(record, level)
+    entered = starts[(lengths >= _SHORTEST_PLATEAU) & (starts > 1)]
+    entry = np.maximum(record.step(entered - 1), record.step(entered - 2))
+    kinked = entry > max(0.1 * record.typical_step, 4 * record.smallest_step)
+    cut_off = there.size >= 3 * beside and kinked.size > 0 and np.count_nonzero(kinked) >= 0.5 * kinked.size
+    return there if cut_off else there[:0]
+
+
+def _count_beside(record: _Record, level: float) -> int:
+    """How many samples have the value next to an end of the range."""
+    others = record.samples[record.samples != level]
+    return int(np.count_nonzero(others == (others.max() if level == record.high else others.min())))
+
+
+def _rests(record: _Record, ends: Ints) -> bool:
+    # Away from the end of the range a signal that mostly stands still is a command or a state, not a vibration.
+    at_end = int(np.count_nonzero(np.diff(ends) == 1))
+    return record.still.size - at_end > 0.5 * (record.samples.size - ends.size)
+
+
+def _held(record: _Record) -> Ints:
+    if record.still.size > 0.25 * record.samples.size:
+        return record.still[:0]
+    starts, lengths = _runs(record.still)
+    long = lengths >= _SHORTEST_HOLD - 1
+    starts, lengths = starts[long], lengths[long]
+    entered = record.step(starts - 1) > 0.1 * record.typical_step
+    left = record.step(starts + lengths) > max(0.5 * record.typical_step, 4 * record.smallest_step)
+    level = record.samples[starts]
+    chosen = entered & left & (level != record.high) & (level != record.low)
+    return _filled(starts[chosen], lengths[chosen] + 1)
+
+
+def _spikes(record: _Record) -> Ints:
+    if record.channel.unit == "N" or record.channel.role == "reference" or record.leaps.size < 2:
+        return record.leaps[:0]
+    away, back = record.leaps[:-1], record.leaps[1:]
+    close = back - away <= _WIDEST_SPIKE
+    away, back = away[close], back[close]
+    samples = record.samples
+    there, again = samples[away + 1] - samples[away], samples[back + 1] - samples[back]
+    around = np.arange(1, _QUIET_AROUND + 1)
+    nearby = np.maximum(record.step(away[:, None] - around), record.step(back[:, None] + around)).max(axis=1)
+    chosen = (np.abs(there + again) < 0.3 * np.abs(there)) & (nearby < 0.25 * np.abs(there))
+    return _filled(away[chosen] + 1, (back - away)[chosen])
+
+
+def _runs(places: Ints) -> tuple[Ints, Ints]:
+    """First of each run of consecutive whole numbers, and its length."""
+    breaks = np.flatnonzero(np.diff(places, prepend=-2) != 1)
+    return places[breaks], np.diff(breaks, append=places.size)
+
+
+def _filled(starts: Ints, lengths: Ints) -> Ints:
+    if not starts.size:
+        return starts
+    return np.concatenate([np.arange(start, start + length) for start, length in zip(starts, lengths, strict=True)])
