@@ -1,7 +1,7 @@
 """Convert between MCAP logs and the files of other tools."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -186,12 +186,22 @@ def _write(
     if target.suffix.lower() == LOG_SUFFIX:
         from chladni.io.mcap.writer import write_mcap
 
+        series, shifted = _since_1970(series)
         options.setdefault("layout", "messages" if all(name.startswith("/") for name in names) else "batches")
         written = _call(write_mcap, series, {"path": target, "overwrite": overwrite} | options)
         renamed = tuple(f"{old}: called {new} in the log." for old, new in written.names.items() if old != new)
-        return tuple(written.names[name] for name in names), renamed
+        return tuple(written.names[name] for name in names), shifted + renamed
     losses: tuple[str, ...] = _call(_writer(target), series, {"path": target, "overwrite": overwrite} | options)
     return names, losses
+
+
+def _since_1970(series: tuple[TimeSeries, ...]) -> tuple[tuple[TimeSeries, ...], tuple[str, ...]]:
+    """Shift series that start before time 0, which a log can't stamp: a pretrigger, or jitter about a start at 0."""
+    first_ns = min((part.start_time_ns for part in series), default=0)
+    if first_ns >= 0:
+        return series, ()
+    shifted = tuple(replace(part, start_time_ns=part.start_time_ns - first_ns) for part in series)
+    return shifted, (f"All times are {-first_ns / 1e9:g} s later in the log, which holds none before 0.",)
 
 
 def _call(function: Callable[..., Any], first: object, options: dict[str, Any]) -> Any:

@@ -1,11 +1,6 @@
 """One pass over a whole log, to learn whether it is sound."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.catalog import Catalog
 from chladni.io.channel_source import UNKNOWN_UNIT
@@ -14,41 +9,23 @@ from chladni.io.log_info import ChannelInfo, LogInfo, some_of
 from chladni.io.loss import Loss, losses
 from chladni.io.mcap.container import McapContainer
 from chladni.io.placement import Placement
+from chladni.io.sample_monitor import SampleMonitor
 from chladni.io.stream import read_pieces
 from chladni.signals.time_series import NS_PER_S
-
-#: Samples of a channel that are looked at together for clipping, dropouts and spikes.
-STRETCH = 1 << 18
-
-
-@dataclass(slots=True, kw_only=True)
-class _Monitor:
-    """Stamps of one stream, and counts of what is wrong with its samples."""
-
-    gathering: Gathering
-    samples: int = 0
-    nonfinite: NDArray[np.int64] = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.nonfinite = np.zeros(len(self.gathering.stream.sources), np.int64)
-
-    def watch(self, values: NDArray[np.floating[Any]]) -> None:
-        """Look at the samples of one piece."""
-        self.samples += values.shape[1]
-        self.nonfinite += values.shape[1] - np.count_nonzero(np.isfinite(values), axis=1)
 
 
 def survey(container: McapContainer, content: Catalog, lost: LostMessages) -> LogInfo:
     """Read every channel listed once.
 
-    Stamps are kept (8 bytes a message), samples aren't.
+    Stamps are kept (8 bytes a message), samples only as long as they're being judged.
     """
     streams = content.streams(content.channels)
-    monitors = [_Monitor(gathering=Gathering(stream=stream)) for stream in streams]
+    monitors = [SampleMonitor(gathering=Gathering(stream=stream)) for stream in streams]
     pass_lost = LostMessages()
     for index, piece in windowed(streams, read_pieces(container, streams), pass_lost, window_ns=(None, None)):
-        monitors[index].gathering.add(piece, with_values=False)
-        monitors[index].watch(piece.values)
+        monitors[index].watch(piece)
+    for monitor in monitors:
+        monitor.judge()
     lost.merge(pass_lost)
     placements = [monitor.gathering.place() for monitor in monitors]
     found = dict(_channels(content, monitors, placements))
@@ -64,7 +41,7 @@ def survey(container: McapContainer, content: Catalog, lost: LostMessages) -> Lo
 
 
 def _channels(
-    content: Catalog, monitors: Sequence[_Monitor], placements: Sequence[Placement]
+    content: Catalog, monitors: Sequence[SampleMonitor], placements: Sequence[Placement]
 ) -> Iterator[tuple[str, ChannelInfo]]:
     for monitor, placement in zip(monitors, placements, strict=True):
         stream, base = placement.stream, placement.time_base
@@ -77,17 +54,17 @@ def _channels(
                 ChannelInfo(
                     channel=channel,
                     encoding=stream.topic.encoding,
-                    samples=monitor.samples - int(monitor.nonfinite[row]),
+                    samples=monitor.samples - (int(monitor.missing[row]) if monitor.samples else 0),
                     stamp=stream.choice.kind,
                     stamp_reason=stream.choice.reason,
                     time_base=base,
                     gaps=gaps,
-                    clipped=0,
+                    clipped=monitor.clipped(channel.name),
                 ),
             )
 
 
-def _duration_s(content: Catalog, monitors: Sequence[_Monitor], placements: Sequence[Placement]) -> float:
+def _duration_s(content: Catalog, monitors: Sequence[SampleMonitor], placements: Sequence[Placement]) -> float:
     """From the log's start to the end of its last sample."""
     ends = [
         monitor.gathering.end_ns(placement.time_base.rate_hz)
@@ -101,7 +78,7 @@ def _duration_s(content: Catalog, monitors: Sequence[_Monitor], placements: Sequ
 
 
 def _findings(
-    content: Catalog, monitors: Sequence[_Monitor], placements: Sequence[Placement], damage: Sequence[Loss]
+    content: Catalog, monitors: Sequence[SampleMonitor], placements: Sequence[Placement], damage: Sequence[Loss]
 ) -> Iterator[str]:
     if damage:
         known = [one.lost_messages for one in damage if one.lost_messages is not None]
@@ -144,11 +121,17 @@ def _clock_findings(placement: Placement) -> Iterator[str]:
         yield f"{stream.label}: {base.out_of_order} messages came after later ones; they were put in order"
 
 
-def _sample_findings(monitor: _Monitor) -> Iterator[str]:
+def _sample_findings(monitor: SampleMonitor) -> Iterator[str]:
     stream = monitor.gathering.stream
-    for channel, count in zip(stream.channels, monitor.nonfinite.tolist(), strict=True):
+    for channel, count in zip(stream.channels, monitor.missing.tolist(), strict=False):
         if count:
-            yield f"{channel.name}: {count} of {monitor.samples} samples are no finite number; they count as missing"
+            yield f"{channel.name}: {count} of {monitor.samples} samples are not a number; they count as missing"
+    dead = [fault for fault in monitor.faults.values() if fault.kind == "dead"]
+    yield from (fault.sentence for fault in monitor.faults.values() if fault.kind != "dead")
+    if len(dead) > 1:
+        # Messages have fields that many sensors don't fill; one sentence for all of them.
+        yield f"{some_of([fault.channel for fault in dead])}: constant; fields that aren't measured, or dead sensors"
+    yield from (fault.sentence for fault in dead if len(dead) == 1)
 
 
 def _content_findings(content: Catalog) -> Iterator[str]:
