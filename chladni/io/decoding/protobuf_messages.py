@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from functools import partial
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
@@ -11,10 +13,10 @@ import numpy as np
 from chladni.io.decoding.columns import Decoded, outside_buffer, require_known
 from chladni.io.decoding.found import found_of, joined_column, nothing
 from chladni.io.decoding.protobuf_schema import load_descriptor, record_of
-from chladni.io.decoding.schema import Array, FieldType, Stamp, leaves
+from chladni.io.decoding.schema import Array, FieldType, Primitive, Stamp, Text, leaves
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from google.protobuf.descriptor import Descriptor
     from google.protobuf.message import Message
@@ -70,15 +72,16 @@ class ProtobufDecoder:
 
     def _rows(
         self, messages: EncodedMessages, chosen: Sequence[Leaf], bad: NDArray[np.bool_], reasons: Counter[str]
-    ) -> list[list[list[object]]]:
+    ) -> list[list[Sequence[object]]]:
         from google.protobuf.message import DecodeError
 
+        readers = [_reader(leaf) for leaf in chosen]
         rows = []
         for index in np.flatnonzero(~bad).tolist():
             start, length = int(messages.offsets[index]), int(messages.lengths[index])
             try:
                 message = self._new.FromString(messages.buffer[start : start + length].tobytes())
-                rows.append([_values(message, leaf) for leaf in chosen])
+                rows.append([read(message) for read in readers])
             except DecodeError:
                 bad[index] = True
                 reasons["not a protobuf message of this type"] += 1
@@ -88,8 +91,16 @@ class ProtobufDecoder:
         return rows
 
 
-def _values(message: Message, leaf: Leaf) -> list[object]:
-    """Values of a leaf in one message: one, or, below a list of messages, any number."""
+def _reader(leaf: Leaf) -> Callable[[Message], Sequence[object]]:
+    """Function that gives the values of a leaf in one message: one, or, below a list of messages, any number."""
+    if any(leaf.lists) or not isinstance(leaf.type, Primitive | Text):
+        return partial(_values, leaf=leaf)
+    # The common case: plain numbers, reached by attributes alone.
+    reach = attrgetter(".".join(leaf.names))
+    return lambda message: (reach(message),)
+
+
+def _values(message: Message, leaf: Leaf) -> Sequence[object]:
     places: list[object] = [message]
     for name, lists in zip(leaf.names, leaf.lists, strict=True):
         below = [getattr(place, name) for place in places]

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-MAX_ELEMENT_STEPS: Final = 100_000
+MAX_ELEMENT_STEPS: Final = 20_000
 """Most elements of varying size (strings, messages with strings) that a batch is walked through one after another.
 
-Each step costs some ten microseconds whatever the number of messages; a file made to hold millions of them in one
+Each step costs some hundred microseconds whatever the number of messages; a file made to hold millions of them in one
 message would otherwise stop the reader for hours.
 """
 
@@ -270,6 +270,8 @@ class Walk:
     def _each_element(self, element: FieldType, counts: int | NDArray[np.int64], wanted: Tree | Leaf | None) -> None:
         """Go through the elements one after another: element k of all messages that have one, at once."""
         for k in range(counts if isinstance(counts, int) else int(counts.max(initial=0))):
+            if not len(self.cursor):
+                return  # all were found bad on the way
             if self.steps_left == 0:
                 wrong = np.broadcast_to(np.asarray(counts) > k, len(self.cursor))
                 self.cursor.drop(wrong, f"more than {MAX_ELEMENT_STEPS} elements of varying size in a batch")

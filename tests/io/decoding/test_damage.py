@@ -187,6 +187,16 @@ def test_lists_beyond_the_step_limit_are_refused(monkeypatch: pytest.MonkeyPatch
     assert values_of(decoded, "names")[0] == ("abc",) * 3
 
 
+def test_a_list_whose_messages_are_all_bad_is_not_walked(monkeypatch: pytest.MonkeyPatch) -> None:
+    steps = []
+    walked = walk_module.Walk._element
+    monkeypatch.setattr(walk_module.Walk, "_element", lambda *given: (steps.append(1), walked(*given)))
+    huge = cdr(struct.pack("<I", 2**32 - 1), b"\0" * 12)
+    decoded = decoder_of("string[] names\nint32 x").columns(batch_of([huge]), ["names", "x"])
+    assert decoded.bad.tolist() == [True]
+    assert not steps
+
+
 def test_no_messages_give_empty_columns() -> None:
     decoded = decode_all(decoder_of(JOINT_STATE), batch_of([]))
     assert {path: len(values_of(decoded, path)) for path in decoded.columns} == dict.fromkeys(PATHS, 0)
