@@ -2,6 +2,9 @@
 
 import zlib
 
+import numpy as np
+from numpy.typing import NDArray
+
 from chladni.io.mcap.log_file import LogFile
 from chladni.io.mcap.summary import LogEnd
 
@@ -28,8 +31,14 @@ class DataCrc:
         """Whether the log carries such a checksum."""
         return self._end.data_crc != 0
 
-    def advance_to(self, offset: int) -> None:
-        """Take in the bytes up to ``offset``."""
+    def take(self, offset: int, content: NDArray[np.uint8]) -> None:
+        """Take in bytes that have been read already, and those of the file before them."""
+        self._read_to(offset)
+        if self._position == offset:
+            self._crc = zlib.crc32(content.data, self._crc)
+            self._position += len(content)
+
+    def _read_to(self, offset: int) -> None:
         while self._position < offset:
             block = self._file.read(self._position, min(_BLOCK_BYTES, offset - self._position))
             if not block:
@@ -39,5 +48,5 @@ class DataCrc:
 
     def is_right(self) -> bool:
         """Take in the rest and compare."""
-        self.advance_to(self._end.data_end)
+        self._read_to(self._end.data_end)
         return self._crc == self._end.data_crc

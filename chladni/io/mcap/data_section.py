@@ -330,16 +330,24 @@ class DataSection:
         buffer = np.frombuffer(content, np.uint8)
         walk = walk_records(buffer, start=0, stop=len(buffer), until=_SINGLE)
         if walk.end == 0:
-            return None, self._broken(position, "the record can't be one", record_name(opcode))
+            return None, self._no_record(position, opcode, end, len(content))
         used_up = walk.end + PREFIX_BYTES > len(buffer) or len(walk.starts) > 1
         self._stretch = min(self._stretch * 4, _STRETCH_BYTES) if used_up else _FIRST_STRETCH_BYTES
         segment = BareSegment(
             offset=position,
-            buffer=buffer,
+            buffer=buffer[: walk.end],
             table=table_from_walk(buffer, walk),
             in_chunked_log=self._chunks_seen,
         )
         return segment, position + walk.end
+
+    def _no_record(self, position: int, opcode: int, end: int, found: int) -> int:
+        if found < end - position:
+            return self._broken(position, "the file became shorter while it was read", record_name(opcode))
+        # The only record that fits and yet can't be one; its length is as good as any other.
+        what = "a message too short to hold its own fields"
+        self._damage.add(what, offset=position, record="Message", lost_messages=1)
+        return end
 
 
 def _header_from_summary(start: bytes, listed: ChunkIndex) -> ChunkHeader | None:

@@ -3,7 +3,7 @@
 import os
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 from chladni.io.mcap.channel_registry import ChannelRegistry
@@ -62,7 +62,6 @@ class LogPass:
         self._limits = limits
         self._check_crc = check_crc
         self._crc = DataCrc(file, end)
-        self._crc_task: Future[None] | None = None
         self._checksum_seen = False
         self._contradicted: set[int] = set()
         self._skipped_any = False
@@ -99,7 +98,8 @@ class LogPass:
                 task = self._start(pool, segment)
                 if task is not None:
                     ahead.append((size, task))
-                self._advance_crc(pool, segment)
+                if isinstance(segment, BareSegment) and self._crc.wanted and self._check_crc:
+                    self._crc.take(segment.offset, segment.buffer)
             while ahead:
                 yield from self._enter(ahead.popleft()[1]())
             self._check_data_crc()
@@ -107,16 +107,7 @@ class LogPass:
             pool.shutdown(cancel_futures=True)
         self._close_books()
 
-    def _advance_crc(self, pool: ThreadPoolExecutor, segment: Segment) -> None:
-        """Let the checksum over all data follow the walk, in a thread."""
-        if self._crc_task is not None:
-            self._crc_task.result()
-        if self._crc.wanted and self._check_crc and not self._skipped_any:
-            self._crc_task = pool.submit(self._crc.advance_to, segment.offset)
-
     def _check_data_crc(self) -> None:
-        if self._crc_task is not None:
-            self._crc_task.result()
         # With chunks left out, reading all bytes for the checksum would undo what leaving them out saves.
         if not self._crc.wanted or not self._check_crc or self._skipped_any:
             return

@@ -42,16 +42,32 @@ class MessageTable:
 
 def message_headers(buffer: NDArray[np.uint8], starts: NDArray[np.int64]) -> NDArray[np.void]:
     """Return the headers of the messages at ``starts`` (which must lie inside), a view when equally spaced."""
-    if len(starts) == 0:
-        return np.empty(0, MESSAGE_HEADER)
-    stride = _constant_stride(starts)
-    if stride is not None:
-        return np.ndarray(len(starts), MESSAGE_HEADER, buffer, offset=int(starts[0]), strides=(stride,))
+    view = _even_headers(buffer, starts)
+    if view is not None:
+        return view
     # A header at every byte, overlapping; indexing then copies one header a message.
     everywhere: NDArray[np.void] = np.ndarray(
         len(buffer) - MESSAGE_HEADER_BYTES + 1, MESSAGE_HEADER, buffer, strides=(1,)
     )
     return everywhere[starts]
+
+
+def choose_messages(
+    buffer: NDArray[np.uint8], table: MessageTable, chosen: NDArray[np.intp]
+) -> tuple[NDArray[np.int64], NDArray[np.void]]:
+    """Return starts and headers of some messages of a table, the headers as a view when equally spaced."""
+    starts = table.starts[chosen]
+    view = _even_headers(buffer, starts)
+    return starts, table.headers[chosen] if view is None else view
+
+
+def _even_headers(buffer: NDArray[np.uint8], starts: NDArray[np.int64]) -> NDArray[np.void] | None:
+    if len(starts) == 0:
+        return np.empty(0, MESSAGE_HEADER)
+    stride = _constant_stride(starts)
+    if stride is None:
+        return None
+    return np.ndarray(len(starts), MESSAGE_HEADER, buffer, offset=int(starts[0]), strides=(stride,))
 
 
 def _constant_stride(starts: NDArray[np.int64]) -> int | None:

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from chladni.io.mcap.records import MESSAGE_FIELDS_BYTES, PREFIX_BYTES, RECORD_PREFIX, Opcode
 
 _PREFIX = np.dtype([("opcode", "u1"), ("length", "<u8")])
+# Comparing with an enumeration's member costs more than all else in a step.
+_MESSAGE = int(Opcode.MESSAGE)
 _LONGEST_PATTERN = 256
 _FIRST_LEAP_PERIODS = 16
 _LEAP_GROWTH = 8
@@ -59,46 +61,45 @@ class _Walk:
         self._buffer = buffer
         self._view = buffer.data
         self._stop = stop
-        self._until = until | {0}
+        self._until = frozenset(int(opcode) for opcode in until) | {0}
         self._position = start
         self._starts = array("q")
-        self._last_seen: dict[tuple[int, int], int] = {}
         self._period = 0
-        self._repeats = 0
         self._next_try = 0
 
     def run(self) -> RecordWalk:
-        while self._step():
-            # The last `period` records have each come twice: time to guess.
-            if self._repeats > self._period and len(self._starts) >= self._next_try:
-                self._leap()
+        while self._step_until_repeat():
+            self._leap()
         return RecordWalk(starts=np.frombuffer(self._starts, np.int64), end=self._position)
 
-    def _step(self) -> bool:
-        position = self._position
-        if position + PREFIX_BYTES > self._stop:
-            return False
-        opcode, length = RECORD_PREFIX.unpack_from(self._view, position)
-        end = position + PREFIX_BYTES + length
-        if end > self._stop or opcode in self._until:
-            return False
-        if opcode == Opcode.MESSAGE and length < MESSAGE_FIELDS_BYTES:
-            return False
-        self._notice_period((opcode, length))
-        self._starts.append(position)
-        self._position = end
-        return True
-
-    def _notice_period(self, kind: tuple[int, int]) -> None:
-        index = len(self._starts)
-        period = index - self._last_seen.get(kind, -_LONGEST_PATTERN)
-        self._last_seen[kind] = index
-        self._repeats = self._repeats + 1 if period == self._period else 1
-        self._period = period
+    def _step_until_repeat(self) -> bool:
+        """Step until the last records have come once before in the same order; False where the walk ends."""
+        # All in one loop and in local names: logs without any pattern spend their time here.
+        view, stop, until, unpack = self._view, self._stop, self._until, RECORD_PREFIX.unpack_from
+        position, index, append = self._position, len(self._starts), self._starts.append
+        last_seen: dict[int, int] = {}
+        period = repeats = 0
+        while position + PREFIX_BYTES <= stop:
+            opcode, length = unpack(view, position)
+            end = position + PREFIX_BYTES + length
+            too_short = opcode == _MESSAGE and length < MESSAGE_FIELDS_BYTES
+            if end > stop or too_short or opcode in until:
+                break
+            append(position)
+            position = end
+            kind = length << 8 | opcode
+            distance = index - last_seen.get(kind, index)
+            last_seen[kind] = index
+            index += 1
+            repeats = repeats + 1 if distance == period else 1
+            period = distance
+            if 0 < period < repeats and period < _LONGEST_PATTERN and index >= self._next_try:
+                self._position, self._period = position, period
+                return True
+        self._position = position
+        return False
 
     def _leap(self) -> None:
-        if self._period >= _LONGEST_PATTERN:
-            return
         pattern = self._starts[-self._period :]
         periods = self._count_periods(pattern)
         if periods:
@@ -106,8 +107,6 @@ class _Walk:
             bases = self._position + (self._position - pattern[0]) * np.arange(periods, dtype=np.int64)
             self._starts.frombytes((bases[:, np.newaxis] + offsets).tobytes())
             self._position += periods * (self._position - pattern[0])
-            self._last_seen.clear()
-            self._repeats = 0
         if periods < _FIRST_LEAP_PERIODS:
             self._next_try = len(self._starts) + _STEPS_AFTER_FAILURE
 

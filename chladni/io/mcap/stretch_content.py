@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chladni.io.mcap.damage import Damage
 from chladni.io.mcap.message_batch import MessageBatch
-from chladni.io.mcap.message_table import MessageTable, message_headers
+from chladni.io.mcap.message_table import MessageTable, choose_messages
 from chladni.io.mcap.records import (
     MESSAGE_FIELDS_BYTES,
     PREFIX_BYTES,
@@ -88,8 +88,7 @@ def _by_channel(
     order = np.argsort(ids, kind="stable")
     borders = np.flatnonzero(np.diff(ids[order])) + 1
     for group in np.split(order, borders):
-        starts = table.starts[group]
-        yield int(ids[group[0]]), starts, message_headers(buffer, starts)
+        yield int(ids[group[0]]), *choose_messages(buffer, table, group)
 
 
 def _add_batch(content: StretchContent, batch: MessageBatch, selection: Selection) -> None:

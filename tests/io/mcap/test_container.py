@@ -205,6 +205,16 @@ def test_a_file_cut_short_while_it_is_read_gives_what_is_left(tmp_path: Path) ->
         assert log.damage
 
 
+def test_a_file_without_chunks_cut_short_while_it_is_read(tmp_path: Path) -> None:
+    content = b"".join(lb.message(number, size=1000) for number in range(300))
+    path = lb.write(tmp_path, lb.log(lb.schema() + lb.channel(), content, summary=b""))
+    with McapContainer.open(path) as log:
+        with path.open("r+b") as file:
+            file.truncate(100_500)
+        assert lb.messages(log) == lb.expected(range(97), size=1000)
+        assert any("shorter" in one.what or "cut off" in one.what or "ends within" in one.what for one in log.damage)
+
+
 def test_long_stretches_outside_chunks_come_in_bounded_pieces(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

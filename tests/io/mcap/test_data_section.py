@@ -393,3 +393,49 @@ def test_a_listed_chunk_that_is_not_there_is_told(tmp_path: Path) -> None:
         found = lb.messages(log)
         assert 0 < len(found) < 203
         assert sum(one.lost_messages or 0 for one in log.damage) == 203 - len(found)
+
+
+def test_a_chunk_that_is_spoiled_and_cut_gives_nothing(tmp_path: Path) -> None:
+    content = b"".join(noisy_message(number) for number in range(3000))
+    chunk = bytearray(lb.chunk(content, "zstd"))
+    chunk[60:80] = b"\xff" * 20
+    with McapContainer.open(lb.write(tmp_path, lb.log(DEFINITIONS, bytes(chunk[:100_000])))) as log:
+        assert lb.messages(log) == []
+        assert "the file ends within the chunk" in log.damage[0].what
+        assert "none of the chunk's messages are given" in log.damage[0].what
+
+
+def test_a_chunk_that_reaches_over_the_data_is_not_read(tmp_path: Path) -> None:
+    content = content_of(range(10))
+    header = bytearray(lb.chunk(content))
+    header[1:9] = struct.pack("<Q", len(header) - 9 + 10_000)
+    header[41:49] = struct.pack("<Q", len(content) + 10_000)
+    data = bytes(header) + lb.chunk(content_of(range(10, 20)))
+    with McapContainer.open(lb.write(tmp_path, lb.log(DEFINITIONS, data, summary=b""))) as log:
+        assert lb.messages(log) == lb.expected(range(10, 20))
+        assert "bytes doesn't fit here; reading goes on at byte" in log.damage[0].what
+
+
+def test_a_record_that_reaches_into_a_listed_chunk_is_not_believed(tmp_path: Path) -> None:
+    one = content_of(range(10))
+    sound = summarised((one, lb.index_of(one)), counts={1: 10})
+    content = patched(sound, 9, struct.pack("<Q", 200))
+    with McapContainer.open(lb.write(tmp_path, content)) as log:
+        assert lb.messages(log) == lb.expected(range(10))
+        assert [(one.record, one.lost_messages) for one in log.damage] == [("Header", None)]
+
+
+def test_a_message_too_short_to_be_one_is_stepped_over(tmp_path: Path) -> None:
+    data = content_of(range(5)) + lb.record(5, b"short") + content_of(range(5, 8))
+    with McapContainer.open(lb.write(tmp_path, lb.log(DEFINITIONS, data, summary=b""))) as log:
+        assert lb.messages(log) == lb.expected(range(8))
+        (damage,) = log.damage
+        assert (damage.what, damage.lost_messages) == ("a message too short to hold its own fields", 1)
+
+
+def test_a_schema_that_comes_after_its_channel_is_still_used(tmp_path: Path) -> None:
+    data = lb.channel() + lb.schema() + content_of(range(3))
+    with McapContainer.open(lb.write(tmp_path, lb.log(data, summary=b""))) as log:
+        assert log.channels[1].schema is not None
+        assert lb.messages(log) == lb.expected(range(3))
+        assert log.damage == ()
