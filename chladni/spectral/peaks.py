@@ -20,8 +20,10 @@ FLOOR_SHARE = 0.1
 FLOOR_LINES = 51
 # Interpolation between lines is never better than this share of a line: windows and resonances are not parabolas.
 INTERPOLATION_LINES = 0.02
-# Estimates said to be exact still scatter by rounding and by the slow change of any machine.
+# Estimates said to be exact still scatter by rounding and by the slow change of any machine; one that is as uncertain
+# as it is high is no peak, and how much worse it is matters no more.
 SMALLEST_RELATIVE_STD = 1e-3
+LARGEST_RELATIVE_STD = 2.0
 
 Floats = NDArray[np.float64]
 
@@ -206,7 +208,7 @@ def _curve(
     return _Curve(
         frequency_hz=frequency_hz,
         power=power,
-        relative_std=np.maximum(relative_std, SMALLEST_RELATIVE_STD),
+        relative_std=np.clip(relative_std, SMALLEST_RELATIVE_STD, LARGEST_RELATIVE_STD),
         spacing_hz=_spacing(frequency_hz),
         first_hz=first_hz,
         line_sampled=line_sampled,
@@ -224,10 +226,10 @@ def _significant(curve: _Curve, min_prominence_db: float, false_alarm: float) ->
     freedom = 2 / curve.relative_std**2
     # Half of the false alarms for each of the two tests.
     chance = false_alarm / (2 * power.size)
-    loud = scipy.special.chdtrc(freedom, freedom * over_floor) <= chance
+    loud = (scipy.special.chdtrc(freedom, freedom * over_floor) <= chance) & (curve.relative_std <= 1)
     found = []
     for line in np.flatnonzero(loud & _maxima(curve)):
-        valley = _valley(power, int(line))
+        valley = _valley(curve, int(line))
         ratio, pairs = power[line] / power[valley], abs(int(line) - valley)
         surprise = scipy.special.fdtrc(freedom[line], freedom[valley], ratio)
         if surprise * pairs <= chance and 10 * np.log10(ratio) >= min_prominence_db:
@@ -252,15 +254,19 @@ def _floor(curve: _Curve) -> Floats:
     return np.asarray(median * freedom / scipy.special.chdtri(freedom, 0.5), dtype=np.float64)
 
 
-def _valley(power: Floats, line: int) -> int:
-    """Deepest line between a peak and the next higher one, on the side where that is less deep."""
+def _valley(curve: _Curve, line: int) -> int:
+    """Deepest line between a peak and the next higher one, on the side where that is less deep.
+
+    Lines are as deep as they surely are, one sigma up: the deepest of all may be one of which nothing is known.
+    """
+    power, sure = curve.power, curve.power * (1 + curve.relative_std)
     higher = np.flatnonzero(power > power[line])
     left, right = higher[higher < line], higher[higher > line]
     first = int(left[-1]) if left.size else 0
     last = int(right[0]) if right.size else power.size - 1
-    before = first + int(np.argmin(power[first : line + 1]))
-    after = line + int(np.argmin(power[line : last + 1]))
-    return before if power[before] > power[after] else after
+    before = first + int(np.argmin(sure[first : line + 1]))
+    after = line + int(np.argmin(sure[line : last + 1]))
+    return before if sure[before] > sure[after] else after
 
 
 def _located(curve: _Curve, line: int, over_floor: float) -> _Found:

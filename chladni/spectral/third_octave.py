@@ -17,7 +17,7 @@ OCTAVE = 10**0.3
 REFERENCE_HZ = 1000.0
 # Preferred numbers R10 (ISO 3), by which bands are called; the exact mid-band frequencies differ from them.
 NOMINAL = (1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0)
-# Order of the Butterworth prototype; the band-pass has twice as many poles. Three meets class 1 up to a quarter of the
+# Order of the Butterworth prototype; the band-pass has twice as many poles. Three meets class 1 to a quarter of the
 # sample rate, above which the bilinear transform makes the lower flank too shallow; four meets it up to 0.45.
 FILTER_ORDER = 4
 

@@ -211,6 +211,17 @@ def test_a_response_as_uncertain_as_it_is_high_has_no_peak():
     assert find_response_peaks(unknown) == ()
 
 
+def test_a_peak_stands_out_between_lines_of_which_nothing_is_known():
+    response = oscillators(lambda f: np.ones(f.size, dtype=bool))
+    std = response.std.copy()
+    # Above 80 Hz the sensors see only noise, which looks smaller than it may be.
+    std[..., response.frequency_hz > 80] = np.inf
+    values = np.where(response.frequency_hz > 80, 1e-6, response.values)
+    peaks = find_response_peaks(replace(response, values=values, std=std), count=1)
+    assert all(peak.frequency_hz == pytest.approx(20.0, abs=0.1) for peak in peaks)
+    assert len(peaks) == 2
+
+
 @pytest.mark.parametrize("options", [{"count": 0}, {"false_alarm": 0.0}, {"false_alarm": 1.0}])
 def test_arguments_out_of_range_are_refused(options):
     with pytest.raises(EstimateError, match=next(iter(options))):
