@@ -22,7 +22,7 @@ _NEAR_OVERLOAD = 0.999
 _SHORTEST_PLATEAU = 3
 _SHORTEST_HOLD = 8
 # A leap is this many medians of the local step; Gaussian noise of 10^7 samples reaches 8.
-_LEAP = 20.0
+_LEAP = 30.0
 _LEAP_BLOCK = 4096
 _WIDEST_SPIKE = 3
 _QUIET_AROUND = 8
@@ -98,7 +98,7 @@ def sensor_quality(series: TimeSeries) -> tuple[SensorFault, ...]:
     - dead: constant, or two or three values within 0.1 % of the mean or 0.01 % of the overload.
     - dropouts: the same value for at least eight samples, not at an end of the range, between steps above 0.1 m
       before and 0.5 m after; in a channel that otherwise moves.
-    - spikes: 20 m and 4 q away and back within three samples (m of the 4096 around), steps of the eight samples
+    - spikes: 30 m and 4 q away and back within three samples (m of the 4096 around), steps of the eight samples
       before and after below a quarter of that. Force channels are left out, where that's a hit.
     - not-a-number: NaN or infinite.
     - coarse: three to sixteen different values, in a channel that keeps changing.
@@ -135,13 +135,12 @@ def _faults_of(record: _Record, place: Ints | None) -> list[SensorFault]:
     channel = record.channel
     if _is_dead(record):
         everything = np.arange(record.samples.size)
-        span = f"stays between {record.low:.6g} and {record.high:.6g} {channel.unit}"
-        return _fault(channel, "dead", everything, f"{span}; check cable, supply and range", place)
+        return _fault(channel, "dead", everything, _dead_sentence(record), place)
     faults = _fault(
         channel,
         "clipped",
         _clipped(record),
-        f"are clipped between {record.low:.6g} and {record.high:.6g} {channel.unit}; use a larger range",
+        f"are cut off, at {record.low:.6g} or {record.high:.6g} {channel.unit}; use a larger range",
         place,
     )
     faults += _fault(
@@ -152,6 +151,14 @@ def _faults_of(record: _Record, place: Ints | None) -> list[SensorFault]:
         told = f"move in coarse steps of {record.smallest_step:.3g} {channel.unit}; use a smaller range"
         faults += _fault(channel, "coarse", np.arange(record.samples.size), told, place)
     return faults
+
+
+def _dead_sentence(record: _Record) -> str:
+    if record.low == record.high == 0:
+        return "is 0 throughout; the sensor isn't connected or nobody fills this field"
+    if record.low == record.high:
+        return f"is {record.low:.6g} {record.channel.unit} throughout; check cable and supply, or leave it out"
+    return f"moves by its last digit only, at {record.low:.6g} {record.channel.unit}; check cable, supply and range"
 
 
 def _fault(
