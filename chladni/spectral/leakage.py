@@ -1,5 +1,7 @@
 """What a window does between spectral lines and to the correlation of neighbouring lines."""
 
+from functools import lru_cache
+
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
@@ -33,28 +35,15 @@ def named_window(name: str) -> NDArray[np.float64]:
 def leakage(window: NDArray[np.float64], offset: NDArray[np.float64]) -> NDArray[np.float64]:
     """Power that a line shows of a tone `offset` lines away, 1 for a tone on the line.
 
-    Further away than half the window's samples it stays at what it is there, an upper bound.
+    Offsets are rounded to a 64th of a line. Further away than half the window's samples the power stays at what it is
+    there, an upper bound.
 
     Examples
     --------
-    >>> leakage(named_window("hann"), np.array([0.0, 1.0, 2.0])).round(3)
-    array([1.  , 0.25, 0.  ])
-    """
-    at = np.arange(window.size)
-    furthest = (window.size - 1) / 2
-    turn = np.exp(2j * np.pi * np.multiply.outer(np.clip(offset, -furthest, furthest), at) / window.size)
-    return np.asarray(np.abs(turn @ window) ** 2 / window.sum() ** 2, dtype=np.float64)
-
-
-def coarse_leakage(window: NDArray[np.float64], offset: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give `leakage` for very many offsets, each rounded to a 64th of a line.
-
-    Examples
-    --------
-    >>> coarse_leakage(named_window("hann"), np.array([0.0, 1.0, 0.5])).round(3)
+    >>> leakage(named_window("hann"), np.array([0.0, 1.0, 0.5])).round(3)
     array([1.   , 0.25 , 0.721])
     """
-    fine = np.abs(scipy.fft.rfft(window, STEPS * window.size)) ** 2 / window.sum() ** 2
+    fine = _fine_spectrum(window.tobytes())
     at = np.rint(np.abs(offset) * STEPS).astype(np.int64)
     return np.asarray(fine[np.minimum(at, STEPS * (window.size - 1) // 2)], dtype=np.float64)
 
@@ -73,3 +62,12 @@ def line_correlation(window: NDArray[np.float64]) -> float:
     35.0
     """
     return float(window.size * np.sum(window**4) / np.sum(window**2) ** 2)
+
+
+@lru_cache(maxsize=8)
+def _fine_spectrum(window: bytes) -> NDArray[np.float64]:
+    """Power of a window's spectrum at every 64th of a line; kept, since one is asked for again for every peak."""
+    samples = np.frombuffer(window)
+    fine = np.abs(scipy.fft.rfft(samples, STEPS * samples.size)) ** 2 / samples.sum() ** 2
+    fine.flags.writeable = False
+    return np.asarray(fine, dtype=np.float64)

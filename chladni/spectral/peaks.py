@@ -312,19 +312,19 @@ def _from_three(curve: _Curve, line: int) -> tuple[float, float, float]:
     if not curve.tonal:
         height = np.exp(top - (before - after) ** 2 / (8 * bend))
         return float(curve.frequency_hz[line] + vertex * curve.spacing_hz), std_hz, float(height)
-    offset, slope = _tone_offset(curve.window, float(vertex))
-    shown = leakage(curve.window, np.array([offset]))[0]
+    offset, slope, shown = _tone(curve.window, float(vertex))
     return curve.frequency_hz[line] + offset * curve.spacing_hz, slope * std_hz, float(curve.power[line] / shown)
 
 
-def _tone_offset(window: Floats, vertex: float) -> tuple[float, float]:
-    """Where between lines a tone lies whose three highest lines give this vertex of a parabola, and the slope."""
-    offsets = np.linspace(-0.5, 0.5, 41)
-    tiny = np.finfo(float).tiny
-    before, top, after = (np.log(leakage(window, offsets - line) + tiny) for line in (-1, 0, 1))
+def _tone(window: Floats, vertex: float) -> tuple[float, float, float]:
+    """Where between lines a tone lies whose lines give this vertex, the slope of that, and what its own line shows."""
+    offsets = np.arange(-32, 33) / 64
+    shown = leakage(window, np.stack([offsets + 1, offsets, offsets - 1]))
+    before, top, after = np.log(shown + np.finfo(float).tiny)
     vertices = 0.5 * (before - after) / (before - 2 * top + after)
+    offset = np.interp(vertex, vertices, offsets)
     slope = np.interp(vertex, vertices, np.gradient(offsets, vertices))
-    return float(np.interp(vertex, vertices, offsets)), float(slope)
+    return float(offset), float(slope), float(np.interp(offset, offsets, shown[1]))
 
 
 def _from_resonance(curve: _Curve, line: int, run: NDArray[np.int64]) -> tuple[float, float, float]:

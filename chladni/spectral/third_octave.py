@@ -10,7 +10,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.bands import BandLevels, band_rms
-from chladni.spectral.leakage import coarse_leakage, named_window
+from chladni.spectral.leakage import leakage, named_window
 
 # IEC 61260-1:2014: octave frequency ratio and reference frequency.
 OCTAVE = 10**0.3
@@ -168,7 +168,7 @@ def synthesised_class(band: ThirdOctaveBand, *, spacing_hz: float, window: NDArr
     inside = np.minimum(band.high_hz / spacing_hz, lines + 0.5) - np.maximum(band.low_hz / spacing_hz, lines - 0.5)
     share = np.clip(inside, 0.0, 1.0)
     tones = band.mid_hz / spacing_hz * ratio
-    shown = coarse_leakage(window, np.subtract.outer(lines, tones))
+    shown = leakage(window, np.subtract.outer(lines, tones))
     bandwidth = window.size * np.sum(window**2) / np.sum(window) ** 2
     attenuation_db = -10 * np.log10(share @ shown / bandwidth + 1e-30)
     for performance_class in (1, 2):
