@@ -89,6 +89,16 @@ def test_names_that_are_no_paths_go_to_batches(tmp_path: Path) -> None:
     assert {channel.name for channel in read_log(done.target).channels} == set(done.channels)
 
 
+def test_times_before_zero_are_shifted_with_a_word(tmp_path: Path) -> None:
+    rows = "".join(f"{(index - 25) / 100},{index}\n" for index in range(100))
+    (tmp_path / "a.csv").write_text(f"time [s],a [N]\n{rows}")
+    done = convert(tmp_path / "a.csv", tmp_path / "a.mcap")
+    assert done.losses[0] == "All times are 0.25 s later in the log, which holds none before 0."
+    again = read_log(done.target)
+    assert again.start_time_ns == 0
+    np.testing.assert_array_equal(again.values, [np.arange(100)])
+
+
 def test_part_of_a_file(tmp_path: Path) -> None:
     write_npz([series_of(), series_of(("c",), 40, sample_rate_hz=25.0)], tmp_path / "a.npz")
     done = convert(tmp_path / "a.npz", tmp_path / "b.npz", channels=[PATHS[1]], start_s=0.4, end_s=1.0)

@@ -93,16 +93,26 @@ def placed_rows(
     from chladni.signals.time_base import fit_time_base
     from chladni.signals.uniform import place
 
+    # A record with a pretrigger begins before 0, which no clock does: the fit is about differences only.
+    origin_ns = int(stamps_ns.min(initial=2**62))
     try:
-        base = fit_time_base(stamps_ns)
-        grid = place(stamps_ns, np.stack(rows), base, channels=tuple(channels))
+        base = fit_time_base(stamps_ns - origin_ns)
+        grid = place(
+            stamps_ns - origin_ns, np.stack(rows), base, channels=tuple(channels), max_samples=_most_values(rows)
+        )
     except EstimateError as error:
         raise LogError(f"{where}: the times don't make a sampled signal: {error}") from error
     series = series_of_rows(
-        list(grid.values), channels, sample_rate_hz=grid.sample_rate_hz, start_time_ns=grid.start_time_ns
+        list(grid.values),
+        channels,
+        sample_rate_hz=grid.sample_rate_hz,
+        start_time_ns=grid.start_time_ns + origin_ns,
     )
-    notes = () if base.verdict == "regular" else (f"{where}: the times are {base.verdict}: {base.advice}",)
-    return FileContents(series=(series,), notes=notes)
+    notes = [] if base.verdict == "regular" else [f"{where}: the times are {base.verdict}: {base.advice}."]
+    lost = int(np.isfinite(rows).any(axis=0).sum() - np.isfinite(grid.values).any(axis=0).sum())
+    if lost:
+        notes.append(f"{where}: {lost} samples came at the same time as another one and are left out.")
+    return FileContents(series=(series,), notes=tuple(notes))
 
 
 def one_series(series: Iterable[TimeSeries], kind: str) -> TimeSeries:
@@ -131,6 +141,16 @@ def require_no_gaps(series: TimeSeries, kind: str) -> None:
             )
 
 
-def seconds_to_ns(seconds: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Round times in seconds to whole nanoseconds."""
-    return np.rint(seconds * NS_PER_S).astype(np.int64)
+def times_to_ns(
+    times: NDArray[np.float64], *, unit_ns: int = NS_PER_S, start_ns: int = 0, where: str
+) -> NDArray[np.int64]:
+    """Round times to whole nanoseconds since 1970; `LogError` for what is no time within centuries."""
+    largest = float(np.abs(times).max(initial=0.0)) * unit_ns + abs(start_ns)
+    if not largest < 2**62:
+        raise LogError(f"{where}: the times aren't all numbers within 146 years of 1970")
+    return np.rint(times * unit_ns).astype(np.int64) + start_ns
+
+
+def _most_values(rows: Sequence[NDArray[Any]]) -> int:
+    # A wrong time far off would otherwise ask for a grid of years between two rows of a table.
+    return max(2**22, 256 * len(rows) * len(rows[0]))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.atomic import atomic_write
-from chladni.io.files.contents import FileContents, one_series, placed_rows, series_of_rows, unit_of
+from chladni.io.files.contents import FileContents, one_series, placed_rows, series_of_rows, times_to_ns, unit_of
 from chladni.io.files.csv_dialect import CsvDialect, sniff_csv, split_cells
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
@@ -269,9 +269,8 @@ def _stamps_ns(path: Path, title: _Title, times: NDArray[np.float64], time_unit:
     bad = np.flatnonzero(~np.isfinite(times))
     if bad.size:
         raise LogError(f"{path}: column {title.name!r}: row {bad[0] + 1} has no time")
-    if times.size and np.abs(times).max() > 2**62 / TIME_UNITS_NS[unit]:
-        raise LogError(f"{path}: column {title.name!r}: {times[np.abs(times).argmax()]:g} {unit} is no time")
-    return np.rint(times * TIME_UNITS_NS[unit]).astype(np.int64) + title.start_ns
+    where = f"{path}: column {title.name!r}"
+    return times_to_ns(times, unit_ns=TIME_UNITS_NS[unit], start_ns=title.start_ns, where=where)
 
 
 def _written_titles(series: TimeSeries) -> Iterator[str]:

@@ -49,10 +49,6 @@ class CsvDialect:
     first_data_line: int
     columns: int
 
-    def cells(self, line: str) -> list[str]:
-        """Split a line into stripped cells."""
-        return split_cells(line, self.delimiter)
-
     def number(self, cell: str) -> float:
         """Read a cell; an empty one is NaN. Raises `ValueError` when it's no number."""
         if not cell:

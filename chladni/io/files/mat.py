@@ -1,7 +1,5 @@
 """MATLAB ``.mat`` files of versions 5 to 7.2."""
 
-import struct
-import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,13 +8,12 @@ import numpy as np
 
 from chladni.io.atomic import atomic_path
 from chladni.io.files.contents import MAX_BYTES, FileContents
+from chladni.io.files.mat_elements import HEADER_BYTES, read_mat_elements
 from chladni.io.files.named_arrays import series_of_arrays
 from chladni.io.files.series_fields import SERIES_FORMAT, series_fields, series_of_fields
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
 
-_COMPRESSED = 15
-_HEADER_BYTES = 128
 _MAX_DEPTH = 8
 
 
@@ -47,16 +44,12 @@ def read_mat(
     SetupError
         When nothing says the sample rate, or a unit is unknown.
     """
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
     path = Path(path)
-    _require_readable(path, max_bytes)
+    raw = _raw(path, max_bytes)
     try:
-        content = loadmat(path, simplify_cells=True, appendmat=False)
-    except (MatReadError, ValueError, TypeError, KeyError, OSError, zlib.error, NotImplementedError) as error:
+        variables = read_mat_elements(raw, max_bytes=max_bytes)
+    except LogError as error:
         raise LogError(f"{path}: this mat file can't be read: {error}") from error
-    variables = {name: value for name, value in content.items() if not name.startswith("__")}
     if variables.get("format") == SERIES_FORMAT:
         return FileContents(
             series=tuple(
@@ -113,40 +106,18 @@ def _flat(content: Mapping[str, Any], prefix: str = "", depth: int = 0) -> dict[
     return flat
 
 
-def _require_readable(path: Path, max_bytes: int) -> None:
+def _raw(path: Path, max_bytes: int) -> bytes:
     with path.open("rb") as file:
-        header = file.read(_HEADER_BYTES)
-        if header.startswith((b"MATLAB 7.3", b"\x89HDF")):
-            raise LogError(
-                f"{path}: is a version 7.3 file (HDF5), which isn't read; save it in MATLAB with "
-                f"save('{path.name}', '-v7')"
-            )
-        if len(header) < _HEADER_BYTES or header[126:128] not in (b"IM", b"MI"):
-            raise LogError(f"{path}: is no mat file of versions 5 to 7.2")
-        order = "<" if header[126:128] == b"IM" else ">"
-        size = path.stat().st_size
-        total = 0
-        while len(tag := file.read(8)) == 8:
-            kind, length = struct.unpack(f"{order}II", tag)
-            if file.tell() + length > size:
-                raise LogError(
-                    f"{path}: a variable claims {length} bytes, {size - file.tell()} are there: cut short?"
-                )
-            total += _unpacked_bytes(path, file.read(length), max_bytes - total) if kind == _COMPRESSED else length
-            if kind != _COMPRESSED:
-                file.seek(length, 1)
-
-
-def _unpacked_bytes(path: Path, packed: bytes, allowed: int) -> int:
-    """Count what a compressed variable unpacks to, a megabyte at a time, keeping none of it."""
-    unpacker = zlib.decompressobj()
-    count, rest = 0, packed
-    while rest and not unpacker.eof:
-        try:
-            count += len(unpacker.decompress(rest, 2**20))
-        except zlib.error as error:
-            raise LogError(f"{path}: a compressed variable is damaged: {error}") from error
-        rest = unpacker.unconsumed_tail
-        if count > allowed:
-            raise LogError(f"{path}: unpacks to more than the bytes allowed; raise max_bytes to read it")
-    return count
+        header = file.read(HEADER_BYTES)
+    if header.startswith((b"MATLAB 7.3", b"\x89HDF")):
+        raise LogError(
+            f"{path}: is a version 7.3 file (HDF5), which isn't read; save it in MATLAB with "
+            f"save('{path.name}', '-v7')"
+        )
+    if len(header) < HEADER_BYTES or header[126:128] not in (b"IM", b"MI"):
+        raise LogError(f"{path}: is no mat file of versions 5 to 7.2")
+    if path.stat().st_size > max_bytes:
+        raise LogError(
+            f"{path}: has {path.stat().st_size} bytes, {max_bytes} are allowed; raise max_bytes to read it"
+        )
+    return path.read_bytes()

@@ -1,5 +1,7 @@
 """NumPy ``.npz`` files, never unpickled."""
 
+import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
@@ -17,6 +19,21 @@ from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
 
 _MAX_HEADER = 10_000
+# What zipfile and NumPy raise for archives whose bytes are wrong: a flag that claims encryption is a RuntimeError, an
+# offset that points nowhere an OSError.
+_DAMAGED = (
+    zipfile.BadZipFile,
+    zlib.error,
+    ValueError,
+    TypeError,
+    EOFError,
+    OSError,
+    KeyError,
+    RuntimeError,
+    struct.error,
+    SyntaxError,
+    tokenize.TokenError,
+)
 
 
 def read_npz(
@@ -50,7 +67,7 @@ def read_npz(
             _require_bounded(path, archive, max_bytes)
         with np.load(path, allow_pickle=False) as arrays:
             content = {name: arrays[name] for name in arrays.files}
-    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, NotImplementedError, KeyError) as error:
+    except _DAMAGED as error:
         raise LogError(f"{path}: this npz file can't be read: {error}") from error
     if str(content.get("format", "")) != SERIES_FORMAT:
         return series_of_arrays(content, where=str(path), sample_rate_hz=sample_rate_hz, units=units)

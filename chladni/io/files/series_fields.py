@@ -57,11 +57,14 @@ def series_of_fields(fields: Mapping[str, Any], *, where: str) -> TimeSeries:
         values = values.astype(np.float64)
     channels = _channels(fields, names, where)
     valid = _rows(fields, "valid", count, where).astype(np.bool_) if "valid" in fields else None
+    start_time_ns = _number(fields, "start_time_ns", where)
+    if not abs(float(start_time_ns)) < 2**62:
+        raise LogError(f"{where}: start_time_ns {start_time_ns} isn't within 146 years of 1970")
     try:
         return TimeSeries(
             values=values,
             sample_rate_hz=float(_number(fields, "fs", where)),
-            start_time_ns=int(_number(fields, "start_time_ns", where)),
+            start_time_ns=int(start_time_ns),
             channels=channels,
             valid=valid,
         )
@@ -103,8 +106,9 @@ def _number(fields: Mapping[str, Any], name: str, where: str) -> Any:
 
 
 def _texts(fields: Mapping[str, Any], name: str, where: str, count: int | None = None) -> list[str]:
-    # MATLAB turns a cell of one text into a text, and an empty text into an empty array.
-    texts = [text if isinstance(text, str) else "" for text in np.atleast_1d(_field(fields, name, where)).tolist()]
+    content = _field(fields, name, where)
+    listed = content if isinstance(content, list) else np.atleast_1d(content).tolist()
+    texts = [text if isinstance(text, str) else "" for text in listed]
     if count is not None and len(texts) != count:
         raise LogError(f"{where}: {len(texts)} {name} for {count} channels")
     return texts

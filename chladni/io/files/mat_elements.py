@@ -1,0 +1,194 @@
+"""The elements of a ``.mat`` file of versions 5 to 7.2, after MathWorks' "MAT-File Format" (R2019b), chapter 1.
+
+`scipy.io.loadmat` reads the same, but a few wrong bytes make it crash the interpreter, which no handler can catch.
+Here every length is checked before it's believed.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import prod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.errors import LogError
+
+HEADER_BYTES = 128
+
+_INT32, _UINT32, _MATRIX, _COMPRESSED = 5, 6, 14, 15
+_STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_TEXT = {1: "latin-1", 2: "latin-1", 16: "utf-8", 17: "utf-16", 18: "utf-32", 4: "utf-16"}
+_NUMERIC = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
+_CELL, _STRUCT, _CHAR = 1, 2, 4
+_COMPLEX = 0x0800
+_MAX_DEPTH = 16
+
+
+def read_mat_elements(raw: bytes, *, max_bytes: int) -> dict[str, Any]:
+    """Give the variables of a file.
+
+    Parameters
+    ----------
+    raw
+        The whole file.
+    max_bytes
+        Most bytes that compressed variables may unpack to, together.
+
+    Returns
+    -------
+    variables
+        Arrays without axes of length one, text as `str`, cells as lists, structs as dictionaries (lists of them,
+        when they are arrays), None for what is none of these (objects, functions, sparse matrices).
+
+    Raises
+    ------
+    LogError
+        When a length or type doesn't fit, or the variables unpack to more than `max_bytes`.
+    """
+    order = "<" if raw[126:128] == b"IM" else ">"
+    variables: dict[str, Any] = {}
+    for body in _matrices(memoryview(raw), order, max_bytes):
+        name, content = _Matrix(body=body, order=order).read()
+        variables[name] = content
+    return variables
+
+
+def _matrices(raw: memoryview, order: str, max_bytes: int) -> Iterator[memoryview]:
+    place, left = HEADER_BYTES, max_bytes
+    while place + 8 <= len(raw):
+        kind, length = struct.unpack_from(f"{order}II", raw, place)
+        if place + 8 + length > len(raw):
+            raise LogError(f"a variable claims {length} bytes, {len(raw) - place - 8} are there; it's cut short")
+        body = raw[place + 8 : place + 8 + length]
+        place += 8 + length
+        if kind == _COMPRESSED:
+            unpacked = _unpacked(body, left)
+            left -= len(unpacked)
+            kind, body, _ = _element(memoryview(unpacked), 0, order)
+        if kind == _MATRIX and len(body):
+            yield body
+
+
+def _unpacked(packed: memoryview, allowed: int) -> bytes:
+    unpacker = zlib.decompressobj()
+    try:
+        content = unpacker.decompress(packed, allowed + 1)
+    except zlib.error as error:
+        raise LogError(f"a compressed variable is damaged ({error})") from error
+    if len(content) > allowed:
+        raise LogError("the variables unpack to more bytes than allowed; raise max_bytes to read them")
+    if not unpacker.eof:
+        raise LogError("a compressed variable is damaged (it ends too early)")
+    return content
+
+
+def _element(raw: memoryview, place: int, order: str) -> tuple[int, memoryview, int]:
+    """Give the type, content and end of the element at a place."""
+    if place + 8 > len(raw):
+        raise LogError("an element is missing where the file announces one")
+    first, length = struct.unpack_from(f"{order}II", raw, place)
+    if first >> 16:  # up to four bytes of content sit in the tag itself
+        length = first >> 16
+        if length > 4:
+            raise LogError(f"a small element claims {length} bytes, it holds 4")
+        return first & 0xFFFF, raw[place + 4 : place + 4 + length], place + 8
+    end = place + 8 + length
+    if end > len(raw):
+        raise LogError(f"an element claims {length} bytes, {len(raw) - place - 8} are there")
+    return first, raw[place + 8 : end], end + -end % 8
+
+
+@dataclass(slots=True, kw_only=True)
+class _Matrix:
+    """Reads one array element; `place` walks over its parts."""
+
+    body: memoryview
+    order: str
+    depth: int = 0
+    place: int = 0
+
+    def read(self) -> tuple[str, Any]:
+        flags = self._numbers(_UINT32)
+        shape = tuple(int(length) for length in self._numbers(_INT32))
+        if len(flags) != 2 or len(shape) < 2 or min(shape) < 0:
+            raise LogError(f"an array has {len(flags)} flags and the shape {shape}")
+        kind, name, self.place = _element(self.body, self.place, self.order)
+        if kind not in _TEXT:
+            raise LogError(f"the name of an array has the type {kind}")
+        return bytes(name).decode("latin-1"), self._content(int(flags[0]), shape)
+
+    def _content(self, flags: int, shape: tuple[int, ...]) -> Any:
+        kind = flags & 0xFF
+        if kind in _NUMERIC:
+            return self._array(_NUMERIC[kind], shape, is_complex=bool(flags & _COMPLEX))
+        if kind == _CHAR:
+            return self._text()
+        if kind == _CELL:
+            return [content for _, content in self._members(prod(shape))]
+        if kind == _STRUCT:
+            return self._struct(prod(shape))
+        return None
+
+    def _numbers(self, expected: int | None = None) -> NDArray[Any]:
+        kind, content, self.place = _element(self.body, self.place, self.order)
+        if kind not in _STORED or (expected is not None and kind != expected):
+            raise LogError(f"numbers have the type {kind}, which is none")
+        dtype = np.dtype(self.order + _STORED[kind])
+        if len(content) % dtype.itemsize:
+            raise LogError(f"{len(content)} bytes are no whole count of {dtype}")
+        return np.frombuffer(content, dtype=dtype)
+
+    def _array(self, code: str, shape: tuple[int, ...], *, is_complex: bool) -> NDArray[Any]:
+        array = self._part(code, shape)
+        if not is_complex:
+            return array
+        whole: NDArray[Any] = array + 1j * self._part(code, shape)
+        return whole
+
+    def _part(self, code: str, shape: tuple[int, ...]) -> NDArray[Any]:
+        # Numbers are stored in the smallest type that holds them, whatever their class.
+        numbers = self._numbers()
+        if len(numbers) != prod(shape):
+            raise LogError(f"an array of shape {shape} holds {len(numbers)} numbers")
+        with np.errstate(invalid="ignore", over="ignore"):
+            return numbers.astype(code).reshape(shape, order="F").squeeze()
+
+    def _text(self) -> str:
+        kind, content, self.place = _element(self.body, self.place, self.order)
+        codec = _TEXT.get(kind)
+        if codec is None:
+            raise LogError(f"text has the type {kind}, which is none")
+        if codec in ("utf-16", "utf-32"):
+            codec += "-le" if self.order == "<" else "-be"
+        return bytes(content).decode(codec, errors="replace")
+
+    def _members(self, count: int) -> Iterator[tuple[str, Any]]:
+        if self.depth >= _MAX_DEPTH:
+            raise LogError(f"cells and structs lie more than {_MAX_DEPTH} deep in each other")
+        if count * 8 > len(self.body) - self.place:
+            raise LogError(f"a cell or struct announces {count} members, more than the file holds")
+        for _ in range(count):
+            kind, body, self.place = _element(self.body, self.place, self.order)
+            if kind != _MATRIX:
+                raise LogError(f"a member of a cell or struct has the type {kind}, which is no array")
+            yield _Matrix(body=body, order=self.order, depth=self.depth + 1).read() if len(body) else ("", None)
+
+    def _struct(self, count: int) -> Any:
+        lengths = self._numbers(_INT32)
+        _, raw, self.place = _element(self.body, self.place, self.order)
+        width = int(lengths[0]) if len(lengths) == 1 else 0
+        if width <= 0 or len(raw) % width:
+            raise LogError(f"the field names of a struct are {len(raw)} bytes in pieces of {width}")
+        names = [
+            bytes(raw[first : first + width]).split(b"\x00")[0].decode("latin-1")
+            for first in range(0, len(raw), width)
+        ]
+        contents = [content for _, content in self._members(count * len(names))]
+        rows = [
+            dict(zip(names, contents[first : first + len(names)], strict=True))
+            for first in range(0, len(contents), len(names) or 1)
+        ]
+        return rows[0] if len(rows) == 1 else rows
