@@ -101,6 +101,7 @@ class ChannelRegistry:
         if excess is not None:
             raise MalformedRecordError(f"with it the definitions of channels and schemas {excess}")
         conflicts = self._define_schema(content) if opcode == Opcode.SCHEMA else self._define_channel(content)
+        # What contradicts is looked at again each time, so that each pass over the log meets it.
         if not conflicts:
             self._bytes += len(content)
             self._known.add(key)

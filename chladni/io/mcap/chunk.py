@@ -73,6 +73,7 @@ def chunk_content(segment: ChunkSegment, opened: OpenedChunk, selection: Selecti
 def _report(content: StretchContent, segment: ChunkSegment, what: str) -> None:
     """Note the damage, counting as lost what the message index lists and was not found."""
     listed = Counter({one.channel_id: len(one.entries) for one in segment.index})
+    # Subtracting counters leaves out what would be negative: an index may list too few.
     lost = listed - content.found
     content.lost += lost
     content.damage.append(
@@ -93,6 +94,8 @@ def _open(header: ChunkHeader, data: bytes | memoryview, rules: ChunkRules) -> O
         opened = decompress(data, header.compression, size=header.uncompressed_size)
         _check_crc(opened, header.uncompressed_crc, rules)
     except (DecompressError, _UnreadableChunkError):
+        # Recorders that lose power leave zeros where the end of a chunk should be. What comes before them
+        # is whole. Any other damage in the middle may have spoiled bytes long before it shows.
         start = bytes(data).rstrip(b"\0")
         if len(data) - len(start) < _ZERO_TAIL_BYTES or (header.compression == "" and _tiles(data)):
             raise
@@ -115,6 +118,7 @@ def _tiles(data: bytes | memoryview) -> bool:
 
 
 def _check_crc(content: bytes | memoryview, crc: int, rules: ChunkRules) -> None:
+    # The checksum of nothing is 0, the same as no checksum.
     if not rules.check_crc or not content:
         return
     if crc and zlib.crc32(content) != crc:

@@ -160,7 +160,7 @@ class McapContainer:
         Yields
         ------
         MessageBatch
-            One for each channel in each chunk, or in each stretch of at most 16 MiB outside chunks. Some
+            One for each channel in each chunk, or in each stretch of at most 4 MiB outside chunks. Some
             chunks are decompressed ahead in threads; memory doesn't grow with the log.
         """
         selection = Selection(

@@ -36,7 +36,7 @@ from chladni.io.mcap.records import (
 from chladni.io.mcap.stepping_stones import SteppingStones, agrees, lies_alike
 from chladni.io.mcap.summary import ChunkIndex, LogEnd
 
-_STRETCH_BYTES = 16 * MIB
+_STRETCH_BYTES = 4 * MIB
 _FIRST_STRETCH_BYTES = 64 * 1024
 _READ_ALONG_BYTES = 16 * MIB
 _ZERO_BLOCK_BYTES = MIB
@@ -50,7 +50,7 @@ class ChunkSegment:
     """A chunk that is not decompressed yet.
 
     ``listed`` is the summary's entry for it, if any; ``agrees`` tells whether the chunk's own header says
-    the same, ``cut`` whether the file ends within it.
+    the same.
     """
 
     offset: int
@@ -60,7 +60,6 @@ class ChunkSegment:
     data: memoryview | None
     listed: ChunkIndex | None
     agrees: bool
-    cut: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -111,6 +110,7 @@ class DataSection:
         self._chunks_seen = len(self._stones) > 0
         self._reached: set[int] = set()
         self._closed = end.has_footer
+        self._behind_chunk = -1
 
     def segments(self) -> Iterator[Segment]:
         """Yield what the data section holds, in file order."""
@@ -138,6 +138,7 @@ class DataSection:
         if not self._closed:
             what = "the log ends without a footer: its recording was cut off"
             self._damage.add(what, offset=self._file.size, record="Footer", lost_messages=None)
+        # A chunk in the list that the walk never came to is missing, or the list is wrong: both are damage.
         for stone in self._end.chunk_indexes:
             if stone.offset not in self._reached:
                 what = "no chunk was found here, where the summary lists one"
@@ -147,6 +148,7 @@ class DataSection:
 
     def _next(self, position: int) -> tuple[Segment | None, int]:
         listed = self._stones.at(position)
+        # Where the summary lists a chunk there is one, whatever its first byte says.
         if listed is not None:
             self._read_along(listed)
         prefix = self._window.read(position, PREFIX_BYTES)
@@ -155,6 +157,7 @@ class DataSection:
         opcode, length = RECORD_PREFIX.unpack(prefix)
         if opcode == Opcode.CHUNK or self._is_disguised_chunk(position, opcode) or listed is not None:
             return self._chunk(position, listed)
+        # The specification reserves 0: a record never starts with it, a file that lost its end often does.
         if opcode == 0:
             return None, self._zeros(position)
         end = position + PREFIX_BYTES + length
@@ -166,6 +169,7 @@ class DataSection:
             return None, self._broken(position, "a footer lies within the data", "Footer")
         if opcode == Opcode.MESSAGE_INDEX:
             return None, self._orphan_index(position, end)
+        # An attachment can be larger than memory and is of no interest.
         if opcode in _SINGLE:
             return None, end
         return self._bare(position, opcode, end)
@@ -185,9 +189,13 @@ class DataSection:
         return True
 
     def _orphan_index(self, position: int, end: int) -> int:
-        fields_bytes = PREFIX_BYTES + 6
-        lost = max(end - position - fields_bytes, 0) // INDEX_ENTRY.itemsize
-        what = "a message index without a chunk before it"
+        if position == self._behind_chunk:
+            # Left over from the chunk before, which had no room for so many messages.
+            what, lost = "a message index with more entries than its chunk can hold messages", 0
+        else:
+            fields_bytes = PREFIX_BYTES + 6
+            lost = max(end - position - fields_bytes, 0) // INDEX_ENTRY.itemsize
+            what = "a message index without a chunk before it"
         self._damage.add(what, offset=position, record="MessageIndex", lost_messages=lost)
         return end
 
@@ -204,6 +212,7 @@ class DataSection:
 
     def _does_not_fit(self, position: int, opcode: int, end: int) -> int:
         name = record_name(opcode)
+        # A file that has its end isn't cut off: then the length is wrong, and so may be all the rest.
         if self._end.has_footer or end <= self._end.data_end:
             return self._broken(position, f"a record of {end - position} bytes doesn't fit here", name)
         what = f"the file ends within a record of {end - position} bytes"
@@ -213,6 +222,7 @@ class DataSection:
         if self._end.data_end_found or end != position + DATA_END_BYTES:
             return self._broken(position, "the data seem to end here, too early", "DataEnd")
         self._closed = True
+        # The footer may be gone, with the summary before it; all messages lie before this record.
         if not self._end.has_footer:
             what = "the summary is cut off or overwritten; the data before it is whole"
             self._damage.add(what, offset=end, record="Summary", lost_messages=0)
@@ -259,8 +269,8 @@ class DataSection:
             data=data,
             listed=listed,
             agrees=listed is not None and agrees(header, listed),
-            cut=cut,
         )
+        self._behind_chunk = position_behind
         return segment, position_behind
 
     def _chunk_header(self, position: int, listed: ChunkIndex | None) -> ChunkHeader | None:
@@ -293,6 +303,7 @@ class DataSection:
                 self._damage.add(str(problem), offset=position, record="MessageIndex", lost_messages=0)
             room -= len(content)
             position += PREFIX_BYTES + len(content)
+        # Two for one channel can't both be right, and the counts of lost messages rely on them.
         if len({one.channel_id for one in found}) < len(found):
             what = "two message indexes for one channel; the chunk is read record by record"
             self._damage.add(what, offset=start, record="MessageIndex", lost_messages=0)
@@ -331,6 +342,7 @@ class DataSection:
         walk = walk_records(buffer, start=0, stop=len(buffer), until=_SINGLE)
         if walk.end == 0:
             return None, self._no_record(position, opcode, end, len(content))
+        # A walk that ended early has met a chunk or the end: the next stretch begins small again.
         used_up = walk.end + PREFIX_BYTES > len(buffer) or len(walk.starts) > 1
         self._stretch = min(self._stretch * 4, _STRETCH_BYTES) if used_up else _FIRST_STRETCH_BYTES
         segment = BareSegment(
@@ -352,6 +364,7 @@ class DataSection:
 
 def _header_from_summary(start: bytes, listed: ChunkIndex) -> ChunkHeader | None:
     """Build a chunk's header from the summary; only the checksum comes from the chunk, and proves the rest."""
+    # Without it nothing would tell a chunk from whatever lies at that place.
     crc = int.from_bytes(start[PREFIX_BYTES + 24 : PREFIX_BYTES + 28], "little")
     if crc == 0:
         return None

@@ -54,6 +54,7 @@ def decompress_start(data: Compressed, compression: str, *, size: int) -> bytes:
     result = bytearray()
     for step in _STEPS[compression](data):
         result += step
+        # Checked at each step, so that a bomb is stopped at its first bytes too many.
         if len(result) > size:
             raise DecompressError(f"declares {size} bytes but more were found in it")
     return bytes(result)
@@ -102,6 +103,7 @@ def _zstd_steps(data: Compressed) -> Iterator[bytes]:
 def _lz4(data: Compressed, size: int) -> bytes:
     import lz4.frame
 
+    # With a length to stop at, the library takes that much memory at once.
     if not _believable(len(data), size):
         return decompress_start(data, "lz4", size=size)
     decompressor = lz4.frame.LZ4FrameDecompressor()
@@ -111,6 +113,7 @@ def _lz4(data: Compressed, size: int) -> bytes:
         raise DecompressError(f"lz4: {error}") from error
     if decompressor.eof and not decompressor.unused_data:
         return result
+    # More than one frame, or more than was declared.
     return decompress_start(data, "lz4", size=size)
 
 

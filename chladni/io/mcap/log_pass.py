@@ -86,7 +86,8 @@ class LogPass:
             self._limits,
             channel_ids=self._selection.channel_ids,
         )
-        # One core is left to whoever decodes what comes out.
+        # More threads than that only wait for each other: what they can't do in parallel is what the
+        # reader has to do anyway. One core is left to whoever decodes what comes out.
         threads = max(1, min(_MOST_THREADS, (os.cpu_count() or 2) - 1))
         pool = ThreadPoolExecutor(threads, thread_name_prefix="mcap")
         ahead: deque[tuple[int, _Task]] = deque()
@@ -126,6 +127,7 @@ class LogPass:
             self.found.update({one.channel_id: len(one.entries) for one in segment.index})
             return None
         header = segment.header
+        # Before a byte of the chunk is read: both sizes are nothing but claims so far.
         for size in (header.compressed_size, header.uncompressed_size):
             excess = self._limits.excess("chunk_bytes", size)
             if excess is not None:
@@ -152,6 +154,7 @@ class LogPass:
             return False
         if {one.channel_id for one in segment.index} != listed.channel_ids:
             return False
+        # An empty index is as good as none: it says that the channel isn't in the chunk.
         wanted = [
             one.entries["log_time"]
             for one in segment.index
@@ -166,6 +169,7 @@ class LogPass:
         self._damage.extend(content.damage)
         self._lost.update(content.lost)
         self._define(content)
+        # In the middle of a damaged chunk everything looks like messages outside chunks.
         if content.unprotected and content.found.total():
             what = "messages outside the chunks, in a log whose chunks carry the checksums, are left out"
             self._leave_out(content, set(content.found), what)
@@ -173,6 +177,8 @@ class LogPass:
         if unknown:
             what = f"messages of the undefined channel {_listing(unknown)} are left out"
             self._leave_out(content, unknown, what)
+        # Which of the two definitions these messages follow can't be known; decoded by the wrong one they
+        # would be wrong without looking wrong.
         contradicted = content.found.keys() & self._contradicted
         if contradicted:
             what = f"messages of channel {_listing(contradicted)}, defined in two ways, are left out"
@@ -221,6 +227,7 @@ class LogPass:
         if statistics is None:
             return
         channel_ids = self._selection.channel_ids
+        # A pass that takes stock asks for no channel but meets them all.
         if not self._end.lists_all_channels:
             channel_ids = frozenset(statistics.message_counts) | frozenset(self.found)
         for channel_id in sorted(channel_ids):
@@ -235,6 +242,7 @@ class LogPass:
             f"channel {channel_id} has {abs(counted - met)} messages {way} than the statistics count, "
             "beyond other damage told of"
         )
+        # Messages that are there beyond the count are no loss, but one of the two numbers is wrong.
         lost = max(counted - met, 0)
         self._damage.add(what, offset=self._end.data_end, record="Statistics", lost_messages=lost)
 

@@ -74,7 +74,7 @@ def _constant_stride(starts: NDArray[np.int64]) -> int | None:
     if len(starts) < 2:
         return MESSAGE_HEADER_BYTES
     stride = int(starts[1]) - int(starts[0])
-    # Most stretches that are not evenly spaced show it here already.
+    # One comparison before a thousand: most stretches that are not evenly spaced show it here already.
     if starts[0] + stride * (len(starts) - 1) != starts[-1]:
         return None
     return stride if (starts[1:] - starts[:-1] == stride).all() else None
@@ -97,6 +97,7 @@ def table_from_index(buffer: NDArray[np.uint8], index: Sequence[MessageIndex]) -
         and these messages together with other records tile the chunk exactly.
     """
     starts, log_time, channel_id = _merge(index)
+    # Sorted, so that the first and the last speak for all; as int64, an offset of 2^63 and more is negative.
     if len(starts) == 0 or starts[0] < 0 or starts[-1] > len(buffer) - MESSAGE_HEADER_BYTES:
         return None
     headers = message_headers(buffer, starts)
@@ -121,6 +122,7 @@ def _merge(
     if len(index) == 1:
         entries, channel_id = index[0].entries, index[0].channel_id
         starts = entries["offset"].astype(np.int64)
+        # The usual case by far, and worth its own way: no sorting, no joining.
         if (starts[1:] > starts[:-1]).all():
             return starts, entries["log_time"], channel_id
     starts = np.concatenate([one.entries["offset"] for one in index]).astype(np.int64)

@@ -85,6 +85,7 @@ def _by_channel(
     if (ids == ids[0]).all():
         yield int(ids[0]), table.starts, table.headers
         return
+    # Stable, so that messages keep their order within a channel; 16-bit keys are sorted in linear time.
     order = np.argsort(ids, kind="stable")
     borders = np.flatnonzero(np.diff(ids[order])) + 1
     for group in np.split(order, borders):

@@ -104,14 +104,15 @@ def read_log_end(
         return LogEnd(data_end=file.size, has_footer=False)
     fields = FieldReader(footer[PREFIX_BYTES:])
     start, _offsets_start, crc = fields.uint64(), fields.uint64(), fields.uint32()
-    without_summary = _with_data_end(file, footer_offset)
+    # The specification's way of saying that there is no summary.
     if start == 0:
-        return without_summary
+        return _with_data_end(file, footer_offset)
     try:
         content = _checked_content(file, start, footer_offset, footer, crc if check_crc else 0, limits)
         return _parse(file, start, content, registry, crc_checked=check_crc and crc != 0)
     except (_UnsoundSummaryError, MalformedRecordError) as problem:
         damage.add(f"{problem}; {_READ_FROM_START}", offset=start, record="Summary", lost_messages=0)
+        # What the footer says of the summary's place may be right although the summary is not.
         before_summary = _with_data_end(file, min(start, footer_offset))
         if before_summary.data_end_found:
             return before_summary
@@ -154,6 +155,7 @@ def _parse(file: LogFile, start: int, content: bytes, registry: ChannelRegistry,
             statistics = _parse_statistics(record)
         elif opcode == Opcode.CHUNK_INDEX:
             indexes.append(_parse_chunk_index(record))
+    # Only now, since nothing says that schemas come first in a summary.
     for record in channels:
         _define(registry, Opcode.CHANNEL, record)
     end = _with_data_end(file, start)
@@ -234,6 +236,7 @@ def _check_layout(indexes: list[ChunkIndex], data_end: int) -> None:
 
 
 def _lists_all_channels(registry: ChannelRegistry, statistics: Statistics | None, indexes: list[ChunkIndex]) -> bool:
+    # A channel that nobody knows of is a channel that nobody asks for: its messages would vanish.
     known = registry.channels.keys()
     if registry.undefined_schemas() or any(index.channel_ids - known for index in indexes):
         return False

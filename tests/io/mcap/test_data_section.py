@@ -230,7 +230,9 @@ def test_an_index_larger_than_its_chunk_could_need_is_not_kept(tmp_path: Path) -
     index = lb.message_index(1, [(0, 0)] * 1000)
     with McapContainer.open(lb.write(tmp_path, lb.log(DEFINITIONS, lb.chunk(content) + index, summary=b""))) as log:
         assert lb.messages(log) == lb.expected(range(3))
-        assert [damage.record for damage in log.damage] == ["MessageIndex"]
+        (damage,) = log.damage
+        assert (damage.record, damage.lost_messages) == ("MessageIndex", 0)
+        assert "more entries than its chunk can hold" in damage.what
 
 
 def test_a_summary_that_hides_a_channel_of_a_chunk_is_found_out(tmp_path: Path) -> None:
