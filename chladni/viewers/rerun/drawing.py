@@ -3,11 +3,12 @@
 import rerun as rr
 
 from chladni.signals.study import Study
+from chladni.viewers.panels import panels
 from chladni.viewers.rerun.blueprint import ChannelViews, ResponseViews, Views, arrange
 from chladni.viewers.rerun.deflection import draw_deflections
 from chladni.viewers.rerun.density import draw_densities
 from chladni.viewers.rerun.findings import draw_findings
-from chladni.viewers.rerun.frequency_response import draw_coherence, draw_magnitude, draw_phase, panels
+from chladni.viewers.rerun.frequency_response import draw_coherence, draw_magnitude, draw_phase
 from chladni.viewers.rerun.nyquist import draw_nyquist
 from chladni.viewers.rerun.spectrum import draw_spectra
 from chladni.viewers.rerun.waterfall import draw_waterfalls

@@ -5,8 +5,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from chladni.viewers.drawing import Floats, line_breaks, ticks
+from chladni.viewers.panels import Panel
 from chladni.viewers.rerun.entities import channel_entity
-from chladni.viewers.rerun.frequency_response import Panel
+from chladni.viewers.rerun.frequency_response import panel_folder
 from chladni.viewers.rerun.timelines import frequency_index, send_columns
 from chladni.viewers.style import Style
 
@@ -18,7 +19,7 @@ MARGIN = 0.12
 
 def draw_nyquist(recording: rr.RecordingStream, panel: Panel, style: Style) -> rrb.View:
     """Write the curves, a dot on each at the frequency under the cursor, and the axes."""
-    parent = panel.folder("nyquist")
+    parent = panel_folder(panel, "nyquist")
     curves = {row: _plane(panel, row) for row in panel.group.rows}
     low, high = _square(np.concatenate(list(curves.values())))
     _draw_axes(recording, f"{parent}/axes", low, high)

@@ -1,0 +1,76 @@
+"""Power spectral densities with their one-sigma bands and named peaks."""
+
+from typing import Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.study import Study
+from chladni.viewers.drawing import decibels_of_power, level_limits
+from chladni.viewers.figures.log_axis import logarithmic
+from chladni.viewers.figures.peak_labels import headroom, label_peaks
+from chladni.viewers.figures.sheet import BAND_OPACITY, BANDS_OF, legend, look, paint, plain, sheet
+from chladni.viewers.groups import Group, groups
+from chladni.viewers.labels import printed_unit
+from chladni.viewers.style import Style
+
+HEIGHT_IN = 2.9
+
+
+def density_figures(study: Study, *, frequency_scale: Literal["linear", "log"] = "linear") -> dict[str, Figure]:
+    """Draw the densities on a logarithmic scale; one figure for each group of channels of one unit, by name.
+
+    Parameters
+    ----------
+    study
+        What to draw.
+    frequency_scale
+        Scale of the frequency axis.
+    """
+    style = Style.of(study)
+    with look():
+        return {
+            f"psd {place} {group.name}": _figure(study, density, group, style, frequency_scale)
+            for place, density in enumerate(study.densities, start=1)
+            for group in groups(density.channels)
+        }
+
+
+def _figure(
+    study: Study, density: PowerSpectralDensity, group: Group, style: Style, frequency_scale: Literal["linear", "log"]
+) -> Figure:
+    figure, (axes,) = sheet([HEIGHT_IN])
+    axes.set_xscale(frequency_scale)
+    # A logarithmic axis has no place for zero frequency.
+    shown = density.frequency_hz > (0.0 if frequency_scale == "log" else -1.0)
+    low, high = level_limits(decibels_of_power(density.values[list(group.rows)][:, shown]))
+    unit = density.units[group.rows[0]]
+    names = {density.channels[row].name for row in group.rows}
+    peaks = [peak for peak in study.peaks if peak.unit == unit and set(peak.channels[:1]) <= names]
+    top = headroom(low, high, height_in=HEIGHT_IN) if peaks else high
+    logarithmic(axes, 10 ** (low / 10), 10 ** (top / 10))
+    for row in group.rows:
+        _draw(axes, density, row, shown, style, banded=len(group.rows) <= BANDS_OF)
+    axes.set_xlim(density.frequency_hz[shown][0], density.frequency_hz[-1])
+    label_peaks(axes, peaks)
+    axes.set_xlabel("Frequency [Hz]")
+    axes.set_ylabel(f"Power spectral density [{printed_unit(unit)}]")
+    legend(axes)
+    return figure
+
+
+def _draw(
+    axes: Axes, density: PowerSpectralDensity, row: int, shown: np.ndarray, style: Style, *, banded: bool
+) -> None:
+    channel = density.channels[row]
+    frequency_hz, values, std = density.frequency_hz[shown], density.values[row, shown], density.std[row, shown]
+    colour = paint(style.on_light(channel))
+    positive = np.where(values > 0, values, np.nan)
+    axes.plot(frequency_hz, positive, color=colour, label=plain(style.labels[channel.name]))
+    if banded:
+        bottom = axes.get_ylim()[0]
+        upper = np.where(np.isfinite(std), positive + std, np.nan)
+        lower = np.maximum(positive - std, bottom * 1e-3)
+        axes.fill_between(frequency_hz, lower, upper, color=colour, alpha=BAND_OPACITY, linewidth=0)

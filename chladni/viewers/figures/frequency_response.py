@@ -1,0 +1,84 @@
+"""Frequency responses: magnitude, phase and coherence above one another."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from chladni.signals.peak import Peak
+from chladni.signals.study import Study
+from chladni.viewers.drawing import decibels_of_amplitude, level_limits, line_breaks, phase_wraps, with_breaks
+from chladni.viewers.figures.log_axis import logarithmic
+from chladni.viewers.figures.peak_labels import headroom, label_peaks
+from chladni.viewers.figures.sheet import BAND_OPACITY, BANDS_OF, legend, look, paint, plain, sheet
+from chladni.viewers.panels import Panel, panels
+from chladni.viewers.style import Style
+
+CONVENTION = "H = Y/X, e^{+jωt}"
+MAGNITUDE_IN = 2.4
+
+
+def response_figures(study: Study) -> dict[str, Figure]:
+    """Draw the frequency responses on their excited lines; one figure for each group and reference, by name.
+
+    The magnitude carries its one-sigma band, the phase its convention.
+    """
+    if study.response is None:
+        return {}
+    style = Style.of(study)
+    with look():
+        return {
+            f"response {panel.reference + 1} {panel.group.name}": _figure(study, panel, style)
+            for panel in panels(study.response)
+        }
+
+
+def _figure(study: Study, panel: Panel, style: Style) -> Figure:
+    figure, (magnitude, phase, coherence) = sheet([MAGNITUDE_IN, 1.15, 1.1], sharex=True)
+    _draw_magnitude(magnitude, study, panel, style)
+    for row in panel.group.rows:
+        colour = paint(style.on_light(panel.response.responses[row]))
+        angle = np.angle(panel.function(row), deg=True)
+        breaks = np.union1d(line_breaks(panel.frequency_hz()), phase_wraps(angle))
+        phase.plot(*with_breaks(panel.frequency_hz(), angle, breaks), color=colour)
+        breaks = line_breaks(panel.frequency_hz())
+        coherence.plot(*with_breaks(panel.frequency_hz(), panel.coherence(row), breaks), color=colour)
+    phase.set_ylabel(f"Phase [deg]\n{CONVENTION}")
+    phase.set_ylim(-190, 190)
+    phase.set_yticks([-180, -90, 0, 90, 180])
+    coherence.set_ylabel(("Coherence" if len(panel.response.references) == 1 else "Multiple\ncoherence") + " [1]")
+    coherence.set_ylim(0, 1.04)
+    coherence.set_xlabel("Frequency [Hz]")
+    return figure
+
+
+def _draw_magnitude(axes: Axes, study: Study, panel: Panel, style: Style) -> None:
+    magnitudes = np.array([np.abs(panel.function(row)) for row in panel.group.rows])
+    low, high = level_limits(decibels_of_amplitude(magnitudes))
+    peaks = _peaks(study, panel)
+    top = headroom(low, high, height_in=MAGNITUDE_IN) if peaks else high
+    logarithmic(axes, 10 ** (low / 20), 10 ** (top / 20))
+    frequency_hz = panel.frequency_hz()
+    axes.set_xlim(frequency_hz[0], frequency_hz[-1])
+    breaks = line_breaks(frequency_hz)
+    for row, value in zip(panel.group.rows, magnitudes, strict=True):
+        channel, std = panel.response.responses[row], panel.deviation(row)
+        colour = paint(style.on_light(channel))
+        upper = np.where(np.isfinite(std), value + std, np.nan)
+        lower = np.maximum(value - std, 10 ** (low / 20) * 1e-3)
+        x, curves = with_breaks(frequency_hz, np.column_stack([value, lower, upper]), breaks)
+        axes.plot(x, curves[:, 0], color=colour, label=plain(style.labels[channel.name]))
+        if len(panel.group.rows) <= BANDS_OF:
+            axes.fill_between(x, curves[:, 1], curves[:, 2], color=colour, alpha=BAND_OPACITY, linewidth=0)
+    reference = plain(style.labels[panel.response.references[panel.reference].name])
+    axes.set_ylabel(f"{panel.quantity} |H| [{panel.unit}]\n{panel.response.provenance.estimator}, to {reference}")
+    label_peaks(axes, peaks)
+    legend(axes)
+
+
+def _peaks(study: Study, panel: Panel) -> list[Peak]:
+    """Peaks of the functions drawn; none with several references, for a peak doesn't say to which it belongs."""
+    if len(panel.response.references) > 1:
+        return []
+    unit = panel.response.unit(panel.group.rows[0], panel.reference)
+    names = {panel.response.responses[row].name for row in panel.group.rows}
+    return [peak for peak in study.response_peaks if peak.unit == unit and set(peak.channels[:1]) <= names]

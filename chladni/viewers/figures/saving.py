@@ -1,0 +1,88 @@
+"""Figures of a study, written to a folder."""
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from chladni.io.atomic import atomic_write
+from chladni.signals.errors import LogError, SetupError
+from chladni.signals.study import Study
+from chladni.viewers.figures.density import density_figures
+from chladni.viewers.figures.frequency_response import response_figures
+from chladni.viewers.figures.nyquist import nyquist_figures
+from chladni.viewers.figures.rendering import rendered
+from chladni.viewers.figures.waterfall import waterfall_figures
+from chladni.viewers.figures.waveforms import waveform_figures
+
+FORMATS = ("png", "svg", "pdf")
+
+
+def study_figures(study: Study) -> dict[str, Figure]:
+    """Draw every figure that the study has data for, by name."""
+    return {
+        **waveform_figures(study),
+        **density_figures(study),
+        **response_figures(study),
+        **nyquist_figures(study),
+        **waterfall_figures(study),
+    }
+
+
+def save_figures(
+    study: Study, folder: str | os.PathLike[str], *, formats: Sequence[str] = ("png", "svg")
+) -> list[Path]:
+    """Write every figure of a study to a folder, which is made when it isn't there.
+
+    Parameters
+    ----------
+    study
+        What to draw.
+    folder
+        Where to; files of the same names are replaced, each whole or not at all.
+    formats
+        Any of ``png`` (300 dots an inch), ``svg``, ``pdf``.
+
+    Returns
+    -------
+    list of Path
+        The files, in the order of the figures.
+
+    Raises
+    ------
+    SetupError
+        When a format is none of those.
+    LogError
+        When the folder can't be made or a file can't be written.
+    """
+    for kind in formats:
+        if kind not in FORMATS:
+            raise SetupError(f"figure format {kind!r} is none of {', '.join(FORMATS)}")
+    target = Path(folder)
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise LogError(
+            f"{target}: can't be made a folder ({error.strerror}); name another for the figures"
+        ) from error
+    written = []
+    for name, figure in study_figures(study).items():
+        for kind in formats:
+            path = target / f"{file_name(name)}.{kind}"
+            with atomic_write(path) as file:
+                file.write(rendered(figure, kind))
+            written.append(path)
+    return written
+
+
+def file_name(name: str) -> str:
+    """Make a file name of a figure's name.
+
+    Examples
+    --------
+    >>> file_name("psd 1 Acceleration 2/3")
+    'psd-1-acceleration-2-3'
+    """
+    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")

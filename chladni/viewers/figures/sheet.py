@@ -1,0 +1,106 @@
+"""The look that all figures share: size, type, colours, legends, and text that came from a log."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, findfont
+from matplotlib.ft2font import FT2Font
+
+from chladni.viewers.style import Colour
+
+# A figure this wide is set across one column of a page at three quarters of its size, type then 6.4 pt.
+WIDTH_IN = 4.6
+LEGEND_COLUMNS = 3
+BAND_OPACITY = 0.2
+# More bands than this in one plot hide the lines.
+BANDS_OF = 4
+
+# Keys are names of settings, which matplotlib types one by one.
+_LOOK: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8.5,
+    "axes.labelsize": 8.5,
+    "axes.titlesize": 8.5,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "legend.fontsize": 7.5,
+    "axes.linewidth": 0.6,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 0.9,
+    "lines.solid_joinstyle": "round",
+    "xtick.direction": "out",
+    "ytick.direction": "out",
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "svg.fonttype": "path",
+}
+
+
+@contextmanager
+def look() -> Iterator[None]:
+    """Draw with the look of chladni's figures, whatever the user's own settings are; those come back after."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_LOOK)
+        yield
+
+
+def sheet(heights_in: Sequence[float], **options: Any) -> tuple[Figure, list[Axes]]:
+    """Make a figure of stacked axes, one for each height."""
+    figure = Figure(figsize=(WIDTH_IN, sum(heights_in)), layout="constrained")
+    axes = figure.subplots(len(heights_in), 1, squeeze=False, height_ratios=list(heights_in), **options)
+    return figure, list(axes[:, 0])
+
+
+def legend(axes: Axes) -> None:
+    """Put the legend above the axes, where it can't cover data."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        axes.legend(
+            handles,
+            labels,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=LEGEND_COLUMNS,
+            frameon=False,
+            borderaxespad=0.2,
+            handlelength=1.4,
+            columnspacing=1.2,
+        )
+
+
+def paint(colour: Colour) -> tuple[float, float, float]:
+    """Give a colour as matplotlib takes it."""
+    red, green, blue = colour
+    return red / 255, green / 255, blue / 255
+
+
+def plain(text: str) -> str:
+    r"""Make a text that came from a log safe to print: no mathematics, no missing glyphs, kept in legends.
+
+    Examples
+    --------
+    >>> plain("$x_$")
+    '\\$x_\\$'
+    >>> plain("_hidden")
+    ' _hidden'
+    """
+    known = _glyphs()
+    shown = "".join(character if ord(character) in known else "\ufffd" for character in text)
+    # matplotlib leaves labels that begin with an underscore out of legends.
+    return (" " if shown.startswith("_") else "") + shown.replace("$", r"\$")
+
+
+@cache
+def _glyphs() -> frozenset[int]:
+    return frozenset(FT2Font(findfont(FontProperties(family="DejaVu Sans"))).get_charmap())

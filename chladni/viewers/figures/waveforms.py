@@ -1,0 +1,54 @@
+"""Waveforms: one axes for each channel, the same scale for channels of one unit."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from chladni.signals.study import Study
+from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.viewers.drawing import thin
+from chladni.viewers.figures.sheet import look, paint, plain, sheet
+from chladni.viewers.groups import Group, groups
+from chladni.viewers.labels import printed_unit
+from chladni.viewers.style import Style
+
+# Three a pixel at 300 dots an inch: what is left out can't be seen.
+POINTS = 4000
+
+
+def waveform_figures(study: Study) -> dict[str, Figure]:
+    """Draw the waveforms; one figure for each group of channels of one unit, by name.
+
+    Long records are drawn through the least and the greatest sample of each stretch.
+    """
+    style = Style.of(study)
+    with look():
+        return {
+            f"waveforms {place} {group.name}": _figure(series, group, style)
+            for place, series in enumerate(study.series, start=1)
+            for group in groups(series.channels)
+        }
+
+
+def _figure(series: TimeSeries, group: Group, style: Style) -> Figure:
+    figure, stack = sheet([0.9] * len(group.rows), sharex=True, sharey=True)
+    for axes, row in zip(stack, group.rows, strict=True):
+        _draw(axes, series, row, style)
+    start_s = (series.start_time_ns - style.origin_ns) / NS_PER_S
+    stack[-1].set_xlim(start_s, start_s + series.duration_s)
+    stack[-1].set_xlabel("Time [s]")
+    figure.supylabel(f"{group.name} [{printed_unit(group.unit)}]", fontsize=8.5)
+    return figure
+
+
+def _draw(axes: Axes, series: TimeSeries, row: int, style: Style) -> None:
+    channel = series.channels[row]
+    values = series.values[row].astype(np.float64)
+    if series.valid is not None:
+        values[~series.valid[row]] = np.nan
+    chosen, _ = thin(values, limit=POINTS)
+    start_s = (series.start_time_ns - style.origin_ns) / NS_PER_S
+    axes.plot(
+        start_s + chosen / series.sample_rate_hz, values[chosen], color=paint(style.on_light(channel)), linewidth=0.6
+    )
+    axes.set_title(plain(style.labels[channel.name]), loc="left", pad=2)

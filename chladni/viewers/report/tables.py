@@ -1,0 +1,85 @@
+"""The report's tables."""
+
+from collections.abc import Iterator, Sequence
+
+from chladni.signals.channel import Channel
+from chladni.signals.peak import Peak
+from chladni.signals.provenance import Provenance
+from chladni.signals.study import Study
+from chladni.viewers.labels import printed_unit, value_with_deviation
+from chladni.viewers.report.markup import element, escaped, table
+from chladni.viewers.style import Style
+
+
+def peak_table(peaks: Sequence[Peak], style: Style) -> str:
+    """Tabulate peaks with one sigma; empty when there are none."""
+    rows = [
+        (
+            value_with_deviation(peak.frequency_hz, peak.frequency_std_hz),
+            value_with_deviation(peak.height, peak.height_std),
+            printed_unit(peak.unit),
+            ", ".join(style.labels.get(name, name) for name in peak.channels),
+        )
+        for peak in peaks
+    ]
+    return table(("Frequency [Hz]", "Height", "Unit", "Channels, strongest first"), rows, numbers=(0, 1))
+
+
+def channel_table(study: Study, style: Style) -> str:
+    """Tabulate the channels: label in the figures, full name, unit, role, place, rate and length."""
+    headings = ("Label", "Channel", "Unit", "Role", "Point", "Direction", "Rate [Hz]", "Length [s]")
+    return table(headings, _channel_rows(study, style), numbers=(6, 7))
+
+
+def _channel_rows(study: Study, style: Style) -> Iterator[tuple[str, ...]]:
+    seen: set[str] = set()
+    for series in study.series:
+        for channel in series.channels:
+            seen.add(channel.name)
+            yield (*_place(channel, style), f"{series.sample_rate_hz:.6g}", f"{series.duration_s:.6g}")
+    others = [channel for density in study.densities for channel in density.channels]
+    for channel in others:
+        if channel.name not in seen:
+            seen.add(channel.name)
+            yield (*_place(channel, style), "", "")
+
+
+def _place(channel: Channel, style: Style) -> tuple[str, ...]:
+    direction = "" if channel.direction is None else ", ".join(f"{part:g}" for part in channel.direction)
+    unit = printed_unit(channel.unit)
+    return style.labels[channel.name], channel.name, unit, channel.role, channel.point or "", direction
+
+
+def method_table(study: Study) -> str:
+    """Tabulate how each estimate was made, with the advice that goes with it."""
+    accounts = list(dict.fromkeys(density.provenance for density in study.densities))
+    accounts += [] if study.response is None else [study.response.provenance]
+    headings = (
+        "Estimate",
+        "Window",
+        "Segment [s]",
+        "Overlap",
+        "Averaging",
+        "Segments",
+        "Effective",
+        "Left out",
+        "Detrend",
+    )
+    shown = table(headings, [_account(account) for account in accounts], numbers=(2, 3, 5, 6, 7))
+    notes = dict.fromkeys(note for account in accounts for note in account.notes)
+    advice = "".join(element("li", escaped(note)) for note in notes)
+    return shown + (element("ul", advice) if advice else "")
+
+
+def _account(account: Provenance) -> tuple[str, ...]:
+    return (
+        account.estimator,
+        account.window,
+        f"{account.segment_s:g}",
+        f"{account.overlap:.0%}",
+        account.averaging,
+        f"{account.averages}",
+        f"{account.effective_averages:.4g}",
+        f"{account.skipped}",
+        account.detrend,
+    )

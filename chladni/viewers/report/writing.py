@@ -1,0 +1,63 @@
+"""The report's page and file."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from chladni.io.atomic import atomic_write
+from chladni.signals.study import Study
+from chladni.viewers.report.markup import PAGE, element, escaped
+from chladni.viewers.report.pictures import pictures
+from chladni.viewers.report.tables import channel_table, method_table, peak_table
+from chladni.viewers.style import Style
+
+
+def write_report(study: Study, path: str | os.PathLike[str]) -> Path:
+    """Write the report of a study as one HTML file, whole or not at all.
+
+    Parameters
+    ----------
+    study
+        What to report.
+    path
+        File to write; one that exists is replaced.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    LogError
+        When the file can't be written.
+    """
+    target = Path(path)
+    with atomic_write(target) as file:
+        file.write(report_html(study).encode())
+    return target
+
+
+def report_html(study: Study) -> str:
+    """Give the report of a study as HTML: findings, tables and figures, no script and nothing to fetch.
+
+    Everything that came from the log is escaped, and the page's own policy forbids scripts and requests.
+    """
+    return PAGE.substitute(title=escaped(study.title), body="\n".join(_body(study)))
+
+
+def _body(study: Study) -> Iterator[str]:
+    style = Style.of(study)
+    yield element("h1", escaped(study.title))
+    if study.findings:
+        yield _section("Findings", element("ul", "".join(element("li", escaped(text)) for text in study.findings)))
+    yield _section("Peaks of the frequency responses", peak_table(study.response_peaks, style))
+    yield _section("Peaks of the spectra", peak_table(study.peaks, style))
+    for heading, shown in pictures(study).items():
+        yield _section(heading, shown)
+    yield _section("Channels", channel_table(study, style))
+    yield _section("Method", method_table(study))
+
+
+def _section(heading: str, content: str) -> str:
+    return element("section", element("h2", heading) + content) if content else ""
