@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from chladni.io.decoding.walk import Piece
+    from chladni.io.decoding.piece import Piece
 
 
 def scattered(pieces: Sequence[Piece], messages: int) -> NDArray[np.generic]:
@@ -21,12 +21,13 @@ def scattered(pieces: Sequence[Piece], messages: int) -> NDArray[np.generic]:
     -------
     ndarray [message, ...]
     """
-    (piece,) = pieces
-    if len(piece.rows) == messages:
-        return piece.values
-    # Only messages of fixed width come here (a number or a string's place), so zeros for all are bounded.
-    out = np.zeros((messages, *piece.values.shape[1:]), piece.values.dtype)
-    out[piece.rows] = piece.values
+    first = pieces[0]
+    if len(first.rows) == messages:
+        return first.values
+    # Only values of fixed width come here (a number or a string's place), so zeros for all are bounded.
+    out = np.zeros((messages, *first.values.shape[1:]), first.values.dtype)
+    for piece in pieces:
+        out[piece.rows] = piece.values
     return out
 
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from chladni.io.decoding.columns import EncodedMessages, StringValue
+    from chladni.io.decoding.piece import Piece
     from chladni.io.decoding.schema import FieldInfo, Leaf, Record
-    from chladni.io.decoding.walk import Piece
 
 HEADER_BYTES: Final = 4
 """Bytes of the CDR encapsulation header; alignment counts from its end."""

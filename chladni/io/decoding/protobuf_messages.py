@@ -10,9 +10,19 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
 
-from chladni.io.decoding.columns import Decoded, outside_buffer, require_known
-from chladni.io.decoding.found import found_of, joined_column, nothing
-from chladni.io.decoding.protobuf_schema import load_descriptor, record_of
+from chladni.io.decoding.assemble import joined, scattered
+from chladni.io.decoding.columns import Column, Decoded, outside_buffer, require_known
+from chladni.io.decoding.found import Found, found_of, joined_column, nothing
+from chladni.io.decoding.piece import Piece
+from chladni.io.decoding.protobuf_schema import load_descriptor, record_of, zero_is_default
+from chladni.io.decoding.protobuf_template import (
+    Template,
+    UnfitError,
+    is_plain,
+    packed_in_fixed_width,
+    read_block,
+    read_slot,
+)
 from chladni.io.decoding.schema import Array, FieldType, Primitive, Stamp, Text, leaves
 
 if TYPE_CHECKING:
@@ -25,6 +35,13 @@ if TYPE_CHECKING:
     from chladni.io.decoding.columns import EncodedMessages
     from chladni.io.decoding.schema import FieldInfo, Leaf
 
+MAX_TEMPLATES: Final = 16
+"""Layouts tried in a batch before the remaining messages are read one by one."""
+
+LARGEST_TIME_S: Final = 9_000_000_000
+"""Seconds (the year 2255) beyond which nanoseconds come near the end of 64 bits."""
+
+_TIME_OVERFLOW: Final = "a time exceeds 64 bits of nanoseconds"
 _INT64: Final = range(-(2**63), 2**63)
 
 
@@ -42,7 +59,9 @@ class ProtobufDecoder:
 
         self.name = descriptor.full_name
         self._leaves = {leaf.info.path: leaf for leaf in leaves(record_of(descriptor))}
-        self._new = message_factory.GetMessageClass(descriptor)
+        self._descriptor = descriptor
+        self._message_class: type[Message] = message_factory.GetMessageClass(descriptor)
+        self._without_defaults = zero_is_default(descriptor)
         self.fields: tuple[FieldInfo, ...] = tuple(leaf.info for leaf in self._leaves.values())
 
     @classmethod
@@ -58,37 +77,144 @@ class ProtobufDecoder:
     def columns(self, messages: EncodedMessages, paths: Sequence[str]) -> Decoded:
         """Decode the fields named; see `chladni.io.decoding.columns.Decoder`. What a message leaves out is 0."""
         require_known(paths, self.fields, schema_name=self.name)
-        bad = outside_buffer(messages)
-        reasons: Counter[str] = Counter()
-        if bad.any():
-            reasons["the message lies outside the data"] += int(bad.sum())
-        chosen = [self._leaves[path] for path in paths]
-        rows = self._rows(messages, chosen, bad, reasons)
-        columns = {
-            leaf.info.path: joined_column([found_of(leaf, [row[i] for row in rows])], bad, empty=nothing(leaf))
-            for i, leaf in enumerate(chosen)
-        }
-        return Decoded(columns=columns, bad=bad, reasons=dict(reasons))
+        batch = _Batch(messages, [self._leaves[path] for path in paths], self._message_class)
+        if self._templates_serve(batch.chosen):
+            return batch.by_templates(self._descriptor)
+        return batch.by_library()
 
-    def _rows(
-        self, messages: EncodedMessages, chosen: Sequence[Leaf], bad: NDArray[np.bool_], reasons: Counter[str]
-    ) -> list[list[Sequence[object]]]:
+    def _templates_serve(self, chosen: Sequence[Leaf]) -> bool:
+        plain = self._without_defaults and all(is_plain(leaf) for leaf in chosen)
+        return plain and packed_in_fixed_width(chosen, self._descriptor)
+
+
+class _Batch:
+    """Messages of one call and what was found wrong with them."""
+
+    def __init__(self, messages: EncodedMessages, chosen: Sequence[Leaf], message_class: type[Message]) -> None:
+        self.messages = messages
+        self.chosen = chosen
+        self.message_class = message_class
+        self.bad = outside_buffer(messages)
+        self.reasons: Counter[str] = Counter()
+        if self.bad.any():
+            self.reasons["the message lies outside the data"] += int(self.bad.sum())
+
+    def by_library(self) -> Decoded:
+        """Decode message by message."""
+        found = self._read(np.flatnonzero(~self.bad))
+        columns = {
+            leaf.info.path: joined_column([one], self.bad, empty=nothing(leaf))
+            for leaf, one in zip(self.chosen, found, strict=True)
+        }
+        return Decoded(columns=columns, bad=self.bad, reasons=dict(self.reasons))
+
+    def by_templates(self, descriptor: Descriptor) -> Decoded:
+        """Decode messages that share a layout at once, and the rest one by one."""
+        pieces: list[list[Piece]] = [[] for _ in self.chosen]
+        rows, aside = np.flatnonzero(~self.bad), []
+        for _ in range(MAX_TEMPLATES):
+            if not len(rows):
+                break
+            done = self._by_template(rows, descriptor, pieces)
+            if not done[0]:
+                aside.append(int(rows[0]))
+                done[0] = True
+            rows = rows[~done]
+        rows = np.sort(np.append(rows, np.array(aside, rows.dtype)))
+        alone = self._read(rows)
+        rows = rows[~self.bad[rows]]
+        columns = {}
+        for leaf, some, one in zip(self.chosen, pieces, alone, strict=True):
+            some.append(Piece(rows=rows, values=np.asarray(one.values), counts=one.counts))
+            columns[leaf.info.path] = self._column(leaf, some)
+        return Decoded(columns=columns, bad=self.bad, reasons=dict(self.reasons))
+
+    def _column(self, leaf: Leaf, pieces: list[Piece]) -> Column:
+        if not isinstance(leaf.type, Array):
+            return Column(values=scattered(pieces, len(self.bad)))
+        values, counts = joined(pieces, self.bad, empty=np.empty(0, leaf.info.dtype))
+        return Column(values=values, counts=counts)
+
+    def _by_template(
+        self, rows: NDArray[np.intp], descriptor: Descriptor, pieces: list[list[Piece]]
+    ) -> NDArray[np.bool_]:
+        """Read all messages that have the layout of the first one; tells which those are."""
+        done = np.zeros(len(rows), np.bool_)
+        content = self._content(int(rows[0]))
+        try:
+            self.message_class.FromString(content)
+            template = Template(content, descriptor, {names for leaf in self.chosen for names in _slots_of(leaf)})
+        except (self._decode_error(), UnfitError):
+            return done
+        alike = np.flatnonzero(self.messages.lengths[rows] == len(content))
+        table = self._table(self.messages.offsets[rows[alike]], len(content))
+        fits = template.fitting(table)
+        for leaf in self.chosen:
+            if isinstance(leaf.type, Stamp):
+                # Exact arithmetic, which finds an overflow, is the library's way.
+                seconds = read_slot(table, template.slots.get((*leaf.names, "seconds")), leaf.type.seconds).astype(
+                    np.int64
+                )
+                fits &= (seconds > -LARGEST_TIME_S) & (seconds < LARGEST_TIME_S)
+        done[alike[fits]] = True
+        table, taken = table[fits], rows[done]
+        for leaf, some in zip(self.chosen, pieces, strict=True):
+            some.append(Piece(rows=taken, values=_from_template(table, template, leaf)))
+        return done
+
+    def _table(self, offsets: NDArray[np.int64], length: int) -> NDArray[np.uint8]:
+        if not length:
+            return np.empty((len(offsets), 0), np.uint8)
+        buffer = self.messages.buffer
+        everywhere = np.ndarray((buffer.size - length + 1,), f"V{length}", buffer, 0, (1,))
+        return everywhere[offsets].view(np.uint8).reshape(len(offsets), length)
+
+    def _content(self, index: int) -> bytes:
+        start, length = int(self.messages.offsets[index]), int(self.messages.lengths[index])
+        return self.messages.buffer[start : start + length].tobytes()
+
+    @staticmethod
+    def _decode_error() -> type[Exception]:
         from google.protobuf.message import DecodeError
 
-        readers = [_reader(leaf) for leaf in chosen]
-        rows = []
-        for index in np.flatnonzero(~bad).tolist():
-            start, length = int(messages.offsets[index]), int(messages.lengths[index])
+        error: type[Exception] = DecodeError
+        return error
+
+    def _read(self, rows: NDArray[np.intp]) -> list[Found]:
+        """Read messages one by one; bad ones are marked and give nothing."""
+        decode_error = self._decode_error()
+        readers = [_reader(leaf) for leaf in self.chosen]
+        values = []
+        for index in rows.tolist():
             try:
-                message = self._new.FromString(messages.buffer[start : start + length].tobytes())
-                rows.append([read(message) for read in readers])
-            except DecodeError:
-                bad[index] = True
-                reasons["not a protobuf message of this type"] += 1
+                message = self.message_class.FromString(self._content(index))
+                values.append([read(message) for read in readers])
+            except decode_error:
+                self._mark(index, "not a protobuf message of this type")
             except OverflowError:
-                bad[index] = True
-                reasons["a time exceeds 64 bits of nanoseconds"] += 1
-        return rows
+                self._mark(index, _TIME_OVERFLOW)
+        return [found_of(leaf, [one[i] for one in values]) for i, leaf in enumerate(self.chosen)]
+
+    def _mark(self, index: int, reason: str) -> None:
+        self.bad[index] = True
+        self.reasons[reason] += 1
+
+
+def _slots_of(leaf: Leaf) -> list[tuple[str, ...]]:
+    if isinstance(leaf.type, Stamp):
+        return [(*leaf.names, "seconds"), (*leaf.names, "nanos")]
+    return [leaf.names]
+
+
+def _from_template(table: NDArray[np.uint8], template: Template, leaf: Leaf) -> NDArray[np.generic]:
+    slots = [template.slots.get(names) for names in _slots_of(leaf)]
+    if isinstance(leaf.type, Stamp):
+        seconds = read_slot(table, slots[0], leaf.type.seconds)
+        nanoseconds = read_slot(table, slots[1], leaf.type.nanoseconds)
+        total: NDArray[np.int64] = seconds.astype(np.int64) * 1_000_000_000 + nanoseconds.astype(np.int64)
+        return total
+    dtype = leaf.info.dtype or np.dtype(np.uint8)
+    return (read_block if isinstance(leaf.type, Array) else read_slot)(table, slots[0], dtype)
 
 
 def _reader(leaf: Leaf) -> Callable[[Message], Sequence[object]]:

@@ -105,6 +105,27 @@ def _repeated(descriptor: Descriptor) -> set[str]:
     return {field.name for field in proto.field if field.label == _REPEATED}
 
 
+def zero_is_default(descriptor: Descriptor) -> bool:
+    """Whether a field left out of this message, or of a message in it, is always zero, and none is required.
+
+    That is so in proto3; elsewhere only the library knows what an absent field means.
+    """
+    from google.protobuf.descriptor_pb2 import FileDescriptorProto
+
+    waiting, seen = [descriptor], set()
+    while waiting:
+        one = waiting.pop()
+        if one.full_name in seen:
+            continue
+        seen.add(one.full_name)
+        file = FileDescriptorProto()
+        one.file.CopyToProto(file)
+        if file.syntax != "proto3":
+            return False
+        waiting += [field.message_type for field in one.fields if field.message_type is not None]
+    return True
+
+
 class _Translator:
     def __init__(self) -> None:
         self.done: dict[str, Record] = {}

@@ -15,6 +15,7 @@ import numpy as np
 from chladni.io.decoding.cursor import Cursor, uniform
 from chladni.io.decoding.element_span import ElementPlaces, ElementSpan
 from chladni.io.decoding.layout import Layouts, element_offset
+from chladni.io.decoding.piece import Piece
 from chladni.io.decoding.schema import Array, FieldType, Leaf, Primitive, Record, Stamp, Text, Tree, smallest_size
 from chladni.signals.errors import LogError
 
@@ -48,24 +49,6 @@ class WireRules:
 
     max_alignment: int
     terminated: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Piece:
-    """Part of a column: what some rows gave for one leaf.
-
-    Parameters
-    ----------
-    rows : int64 array [row]
-    values : ndarray
-        ``[row]``, ``[row, element]``, or ``[element]`` with counts. For strings two numbers take the place of one:
-        first byte and number of bytes, ``[..., 2]``.
-    counts : int64 array [row], optional
-    """
-
-    rows: NDArray[np.int64]
-    values: NDArray[np.generic]
-    counts: NDArray[np.int64] | None = None
 
 
 class Walk:

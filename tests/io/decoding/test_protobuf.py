@@ -1,13 +1,16 @@
 """Protobuf messages to columns, against the messages that were written."""
 
 import struct
+from functools import cache
 
 import numpy as np
 import pytest
 from google.protobuf import descriptor_pb2, duration_pb2, message_factory, struct_pb2, timestamp_pb2
 from google.protobuf.descriptor_pool import DescriptorPool
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from chladni.io.decoding import make_decoder
+from chladni.io.decoding import make_decoder, protobuf_messages
 from chladni.signals.errors import LogError
 from tests.io.decoding.encoded import batch_of, decode_all, values_of
 
@@ -54,6 +57,7 @@ def descriptor_set() -> descriptor_pb2.FileDescriptorSet:
     return found
 
 
+@cache
 def sample_class():
     files = descriptor_set().file
     pool = DescriptorPool()
@@ -81,6 +85,9 @@ def filled(index: int):
     sample.stamps.add(seconds=index)
     sample.gains["k"] = 2.0
     return sample
+
+
+PLAIN_DECODER = decoder_of(descriptor_set().SerializeToString())
 
 
 def test_every_kind_of_field_is_read_with_its_wire_type() -> None:
@@ -119,6 +126,90 @@ def test_every_kind_of_field_is_read_with_its_wire_type() -> None:
     assert decoded.columns["samples"].counts is not None
     assert decoded.columns["raw"].counts is None
     assert len(decoded.columns["names"].strings.table) == 1
+
+
+PLAIN = ["stamp", "age", "accel.x", "accel.z", "f", "i", "s", "u", "x", "b", "raw", "samples"]
+
+
+@given(
+    layouts=st.lists(st.integers(0, 3), min_size=1, max_size=8),
+    seed=st.integers(0, 2**32),
+    damage=st.lists(st.tuples(st.integers(0, 7), st.integers(0, 150), st.integers(0, 255)), max_size=4),
+)
+@settings(max_examples=150, deadline=None)
+def test_shared_layouts_give_what_the_library_gives(
+    layouts: list[int], seed: int, damage: list[tuple[int, int, int]]
+) -> None:
+    rng = np.random.default_rng(seed)
+    messages = [bytearray(varied(rng, layout).SerializeToString()) for layout in layouts]
+    for index, place, byte in damage:
+        chosen = messages[index % len(messages)]
+        if chosen:
+            chosen[place % len(chosen)] = byte
+    encoded = batch_of([bytes(one) for one in messages], gaps=(3, 4))
+    decoder = PLAIN_DECODER
+    fast = decoder.columns(encoded, PLAIN)
+    slow = decoder.columns(encoded, [*PLAIN, "name"])  # strings are beyond templates
+    # The library also refuses damage in fields that weren't asked for.
+    assert not (fast.bad & ~slow.bad).any()
+    for path in PLAIN:
+        pairs = zip(values_of(fast, path), values_of(slow, path), strict=True)
+        for one, other in (pair for pair, bad in zip(pairs, slow.bad, strict=True) if not bad):
+            assert np.array_equal(one, other, equal_nan=True), path
+
+
+def varied(rng: np.random.Generator, layout: int):
+    sample = sample_class()()
+    if layout == 0:
+        return sample
+    sample.stamp.seconds, sample.stamp.nanos = int(rng.integers(2**30, 2**31)), int(rng.integers(0, 10**9))
+    sample.age.nanos = -int(rng.integers(1, 100))
+    sample.accel.x, sample.f, sample.name = rng.normal(), rng.normal(), "é" * layout
+    sample.i, sample.s, sample.u = (
+        int(rng.integers(-(2**31), 2**31)),
+        -int(rng.integers(9)),
+        int(rng.integers(2**62)),
+    )
+    sample.x, sample.b, sample.raw = int(rng.integers(2**32)), True, rng.bytes(layout)
+    sample.samples.extend(rng.normal(size=layout))
+    sample.points.add(x=1.0)
+    return sample
+
+
+def test_a_shared_layout_is_not_read_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    read = []
+    original = protobuf_messages._Batch._read
+    monkeypatch.setattr(
+        protobuf_messages._Batch, "_read", lambda self, rows: (read.extend(rows), original(self, rows))[1]
+    )
+    messages = [filled(2 * index).SerializeToString() for index in range(50)]
+    decoded = PLAIN_DECODER.columns(batch_of(messages), ["accel.x", "stamp", "samples"])
+    assert values_of(decoded, "accel.x") == [0.1 + 2 * index for index in range(50)]
+    assert values_of(decoded, "samples") == [[0.5, float(2 * index)] for index in range(50)]
+    assert not read
+
+
+def test_repeated_and_odd_forms_of_a_field_are_left_to_the_library() -> None:
+    good = filled(0).SerializeToString()
+    twice = sample_class()()
+    twice.accel.x = 7.0
+    group = b"\xa3\x06\xa4\x06"  # an unknown group, which nothing but the library knows to pass over
+    messages = [good + twice.SerializeToString(), good + b"\x28\x05", group + good, good]
+    decoded = PLAIN_DECODER.columns(batch_of(messages), ["accel.x", "accel.z", "i"])
+    assert not decoded.bad.any(), decoded.reasons
+    assert values_of(decoded, "accel.x") == [7.0, 0.1, 0.1, 0.1]
+    assert values_of(decoded, "accel.z") == [-1e-300] * 4
+    assert values_of(decoded, "i") == [-7, 5, -7, -7]
+
+
+def test_defaults_of_proto2_are_the_librarys() -> None:
+    files = descriptor_pb2.FileDescriptorSet()
+    file = files.file.add(name="old.proto", package="old", syntax="proto2")
+    file.message_type.add(name="M").field.add(
+        name="v", number=1, type=Field.TYPE_DOUBLE, label=Field.LABEL_OPTIONAL, default_value="2.5"
+    )
+    decoder = decoder_of(files.SerializeToString(), "old.M")
+    assert values_of(decoder.columns(batch_of([b"", b""]), ["v"]), "v") == [2.5, 2.5]
 
 
 def test_what_a_message_leaves_out_is_zero() -> None:
