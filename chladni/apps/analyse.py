@@ -124,7 +124,7 @@ def _response(
     averaging: Averaging,
     span: Span,
 ) -> FrequencyResponse | None:
-    chosen = references or _excitations(moving)
+    chosen = references or excitations(moving)
     if not chosen:
         return None
     others = None if channels is None else [name for name in log.names(channels) if name not in log.names(chosen)]
@@ -139,7 +139,8 @@ def _response(
         return None
 
 
-def _excitations(moving: Sequence[Channel]) -> tuple[str, ...]:
+def excitations(moving: Sequence[Channel]) -> tuple[str, ...]:
+    """Name the channels marked as reference, else the first force."""
     marked = tuple(channel.name for channel in moving if channel.role == "reference")
     forces = tuple(channel.name for channel in moving if channel.unit in FORCE_UNITS)
     return marked or forces[:1]

@@ -1,17 +1,22 @@
 """Results as the JSON documents that programs rely on; NaN and infinity become null."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.comparison import DensityComparison, LevelChange, PeakChange
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
-from chladni.spectral.bands import band_rms
+from chladni.spectral.bands import total_rms
 from chladni.spectral.peaks import find_peaks
+
+if TYPE_CHECKING:
+    from chladni.apps.compare import LogComparison
 
 Document = dict[str, Any]
 
@@ -61,6 +66,49 @@ def frf_document(response: FrequencyResponse, peaks: Sequence[Peak]) -> Document
     }
 
 
+def comparison_document(comparison: "LogComparison") -> Document:
+    """Document of ``chladni compare``."""
+    response = comparison.response
+    return {
+        "format": "chladni.compare/1",
+        "levels": [_level_change(one) for density in comparison.densities for one in density.overall],
+        "bands": [_level_change(one) for density in comparison.densities for one in density.bands],
+        "peaks": [_peak_change(one) for density in comparison.densities for one in density.peaks],
+        "response_peaks": [] if response is None else [_peak_change(one) for one in response.peaks],
+        "spectra": [_density_change(density, row) for density in comparison.densities for row in _rows(density)],
+        "notes": [*comparison.notes, *(note for density in comparison.densities for note in density.notes)],
+    }
+
+
+def _rows(density: DensityComparison) -> range:
+    return range(len(density.channels))
+
+
+def _density_change(density: DensityComparison, row: int) -> Document:
+    return {
+        "name": density.channels[row].name,
+        "frequency_hz": plain(density.frequency_hz),
+        "change_db": plain(density.change_db[row]),
+        "change_std_db": plain(density.change_std_db[row]),
+        "significant": plain(density.significant[row]),
+    }
+
+
+def _level_change(change: LevelChange) -> Document:
+    return {name: finite(value) if isinstance(value, float) else value for name, value in asdict(change).items()}
+
+
+def _peak_change(change: PeakChange) -> Document:
+    return {
+        "fate": change.fate,
+        "channels": list(change.channels),
+        "before_hz": None if change.before is None else change.before.frequency_hz,
+        "after_hz": None if change.after is None else change.after.frequency_hz,
+        "shift_hz": finite(change.shift_hz),
+        "shift_std_hz": finite(change.shift_std_hz),
+    }
+
+
 def _axis(estimate: PowerSpectralDensity | FrequencyResponse) -> Document:
     account = estimate.provenance
     return {
@@ -75,7 +123,6 @@ def _axis(estimate: PowerSpectralDensity | FrequencyResponse) -> Document:
 
 def _channel_density(density: PowerSpectralDensity, name: str) -> Document:
     alone = density.select([name])
-    top_hz = float(density.frequency_hz[-1])
     return {
         "name": name,
         "channel_unit": alone.channels[0].unit,
@@ -91,7 +138,7 @@ def _channel_density(density: PowerSpectralDensity, name: str) -> Document:
             }
             for peak in find_peaks(alone)
         ],
-        "rms": float(band_rms(alone, [(0.0, top_hz)]).values[0, 0]),
+        "rms": float(total_rms(alone).rms[0, 0]),
     }
 
 

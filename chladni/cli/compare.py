@@ -1,5 +1,94 @@
-"""Command."""
+"""``chladni compare``: before and after."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from chladni.cli import options
+from chladni.cli.output import Output
+from chladni.cli.words import number, with_error
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from chladni.signals.comparison import LevelChange, PeakChange
+
+UNCHANGED = "nothing that scatter doesn't explain"
 
 
-def compare() -> None:
-    """Wait."""
+def compare(
+    before: Annotated[Path, typer.Argument(metavar="BEFORE", help="An MCAP log.", show_default=False)],
+    after: Annotated[Path, typer.Argument(metavar="AFTER", help="Another of the same channels.", show_default=False)],
+    *,
+    channel: options.Channels = None,
+    reference: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PATH", help="Channel of the excitation; a force is taken if not given.", show_default=False
+        ),
+    ] = None,
+    resolution: options.Resolution = None,
+    setup: options.Setup = None,
+    stamp: options.Stamp = "auto",
+    json: options.Json = None,
+) -> None:
+    """Levels, spectra and transfer functions of two logs side by side, with what is significant."""
+    from chladni.apps.compare import compare_logs
+    from chladni.apps.documents import comparison_document
+    from chladni.io.log import open_log
+
+    out = Output(json)
+    with (
+        open_log(before, setup=setup, stamp=stamp) as old,
+        open_log(after, setup=setup, stamp=stamp) as new,
+        out.progress(f"{before.name}, {after.name}") as progress,
+    ):
+        found = compare_logs(
+            old, new, channels=channel, references=reference, resolution_hz=resolution, progress=progress
+        )
+    for density in found.densities:
+        _print_levels(out, density.overall)
+        _print_peaks(out, "Peaks of the spectra", density.peaks)
+        out.lines(density.notes)
+    if found.response is not None:
+        _print_peaks(out, "Peaks of the transfer functions", found.response.peaks)
+        out.lines(found.response.notes)
+    out.lines(found.notes)
+    out.json(comparison_document(found))
+
+
+def _print_levels(out: Output, changes: "Sequence[LevelChange]") -> None:
+    out.table(
+        "Levels (RMS)",
+        ["channel", "before", "after", "unit", "change [dB]", "significant"],
+        [
+            [
+                one.channel,
+                with_error(one.before, one.before_std),
+                with_error(one.after, one.after_std),
+                one.unit,
+                with_error(one.change_db, one.change_std_db),
+                "yes" if one.significant else "no",
+            ]
+            for one in changes
+        ],
+    )
+
+
+def _print_peaks(out: Output, title: str, changes: "Sequence[PeakChange]") -> None:
+    told = [one for one in changes if one.fate != "unchanged"]
+    if not told:
+        out.line(f"{title}: {UNCHANGED}; {len(changes)} peaks stayed.")
+        return
+    rows: list[list[Any]] = [
+        [
+            ", ".join(one.channels),
+            one.fate,
+            number(None if one.before is None else one.before.frequency_hz, digits=5),
+            number(None if one.after is None else one.after.frequency_hz, digits=5),
+            with_error(one.shift_hz, one.shift_std_hz) if one.fate == "moved" else "-",
+        ]
+        for one in told
+    ]
+    out.table(title, ["channels", "what", "before [Hz]", "after [Hz]", "shift [Hz]"], rows)

@@ -65,6 +65,12 @@ class PeakChange:
     shift_std_hz: float
 
     @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels that show the peak."""
+        peak = self.before or self.after
+        return peak.channels if peak else ()
+
+    @property
     def sigmas(self) -> float:
         """Shift over its own uncertainty; NaN unless the peak is in both measurements."""
         return abs(self.shift_hz) / self.shift_std_hz

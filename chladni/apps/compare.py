@@ -1,0 +1,141 @@
+"""Two logs, before and after: what changed that scatter doesn't explain."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from chladni.apps.analyse import excitations
+from chladni.apps.sources import Progress, Span, no_progress
+from chladni.apps.spectra import Averaging, densities, transfer
+from chladni.io.log import Log
+from chladni.signals.comparison import DensityComparison, ResponseComparison
+from chladni.signals.errors import EstimateError
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.spectral.comparison import compare_densities, compare_responses
+
+Densities = tuple[PowerSpectralDensity, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LogComparison:
+    """What changed between two logs.
+
+    Attributes
+    ----------
+    densities
+        Levels, spectra and peaks, one value for each sampling grid that both have.
+    response
+        Transfer functions to the references that both have; None when there is none.
+    notes
+        What could not be compared, and why.
+    """
+
+    densities: tuple[DensityComparison, ...]
+    response: ResponseComparison | None
+    notes: tuple[str, ...]
+
+
+def compare_logs(
+    before: Log,
+    after: Log,
+    *,
+    channels: Sequence[str] | None = None,
+    references: Sequence[str] | None = None,
+    resolution_hz: float | None = None,
+    progress: Progress = no_progress,
+) -> LogComparison:
+    """Compare the spectra and transfer functions of two logs.
+
+    Parameters
+    ----------
+    before, after
+        From `open_log`; channels are matched by name.
+    channels
+        Message paths; None for all that both have and that change at all.
+    references
+        Excitations; None takes the channels whose role is reference, else the first force.
+    resolution_hz
+        Distance of the spectral lines; None chooses the coarser of what would suit each log.
+    progress
+        Called with the share done, 0 to 1.
+
+    Raises
+    ------
+    LogError
+        When there is no such channel.
+    EstimateError
+        When the logs share no channel at the same sample rate.
+    """
+    pairs, notes = _matched_densities(before, after, channels, resolution_hz)
+    progress(0.5)
+    compared = tuple(compare_densities(old, new) for old, new in pairs)
+    moving = [channel for comparison in compared for channel in comparison.channels]
+    chosen = tuple(references or excitations(moving))
+    response, reasons = _response(before, after, channels, chosen, resolution_hz) if chosen else (None, ())
+    progress(1.0)
+    return LogComparison(densities=compared, response=response, notes=(*notes, *reasons))
+
+
+def _matched_densities(
+    before: Log, after: Log, channels: Sequence[str] | None, resolution_hz: float | None
+) -> tuple[list[tuple[PowerSpectralDensity, PowerSpectralDensity]], tuple[str, ...]]:
+    old, new = _averaged(before, channels, resolution_hz), _averaged(after, channels, resolution_hz)
+    pairs = [(one, other) for one in old for other in new if _share_rate(one, other)]
+    if not pairs:
+        raise EstimateError(
+            f"{before.path.name} and {after.path.name} share no channel at the same sample rate; nothing to compare"
+        )
+    matched = [_on_one_axis(before, after, one, other) for one, other in pairs]
+    notes = [note for pair in matched for density in pair for note in density.provenance.notes]
+    return matched, tuple(dict.fromkeys(notes))
+
+
+def _averaged(log: Log, channels: Sequence[str] | None, resolution_hz: float | None) -> Densities:
+    return densities(log, channels=channels, averaging=Averaging(resolution_hz=resolution_hz))
+
+
+def _share_rate(one: PowerSpectralDensity, other: PowerSpectralDensity) -> bool:
+    names = {channel.name for channel in other.channels}
+    common = any(channel.name in names for channel in one.channels)
+    return common and bool(np.isclose(_rate_hz(one), _rate_hz(other), rtol=1e-4))
+
+
+def _rate_hz(density: PowerSpectralDensity) -> float:
+    # Half the rate is the last line, or half a line above it when the segment is odd.
+    return 2 * float(density.frequency_hz[-1])
+
+
+def _on_one_axis(
+    before: Log, after: Log, old: PowerSpectralDensity, new: PowerSpectralDensity
+) -> tuple[PowerSpectralDensity, PowerSpectralDensity]:
+    """Average again with the coarser lines where each log alone would have got its own."""
+    if old.frequency_hz.shape == new.frequency_hz.shape:
+        return old, new
+    spacing_hz = max(float(one.frequency_hz[1] - one.frequency_hz[0]) for one in (old, new))
+    names = {channel.name for channel in new.channels}
+    common = [channel.name for channel in old.channels if channel.name in names]
+    return (_averaged(before, common, spacing_hz)[0], _averaged(after, common, spacing_hz)[0])
+
+
+def _response(
+    before: Log, after: Log, channels: Sequence[str] | None, references: Sequence[str], resolution_hz: float | None
+) -> tuple[ResponseComparison | None, tuple[str, ...]]:
+    responses = None if channels is None else [name for name in channels if name not in references]
+    if responses == []:
+        return None, ()
+    try:
+        old, new = (
+            transfer(
+                log,
+                references,
+                responses,
+                estimator="H1",
+                averaging=Averaging(resolution_hz=resolution_hz),
+                span=Span(),
+            )
+            for log in (before, after)
+        )
+        return compare_responses(old, new), (*old.provenance.notes, *new.provenance.notes)
+    except EstimateError as error:
+        return None, (f"transfer functions to {', '.join(references)} were not compared: {error}",)
