@@ -272,8 +272,8 @@ def _publish_trouble(head: TopicHead) -> str | None:
 
 def _standstill(stamps_ns: NDArray[np.int64], name: str) -> str | None:
     """Say what is wrong with stamps that don't move, or None."""
-    if not stamps_ns.size or not stamps_ns.any():
-        return f"{name} is zero"
+    if not stamps_ns.any():
+        return f"{name} stands still at zero"
     steps = np.diff(stamps_ns)
     still = int(np.count_nonzero(steps == 0))
     # Drivers that stamp several messages at once exist; beyond half of them the stamp tells nothing.

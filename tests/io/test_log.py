@@ -426,6 +426,22 @@ def test_different_rates_are_told(tmp_path: Path) -> None:
         ]
 
 
+def test_different_rates_on_one_grid(tmp_path: Path) -> None:
+    """A sine well inside both bands comes out the same from both topics, whatever their rates and offsets."""
+    times = {"/fast": np.arange(2000) * 5_000_000, "/slow": np.arange(500) * 20_000_000 + 7_000_000}
+    columns = {topic: (START_NS + at, np.sin(2 * np.pi * 3.0 * at * 1e-9)) for topic, at in times.items()}
+    write_scalars(tmp_path / "a.mcap", columns)  # type: ignore[arg-type]
+    with open_log(tmp_path / "a.mcap") as log:
+        series = log.read(["/slow.data", "/fast.data"], sample_rate_hz=40.0)
+        assert [channel.name for channel in series.channels] == ["/slow.data", "/fast.data"]
+        assert [channel.name for channel in log.read(sample_rate_hz=40.0).channels] == ["/fast.data", "/slow.data"]
+    assert series.sample_rate_hz == 40.0
+    at_s = (series.times_ns() - START_NS) * 1e-9
+    expected = np.sin(2 * np.pi * 3.0 * at_s)
+    good = slice(40, -40)
+    np.testing.assert_allclose(series.values[:, good], [expected[good]] * 2, atol=1e-3)
+
+
 def test_the_same_rate_half_a_sample_apart_is_another_grid(tmp_path: Path) -> None:
     times = START_NS + np.arange(300) * 10_000_000
     write_scalars(tmp_path / "a.mcap", {"/a": (times, range(300)), "/b": (times + 5_000_000, range(300))})
