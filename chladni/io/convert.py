@@ -110,6 +110,7 @@ def _require_paths(source: Path, target: Path, *, overwrite: bool) -> None:
             )
     if not source.is_file():
         raise LogError(f"{source}: no such file")
+    # Said before the question of overwriting, whose answer would destroy the source.
     if target.exists() and target.samefile(source):
         raise SetupError(f"{target}: is the source itself; name another target")
     if target.exists() and not overwrite:
@@ -167,6 +168,7 @@ def _cut(
         series = tuple(part.select(names) for part, names in zip(series, wanted, strict=True) if names)
     if start_s is None and end_s is None:
         return series
+    # One clock for all series of a file: seconds count from the earliest sample, as in a log.
     origin_ns = min(part.start_time_ns for part in series)
     return tuple(_window(part, origin_ns, start_s, end_s) for part in series)
 
@@ -187,6 +189,7 @@ def _write(
         from chladni.io.mcap.writer import write_mcap
 
         series, shifted = _since_1970(series)
+        # Message paths come from a log and fit messages; other names only fit the columns of a batch.
         options.setdefault("layout", "messages" if all(name.startswith("/") for name in names) else "batches")
         written = _call(write_mcap, series, {"path": target, "overwrite": overwrite} | options)
         renamed = tuple(f"{old}: called {new} in the log." for old, new in written.names.items() if old != new)
@@ -206,6 +209,7 @@ def _since_1970(series: tuple[TimeSeries, ...]) -> tuple[tuple[TimeSeries, ...],
 
 def _call(function: Callable[..., Any], first: object, options: dict[str, Any]) -> Any:
     """Call a reader or writer, with an option it doesn't have turned into one line."""
+    # Options come from the command line by name: a wrong one is an input error, not a defect of chladni.
     from inspect import signature
 
     known = [name for name in signature(function).parameters if name not in ("path", "series")]

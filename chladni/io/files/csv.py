@@ -22,9 +22,11 @@ from chladni.signals.time_series import NS_PER_S, TimeSeries
 TIME_UNITS_NS = {"s": NS_PER_S, "ms": 1_000_000, "us": 1_000, "µs": 1_000, "μs": 1_000, "ns": 1, "min": 60 * NS_PER_S}
 """Nanoseconds in each unit that a time column may have."""
 
+# Some ten MB of text at a time: the table grows, the text of it doesn't.
 _LINES_AT_ONCE = 65536
 _TITLE = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>.*)\))$")
 _TIME_NAME = re.compile(r"^(time|t|timestamp|zeit|seconds|elapsed( time)?)$", re.IGNORECASE)
+# Our own titles carry the start, so that a table keeps absolute time without a column of 19 digits.
 _TIME_FROM = re.compile(r"^(?P<unit>\w+) from (?P<start>\d+(\.\d+)?)$")
 
 
@@ -157,6 +159,7 @@ def _title(text: str, unit_below: str) -> _Title:
     match = _TITLE.match(text)
     if match is None or not match["name"] or not _is_unit(text, match):
         return _Title(name=text, unit=unit_below.strip("[]()") or "1", said=bool(unit_below))
+    # An empty pair of brackets is how some tools write "no unit".
     unit = (match["square"] if match["square"] is not None else match["round"]).strip()
     started = _TIME_FROM.match(unit)
     if started is None:
@@ -169,6 +172,7 @@ def _is_unit(text: str, match: re.Match[str]) -> bool:
     """Whether the brackets at the end of a title hold a unit: not an index of a message path, not a remark."""
     from chladni.signals.units import si_factor
 
+    # In a message path [0] is an index; a unit stands apart from it by a blank.
     if match["square"] is not None:
         return not text.startswith("/") or text[match.start("square") - 2].isspace()
     try:
@@ -203,6 +207,7 @@ def _numbers(
             table = np.loadtxt(plain, delimiter=delimiter, comments=None, quotechar='"', ndmin=2)
     except ValueError:
         return _numbers_by_cell(path, dialect, titles, lines, first_line)
+    # A stretch that is wrong throughout agrees with itself: only the head tells how many columns are right.
     if table.size and table.shape[1] != dialect.columns:
         return _numbers_by_cell(path, dialect, titles, lines, first_line)
     return table.reshape(-1, dialect.columns)
@@ -238,6 +243,7 @@ def _time_column(
     path: Path, titles: list[_Title], table: NDArray[np.float64], sample_rate_hz: float | None
 ) -> int | None:
     named = [column for column, title in enumerate(titles) if _TIME_NAME.match(title.name)]
+    # Two time bases that disagree would leave it to chance which one the spectra are on.
     if sample_rate_hz is not None:
         if named:
             raise SetupError(
@@ -258,6 +264,7 @@ def _known_rate(path: Path, sample_rate_hz: float | None) -> float:
 
 def _stamps_ns(path: Path, title: _Title, times: NDArray[np.float64], time_unit: str | None) -> NDArray[np.int64]:
     unit = time_unit or (title.unit if title.said else None)
+    # "timestamp" without a unit may be seconds, milliseconds or nanoseconds: that one is asked for.
     if unit is None and title.name.lower() in ("time", "t", "seconds"):
         unit = "s"
     if unit not in TIME_UNITS_NS:
@@ -287,6 +294,7 @@ def _quoted(text: str) -> str:
 def _lines(series: TimeSeries, present: NDArray[np.bool_], part: slice) -> Iterator[str]:
     times = series.times_s()[part].tolist()
     columns = series.values[:, part].T.tolist()
+    # Whole stretches are the rule, and take half the time without a test of every cell.
     if present[:, part].all():
         for time_s, numbers in zip(times, columns, strict=True):
             yield f"{time_s!r},{','.join(map(repr, numbers))}\r\n"

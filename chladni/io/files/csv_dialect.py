@@ -86,6 +86,7 @@ def _head(path: Path) -> tuple[str, list[str]]:
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
         whole = len(head) < _HEAD_BYTES
+    # Analysers on Windows write m/s² in cp1252, spreadsheets mark UTF-8 and UTF-16 at the start.
     encoding = next((codec for mark, codec in _MARKS.items() if head.startswith(mark)), "utf-8")
     try:
         text = head.decode(encoding, errors="strict" if whole else "ignore")
@@ -117,6 +118,7 @@ def _numeric(cells: list[str]) -> bool:
 
 def _dialect(path: Path, encoding: str, lines: list[str], place: int, delimiter: str) -> CsvDialect:
     columns = len(split_cells(lines[place], delimiter))
+    # Remarks above the titles have another number of cells; np.savetxt puts # before the titles themselves.
     titles = [
         cells
         for line in lines[:place]
@@ -127,6 +129,7 @@ def _dialect(path: Path, encoding: str, lines: list[str], place: int, delimiter:
             f"{path}: line {place + 1} has {columns} columns, but none of the lines above it has as many names; "
             "give each column a name, or take the lines out"
         )
+    # A comma is a decimal sign only where it can't be a delimiter, and a number shows it.
     samples = [cell for line in lines[place : place + 50] for cell in split_cells(line, delimiter)]
     return CsvDialect(
         encoding=encoding,

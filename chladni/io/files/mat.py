@@ -116,6 +116,7 @@ def _raw(path: Path, max_bytes: int) -> bytes:
         )
     if len(header) < HEADER_BYTES or header[126:128] not in (b"IM", b"MI"):
         raise LogError(f"{path}: is no mat file of versions 5 to 7.2")
+    # The file itself is held in memory beside its arrays.
     if path.stat().st_size > max_bytes:
         raise LogError(
             f"{path}: has {path.stat().st_size} bytes, {max_bytes} are allowed; raise max_bytes to read it"

@@ -19,11 +19,13 @@ from chladni.signals.errors import LogError
 HEADER_BYTES = 128
 
 _INT32, _UINT32, _MATRIX, _COMPRESSED = 5, 6, 14, 15
+# Types of stored numbers, after table 1-1; of texts; and of the classes that arrays have, after table 1-3.
 _STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _TEXT = {1: "latin-1", 2: "latin-1", 16: "utf-8", 17: "utf-16", 18: "utf-32", 4: "utf-16"}
 _NUMERIC = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
 _CELL, _STRUCT, _CHAR = 1, 2, 4
 _COMPLEX = 0x0800
+# Deep enough for any struct a person made; Python's own stack ends at a thousand.
 _MAX_DEPTH = 16
 
 
@@ -64,6 +66,7 @@ def _matrices(raw: memoryview, order: str, max_bytes: int) -> Iterator[memoryvie
             raise LogError(f"a variable claims {length} bytes, {len(raw) - place - 8} are there; it's cut short")
         body = raw[place + 8 : place + 8 + length]
         place += 8 + length
+        # Compressed variables follow one another without padding, unlike everything else.
         if kind == _COMPRESSED:
             unpacked = _unpacked(body, left)
             left -= len(unpacked)
@@ -75,6 +78,7 @@ def _matrices(raw: memoryview, order: str, max_bytes: int) -> Iterator[memoryvie
 def _unpacked(packed: memoryview, allowed: int) -> bytes:
     unpacker = zlib.decompressobj()
     try:
+        # One byte more than allowed is enough to know, and bounds what a bomb can take.
         content = unpacker.decompress(packed, allowed + 1)
     except zlib.error as error:
         raise LogError(f"a compressed variable is damaged ({error})") from error
@@ -168,6 +172,7 @@ class _Matrix:
     def _members(self, count: int) -> Iterator[tuple[str, Any]]:
         if self.depth >= _MAX_DEPTH:
             raise LogError(f"cells and structs lie more than {_MAX_DEPTH} deep in each other")
+        # Each member takes a tag of 8 bytes at least; a count that can't be is refused before the loop.
         if count * 8 > len(self.body) - self.place:
             raise LogError(f"a cell or struct announces {count} members, more than the file holds")
         for _ in range(count):

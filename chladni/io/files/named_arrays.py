@@ -40,6 +40,7 @@ def series_of_arrays(
     SetupError
         When nothing says the sample rate, or two things do.
     """
+    # Scalars and texts are what describes the signals; they are looked up by name below.
     signals = {name: np.asarray(array) for name, array in arrays.items() if _is_signal(array)}
     times = _times(signals)
     rate_hz = _rate(arrays, where=where, given=sample_rate_hz, has_times=times is not None)
@@ -75,6 +76,7 @@ def _rate(arrays: Mapping[str, Any], *, where: str, given: float | None, has_tim
         if given is not None:
             raise SetupError(f"{where}: has a time vector; leave the sample rate out")
         return 1.0  # not used: the times say it
+    # A rate in Hz beats an interval: 1/dt of a rounded dt is a rounded rate.
     if found is None and interval is not None and interval > 0:
         found = 1.0 / interval
     if found is not None and given is not None and not np.isclose(found, given, rtol=1e-9):
@@ -106,7 +108,9 @@ def _columns(
         if length not in array.shape:
             left_out.append(name)
             continue
+        # Whichever axis has the length of the signals is time; a square matrix is read in columns of time.
         rows = array.reshape(1, -1) if array.size == length else array if array.shape[1] == length else array.T
+        # Integers become double, which holds 53 bits of them.
         rows = rows if rows.dtype in (np.float32, np.float64) else rows.astype(np.float64)
         labels = [name] if len(rows) == 1 else [f"{name}[{index}]" for index in range(len(rows))]
         columns |= dict(zip(labels, rows, strict=True))

@@ -123,7 +123,9 @@ def _require_bounded(path: Path, archive: zipfile.ZipFile, max_bytes: int) -> No
             shape, dtype = _header(file)
         if dtype.hasobject:
             raise LogError(f"{path}: {entry.filename} holds Python objects, which are never loaded; store numbers")
+        # Python integers: a product of lengths from a file may well overflow 64 bits.
         size = dtype.itemsize * int(np.prod([int(length) for length in shape], dtype=object))
+        # The header is as untrusted as the rest: NumPy would allocate what it announces.
         if size > entry.file_size:
             raise LogError(f"{path}: {entry.filename} announces {size} bytes and holds {entry.file_size}")
         total += entry.file_size

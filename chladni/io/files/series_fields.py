@@ -52,6 +52,7 @@ def series_of_fields(fields: Mapping[str, Any], *, where: str) -> TimeSeries:
     """Make the series again; `LogError` naming the field that is missing or has the wrong shape."""
     names = _texts(fields, "names", where)
     count = len(names)
+    # The names say how many columns there are, so that axes squeezed away in MATLAB come back.
     values = _rows(fields, "values", count, where)
     if values.dtype.kind != "f":
         values = values.astype(np.float64)
@@ -60,6 +61,7 @@ def series_of_fields(fields: Mapping[str, Any], *, where: str) -> TimeSeries:
     start_time_ns = _number(fields, "start_time_ns", where)
     if not abs(float(start_time_ns)) < 2**62:
         raise LogError(f"{where}: start_time_ns {start_time_ns} isn't within 146 years of 1970")
+    # What TimeSeries refuses, such as a rate of 0, is a fault of this file and is told with its name.
     try:
         return TimeSeries(
             values=values,
@@ -106,6 +108,7 @@ def _number(fields: Mapping[str, Any], name: str, where: str) -> Any:
 
 
 def _texts(fields: Mapping[str, Any], name: str, where: str, count: int | None = None) -> list[str]:
+    # A cell is a list, an npz array of texts an array, and a lone text itself.
     content = _field(fields, name, where)
     listed = content if isinstance(content, list) else np.atleast_1d(content).tolist()
     texts = [text if isinstance(text, str) else "" for text in listed]

@@ -77,6 +77,7 @@ def read_uff(path: Path | str, *, units: Mapping[str, str] | None = None) -> Fil
     _require_known(path, names, units)
     system = next((header for header in headers if header.get("type") == _UNITS), None)
     notes = _left_out(path, headers, [number for number in functions if number not in records])
+    # Records of one measurement share their time axis; others in the same file may not.
     groups: dict[tuple[Any, ...], list[tuple[Dataset, Channel]]] = {}
     for number, name in zip(records, names, strict=True):
         dataset = _dataset(path, file, number)
@@ -155,6 +156,7 @@ def _headers(path: Path, file: Any) -> list[Dataset]:
             headers.append(dict(file.read_sets(number, header_only=True)))
         except Exception as error:  # pyuff raises nothing more specific
             raise LogError(f"{path}: dataset {number + 1} (type {kind}) can't be read: {error}") from error
+    # Pyuff builds the abscissa from the announced count, so it must be believable before the values are read.
     size = path.stat().st_size
     for number, header in enumerate(headers):
         least = _LEAST_BYTES.get(header.get("ord_data_type", 0), 0) * header.get("num_pts", 0)

@@ -27,6 +27,7 @@ FUNCTION_TYPES = {
 }
 """Names of the function types, for messages."""
 
+# Codes 1 to 3 are translations along x, y, z, and 4 to 6 rotations about them.
 _DIRECTIONS: dict[int, Vector] = {
     code + turn: AXES[axis]
     for code, axis in ((1, "+x"), (-1, "-x"), (2, "+y"), (-2, "-y"), (3, "+z"), (-3, "-z"))
@@ -42,6 +43,7 @@ _QUANTITIES = {
     15: ("Pa", -2, 1),
 }
 _TYPE_OF_UNIT = {"m": 8, "m/s": 11, "m/s^2": 12, "Pa": 15}
+# Our own fifth line: the fields of the record round rate and start to six digits.
 _EXACT = re.compile(r"^start_time_ns=(?P<start>-?\d{1,19}) sample_rate_hz=(?P<rate>\d+(\.\d+)?(e[+-]\d+)?)$")
 _EXCITATION_FORCE = 13
 _ID_LENGTH = 80
@@ -104,6 +106,7 @@ def rate_of_header(header: dict[str, Any]) -> float | None:
     increment = float(header["abscissa_inc"])
     if not (isfinite(increment) and 1e-15 < increment < 1e15):
         return None
+    # Half a unit in the last of the six digits, which is how far the true increment may be.
     half = 0.5 * 10.0 ** (floor(log10(increment)) - _INCREMENT_DIGITS + 1)
     lowest, highest = 1 / (increment + half), 1 / (increment - half)
     exact = _EXACT.match(str(header["id5"]).strip())
@@ -171,6 +174,7 @@ def header_of_channel(channel: Channel, series: TimeSeries) -> tuple[dict[str, A
 
 def _shortest(lowest: float, highest: float, middle: float) -> float:
     """Give the number between the bounds that needs the fewest decimal digits, the nearest to the middle of those."""
+    # From the coarsest step to the finest: the first that has a multiple between the bounds is the shortest.
     for digits in range(-15, 16):
         step = 10.0**-digits
         first, last = ceil(lowest / step), floor(highest / step)
@@ -184,11 +188,13 @@ def _place(point: str | None) -> tuple[str, int]:
         return "NONE", 0
     if point.isdecimal() and point.isascii() and 0 < int(point) < 10**9 and str(int(point)) == point:
         return "NONE", int(point)
+    # A fixed column of ten characters: what is longer or not ASCII would shift all fields behind it.
     entity = re.sub(r"[^ -~]", "_", point.strip())[:_ENTITY_LENGTH]
     return entity, 0
 
 
 def _direction_code(channel: Channel) -> int:
+    # The same axis has another code for a rotation; only the unit tells which it is.
     turn = channel.unit.startswith("rad") or channel.unit == "N m"
     for code in (1, -1, 2, -2, 3, -3):
         if channel.direction == _DIRECTIONS[code]:

@@ -134,6 +134,7 @@ def _require_whole(path: Path) -> None:
                 raise LogError(
                     f"{path}: the {name!r} part claims {length} bytes, {there} are there; the file is cut short"
                 )
+            # Samples without a description in front of them, or behind the announced end, are never reached.
             described |= name == b"fmt "
             if name == b"data" and described and file.tell() < end:
                 return

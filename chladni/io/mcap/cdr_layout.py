@@ -32,6 +32,7 @@ class CdrLayout:
     def encode(self, columns: Mapping[str, ArrayLike], count: int) -> NDArray[np.uint8]:
         """Give `count` messages as bytes ``[message, byte]``; `columns` holds the numbers that vary, by path."""
         paths = list(columns)
+        # One copy of the template for each message, then each number written as one strided column.
         messages = np.empty((count, len(self.template)), dtype=np.uint8)
         messages[:] = np.frombuffer(self.template, dtype=np.uint8)
         record = np.dtype(
@@ -68,6 +69,7 @@ class _Encoder:
         if member.count is None:
             self.element(member.type, path, 0)
             return
+        # A sequence has its length in front, a fixed array hasn't.
         count = member.count
         if count < 0:
             count = len(self.texts.get(path, ())) if member.type == "string" else self.lengths.get(path, 0)

@@ -19,6 +19,7 @@ KNOWN_TYPES = (
 )
 """Types that are tried in this order."""
 
+# Every message holds the whole array, measured or not.
 MAX_ELEMENTS = 4096
 """Longest array that is made up to hold a field with an index."""
 
@@ -98,6 +99,7 @@ def _defaults(type_name: str, fields: Sequence[str]) -> dict[str, float]:
 def _joint_state(topic: str, fields: Sequence[str]) -> MessageType:
     matches = [_JOINT_FIELD.match(path) for path in fields]
     pairs = [(match[1], match[2]) for match in matches if match is not None]
+    # Joints are named where the channels name them; numbered ones need names too, which viewers show.
     keys = list(dict.fromkeys(key for _, key in pairs))
     if any(key.isdigit() for key in keys):
         count = _count(topic, keys)

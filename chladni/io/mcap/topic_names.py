@@ -68,6 +68,7 @@ def _message_place(name: str) -> FieldOfTopic:
     match = _TOPIC_AND_REST.match(name)
     if match is not None and match["rest"] is not None and _FIELD_PATH.match(match["rest"]):
         return FieldOfTopic(topic=match["topic"], field=match["rest"], name=name)
+    # ROS names hold letters, digits, _ and /; anything else would be refused by the tools that read the log.
     topic = "/" + (_OUTSIDE_NAMES.sub("_", name).strip("_/") or "channel")
     return FieldOfTopic(topic=topic, field=SCALAR_FIELD, name=f"{topic}.{SCALAR_FIELD}")
 

@@ -96,6 +96,7 @@ def write_mcap(
     """
     parts = (series,) if isinstance(series, TimeSeries) else tuple(series)
     _require_writable(parts, layout=layout, block_s=block_s)
+    # Everything that can be refused is refused before a file is opened.
     places = _places(parts, layout, default_topic)
     topics = _topics(parts, places, layout, block_s)
     with atomic_write(path, overwrite=overwrite) as file:
@@ -177,6 +178,7 @@ def _register(writer: "Writer", topics: list[LogTopic]) -> list[int]:
     schemas: dict[tuple[str, str], int] = {}
     ids = []
     for topic in topics:
+        # Topics of one type share a schema, but a made type may have the name of another with other fields.
         key = (topic.schema_name, topic.schema_text)
         if key not in schemas:
             schemas[key] = writer.register_schema(key[0], "ros2msg", key[1].encode())
@@ -186,6 +188,7 @@ def _register(writer: "Writer", topics: list[LogTopic]) -> list[int]:
 
 def _in_time_order(topics: list[LogTopic]) -> Iterator[tuple[int, int, bytes]]:
     """Give ``(index of the topic, stamp, message)`` of all topics, by stamp."""
+    # Sorting the stamps alone keeps the encoded messages of a topic out of memory until their turn comes.
     stamps_ns = np.concatenate([topic.stamps_ns for topic in topics])
     owners = np.repeat(np.arange(len(topics)), [len(topic.stamps_ns) for topic in topics])
     order = np.argsort(stamps_ns, kind="stable")

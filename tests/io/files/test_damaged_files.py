@@ -30,7 +30,7 @@ def test_wrong_bytes_never_crash(tmp_path: Path, kind: str) -> None:
     raw = (tmp_path / "a").read_bytes()
     rng = np.random.default_rng(2)
     refused = []
-    for number in range(250):
+    for number in range(120):
         changed = bytearray(raw)
         for place in rng.integers(0, len(raw), 1 + number % 3):
             changed[place] = rng.choice(list(TYPICAL)) if number % 2 else rng.integers(256)
@@ -39,5 +39,5 @@ def test_wrong_bytes_never_crash(tmp_path: Path, kind: str) -> None:
             read(tmp_path / "b")
         except ChladniError as error:
             refused.append(str(error))
-    assert len(refused) > 25
+    assert len(refused) > 12
     assert not any("\n" in message for message in refused)

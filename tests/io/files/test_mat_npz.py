@@ -319,7 +319,7 @@ def test_wrong_bytes_never_crash(tmp_path: Path, kind: str) -> None:
         raw = (tmp_path / "plain.mat").read_bytes()
     rng = np.random.default_rng(1)
     refused = 0
-    for _ in range(300):
+    for _ in range(150):
         changed = bytearray(raw)
         for place in rng.integers(0, len(raw), 2):
             changed[place] = rng.integers(256)
@@ -328,4 +328,4 @@ def test_wrong_bytes_never_crash(tmp_path: Path, kind: str) -> None:
             read(tmp_path / f"b.{kind}")
         except ChladniError:
             refused += 1
-    assert refused > 50
+    assert refused > 25
