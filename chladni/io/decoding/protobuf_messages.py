@@ -141,9 +141,10 @@ class _Batch:
         """Read all messages that have the layout of the first one; tells which those are."""
         done = np.zeros(len(rows), np.bool_)
         content = self._content(int(rows[0]))
+        wanted = {names: isinstance(leaf.type, Array) for leaf in self.chosen for names in _slots_of(leaf)}
         try:
             self.message_class.FromString(content)
-            template = Template(content, descriptor, {names for leaf in self.chosen for names in _slots_of(leaf)})
+            template = Template(content, descriptor, wanted)
         except (self._decode_error(), UnfitError):
             return done
         alike = np.flatnonzero(self.messages.lengths[rows] == len(content))

@@ -60,8 +60,8 @@ class Template:
     content : bytes
         The message.
     descriptor : google.protobuf.descriptor.Descriptor
-    wanted : set of tuple of str
-        Names that lead to the fields asked for.
+    wanted : dict of tuple of str to bool
+        Names that lead to the fields asked for, and whether each is an array.
 
     Raises
     ------
@@ -69,7 +69,7 @@ class Template:
         If the message is malformed, repeats a field asked for, or has it in an unusual form.
     """
 
-    def __init__(self, content: bytes, descriptor: Descriptor, wanted: set[tuple[str, ...]]) -> None:
+    def __init__(self, content: bytes, descriptor: Descriptor, wanted: dict[tuple[str, ...], bool]) -> None:
         self.content = np.frombuffer(content, np.uint8)
         self.mask = np.zeros(len(content), np.uint8)
         self.slots: dict[tuple[str, ...], Slot] = {}
@@ -141,7 +141,7 @@ class Template:
     def _enter(self, slot: Slot, names: tuple[str, ...], wire: int, *, again: bool) -> None:
         if names not in self._wanted and names not in self._above:
             return
-        packed = wire == LENGTH and _WIRE_OF.get(slot.field.type) in _FIXED and names in self._wanted
+        packed = wire == LENGTH and _WIRE_OF.get(slot.field.type) in _FIXED and self._wanted.get(names, False)
         oneof = slot.field.containing_oneof
         if again or (oneof is not None and len(oneof.fields) > 1):
             raise UnfitError  # the last one of several counts

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from chladni.io.decoding import walk as walk_module
 from chladni.signals.errors import LogError
 from tests.io.decoding.definitions import ros2_types
-from tests.io.decoding.encoded import (
+from tests.io.decoding.encoded import SEPARATOR, (
     JOINT_STATE,
     batch_of,
     cdr,
@@ -185,6 +185,16 @@ def test_lists_beyond_the_step_limit_are_refused(monkeypatch: pytest.MonkeyPatch
     decoded = decoder_of("string[] names").columns(batch_of(messages), ["names"])
     assert decoded.bad.tolist() == [False, True, False]
     assert values_of(decoded, "names")[0] == ("abc",) * 3
+
+
+def test_elements_that_lack_only_their_padding_are_noticed() -> None:
+    text = f"Part[] parts\n{SEPARATOR}\nMSG: demo/Part\nuint8 a\nfloat64 b\n"
+    good = cdr(struct.pack("<IB3xdB7xd", 2, 1, 0.5, 2, 1.5))
+    decoder = decoder_of(text)
+    assert decoder.informed_by(batch_of([])) is decoder
+    decoded = decoder.columns(batch_of([good, good[:-4], good]), ["parts[].b"])
+    assert decoded.bad.tolist() == [False, True, False]
+    assert decoded.columns["parts[].b"].select(~decoded.bad).numbers.tolist() == [[0.5, 1.5]] * 2
 
 
 def test_a_list_whose_messages_are_all_bad_is_not_walked(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -202,6 +202,12 @@ def test_repeated_and_odd_forms_of_a_field_are_left_to_the_library() -> None:
     assert values_of(decoded, "i") == [-7, 5, -7, -7]
 
 
+def test_a_field_of_another_wire_type_counts_as_unknown() -> None:
+    decoded = PLAIN_DECODER.columns(batch_of([b"\x22\x04abcd"] * 3), ["f"])
+    assert values_of(decoded, "f") == [0.0] * 3
+    assert PLAIN_DECODER.informed_by(batch_of([])) is PLAIN_DECODER
+
+
 def test_defaults_of_proto2_are_the_librarys() -> None:
     files = descriptor_pb2.FileDescriptorSet()
     file = files.file.add(name="old.proto", package="old", syntax="proto2")
