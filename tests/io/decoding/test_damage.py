@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from chladni.io.decoding import walk as walk_module
 from chladni.signals.errors import LogError
 from tests.io.decoding.definitions import ros2_types
-from tests.io.decoding.encoded import SEPARATOR, (
+from tests.io.decoding.encoded import (
     JOINT_STATE,
+    SEPARATOR,
     batch_of,
     cdr,
     decode_all,
