@@ -109,7 +109,7 @@ def typical_peak(force: Samples, peaks: NDArray[np.int64]) -> float:
     """Typical peak: median of the stronger half, so that neither bumps below nor one overload above shift it."""
     if not peaks.size:
         return 0.0
-    whole = [peak for peak in peaks if not is_clipped(force, int(peak), 0.0)]
+    whole = [peak for peak in peaks if not is_clipped(force, int(peak))]
     heights = np.sort(force[whole or peaks])
     return float(np.median(heights[heights.size // 2 :]))
 
@@ -124,21 +124,17 @@ def _width(force: Samples, peak: int) -> int:
     return after + before - 1
 
 
-def is_clipped(x: Samples, peak: int, noise: float) -> bool:
+def is_clipped(x: Samples, peak: int) -> bool:
     """Whether the crest is cut flat: three samples or more at one height while both flanks point well above it."""
     height = x[peak]
-    tolerance = 3 * noise + 1e-9 * abs(height)
-    flat = np.abs(x - height) <= tolerance
-    first, last = peak, peak
-    while first > 0 and flat[first - 1]:
-        first -= 1
-    while last < x.size - 1 and flat[last + 1]:
-        last += 1
+    below = np.flatnonzero(np.abs(x - height) > 1e-9 * abs(height))
+    cut = int(np.searchsorted(below, peak))
+    first = int(below[cut - 1]) + 1 if cut else 0
+    last = int(below[cut]) - 1 if cut < below.size else x.size - 1
     count = last - first + 1
     if count < 3 or first < count or last + count >= x.size:
         return False
     # Slopes are taken over as many samples as are flat: a single step of a coarse converter says nothing.
     rise, fall = x[first] - x[first - count], x[last] - x[last + count]
     # A parabola that enters and leaves the flat part with these slopes would rise by this much above it.
-    hidden = min(rise, fall) / 4
-    return bool(hidden > max(CLIPPED_SHARE * height, 5 * tolerance))
+    return bool(min(rise, fall) / 4 > CLIPPED_SHARE * height)

@@ -297,7 +297,7 @@ class _Judge:
         for channel, values in zip(self.series.channels, self.series.values[:, inside], strict=True):
             x = np.nan_to_num(values.astype(np.float64))
             limited = channel.overload is not None and bool(np.any(np.abs(x) >= channel.overload))
-            if limited or any(is_clipped(side, int(np.argmax(side)), 0.0) for side in (x, -x)):
+            if limited or any(is_clipped(side, int(np.argmax(side))) for side in (x, -x)):
                 over.append(f"{channel.name} reads up to {np.abs(x).max():.4g} {channel.unit}")
         return f"overload: {', '.join(over)}" if over else ""
 

@@ -317,7 +317,7 @@ def _from_three(curve: _Curve, line: int) -> tuple[float, float, float]:
 
 
 def _tone(window: Floats, vertex: float) -> tuple[float, float, float]:
-    """Where between lines a tone lies whose lines give this vertex, the slope of that, and what its own line shows."""
+    """Where between lines a tone lies whose lines give this vertex, the slope of that, and what its line shows."""
     offsets = np.arange(-32, 33) / 64
     shown = leakage(window, np.stack([offsets + 1, offsets, offsets - 1]))
     before, top, after = np.log(shown + np.finfo(float).tiny)

@@ -59,9 +59,9 @@ def waterfall(
     Raises
     ------
     EstimateError
-        When there is no whole segment, blocks don't fit together, or `max_slices` is below 2.
+        When there is no sample, blocks don't fit together, or `max_slices` is below 2.
     SetupError
-        When an option is out of its range.
+        When an option is out of its range, or the source is shorter than a segment.
 
     Examples
     --------
@@ -83,8 +83,6 @@ def waterfall(
     shape = window_samples(window, plan.samples)
     for spectra in _segments(blocks, lead[0], plan, shape):
         slices.add(spectra)
-    if not slices.count:
-        raise EstimateError(f"there is no whole segment of {plan.samples / lead[0].sample_rate_hz:g} s; shorten it")
     return _assembled(lead[0], plan, shape, slices)
 
 

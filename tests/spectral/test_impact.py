@@ -55,7 +55,7 @@ def numbers(rejected):
     return [rejection.record for rejection in rejected]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     noise=st.sampled_from([0.0, 1e-4, 1e-3, 3e-3]),
     scale=st.sampled_from([1e-3, 1.0, 5e3]),

@@ -234,7 +234,9 @@ def test_too_few_lines_hold_no_peak():
     assert find_peaks(line_spectrum(np.array([1.0, 9.0, 1.0]), np.full(3, 0.01), "linear")) == ()
 
 
-@pytest.mark.parametrize(("level", "frequency_hz", "height"), [(1, 7.324, 0.258), (7, 7.227, 0.075)])
+@pytest.mark.parametrize(
+    ("level", "frequency_hz", "height"), [(1, 7.324, 0.258), (3, 7.275, 0.233), (5, 7.227, 0.097), (7, 7.227, 0.075)]
+)
 def test_the_torsion_of_the_aircraft_is_read_as_published(shared_data, level, frequency_hz, height):
     log = aircraft(shared_data, level)
     spectra = periodic_cross_spectra(log, find_period(log, channel="/shaker"))

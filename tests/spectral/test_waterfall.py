@@ -8,7 +8,7 @@ import pytest
 from scipy import signal
 
 from chladni.signals.channel import Channel
-from chladni.signals.errors import EstimateError
+from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.testing import assert_close
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.waterfall import waterfall
@@ -128,3 +128,5 @@ def test_too_little_is_refused():
         waterfall(noise(2000), max_slices=1)
     with pytest.raises(EstimateError, match="no sample"):
         waterfall(iter(()))
+    with pytest.raises(SetupError, match="needs segments of 10 s, but the record is 4 s long"):
+        waterfall(noise(2000), resolution_hz=0.1)
