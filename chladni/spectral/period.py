@@ -29,8 +29,12 @@ FEWEST_LINES = 8.0
 LARGEST_KURTOSIS = 30.0
 # A period belongs to the repetition when its power around the common one is at most this share.
 LARGEST_RESIDUAL = 0.25
-# Drift of the period against the sample grid over the whole record, in samples, that still counts as none.
-LARGEST_DRIFT = 0.1
+# Drift of the period against the sample grid over the whole record that still counts as none: in samples, or in
+# cycles at the signal's RMS frequency, whichever is more; it can't be measured better, and does no harm.
+LARGEST_DRIFT_SAMPLES = 0.1
+LARGEST_DRIFT_CYCLES = 0.01
+# A period nearer than this to a whole number of samples won't get whole by taking several of it.
+CLEAR_FRACTION = 0.1
 # A period is transient when its deviation from the later ones has this many times the power of their own scatter ...
 TRANSIENT_RATIO = 5.0
 # ... and more than this share of the signal's power, below which noise-free data stop mattering.
@@ -51,6 +55,8 @@ class Period:
         Length of a period as fitted, seconds.
     drift_samples
         What a period of `samples` drifts against the fitted one over all periods found.
+    whole
+        Whether that drift is negligible, so that periods can be averaged sample by sample.
     first_sample
         Sample of the series at which averaging starts, transient periods left out.
     count
@@ -65,15 +71,11 @@ class Period:
     samples: int
     period_s: float
     drift_samples: float
+    whole: bool
     first_sample: int
     count: int
     dropped: int
     noise_share: float
-
-    @property
-    def whole(self) -> bool:
-        """Whether it's a whole number of samples, so that periods can be averaged sample by sample."""
-        return abs(self.drift_samples) <= LARGEST_DRIFT
 
 
 def find_period(series: TimeSeries, *, channel: str) -> Period | None:
@@ -124,30 +126,33 @@ def find_period(series: TimeSeries, *, channel: str) -> Period | None:
     for lag in _candidates(correlation):
         length = _refine(correlation, lag)
         candidate = _period(series, row, (first, last), length)
-        if candidate is not None and candidate.whole:
+        if candidate is None:
+            continue
+        if candidate.whole:
             return candidate
         found = found or candidate
+        if abs(found.period_s * series.sample_rate_hz - found.samples) < CLEAR_FRACTION:
+            return found
     return found
 
 
 def _period(series: TimeSeries, row: int, active: Run, length: float) -> Period | None:
-    samples = round(length)
-    first, count = active[0], (active[1] - active[0]) // samples
-    if count < FEWEST_PERIODS:
+    samples, first = round(length), active[0]
+    periods = _cut(series, active, length)
+    begin, end = _repeating(periods[row])
+    if end - begin < FEWEST_PERIODS:
         return None
-    repeating = _repeating(_cut(series, first, count, samples)[row])
-    if repeating[1] - repeating[0] < FEWEST_PERIODS:
-        return None
-    first, count = first + repeating[0] * samples, repeating[1] - repeating[0]
-    periods = _cut(series, first, count, samples)
+    periods, first = periods[:, begin:end], first + round(begin * length)
     if not _is_broadband(periods[row].mean(axis=0)):
         return None
-    dropped = _transients(periods)
+    count, dropped = end - begin, _transients(periods)
+    drift = (length - samples) * count
     return Period(
         channel=series.channels[row].name,
         samples=samples,
         period_s=length / series.sample_rate_hz,
-        drift_samples=(length - samples) * count,
+        drift_samples=drift,
+        whole=abs(drift) <= _tolerated_drift(periods[row].mean(axis=0)),
         first_sample=first + dropped * samples,
         count=count - dropped,
         dropped=dropped,
@@ -158,12 +163,12 @@ def _period(series: TimeSeries, row: int, active: Run, length: float) -> Period 
 def _active(series: TimeSeries, row: int) -> Run:
     """Give the longest valid run without its quiet ends."""
     first, last = max(valid_runs(series), key=lambda run: run[1] - run[0], default=(0, 0))
-    size = max(1, (last - first) // ACTIVITY_BLOCKS)
+    size = max(SHORTEST_PERIOD, (last - first) // ACTIVITY_BLOCKS)
     blocks = (last - first) // size
     if blocks == 0:
         return first, last
     run = np.asarray(series.values[row, first : first + blocks * size], dtype=np.float64)
-    rms = (run - run.mean()).reshape(blocks, size).std(axis=1)
+    rms = np.sqrt(np.mean((run - np.median(run)).reshape(blocks, size) ** 2, axis=1))
     loud = np.flatnonzero(rms > QUIET * rms.max())
     if loud.size == 0:
         return first, first
@@ -219,14 +224,21 @@ def _parabola(three: NDArray[np.floating[Any]]) -> float:
     return 0.0 if curvature >= 0 else float(np.clip((three[0] - three[2]) / (2 * curvature), -0.5, 0.5))
 
 
-def _cut(series: TimeSeries, first: int, count: int, samples: int) -> Floats:
-    values = np.asarray(series.values[:, first : first + count * samples], dtype=np.float64)
-    return values.reshape(len(series.channels), count, samples)
+def _cut(series: TimeSeries, active: Run, length: float) -> Floats:
+    """Cut ``[channel, period, sample]``; a period between samples begins at the sample nearest to its begin."""
+    samples = round(length)
+    count = int((active[1] - active[0] - samples) / length + 1e-6) + 1 if active[1] - active[0] >= samples else 0
+    starts = active[0] + np.rint(np.arange(count) * length).astype(np.intp)
+    starts = starts[starts + samples <= active[1]]
+    index = starts[:, np.newaxis] + np.arange(samples)
+    return np.asarray(series.values[:, index], dtype=np.float64)
 
 
 def _repeating(periods: Floats) -> Run:
     """Give the longest run of periods that agree with their median."""
     periods = periods - periods.mean()
+    if len(periods) < FEWEST_PERIODS:
+        return 0, 0
     common = np.median(periods, axis=0)
     residual = np.mean((periods - common) ** 2, axis=1)
     agree = np.concatenate([[False], residual <= LARGEST_RESIDUAL * np.mean(common**2), [False]])
@@ -241,6 +253,12 @@ def _is_broadband(period: Floats) -> bool:
     effective_lines = lines.sum() ** 2 / np.sum(lines**2)
     kurtosis = np.mean(period**4) / np.mean(period**2) ** 2
     return bool(effective_lines >= FEWEST_LINES and kurtosis <= LARGEST_KURTOSIS)
+
+
+def _tolerated_drift(period: Floats) -> float:
+    lines = np.abs(fft.rfft(period - period.mean())) ** 2
+    cycles_per_sample = np.sqrt(np.sum((np.arange(lines.size) / period.size) ** 2 * lines) / lines.sum())
+    return max(LARGEST_DRIFT_SAMPLES, LARGEST_DRIFT_CYCLES / float(cycles_per_sample))
 
 
 def _transients(periods: Floats) -> int:

@@ -115,14 +115,12 @@ def _spectra(first: TimeSeries, period: Period, scatter: _PeriodScatter) -> Cros
     samples, rate, count = period.samples, first.sample_rate_hz, scatter.count
     scale = one_sided_weights(samples) / (rate * samples)
     products = scatter.products
-    # The sum is Hermitian but for rounding; the lower triangle is made exactly so.
-    for row in range(len(products)):
-        products[row, row].imag = 0.0
-        products[row + 1 :, row] = products[row, row + 1 :].conj()
     products *= scale
     density = scatter.mean.conj()[:, np.newaxis] * scatter.mean[np.newaxis] * scale
     density += products / count
     products /= count - 1
+    _make_hermitian(density)
+    _make_hermitian(products)
     return CrossSpectra(
         frequency_hz=line_frequencies_hz(samples, rate),
         density=density,
@@ -140,6 +138,13 @@ def _spectra(first: TimeSeries, period: Period, scatter: _PeriodScatter) -> Cros
             notes=_notes(period, scatter),
         ),
     )
+
+
+def _make_hermitian(matrix: NDArray[np.complex128]) -> None:
+    # Sums of rounded products are Hermitian but for their last digits.
+    for row in range(len(matrix)):
+        matrix[row, row].imag = 0.0
+        matrix[row + 1 :, row] = matrix[row, row + 1 :].conj()
 
 
 def _notes(period: Period, scatter: _PeriodScatter) -> tuple[str, ...]:
