@@ -1,5 +1,6 @@
 """Decompression of chunks that never yields more than was declared and allowed."""
 
+import contextlib
 from collections.abc import Callable, Iterator
 
 # zstd hands out whole blocks; what a failing step had decoded before is lost with the step.
@@ -77,14 +78,25 @@ def _plain_steps(data: Compressed) -> Iterator[Compressed]:
     yield data
 
 
-def _zstd(data: Compressed, size: int) -> bytes:
+def _zstd(data: Compressed, size: int) -> Compressed:
+    import zstandard
+
+    # The library allocates what a frame's own header claims, so that claim has to be the checked one; -1
+    # stands for none, as streaming writers leave it.
+    if _claimed_zstd_size(data) in (size, -1) and _believable(len(data), size):
+        with contextlib.suppress(zstandard.ZstdError):
+            result = zstandard.ZstdDecompressor().decompress(data, max_output_size=max(size, 1))
+            if len(result) == size:
+                return result
+    # More than one frame, or something is wrong: step by step it shows what.
+    return decompress_start(data, "zstd", size=size)
+
+
+def _claimed_zstd_size(data: Compressed) -> int:
     import zstandard
 
     try:
-        # Without this check the library allocates whatever the frame's own header claims.
-        if zstandard.frame_content_size(data) == size and _believable(len(data), size):
-            return zstandard.ZstdDecompressor().decompress(data)
-        return decompress_start(data, "zstd", size=size)
+        return int(zstandard.frame_content_size(data))
     except zstandard.ZstdError as error:
         raise DecompressError(f"zstd: {error}") from error
 

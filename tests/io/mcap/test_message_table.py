@@ -37,7 +37,7 @@ def assert_same(one: MessageTable, other: MessageTable) -> None:
 MESSAGES = st.lists(st.tuples(st.integers(1, 4), st.integers(0, 60), st.booleans()), min_size=1, max_size=80)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=60)
 @given(chosen=MESSAGES)
 def test_index_and_walk_agree(chosen: list[tuple[int, int, bool]]) -> None:
     content = b""
