@@ -231,8 +231,9 @@ def _split(
     if column.counts is None and column.numbers.ndim == 2 and not bad.any() and np.all(counts >= 0):
         shape = (len(bad), width, -1) if layout.order == "channel" else (len(bad), -1, width)
         axes = (1, 0, 2) if layout.order == "channel" else (2, 0, 1)
-        cube = flat.reshape(shape).transpose(axes)[list(wanted)]
-        return cube.reshape(len(wanted), -1), counts
+        cube = flat.reshape(shape).transpose(axes)
+        chosen = cube if list(wanted) == list(range(width)) else cube[list(wanted)]
+        return chosen.reshape(len(wanted), counts.sum()), counts
     usable = np.where(bad, 0, np.maximum(counts, 0))
     starts = np.repeat(np.cumsum(elements) - elements, usable)
     within = np.arange(usable.sum()) - np.repeat(np.cumsum(usable) - usable, usable)
@@ -241,7 +242,11 @@ def _split(
         flat[starts + (row * per_message + within if layout.order == "channel" else within * width + row)]
         for row in wanted
     ]
-    return np.stack(rows), counts
+    return _stacked(rows, flat, int(usable.sum())), counts
+
+
+def _stacked(rows: list[NDArray[Any]], like: NDArray[Any], samples: int) -> NDArray[Any]:
+    return np.stack(rows) if rows else np.empty((0, samples), like.dtype)
 
 
 def _side_by_side(
@@ -256,9 +261,11 @@ def _side_by_side(
     counts = np.where((lengths == lengths[0]).all(axis=0) & (counts >= 0) & (counts <= lengths[0]), counts, -1)
     usable = np.where(bad, 0, np.maximum(counts, 0))
     within = np.arange(usable.sum()) - np.repeat(np.cumsum(usable) - usable, usable)
-    positions = np.repeat(np.cumsum(lengths[0]) - lengths[0], usable) + within
-    rows = [every[row][0][positions] if positions.size else np.zeros(0) for row in wanted]
-    return np.stack(rows), counts
+    rows = []
+    for flat, elements in (every[row] for row in wanted):
+        # Each column has its own starts: in a message that is bad they differ in length.
+        rows.append(flat[np.repeat(np.cumsum(elements) - elements, usable) + within])
+    return _stacked(rows, every[0][0], within.size), counts
 
 
 def _scaled(

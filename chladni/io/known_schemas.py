@@ -78,7 +78,10 @@ def message_type(schema_name: str) -> str:
     >>> message_type("sensor_msgs/msg/Imu")
     'sensor_msgs/Imu'
     """
-    return schema_name.replace("/msg/", "/").replace("::msg::", "/").replace("msg::dds_::", "")
+    if "::" in schema_name:
+        # DDS puts its own namespace around the type and an underscore behind it.
+        schema_name = schema_name.replace("::dds_::", "::").removesuffix("_").replace("::", "/")
+    return schema_name.replace("/msg/", "/")
 
 
 def known_unit(schema_name: str, leaf: str) -> str | None:

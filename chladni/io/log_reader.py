@@ -112,10 +112,14 @@ class LogReader:
     lost: LostMessages
     required: bool
 
-    def pieces(self) -> Iterator[tuple[int, Piece]]:
+    def pieces(self, *, with_values: bool = True) -> Iterator[tuple[int, Piece]]:
         """What each batch of messages holds of each stream, inside the window, in the order of the file."""
         found = read_pieces(
-            self.container, self.streams, start_ns=self.window.log_start_ns, end_ns=self.window.log_end_ns
+            self.container,
+            self.streams,
+            start_ns=self.window.log_start_ns,
+            end_ns=self.window.log_end_ns,
+            with_values=with_values,
         )
         lost = LostMessages()
         try:
@@ -134,7 +138,7 @@ class LogReader:
     def first_pass(self) -> "FirstPass":
         """Read stamps alone and fit the time bases: all that must be known before blocks can be given."""
         sizes: list[tuple[int, int]] = []
-        gatherings = gather(self.streams, _sized(self.pieces(), sizes), with_values=False)
+        gatherings = gather(self.streams, _sized(self.pieces(with_values=False), sizes), with_values=False)
         return FirstPass(
             placements=tuple(one.place() for one in gatherings),
             sizes=tuple(sizes),

@@ -114,16 +114,20 @@ class Stream:
         """Leaves that the stamps and the filters need."""
         return tuple(dict.fromkeys((*self.choice.leaves, *(one.leaf for one in self.filters))))
 
-    def piece(self, batch: MessageBatch, decoded: Decoded) -> Piece:
-        """Take the stream's samples out of a batch of its topic."""
+    def piece(self, batch: MessageBatch, decoded: Decoded, *, with_values: bool = True) -> Piece:
+        """Take the stream's samples out of a batch of its topic.
+
+        Without values the piece has the same messages, counts and type of samples, but no rows.
+        """
         stamps_ns, usable = self._stamps_ns(batch, decoded)
         lost = dict(decoded.reasons)
         unstamped = int(np.count_nonzero(~usable & ~decoded.bad))
         if unstamped:
             lost[f"stamp {self.choice.own.name if self.choice.own else ''} is no usable number"] = unstamped
         if self.layout is not None:
-            return self._blocks(decoded, stamps_ns, usable, lost)
-        return self._single_samples(decoded, stamps_ns, kept_messages(decoded, self.filters) & usable, lost)
+            return self._blocks(decoded, stamps_ns, usable, lost, with_values=with_values)
+        piece = self._single_samples(decoded, stamps_ns, kept_messages(decoded, self.filters) & usable, lost)
+        return piece if with_values else replace(piece, values=piece.values[:0])
 
     def without(self, messages: int, reason: str) -> Piece:
         """Give an empty piece that says why `messages` of them are not in it."""
@@ -160,18 +164,25 @@ class Stream:
         )
 
     def _blocks(
-        self, decoded: Decoded, stamps_ns: NDArray[np.int64], usable: NDArray[np.bool_], lost: dict[str, int]
+        self,
+        decoded: Decoded,
+        stamps_ns: NDArray[np.int64],
+        usable: NDArray[np.bool_],
+        lost: dict[str, int],
+        *,
+        with_values: bool,
     ) -> Piece:
         if self.layout is None:
             raise AssertionError("only batch messages hold blocks")
         part = replace(decoded, bad=~usable)
-        wanted = [source.column for source in self.sources if source.column is not None]
+        sources = self.sources if with_values else ()
+        wanted = [source.column for source in sources if source.column is not None]
         expanded = expand(self.layout, part, self.names, wanted)
         contradictory = int(np.count_nonzero(expanded.bad & usable))
         if contradictory:
             lost["number of samples, names of columns or rate contradict the other messages"] = contradictory
         keep = ~expanded.bad & (expanded.counts > 0)
-        factors = np.array([source.factor for source in self.sources])[:, None]
+        factors = np.array([source.factor for source in sources])[:, None]
         if np.any(factors != 1.0):
             values = expanded.values * factors.astype(expanded.values.dtype)
         else:
@@ -202,6 +213,7 @@ def read_pieces(
     *,
     start_ns: int | None = None,
     end_ns: int | None = None,
+    with_values: bool = True,
 ) -> Iterator[tuple[int, Piece]]:
     """Read streams in the order of the file.
 
@@ -213,6 +225,8 @@ def read_pieces(
         What to read; streams of the same topic are decoded together.
     start_ns, end_ns
         Only messages with ``start_ns <= log time < end_ns``.
+    with_values
+        Whether samples are wanted, or only their times.
 
     Yields
     ------
@@ -235,7 +249,7 @@ def read_pieces(
             yield from ((index, streams[index].without(len(batch), wanted)) for index in indices)
             continue
         decoded = streams[indices[0]].topic.decode(batch, wanted)
-        yield from ((index, streams[index].piece(batch, decoded)) for index in indices)
+        yield from ((index, streams[index].piece(batch, decoded, with_values=with_values)) for index in indices)
 
 
 def _leaves(channel_id: int, streams: Sequence[Stream]) -> tuple[str, ...] | str:
