@@ -23,6 +23,7 @@ ACTIVITY_BLOCKS = 256
 LEAST_CORRELATION = 0.8
 MAIN_LOBE_FOOT = 0.5
 MOST_CANDIDATES = 32
+PARABOLA_ERROR = 5e-3
 # Fewer effective lines are tones (a sine, a stroke and its harmonics), better served by a window.
 FEWEST_LINES = 8.0
 # A kurtosis above is a train of hits, whose force and response want windows of their own.
@@ -193,15 +194,17 @@ def _candidates(correlation: Floats) -> list[int]:
     if below.size == 0:
         return []
     lobe = max(int(below[0]), SHORTEST_PERIOD)
-    tail = correlation[lobe:-1]
-    highest = tail.max(initial=0.0)
+    tail, before, after = correlation[lobe:-1], correlation[lobe - 1 : -2], correlation[lobe + 1 :]
+    lags = lobe + np.flatnonzero((tail > MAIN_LOBE_FOOT) & (tail >= before) & (tail > after))
+    # A maximum between samples is higher than the sample next to it.
+    heights = [_height(correlation[lag - 1 : lag + 2]) for lag in lags]
+    highest = max(heights, default=0.0)
     if highest < LEAST_CORRELATION:
         return []
-    # Other maxima of a narrow-band signal stay below the one at its period; noise lowers all of them alike.
-    level = max(LEAST_CORRELATION, 1 - 3 * (1 - highest) - 1e-6)
-    peaks = (tail > level) & (tail >= correlation[lobe - 1 : -2]) & (tail > correlation[lobe + 1 :])
-    lags: list[int] = (np.flatnonzero(peaks) + lobe).tolist()
-    return lags[:MOST_CANDIDATES]
+    # Other maxima of a narrow-band signal stay below the one at its period; noise lowers all of them alike, and the
+    # parabola through three samples is right to some thousandths.
+    level = max(LEAST_CORRELATION, 1 - 3 * (1 - min(highest, 1.0)) - PARABOLA_ERROR)
+    return [int(lag) for lag, height in zip(lags, heights, strict=True) if height > level][:MOST_CANDIDATES]
 
 
 def _refine(correlation: Floats, lag: int) -> float:
@@ -224,11 +227,14 @@ def _parabola(three: NDArray[np.floating[Any]]) -> float:
     return 0.0 if curvature >= 0 else float(np.clip((three[0] - three[2]) / (2 * curvature), -0.5, 0.5))
 
 
+def _height(three: NDArray[np.floating[Any]]) -> float:
+    return float(three[1] - (three[0] - three[2]) * _parabola(three) / 4)
+
+
 def _cut(series: TimeSeries, active: Run, length: float) -> Floats:
     """Cut ``[channel, period, sample]``; a period between samples begins at the sample nearest to its begin."""
     samples = round(length)
-    count = int((active[1] - active[0] - samples) / length + 1e-6) + 1 if active[1] - active[0] >= samples else 0
-    starts = active[0] + np.rint(np.arange(count) * length).astype(np.intp)
+    starts = active[0] + np.rint(np.arange((active[1] - active[0]) / length + 1) * length).astype(np.intp)
     starts = starts[starts + samples <= active[1]]
     index = starts[:, np.newaxis] + np.arange(samples)
     return np.asarray(series.values[:, index], dtype=np.float64)
