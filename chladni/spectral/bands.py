@@ -89,6 +89,7 @@ def band_rms(density: PowerSpectralDensity, *, bands_hz: Sequence[tuple[float, f
     edges = np.asarray(bands_hz, dtype=np.float64).reshape(-1, 2)
     if not np.all(np.isfinite(edges)) or np.any(edges < 0) or np.any(edges[:, 1] <= edges[:, 0]):
         raise EstimateError(f"bands {list(bands_hz)} must be pairs of rising frequencies, 0 or above")
+    # Shares of cells, not of lines: otherwise a band would gain or lose a whole line as its edge passes the middle.
     cells = _cell_edges(density.frequency_hz)
     share = _shares(cells, edges)
     spacing_hz = _spacings(density.frequency_hz)
@@ -98,6 +99,7 @@ def band_rms(density: PowerSpectralDensity, *, bands_hz: Sequence[tuple[float, f
     )
     uncovered = (edges[:, 0] < cells[0] - 1e-9) | (edges[:, 1] > cells[-1] + _tail(density.frequency_hz))
     rms = np.where(uncovered, np.nan, np.sqrt(power))
+    # d(sqrt P) = dP / (2 sqrt P); an empty band has no error either.
     half = 2 * np.sqrt(np.maximum(power, np.finfo(float).tiny))
     return BandLevels(
         low_hz=edges[:, 0],
@@ -129,6 +131,7 @@ def _cell_edges(frequency_hz: NDArray[np.float64]) -> NDArray[np.float64]:
     """Edges of the cells over which the power of each line is spread."""
     spacing_hz = _spacings(frequency_hz)
     middles = (frequency_hz[1:] + frequency_hz[:-1]) / 2
+    # The line at 0 Hz holds no mirror image, so that its power lies in half a spacing.
     low = 0.0 if frequency_hz[0] < spacing_hz[0] / 2 else frequency_hz[0] - spacing_hz[0] / 2
     # The last line may be the Nyquist frequency, beyond which there is nothing: its power lies below it.
     return np.concatenate([[low], middles, [frequency_hz[-1]]])

@@ -64,6 +64,7 @@ def compare_densities(
     _require_same_lines(before.frequency_hz, after.frequency_hz)
     first, second = _selected(before, names), _selected(after, names)
     surprise = _ratio_surprise(first.values, first.std, second.values, second.std)
+    # All channels in one family: the share of false ones is promised for the whole comparison.
     significant = _discoveries(surprise, false_discovery)
     overall = _level_changes(total_rms(first), total_rms(second), false_discovery)
     bands, band_notes = _band_changes(first, second, false_discovery)
@@ -150,6 +151,7 @@ def _ratio_surprise(before: Floats, before_std: Floats, after: Floats, after_std
         for value, std in ((before, before_std), (after, after_std))
     ]
     ratio = np.divide(after, before, out=np.ones(before.shape), where=usable)
+    # Both tails are computed as such: 1 - fdtr would end at 1e-16, and ranks need the small ones.
     below = scipy.special.fdtr(freedom[1], freedom[0], ratio)
     above = scipy.special.fdtrc(freedom[1], freedom[0], ratio)
     return np.where(usable, np.minimum(2 * np.minimum(below, above), 1.0), 1.0)
@@ -159,6 +161,7 @@ def _difference_surprise(before: FrequencyResponse, after: FrequencyResponse) ->
     variance = before.std**2 + after.std**2
     distance = np.abs(after.values - before.values) ** 2
     statistic = np.divide(distance, 2 * variance, out=np.zeros(distance.shape), where=(variance > 0) & (distance > 0))
+    # The smaller number of averages has the heavier tails, so this errs towards silence.
     averages = min(before.provenance.effective_averages, after.provenance.effective_averages)
     freedom = max(2 * (averages - len(before.references)), 1.0)
     # The survival function of F(2, d) in closed form.
@@ -212,6 +215,7 @@ def _band_changes(
     try:
         levels = third_octave_levels(before), third_octave_levels(after)
     except EstimateError as error:
+        # A coarse spectrum holds no third octave; its lines and its overall level can be compared all the same.
         return (), (f"levels in bands are not compared: {error}",)
     return _level_changes(*levels, false_discovery), ()
 
@@ -221,6 +225,7 @@ def _density_peaks(
 ) -> tuple[PeakChange, ...]:
     changes: list[PeakChange] = []
     for row, channel in enumerate(before.channels):
+        # One channel at a time, since a peak shared with others carries the frequency of the strongest one.
         old, new = (find_peaks(_selected(d, [channel.name]), count=PEAKS_A_CHANNEL) for d in (before, after))
         changes += _fates(old, new, before.frequency_hz, significant[row])
     return tuple(changes)
@@ -240,6 +245,7 @@ def _response_peaks(before: FrequencyResponse, after: FrequencyResponse, signifi
 def _fates(old: Sequence[Peak], new: Sequence[Peak], frequency_hz: Floats, significant: Mask) -> list[PeakChange]:
     """Pair peaks, the nearest first; those without a partner count only where their lines changed."""
     reach_hz = SAME_PEAK_LINES * float(np.median(np.diff(frequency_hz)))
+    # The nearest pair first: a greedy choice, but peaks further apart than their shifts can't be mixed up by it.
     pairs = sorted(
         (abs(late.frequency_hz - early.frequency_hz), i, k)
         for i, early in enumerate(old)

@@ -31,6 +31,7 @@ def form(response: FrequencyResponse) -> Form:
     Acceleration per force is accelerance, velocity per force mobility, displacement per force receptance
     (ISO 7626-1:2011); rotations follow their time derivative in the same way.
     """
+    # The reference doesn't matter: a force, a voltage to a shaker and a base motion leave the same factor.
     orders = {_motion_order(channel) for channel in response.responses}
     if len(orders) != 1:
         units = ", ".join(sorted({channel.unit for channel in response.responses}))
@@ -69,6 +70,7 @@ def convert_form(response: FrequencyResponse, form: Form) -> FrequencyResponse:
     if not any(steps):
         return response
     factors = np.stack([_power_of_j_omega(response.frequency_hz, step) for step in steps])[:, np.newaxis, :]
+    # A mean displacement leaves no trace in an acceleration: no number would be right at 0 Hz.
     undefined = np.isnan(factors)
     converted = replace(
         response,

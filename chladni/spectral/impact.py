@@ -1,7 +1,5 @@
 """Impact tests: hits found in the force, judged one by one, and averaged."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
@@ -16,79 +14,18 @@ from chladni.spectral.force_pulses import (
     NOISE_SIGMAS,
     Pulses,
     find_pulses,
-    is_clipped,
     typical_peak,
 )
+from chladni.spectral.hits import Hit, Impacts, Judge, Rejection
 
-# At equal noise, a hit of a quarter of the usual force has a sixteenth of the usual ratio of signal to noise power.
-WEAK_SHARE = 0.25
 # Widths of the pulse after the trigger during which the force window is one, and then falls to zero.
 FORCE_WINDOW_PULSES = 4
-# A softer blow lasts longer (Hertz: as its speed to the power of -1/5); what's much shorter than the first is the
-# ringing of an anti-alias filter.
-LIKE_THE_FIRST = 0.75
 # A response whose last tenth still holds this share of its energy has not died away: its record is cut off.
 STILL_RINGING = 1e-3
 
+__all__ = ["Hit", "Impacts", "Rejection", "find_impacts", "impact_cross_spectra", "is_impact_test"]
+
 Samples = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Hit:
-    """One hit of the hammer.
-
-    Attributes
-    ----------
-    record
-        Its number in the log, the first hit is 1; rejected hits count too.
-    time_s
-        When the force crosses the trigger level, seconds since the first sample.
-    peak
-        Largest force, in the channel's unit, with its sign.
-    """
-
-    record: int
-    time_s: float
-    peak: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rejection:
-    """A hit that was left out, and why; `record` and `time_s` as in `Hit`."""
-
-    record: int
-    time_s: float
-    reason: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Impacts:
-    """The hits of an impact test.
-
-    Attributes
-    ----------
-    force
-        Name of the force channel.
-    trigger_level
-        Force at which a hit begins, in the channel's unit, with the sign of the pulses.
-    pretrigger_s, record_s
-        A record begins `pretrigger_s` before the trigger and lasts `record_s`.
-    pulse_s
-        Typical width of the force pulse at half its height.
-    accepted, rejected
-        In order of time.
-    notes
-        Sentences of advice.
-    """
-
-    force: str
-    trigger_level: float
-    pretrigger_s: float
-    record_s: float
-    pulse_s: float
-    accepted: tuple[Hit, ...]
-    rejected: tuple[Rejection, ...]
-    notes: tuple[str, ...] = ()
 
 
 def is_impact_test(series: TimeSeries, channel: str) -> bool:
@@ -111,6 +48,7 @@ def is_impact_test(series: TimeSeries, channel: str) -> bool:
     measured = np.isfinite(alone.values) if alone.valid is None else alone.valid & np.isfinite(alone.values)
     if not measured.any():
         return False
+    # Without a level: the question is whether the channel has pulses of its own accord.
     pulses = find_pulses(alone, channel, level=None)
     if not pulses.starts.size:
         return False
@@ -171,6 +109,7 @@ def find_impacts(
         )
     rate_hz = series.sample_rate_hz
     pulse = int(np.median(pulses.widths))
+    # The pulse crosses the trigger at a tenth of its height, less than one width after it began.
     before = 2 * pulse if pretrigger_s is None else round(pretrigger_s * rate_hz)
     length = (
         _record_length(pulses.starts, before, pulses.force.size) if record_s is None else round(record_s * rate_hz)
@@ -179,7 +118,7 @@ def find_impacts(
         raise EstimateError(
             f"a record of {length / rate_hz:g} s can't hold {before / rate_hz:g} s of pretrigger; make it longer"
         )
-    judge = _Judge(series=series, pulses=pulses, before=before, length=length, double_hit_share=double_hit_share)
+    judge = Judge(series=series, pulses=pulses, before=before, length=length, double_hit_share=double_hit_share)
     accepted, rejected = judge.verdicts()
     return Impacts(
         force=force,
@@ -237,6 +176,7 @@ def impact_cross_spectra(
     length = round(impacts.record_s * rate_hz)
     windows = _windows(series, impacts, length, force_window=force_window, decay_per_s=decay_per_s)
     total: NDArray[np.complex128] = np.zeros((*2 * (len(series.channels),), length // 2 + 1), dtype=np.complex128)
+    # One hit at a time: the memory stays that of one record, however many hits there are.
     for hit in impacts.accepted:
         spectrum = scipy.fft.rfft(_record(series, impacts, hit, length) * windows) / rate_hz
         total += spectrum.conj()[:, np.newaxis] * spectrum
@@ -252,92 +192,10 @@ def impact_cross_spectra(
 def _record_length(starts: NDArray[np.int64], before: int, samples: int) -> int:
     """Longest record that fits between hits; hits that follow each other unusually fast are judged, not obeyed."""
     spaces = np.diff(np.append(starts, samples + before))
+    # The shortest space would obey one hasty double swing, the usual one may be a sample longer than the next.
     usual = float(np.median(spaces))
     longest = int(spaces[spaces >= 0.8 * usual].min())
     return scipy.fft.prev_fast_len(longest, real=True)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Judge:
-    """Looks at one hit after the other and collects every reason against it."""
-
-    series: TimeSeries
-    pulses: Pulses
-    before: int
-    length: int
-    double_hit_share: float
-
-    def verdicts(self) -> tuple[tuple[Hit, ...], tuple[Rejection, ...]]:
-        accepted, rejected = [], []
-        for at, start in enumerate(self.pulses.starts):
-            record, time_s = at + 1, float(start / self.series.sample_rate_hz)
-            reasons = self.reasons(at)
-            if reasons:
-                rejected.append(Rejection(record=record, time_s=time_s, reason="; ".join(reasons)))
-            else:
-                height = self.pulses.sign * self.pulses.force[self.pulses.peaks[at]]
-                accepted.append(Hit(record=record, time_s=time_s, peak=float(height)))
-        return tuple(accepted), tuple(rejected)
-
-    def reasons(self, at: int) -> list[str]:
-        first = int(self.pulses.starts[at]) - self.before
-        inside = slice(max(first, 0), min(first + self.length, self.pulses.force.size))
-        found = [
-            self.overload(inside),
-            self.double_hit(at, inside),
-            self.weak(at),
-            self.ringing(at),
-            self.missing(inside),
-            self.beyond(first),
-        ]
-        return [reason for reason in found if reason]
-
-    def overload(self, inside: slice) -> str:
-        over = []
-        for channel, values in zip(self.series.channels, self.series.values[:, inside], strict=True):
-            x = np.nan_to_num(values.astype(np.float64))
-            limited = channel.overload is not None and bool(np.any(np.abs(x) >= channel.overload))
-            if limited or any(is_clipped(side, int(np.argmax(side))) for side in (x, -x)):
-                over.append(f"{channel.name} reads up to {np.abs(x).max():.4g} {channel.unit}")
-        return f"overload: {', '.join(over)}" if over else ""
-
-    def double_hit(self, at: int, inside: slice) -> str:
-        from scipy.signal import find_peaks
-
-        force, peak = self.pulses.force, int(self.pulses.peaks[at])
-        rise = max(self.double_hit_share * float(force[peak]), NOISE_SIGMAS * self.pulses.noise)
-        tops, _ = find_peaks(force[inside], prominence=rise, width=LIKE_THE_FIRST * self.pulses.widths[at])
-        others = [top for top in (tops + inside.start).tolist() if abs(top - peak) > self.pulses.widths[at] / 2]
-        if not others:
-            return ""
-        second = max(others, key=lambda top: float(force[top]))
-        unit = self.pulses.unit
-        return (
-            f"double hit: a second pulse of {force[second]:.3g} {unit} ({force[second] / force[peak]:.0%}), "
-            f"{(second - peak) / self.series.sample_rate_hz * 1e3:.1f} ms after the first"
-        )
-
-    def weak(self, at: int) -> str:
-        height = float(self.pulses.force[self.pulses.peaks[at]])
-        typical = typical_peak(self.pulses.force, self.pulses.peaks)
-        return (
-            f"too weak: its peak is {height / typical:.0%} of the usual one" if height < WEAK_SHARE * typical else ""
-        )
-
-    def ringing(self, at: int) -> str:
-        since = int(self.pulses.starts[at] - self.pulses.starts[at - 1]) if at else self.length
-        if since >= self.length:
-            return ""
-        return f"the hit {since / self.series.sample_rate_hz:.3g} s before still rings in this record"
-
-    def missing(self, inside: slice) -> str:
-        valid = self.series.valid
-        return "samples are missing in it" if valid is not None and not valid[:, inside].all() else ""
-
-    def beyond(self, first: int) -> str:
-        if first < 0:
-            return "its pretrigger begins before the log"
-        return "its record ends after the log" if first + self.length > self.pulses.force.size else ""
 
 
 def _advice(pulses: Pulses, double_hit_share: float, accepted: int) -> tuple[str, ...]:
@@ -399,6 +257,7 @@ def _still_ringing(series: TimeSeries, impacts: Impacts, decay_per_s: float) -> 
     energy = np.zeros((len(series.channels), length))
     for hit in impacts.accepted:
         energy += _record(series, impacts, hit, length) ** 2
+    # The window acts on the amplitude, and is asked for its share at the end only.
     late = energy[:, -length // 10 :].sum(axis=1) * np.exp(-2 * decay_per_s * impacts.record_s)
     names = [
         c.name for c, share in zip(series.channels, late / energy.sum(axis=1), strict=True) if share > STILL_RINGING

@@ -88,6 +88,8 @@ def integrate(series: TimeSeries, *, low_hz: float, times: int = 1) -> Converted
         passed = _raised_cosine((frequency_hz - low_hz / 2) / (low_hz / 2))
         return passed / (2j * np.pi * np.where(frequency_hz == 0, 1.0, frequency_hz)) ** times
 
+    # Mirrored evenly: an odd mirror image would shift the mean by twice the end's value, which integration turns
+    # into a drift.
     values = _each_run(series, edge_s=edge_s, run=lambda x: _filtered(_detrended(x), series, edge_s, gain, "even"))
     note = (
         f"integrated {times}x above {low_hz:g} Hz (nothing passes below {low_hz / 2:g} Hz); the first and last "
@@ -132,6 +134,7 @@ def differentiate(series: TimeSeries, *, high_hz: float | None = None, times: in
         passed = _raised_cosine((nyquist_hz - frequency_hz) / (nyquist_hz - high_hz))
         return passed * (2j * np.pi * frequency_hz) ** times
 
+    # Mirrored oddly: the slope goes on across the end, and the slope is what is wanted.
     values = _each_run(series, edge_s=edge_s, run=lambda x: _filtered(x, series, edge_s, gain, "odd"))
     note = f"differentiated {times}x below {high_hz:g} Hz; each run's first and last {edge_s:.3g} s are uncertain"
     return _converted(series, values, times=times, band_hz=(0.0, high_hz), edge_s=edge_s, notes=(note,))
@@ -156,6 +159,7 @@ def differentiate_density(density: PowerSpectralDensity, *, times: int = 1) -> P
 
 def _scaled_density(density: PowerSpectralDensity, *, low_hz: float, times: int) -> PowerSpectralDensity:
     frequency_hz = density.frequency_hz
+    # Left out rather than set to zero or NaN: a level summed over the rest is then right by itself.
     kept = (frequency_hz >= low_hz) & ((frequency_hz > 0) | (times > 0))
     if not kept.any():
         raise EstimateError(f"low_hz is {low_hz} Hz, above the last line at {frequency_hz[-1]:g} Hz; lower it")
@@ -197,6 +201,7 @@ def _each_run(series: TimeSeries, *, edge_s: float, run: Callable[[Samples], Sam
     result = np.full(series.values.shape, np.nan)
     valid = np.ones(series.values.shape, dtype=bool) if series.valid is None else series.valid
     for row in range(len(series.channels)):
+        # Each channel by itself: a gap in one sensor is no reason to cut another one's record.
         edges = np.flatnonzero(np.diff(valid[row], prepend=False, append=False))
         for first, last in zip(edges[::2], edges[1::2], strict=True):
             if last - first >= shortest:
@@ -209,6 +214,7 @@ def _each_run(series: TimeSeries, *, edge_s: float, run: Callable[[Samples], Sam
 
 
 def _detrended(x: Samples) -> Samples:
+    # With the time counted from the middle, slope and mean are independent.
     at = np.linspace(-1.0, 1.0, x.size)
     slope = (at @ x) / (at @ at)
     line: Samples = x - x.mean() - slope * at
@@ -219,6 +225,7 @@ def _filtered(
     x: Samples, series: TimeSeries, edge_s: float, gain: Gain, reflection: Literal["even", "odd"]
 ) -> Samples:
     """Multiply the spectrum of a run by `gain`, the run mirrored at its ends so that it doesn't begin with a step."""
+    # A record can't be mirrored further than it's long.
     margin = min(x.size - 1, int(np.ceil(edge_s * series.sample_rate_hz)))
     padded = np.pad(x, margin, mode="reflect", reflect_type=reflection)
     # The mirrored part fades out, else the circular transform would join two strangers.

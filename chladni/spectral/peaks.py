@@ -112,6 +112,7 @@ def find_peaks(
     """
     _require(count, false_alarm)
     curves = [_density_curve(density, row) for row in range(len(density.channels))]
+    # Channel by channel, so that a strong channel's floor doesn't hide a weak one's peak.
     found = [_significant(curve, min_prominence_db, false_alarm) for curve in curves]
     named = [
         (peak, channel.name, unit)
@@ -224,6 +225,7 @@ def _significant(curve: _Curve, min_prominence_db: float, false_alarm: float) ->
         return []
     over_floor = power / _floor(curve)
     freedom = 2 / curve.relative_std**2
+    # A sum of squares of nu Gaussian numbers: what an averaged line is when nothing but scatter is there.
     # Half of the false alarms for each of the two tests.
     chance = false_alarm / (2 * power.size)
     loud = (scipy.special.chdtrc(freedom, freedom * over_floor) <= chance) & (curve.relative_std <= 1)
@@ -340,11 +342,13 @@ def _from_resonance(curve: _Curve, line: int, run: NDArray[np.int64]) -> tuple[f
     weighted = basis * expected[:, np.newaxis]
     target = expected * (1 / expected - (power - expected) / expected**2)
     a, b, c = np.linalg.lstsq(weighted, target, rcond=None)[0]
+    # 1/G has its minimum where G has its maximum; a fit that bends the other way has none.
     top = -b / (2 * c) if c > 0 else np.nan
     if not (x[0] <= top <= x[-1] and a + b * top / 2 > 0):
         # No maximum inside: so flat and noisy a top lies anywhere above half of it.
         return float(curve.frequency_hz[line]), float(np.ptp(x) * curve.spacing_hz / np.sqrt(12)), float(power.max())
     covariance = np.linalg.inv(weighted.T @ weighted) * relative_std**2 * line_correlation(curve.window)
+    # Derivative of -b/(2c) by a, b and c.
     gradient = np.array([0.0, -1 / (2 * c), -top / c])
     std = np.sqrt(gradient @ covariance @ gradient)
     height = 1 / (a + b * top / 2)
@@ -359,6 +363,7 @@ def _merged(named: list[tuple[_Found, str, str]], resolution_hz: float, count: i
         return entry[0].power if one_unit else entry[0].over_floor
 
     groups: list[list[tuple[_Found, str, str]]] = []
+    # The strongest first, so that each name carries the frequency of the channel that knows it best.
     for entry in sorted(named, key=strength, reverse=True):
         peak, channel, _ = entry
         for group in groups:

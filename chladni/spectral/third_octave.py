@@ -101,6 +101,7 @@ def attenuation_limits(ratio: NDArray[np.float64], *, performance_class: int) ->
     within, at_most, beyond = _MASKS[performance_class]
     above = np.log(np.maximum(ratio, 1 / ratio))
     pass_at, stop_at = (np.log(_breakpoints(powers)) for powers in (_POWERS, _STOP_POWERS))
+    # The edge itself belongs to the outside, where the greatest attenuation has no limit.
     inside = above < pass_at[-1]
     least = np.where(inside, np.interp(above, pass_at, within), np.interp(above, stop_at, beyond))
     most = np.where(inside, np.interp(above, pass_at, at_most), np.inf)
@@ -140,6 +141,7 @@ def third_octave_levels(
         raise EstimateError(f"no third-octave band lies between {low_hz:g} and {frequency_hz[-1]:g} Hz")
     levels = band_rms(density, bands_hz=[(band.low_hz, band.high_hz) for band in bands])
     window = named_window(density.provenance.window)
+    # Only a window's main lobe and side lobes matter here, so the answer is the same for every record.
     fitting = [b for b in bands if synthesised_class(b, spacing_hz=spacing_hz, window=window) == 1]
     met = f"from the {fitting[0].nominal_hz:g} Hz band on" if fitting else "in none of these bands"
     note = (

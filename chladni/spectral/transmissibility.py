@@ -47,6 +47,7 @@ def transmissibility(
         chosen = [responses] if isinstance(responses, str) else list(responses)
     if not chosen:
         raise EstimateError(f"no channel but {reference!r} is in {unit}; transmissibility needs two in one unit")
+    # Checked before arithmetic: a ratio of velocity to acceleration is 1/omega in disguise.
     for name in chosen:
         other = spectra.channels[spectra.index(name)].unit
         if other != unit:

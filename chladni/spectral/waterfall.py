@@ -79,6 +79,7 @@ def waterfall(
     lead, blocks = leading_part(source, SAMPLES_TO_CHOOSE_FROM)
     known = samples_known(source, lead, SAMPLES_TO_CHOOSE_FROM)
     plan = _plan(lead[0].sample_rate_hz, known, resolution_hz, window=window, overlap=overlap, detrend=detrend)
+    # An even number can always be halved by averaging pairs.
     slices = _Slices(most=max_slices - max_slices % 2)
     shape = window_samples(window, plan.samples)
     for spectra in _segments(blocks, lead[0], plan, shape):
@@ -88,6 +89,7 @@ def waterfall(
 
 def _plan(rate_hz: float, known: int | None, resolution_hz: float | None, **options: Any) -> Segmentation:
     plan = plan_segmentation(rate_hz, samples_available=known, resolution_hz=resolution_hz, **options)
+    # Spectra over time trade lines for moments; a finer grid than the screen's has the worse of both.
     if resolution_hz is None and plan.samples > DEFAULT_SEGMENT:
         coarser_hz = rate_hz / DEFAULT_SEGMENT
         return plan_segmentation(rate_hz, samples_available=known, resolution_hz=coarser_hz, **options)
@@ -123,6 +125,7 @@ class _Slices:
         if len(self._means) == self.most:
             pairs = zip(self._means[::2], self._means[1::2], strict=True)
             self._means = [(one + other) / 2 for one, other in pairs]
+            # What is pending becomes the first half of a group twice as long.
             self.group *= 2
             return
         self._means.append(np.mean(self._pending, axis=0))
@@ -141,6 +144,7 @@ def _segments(
             continue
         spectra = segment_spectra(held[:, : plan.length_of(count)], plan, window)
         yield np.abs(spectra.transpose(1, 2, 0)) ** 2
+        # What the next segment begins with stays; it overlaps the last one done.
         held = held[:, count * plan.hop :]
 
 
@@ -159,6 +163,7 @@ def _portions(blocks: Iterator[TimeSeries], first: TimeSeries) -> Iterator[NDArr
                 f"a block starts {(start - position) / first.sample_rate_hz:g} s after the one before ended; give "
                 "consecutive blocks, and measurements far apart one by one"
             )
+        # A gap is silence of known length: time must go on, or everything after it would be drawn too early.
         for missing in range(position, start, size):
             yield np.full((len(first.channels), min(size, start - missing)), np.nan)
         for begin in range(0, block.samples, size):
