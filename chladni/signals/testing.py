@@ -26,7 +26,9 @@ def assert_close(actual: Value, expected: Value, *, rtol: float, atol: float = 0
 def _assert_field(name: str, found: Any, wanted: Any, rtol: float, atol: float) -> None:
     if isinstance(wanted, Provenance):
         return
-    if isinstance(wanted, np.ndarray) and isinstance(found, np.ndarray) and wanted.dtype.kind in "fc":
+    if isinstance(wanted, np.ndarray) != isinstance(found, np.ndarray):
+        raise AssertionError(f"{name}: {found!r} is not {wanted!r}")
+    if isinstance(wanted, np.ndarray) and wanted.dtype.kind in "fc":
         np.testing.assert_allclose(found, wanted, rtol=rtol, atol=atol, err_msg=name)
     elif isinstance(wanted, np.ndarray):
         np.testing.assert_array_equal(found, wanted, err_msg=name)
