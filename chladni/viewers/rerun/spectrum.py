@@ -1,5 +1,7 @@
 """The spectrum of the moment under the time cursor, on a real frequency axis."""
 
+from typing import Any
+
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
@@ -8,11 +10,12 @@ from numpy.typing import NDArray
 from chladni.signals.study import Study
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.waterfall import Waterfall
-from chladni.viewers.drawing import block_maximum
+from chladni.viewers.drawing import Floats, block_maximum
 from chladni.viewers.labels import amplitude_density_unit, reduction
 from chladni.viewers.rerun.entities import channel_entity, folder
-from chladni.viewers.rerun.timelines import TIME
-from chladni.viewers.style import Style
+from chladni.viewers.rerun.tensors import TensorColumn
+from chladni.viewers.rerun.timelines import send_columns, time_index
+from chladni.viewers.style import Colour, Style
 
 # A bar narrower than a pixel can't be seen; a chart is rarely wider than this.
 BARS = 1024
@@ -38,24 +41,38 @@ def _draw_channel(
     path = channel_entity(folder("spectrum", str(place)), channel)
     slices, times = block_maximum(waterfall.values[row], axis=0, limit=SLICES)
     slices, lines = block_maximum(slices, axis=1, limit=BARS)
-    amplitude = np.sqrt(slices).astype(np.float32)
     # A run of lines is drawn as one bar in the middle of the run.
     abscissa = waterfall.frequency_hz[::lines] + (lines - 1) / 2 * _step(waterfall.frequency_hz)
     widths = np.full(abscissa.size, lines * _step(waterfall.frequency_hz), dtype=np.float32)
-    for start_ns, bars in zip(_starts_ns(waterfall, style)[::times], amplitude, strict=True):
-        recording.set_time(TIME, duration=np.timedelta64(int(start_ns), "ns"))
-        if np.isnan(bars).any():
-            recording.log(path, rr.Clear(recursive=False))
-        else:
-            chart = rr.BarChart(bars, abscissa=abscissa, widths=widths, color=style.on_dark(channel))
-            recording.log(path, chart)
-    recording.reset_time()
+    _log_look(recording, path, abscissa, widths, style.on_dark(channel))
+    _log_bars(recording, path, _starts_ns(waterfall, style)[::times], np.sqrt(slices))
     return rrb.BarChartView(
         origin=path,
         name=f"{style.labels[channel.name]} at the time cursor [{amplitude_density_unit(channel.unit)}] over Hz"
         + reduction(times, lines),
         plot_legend=rrb.PlotLegend(visible=False),
     )
+
+
+def _log_look(
+    recording: rr.RecordingStream, path: str, abscissa: Floats, widths: NDArray[np.float32], colour: Colour
+) -> None:
+    """Write what all slices share, once."""
+    places = rr.components.TensorDataBatch(rr.encodings.TensorData(array=abscissa))
+    look = [
+        places.described(rr.BarChart.descriptor_abscissa()),
+        rr.components.LengthBatch(widths).described(rr.BarChart.descriptor_widths()),
+        rr.components.ColorBatch([colour]).described(rr.BarChart.descriptor_color()),
+    ]
+    recording.log(path, look, static=True)
+
+
+def _log_bars(recording: rr.RecordingStream, path: str, starts_ns: NDArray[np.int64], bars: NDArray[Any]) -> None:
+    """Write the bars of each slice; a slice with missing samples is an empty list, and the chart is empty then."""
+    known = ~np.isnan(bars).any(axis=1)
+    tensors = TensorColumn(bars[known].astype(np.float32))
+    column = rr.ComponentColumn(rr.BarChart.descriptor_values(), tensors, lengths=known.astype(np.int32))
+    send_columns(recording, path, time_index(starts_ns), rr.ComponentColumnList([column]))
 
 
 def _starts_ns(waterfall: Waterfall, style: Style) -> NDArray[np.int64]:
