@@ -12,7 +12,9 @@ from chladni.io.decoding.schema import FieldInfo
 from chladni.io.known_schemas import message_type
 from chladni.signals.errors import LogError
 
-NS_PER_S = 1e9
+#: Time between samples that is believed: a gigahertz to a sample a day.
+SHORTEST_S = 1e-9
+LONGEST_S = 86_400.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,7 +196,7 @@ def expand(layout: BatchLayout, decoded: Decoded, names: tuple[str, ...], wanted
         Columns to give out, by index into `names`.
     """
     periods_s = _periods_s(layout, decoded)
-    bad = decoded.bad | ~(np.isfinite(periods_s) & (periods_s > 0)) | _renamed(layout, decoded, names)
+    bad = decoded.bad | ~((periods_s >= SHORTEST_S) & (periods_s <= LONGEST_S)) | _renamed(layout, decoded, names)
     if len(layout.samples) == 1 and len(names) > 1:
         values, counts = _split(layout, decoded.columns[layout.samples[0]], len(names), wanted, bad)
     else:
@@ -211,7 +213,7 @@ def _periods_s(layout: BatchLayout, decoded: Decoded) -> NDArray[np.float64]:
         raw = np.full(len(decoded.bad), layout.period * layout.period_unit)
     if not layout.inverse:
         return raw
-    return np.divide(1.0, raw, out=np.zeros_like(raw), where=raw > 0)
+    return np.divide(1.0, raw, out=np.zeros_like(raw), where=raw > 1 / LONGEST_S)
 
 
 def _renamed(layout: BatchLayout, decoded: Decoded, names: tuple[str, ...]) -> NDArray[np.bool_]:

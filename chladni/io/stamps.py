@@ -22,7 +22,9 @@ EPOCH_FROM_NS: Final = 631_152_000_000_000_000
 _OWN_NAMES = ("header.stamp", "stamp", "timestamp_sample", "timestamp", "time", "time_usec", "t")
 _SECONDS = ("sec", "secs", "seconds")
 _NANOSECONDS = ("nsec", "nsecs", "nanosec", "nanos", "nanoseconds")
-_LARGEST_NS = float(2**62)
+LATEST_NS: Final = 2**62
+"""Largest stamp that is taken for a time: the year 2116."""
+
 _STEADY_LAG_NS = 5_000_000_000
 _SAME_CLOCK_NS = 30_000_000_000
 
@@ -80,6 +82,11 @@ class StampChoice:
         """Every leaf that must be decoded."""
         return () if self.own is None else self.own.leaves
 
+    @property
+    def label(self) -> str:
+        """What people know the stamp by."""
+        return f"{self.kind} time" if self.own is None else self.own.name
+
     def shifted(self, shift_ns: int) -> "StampChoice":
         """Give the same choice on the log's clock."""
         reason = f"{self.reason}; its clock isn't the log's, so {shift_ns / 1e9:.6f} s are added to all its stamps"
@@ -124,13 +131,18 @@ def own_stamps_ns(own: OwnStamp, decoded: Decoded) -> tuple[NDArray[np.int64], N
     if own.nanoseconds_leaf is not None:
         rest, rest_usable = _to_ns(decoded.columns[own.nanoseconds_leaf].numbers, 1)
         stamps_ns, usable = stamps_ns + rest, usable & rest_usable
-    usable &= stamps_ns >= 0
     return np.where(usable, stamps_ns, 0), usable & ~decoded.bad
+
+
+def plausible(stamps_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which stamps can be times at all; a damaged message may claim anything."""
+    possible: NDArray[np.bool_] = (stamps_ns >= 0) & (stamps_ns < LATEST_NS)
+    return possible
 
 
 def _to_ns(raw: NDArray[np.generic], unit_ns: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     numbers = raw.astype(np.float64)
-    usable = np.isfinite(numbers) & (np.abs(numbers) * unit_ns < _LARGEST_NS)
+    usable = np.isfinite(numbers) & (np.abs(numbers) * unit_ns < LATEST_NS)
     if raw.dtype.kind in "iu":
         # Integers go through integers: a double has no room for nanoseconds since 1970.
         return np.where(usable, raw, 0).astype(np.int64) * unit_ns, usable
@@ -163,7 +175,8 @@ class TopicHead:
 
     def start_ns(self, choice: StampChoice) -> int:
         """Earliest time of a topic's first messages."""
-        return int(self._chosen(choice).min(initial=2**62)) + choice.shift_ns
+        stamps = self._chosen(choice)
+        return int(stamps[plausible(stamps)].min(initial=LATEST_NS)) + choice.shift_ns
 
     def lags_ns(self, choice: StampChoice) -> NDArray[np.int64]:
         """Time from each message's sample to its log time."""

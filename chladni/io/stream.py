@@ -13,11 +13,10 @@ from chladni.io.decoding import Decoded
 from chladni.io.field_selector import FieldFilter, kept_messages, select
 from chladni.io.mcap.container import McapContainer
 from chladni.io.mcap.message_batch import MessageBatch
-from chladni.io.stamps import StampChoice, own_stamps_ns
+from chladni.io.stamps import LATEST_NS, StampChoice, own_stamps_ns, plausible
 from chladni.io.topic import Topic
 from chladni.signals.channel import Channel
-
-NS_PER_S = 1e9
+from chladni.signals.time_series import NS_PER_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,15 +49,18 @@ class Piece:
             return self
         last = self.stamps_ns
         if self.counts is not None:
-            last = last + np.rint((self.counts - 1) * (self.period_s * NS_PER_S)).astype(np.int64)
+            last = last + _span_ns(self.counts, self.period_s)
         keep = np.ones(len(last), np.bool_)
         if start_ns is not None:
             keep &= last >= start_ns
         if end_ns is not None:
             keep &= self.stamps_ns < end_ns
-        return self if keep.all() else self._kept(keep)
+        return self.kept(keep)
 
-    def _kept(self, keep: NDArray[np.bool_]) -> "Piece":
+    def kept(self, keep: NDArray[np.bool_]) -> "Piece":
+        """Give some of the messages."""
+        if keep.all():
+            return self
         samples = keep if self.counts is None else np.repeat(keep, self.counts)
         counts = None if self.counts is None else self.counts[keep]
         return replace(self, stamps_ns=self.stamps_ns[keep], counts=counts, values=self.values[:, samples])
@@ -123,7 +125,7 @@ class Stream:
         lost = dict(decoded.reasons)
         unstamped = int(np.count_nonzero(~usable & ~decoded.bad))
         if unstamped:
-            lost[f"stamp {self.choice.own.name if self.choice.own else ''} is no usable number"] = unstamped
+            lost[f"{self.choice.label} is no time between 1970 and 2116"] = unstamped
         if self.layout is not None:
             return self._blocks(decoded, stamps_ns, usable, lost, with_values=with_values)
         piece = self._single_samples(decoded, stamps_ns, kept_messages(decoded, self.filters) & usable, lost)
@@ -142,9 +144,11 @@ class Stream:
     def _stamps_ns(self, batch: MessageBatch, decoded: Decoded) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         if self.choice.own is not None:
             stamps_ns, usable = own_stamps_ns(self.choice.own, decoded)
-            return stamps_ns + self.choice.shift_ns, usable
-        stamps_ns = batch.log_time_ns if self.choice.kind == "log" else batch.publish_time_ns
-        return stamps_ns, ~decoded.bad
+            stamps_ns = stamps_ns + self.choice.shift_ns
+        else:
+            stamps_ns = batch.log_time_ns if self.choice.kind == "log" else batch.publish_time_ns
+            usable = ~decoded.bad
+        return stamps_ns, usable & plausible(stamps_ns)
 
     def _single_samples(
         self, decoded: Decoded, stamps_ns: NDArray[np.int64], keep: NDArray[np.bool_], lost: dict[str, int]
@@ -188,12 +192,29 @@ class Stream:
         else:
             values = expanded.values
         periods_s = expanded.periods_s[keep]
-        counts = expanded.counts[keep]
-        first_ns = stamps_ns[keep]
-        if self.layout.stamp == "last":
-            first_ns = first_ns - np.rint((counts - 1) * periods_s * NS_PER_S).astype(np.int64)
-        period_s = float(np.median(periods_s)) if periods_s.size else 0.0
-        return Piece(stamps_ns=first_ns, counts=counts, period_s=period_s, values=values, lost=lost)
+        piece = Piece(
+            stamps_ns=self._first_ns(stamps_ns[keep], expanded.counts[keep], periods_s),
+            counts=expanded.counts[keep],
+            period_s=float(np.median(periods_s)) if periods_s.size else 0.0,
+            values=values,
+            lost=lost,
+        )
+        return piece.kept(plausible(piece.stamps_ns))
+
+    def _first_ns(
+        self, stamps_ns: NDArray[np.int64], counts: NDArray[np.int64], periods_s: NDArray[np.float64]
+    ) -> NDArray[np.int64]:
+        if self.layout is None or self.layout.stamp == "first":
+            return stamps_ns
+        return stamps_ns - _span_ns(counts, periods_s)
+
+
+def _span_ns(counts: NDArray[np.int64], periods_s: NDArray[np.float64] | float) -> NDArray[np.int64]:
+    """From the first sample of each message to its last one."""
+    # A period is what the message claims; a length of centuries mustn't overflow.
+    span_ns = np.minimum((counts - 1) * (periods_s * NS_PER_S), LATEST_NS)
+    whole: NDArray[np.int64] = np.rint(span_ns).astype(np.int64)
+    return whole
 
 
 def _column(decoded: Decoded, source: ChannelSource) -> tuple[NDArray[np.floating[Any]], NDArray[np.bool_] | None]:
