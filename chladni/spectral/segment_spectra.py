@@ -1,6 +1,6 @@
 """Windowed Fourier transforms of many segments at once, laid out for matrix products line by line."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from typing import Any
 
@@ -54,9 +54,9 @@ def segment_spectra(
     return spectra
 
 
-def run_all(work: Callable[[int], None], starts: Iterable[int], executor: Executor | None) -> None:
-    """Call `work` for each start, on the executor's threads when there is one; errors are raised here."""
-    for _ in (map if executor is None else executor.map)(work, starts):
+def run_all(work: Callable[[int], None], starts: Sequence[int], executor: Executor | None) -> None:
+    """Call `work` for each start, on the executor's threads when it pays; errors are raised here."""
+    for _ in (map if executor is None or len(starts) < 2 else executor.map)(work, starts):
         pass
 
 

@@ -1,5 +1,7 @@
 """Coherence in closed form and against SciPy."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.signal import coherence as scipy_coherence
@@ -9,13 +11,14 @@ from chladni.spectral.coherence import coherence, partial_coherence, share
 from chladni.spectral.cross_spectra import cross_spectra
 from tests.spectral.made_signals import noise, series
 
-SAMPLES = 200_000
+SAMPLES = 100_000
 
 
 def spectra_of(values):
     return cross_spectra(series(np.asarray(values)), resolution_hz=10.0)
 
 
+@cache
 def two_sources():
     """References a, b share a source; c hears both, d only a, and e is alone."""
     u, v, w, n, e = noise(5, SAMPLES)

@@ -180,15 +180,15 @@ def test_hv_does_not_depend_on_units():
 def test_the_error_bar_is_the_scatter_of_many_records(references, resolution_hz):
     squares, predicted = [], []
     truth = np.abs(GAINS) if len(references) == 2 else np.abs(GAINS @ [[1.0], [0.6]])
-    for record in range(150):
+    for record in range(100):
         spectra = cross_spectra(two_references(1000, seed=record, level=0.5), resolution_hz=resolution_hz)
         response = frequency_response(spectra, references=references, responses=["c", "d"])
         inner = slice(2, -2) if response.frequency_hz.size > 6 else slice(1, -1)
         squares.append((np.abs(response.values) - truth[:, :, np.newaxis])[..., inner] ** 2)
         predicted.append(response.std[..., inner] ** 2)
     ratio = np.sqrt(np.mean(squares) / np.mean(predicted))
-    # Some 20 independent lines (2 at 200 Hz), 2 to 4 functions, 150 records: known to 1.2 % (4 %), five sigma.
-    assert ratio == pytest.approx(1.0, abs=0.2 if resolution_hz == 200.0 else 0.08)
+    # Some 20 independent lines (2 at 200 Hz), 2 to 4 functions, 100 records: known to 1.5 % (5 %), five sigma.
+    assert ratio == pytest.approx(1.0, abs=0.25 if resolution_hz == 200.0 else 0.08)
 
 
 @pytest.mark.parametrize(("input_noise", "common_noise"), [(0.0, 0.0), (0.1, 0.0), (0.02, 0.1)])

@@ -41,4 +41,4 @@ def test_errors_in_a_thread_are_raised():
         raise ZeroDivisionError(start)
 
     with ThreadPoolExecutor(1) as executor, pytest.raises(ZeroDivisionError):
-        run_all(fail, [1], executor)
+        run_all(fail, [1, 2], executor)
