@@ -24,6 +24,9 @@ INTERPOLATION_LINES = 0.02
 # as it is high is no peak, and how much worse it is matters no more.
 SMALLEST_RELATIVE_STD = 1e-3
 LARGEST_RELATIVE_STD = 2.0
+# Chance of a coherence between unrelated channels, and of a line above its upper bound, that we live with.
+COHERENT_BY_CHANCE = 1e-3
+UPPER_BOUND_CHANCE = 1e-3
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +38,7 @@ class _Curve:
     frequency_hz: Floats
     power: Floats
     relative_std: Floats
+    trusted: NDArray[np.bool_]
     spacing_hz: float
     first_hz: float
     line_sampled: bool
@@ -144,7 +148,8 @@ def find_response_peaks(
     Returns
     -------
     tuple of Peak
-        The highest first; ``channels`` are the response and its reference. Heights are magnitudes.
+        The highest first; ``channels`` are the response and its reference. Heights are magnitudes. Lines whose
+        coherence unrelated channels would show with a chance of 0.1 % or more hold no peak.
 
     Raises
     ------
@@ -173,6 +178,7 @@ def _density_curve(density: PowerSpectralDensity, row: int) -> _Curve:
         density.frequency_hz[usable],
         power[usable],
         std[usable] / power[usable],
+        trusted=np.ones(np.count_nonzero(usable), dtype=bool),
         provenance=density.provenance,
         bandwidth_hz=density.bandwidth_hz,
         tonal=True,
@@ -188,6 +194,7 @@ def _response_curve(response: FrequencyResponse, row: int, column: int) -> _Curv
         response.frequency_hz[usable],
         magnitude[usable] ** 2,
         2 * std[usable] / magnitude[usable],
+        trusted=_coherent(response, row)[usable],
         provenance=response.provenance,
         bandwidth_hz=spacing_hz * noise_bandwidth_bins(named_window(response.provenance.window)),
         tonal=False,
@@ -199,6 +206,7 @@ def _curve(
     power: Floats,
     relative_std: Floats,
     *,
+    trusted: NDArray[np.bool_],
     provenance: Provenance,
     bandwidth_hz: float,
     tonal: bool,
@@ -210,12 +218,22 @@ def _curve(
         frequency_hz=frequency_hz,
         power=power,
         relative_std=np.clip(relative_std, SMALLEST_RELATIVE_STD, LARGEST_RELATIVE_STD),
+        trusted=trusted,
         spacing_hz=_spacing(frequency_hz),
         first_hz=first_hz,
         line_sampled=line_sampled,
         window=named_window(provenance.window),
         tonal=tonal,
     )
+
+
+def _coherent(response: FrequencyResponse, row: int) -> NDArray[np.bool_]:
+    """Lines whose coherence unrelated channels would hardly show: P = (1 - coherence)^(n - q) (Carter 1987).
+
+    With few averages the std is itself an accident, small on some of many lines; the coherence tells which.
+    """
+    freedom = max(response.provenance.effective_averages - len(response.references), 0.0)
+    return np.asarray((1 - response.coherence[row]) ** freedom <= COHERENT_BY_CHANCE)
 
 
 def _significant(curve: _Curve, min_prominence_db: float, false_alarm: float) -> list[_Found]:
@@ -228,7 +246,7 @@ def _significant(curve: _Curve, min_prominence_db: float, false_alarm: float) ->
     # A sum of squares of nu Gaussian numbers: what an averaged line is when nothing but scatter is there.
     # Half of the false alarms for each of the two tests.
     chance = false_alarm / (2 * power.size)
-    loud = (scipy.special.chdtrc(freedom, freedom * over_floor) <= chance) & (curve.relative_std <= 1)
+    loud = (scipy.special.chdtrc(freedom, freedom * over_floor) <= chance) & curve.trusted & (curve.relative_std <= 1)
     found = []
     for line in np.flatnonzero(loud & _maxima(curve)):
         valley = _valley(curve, int(line))
@@ -259,9 +277,10 @@ def _floor(curve: _Curve) -> Floats:
 def _valley(curve: _Curve, line: int) -> int:
     """Deepest line between a peak and the next higher one, on the side where that is less deep.
 
-    Lines are as deep as they surely are, one sigma up: the deepest of all may be one of which nothing is known.
+    Lines are as deep as they surely are: the deepest of all, an antiresonance, may be one of which nothing is known.
     """
-    power, sure = curve.power, curve.power * (1 + curve.relative_std)
+    power, freedom = curve.power, 2 / curve.relative_std**2
+    sure = power * freedom / scipy.special.chdtri(freedom, 1 - UPPER_BOUND_CHANCE)
     higher = np.flatnonzero(power > power[line])
     left, right = higher[higher < line], higher[higher > line]
     first = int(left[-1]) if left.size else 0
