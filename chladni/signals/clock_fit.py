@@ -21,7 +21,7 @@ class Clock:
     start_ns
         Time of index 0, since the first stamp.
     shift
-        ``[stretch]`` what to add to a stretch's indices so that all share one grid, 0 for the first, rising.
+        ``[stretch]`` what to add to a stretch's indices so that all share one grid, 0 for the first.
     residual_ns
         ``[item]`` time off the line of the item's own stretch.
     """
@@ -67,7 +67,7 @@ def fit_clock(count: Count, period_ns: float) -> Clock:
     if not kept.all() and np.bincount(count.stretch, kept).min() > 0:
         slope, starts, residual = _fit_stretches(count, kept, slope)
     # Stretches share one grid to the nearest index; what is left of a period stays as an error of the placing.
-    shift = np.maximum.accumulate(np.rint((starts - starts[0]) / slope).astype(np.int64))
+    shift = np.rint((starts - starts[0]) / slope).astype(np.int64)
     return Clock(
         period_ns=slope,
         period_std_ns=_slope_std(count, residual * kept),

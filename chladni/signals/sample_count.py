@@ -67,11 +67,13 @@ def count_by_phase(time_ns: Ints, steps: Ints, period_ns: float) -> Count:
     scatter = _phase_scatter(steps, period_ns)
     # Reach: the median's own error, a bias of missing samples under scatter, and rounding to whole nanoseconds.
     reach = min(0.08, 4 * scatter / np.sqrt(time_ns.size) + 0.1 * scatter + 2 / period_ns)
-    period = _refined_period(time_ns, period_ns, reach)
+    # Short blocks first: their broad maximum takes few trials to find, and leaves few for the long ones.
+    period = _refined_period(time_ns, period_ns, reach, block=WINDOW)
+    period = _refined_period(time_ns, period, min(reach, 0.5 / WINDOW), block=_BLOCK)
     every = -(-time_ns.size // MAX_ITEMS)
     if every > 1:
         # Windows of every n-th stamp are longer, so the period must be known better.
-        period = _refined_period(time_ns[::every], period, min(reach, 0.5 / _BLOCK), every=every)
+        period = _refined_period(time_ns[::every], period, min(reach, 0.5 / _BLOCK), block=_BLOCK, every=every)
     resumed = _resumed(steps > (3.5 if scatter < _TIGHT else 64) * period)
     item, stretch = _chosen(time_ns.size, resumed)
     window, starts = _windows(stretch)
@@ -147,9 +149,9 @@ def robust_std(values: Floats) -> float:
     return float(1.4826 * np.median(np.abs(part - np.median(part)))) if part.size else 0.0
 
 
-def _refined_period(time_ns: Ints, period_ns: float, reach: float, *, every: int = 1) -> float:
-    """Find the period whose phases agree best over blocks of 1024 stamps, each `every` periods, near the guess."""
-    block = min(_BLOCK, time_ns.size)
+def _refined_period(time_ns: Ints, period_ns: float, reach: float, *, block: int, every: int = 1) -> float:
+    """Find the period whose phases agree best over blocks of stamps, one every n periods, near the guess."""
+    block = min(block, time_ns.size)
     step = 1 / (4 * block * every)
     half = int(np.ceil(reach / step))
     trial = 1 + np.arange(-half, half + 1) * step

@@ -210,17 +210,19 @@ def _in_order(
     """Add the stretches and the gaps between them."""
     first = counted.count.resumed if counted.burst_starts is None else counted.burst_starts[counted.count.resumed]
     resumed_ns = rising_ns[first]
-    lost = np.diff(clock.shift)
+    # A stretch that seems to begin before the one before has ended is late delivery, not time running back.
+    shift = np.maximum.accumulate(clock.shift)
+    lost = np.diff(shift)
     before = first[1:][lost > 0] - 1
     gaps = list_gaps(rising_ns, before, np.broadcast_to(sizes, rising_ns.shape)[before], clock.period_ns)
     return replace(
         base,
         gaps=gaps.longest,
         gap_count=gaps.count,
-        missing=int(clock.shift[-1]),
+        missing=int(shift[-1]),
         jumps=base.jumps + gaps.leaps,
         resumed_ns=resumed_ns,
-        resumed_shift=clock.shift,
+        resumed_shift=shift,
     )
 
 
