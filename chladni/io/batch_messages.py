@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.decoding.columns import Column, Decoded, Strings
+from chladni.io.decoding.columns import Decoded, Strings
 from chladni.io.decoding.schema import FieldInfo
 from chladni.io.known_schemas import message_type
 from chladni.signals.errors import LogError
@@ -198,7 +198,7 @@ def expand(layout: BatchLayout, decoded: Decoded, names: tuple[str, ...], wanted
     periods_s = _periods_s(layout, decoded)
     bad = decoded.bad | ~((periods_s >= SHORTEST_S) & (periods_s <= LONGEST_S)) | _renamed(layout, decoded, names)
     if len(layout.samples) == 1 and len(names) > 1:
-        values, counts = _split(layout, decoded.columns[layout.samples[0]], len(names), wanted, bad)
+        values, counts = _split(layout, decoded, len(names), wanted, bad)
     else:
         values, counts = _side_by_side(layout, decoded, wanted, bad)
     bad |= counts < 0
@@ -225,12 +225,14 @@ def _renamed(layout: BatchLayout, decoded: Decoded, names: tuple[str, ...]) -> N
 
 
 def _split(
-    layout: BatchLayout, column: Column, width: int, wanted: Sequence[int], bad: NDArray[np.bool_]
+    layout: BatchLayout, decoded: Decoded, width: int, wanted: Sequence[int], bad: NDArray[np.bool_]
 ) -> tuple[NDArray[Any], NDArray[np.int64]]:
     """One array holds all columns; -1 as count where its length doesn't divide by their number."""
+    column = decoded.columns[layout.samples[0]]
     flat, elements = column.per_message()
-    counts = np.where(elements % width == 0, elements // width, -1)
-    if column.counts is None and column.numbers.ndim == 2 and not bad.any() and np.all(counts >= 0):
+    room = elements // width
+    counts = np.where(elements % width == 0, _said_counts(layout, decoded, room), -1)
+    if column.counts is None and not bad.any() and np.array_equal(counts, room):
         shape = (len(bad), width, -1) if layout.order == "channel" else (len(bad), -1, width)
         axes = (1, 0, 2) if layout.order == "channel" else (2, 0, 1)
         cube = flat.reshape(shape).transpose(axes)
@@ -239,12 +241,20 @@ def _split(
     usable = np.where(bad, 0, np.maximum(counts, 0))
     starts = np.repeat(np.cumsum(elements) - elements, usable)
     within = np.arange(usable.sum()) - np.repeat(np.cumsum(usable) - usable, usable)
-    per_message = np.repeat(usable, usable)
+    stride = np.repeat(room, usable)
     rows = [
-        flat[starts + (row * per_message + within if layout.order == "channel" else within * width + row)]
+        flat[starts + (row * stride + within if layout.order == "channel" else within * width + row)]
         for row in wanted
     ]
     return _stacked(rows, flat, int(usable.sum())), counts
+
+
+def _said_counts(layout: BatchLayout, decoded: Decoded, room: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Samples of each message as it says itself, all there's room for when it says nothing; -1 where it lies."""
+    if layout.count is None:
+        return room
+    said = decoded.columns[layout.count].numbers.astype(np.float64)
+    return np.where((said >= 0) & (said <= room), said, -1).astype(np.int64)
 
 
 def _stacked(rows: list[NDArray[Any]], like: NDArray[Any], samples: int) -> NDArray[Any]:
@@ -257,10 +267,8 @@ def _side_by_side(
     """An array for each column; -1 as count where they differ in length or are shorter than the message says."""
     every = [decoded.columns[leaf].per_message() for leaf in layout.samples]
     lengths = np.stack([elements for _, elements in every])
-    counts = lengths[0]
-    if layout.count is not None:
-        counts = decoded.columns[layout.count].numbers.astype(np.int64)
-    counts = np.where((lengths == lengths[0]).all(axis=0) & (counts >= 0) & (counts <= lengths[0]), counts, -1)
+    same = (lengths == lengths[0]).all(axis=0)
+    counts = np.where(same, _said_counts(layout, decoded, lengths[0]), -1)
     usable = np.where(bad, 0, np.maximum(counts, 0))
     within = np.arange(usable.sum()) - np.repeat(np.cumsum(usable) - usable, usable)
     rows = []

@@ -129,3 +129,14 @@ def test_a_column_of_text_is_no_number() -> None:
     names = Strings(codes=np.zeros(1, np.int32), table=("a",))
     with pytest.raises(LogError, match="column of strings"):
         expand(BatchLayout(samples=("s",), period=0.1), decoded({"s": Column(values=names)}, messages=1), ("s",), [0])
+
+
+@pytest.mark.parametrize("order", ["channel", "sample"])
+def test_counts_cut_an_array_of_all_columns(order: str) -> None:
+    block = np.arange(8.0).reshape(2, 4)
+    part = (block if order == "channel" else block.T).reshape(1, -1)
+    columns = {"s": Column(values=np.repeat(part, 3, axis=0)), "n": Column(values=np.array([4, 3, -1]))}
+    layout = BatchLayout(samples=("s",), period=0.1, names=("a", "b"), order=order, count="n")  # type: ignore[arg-type]
+    found = expand(layout, decoded(columns, messages=3), ("a", "b"), [0, 1])
+    np.testing.assert_array_equal(found.values, np.concatenate((block, block[:, :3]), axis=1))
+    np.testing.assert_array_equal(found.bad, [False, False, True])

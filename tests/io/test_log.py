@@ -813,6 +813,35 @@ def test_units_in_comments_and_metadata(tmp_path: Path) -> None:
     assert series.channels[2].overload == pytest.approx(2 * 9.80665)
 
 
+@pytest.mark.parametrize(
+    ("key", "text", "attribute", "expected"),
+    [
+        ("chladni.direction.z", "[0, 0, -2]", "direction", (0.0, 0.0, -1.0)),
+        ("chladni.direction.z", "[0, 0, 0]", "direction", None),
+        ("chladni.direction.z", '["x"]', "direction", None),
+        ("chladni.direction.z", "{", "direction", None),
+        ("chladni.direction.z", "[" * 100_000, "direction", None),
+        ("chladni.overload.z", "fifty", "overload", None),
+        ("chladni.overload.z", "inf", "overload", None),
+        ("chladni.point.z", "tip", "point", "tip"),
+        ("unit", "g", "unit", "m/s^2"),
+        ("chladni.unit.z", "bananas", "unit", "1"),
+    ],
+)
+def test_metadata_is_believed_only_where_it_makes_sense(
+    tmp_path: Path, key: str, text: str, attribute: str, expected: object
+) -> None:
+    with LogMaker(tmp_path / "a.mcap") as maker:
+        channel = maker.ros2(
+            "/a", "test/msg/A", "float64 z\nfloat64 padding\n", {key: text, "chladni.fields": '["z"]'}
+        )
+        for index in range(20):
+            maker.write(channel, {"z": 1.0, "padding": 0.0}, START_NS + index * 10**7)
+    with open_log(tmp_path / "a.mcap") as log:
+        (found,) = log.channels
+    assert getattr(found, attribute) == expected
+
+
 def test_long_arrays_are_not_listed(tmp_path: Path) -> None:
     with LogMaker(tmp_path / "a.mcap") as maker:
         channel = maker.ros2("/scan", "test/msg/Scan", "float32[] ranges\nuint8[] picture\nfloat64[3] xyz\n")

@@ -197,3 +197,12 @@ def test_format_is_needed(tmp_path: Path) -> None:
     assert mistakes(tmp_path, 'format = "chladni.model/1"') == [
         "1: format: found 'chladni.model/1'; must be 'chladni.setup/1'"
     ]
+
+
+def test_what_the_documentation_shows_is_a_setup_file(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "setup-file.md").read_text(encoding="utf-8")
+    first, second = (part.partition("```")[0] for part in text.split("```toml\n")[1:])
+    setup = load_setup(setup_of(tmp_path, first + second))
+    assert [point.name for point in setup.geometry.points] == ["wrist", "base"]
+    assert setup.batches["/daq"].names == ("ch1", "ch2")
+    assert setup.batches["/daq"].period == "header.rate"
