@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
-from math import ceil, isfinite, pi
+from math import ceil, inf, isfinite, pi
 from typing import Any
 
 import numpy as np
@@ -40,8 +40,8 @@ class Resampled:
     usable_hz
         The error holds from 0 to this frequency.
     error
-        Largest error of a sine below `usable_hz`, relative to its amplitude, over all phases; 0 when samples were
-        only copied.
+        Largest error of a sine below `usable_hz`, relative to its amplitude, over all phases; when samples were
+        only copied, that of a nanosecond's rounding or 0.
     attenuation_db
         Least attenuation of what would alias into the usable band.
     """
@@ -208,7 +208,7 @@ class _Kernel:
 
     def supported(self, samples: int) -> tuple[float, float]:
         """First and last position, in input samples, whose kernel lies inside."""
-        return self.reach - 1.0, samples - self.reach - 1e-6
+        return self.reach - 1.0, samples - self.reach - 1e-3
 
     def weights(self, fraction: Floats) -> Floats:
         """``[position, tap]`` weights of the samples floor(p) - reach + 1 ... floor(p) + reach at fraction of p."""
@@ -316,24 +316,27 @@ def _copied(series: TimeSeries, start_time_ns: int | None, samples: int | None) 
     valid[:, there] = True if series.valid is None else series.valid[:, source[there]]
     copied = replace(series, values=values, start_time_ns=start_ns, valid=None if valid.all() else valid)
     nyquist_hz = series.sample_rate_hz / 2
-    return Resampled(series=copied, usable_hz=nyquist_hz, error=0.0, attenuation_db=float("inf"))
+    error = 2 * pi * nyquist_hz * _shift_ns(series, start_time_ns) / NS_PER_S
+    return Resampled(series=copied, usable_hz=nyquist_hz, error=error, attenuation_db=inf)
 
 
 def _common_grid(series: Sequence[TimeSeries], slowest: TimeSeries, rate_hz: float) -> tuple[int, int]:
     """Start and length of the grid that lies inside all series, kernels included."""
     same_grid = rate_hz == slowest.sample_rate_hz
+    # Relative to the slowest, because nanoseconds since 1970 don't fit a floating point number.
     lows, highs = [], []
     for one in series:
         low, high = 0.0, one.samples - 1.0
         if not (same_grid and rate_hz == one.sample_rate_hz and _shift_ns(one, slowest.start_time_ns) <= 1):
             low, high = _Kernel.between(one.sample_rate_hz, rate_hz).supported(one.samples)
-        lows.append(one.start_time_ns + low * NS_PER_S / one.sample_rate_hz)
-        highs.append(one.start_time_ns + high * NS_PER_S / one.sample_rate_hz)
+        begin_ns = one.start_time_ns - slowest.start_time_ns
+        lows.append(begin_ns + low * NS_PER_S / one.sample_rate_hz)
+        highs.append(begin_ns + high * NS_PER_S / one.sample_rate_hz)
     start_ns = ceil(max(lows))
     if same_grid:
         # On a grid point of the slowest series, so that its samples stay as they are.
-        number = ceil((start_ns - slowest.start_time_ns) * rate_hz / NS_PER_S - 1e-6)
-        start_ns = slowest.start_time_ns + round(number / rate_hz * NS_PER_S)
+        number = ceil(start_ns * rate_hz / NS_PER_S - 1e-6)
+        start_ns = round(number / rate_hz * NS_PER_S)
     count = int(np.floor((min(highs) - start_ns) * rate_hz / NS_PER_S + 1e-6)) + 1
     if count < 1:
         spans = "; ".join(
@@ -341,4 +344,4 @@ def _common_grid(series: Sequence[TimeSeries], slowest: TimeSeries, rate_hz: flo
             for one in series
         )
         raise EstimateError(f"the series share no time long enough to join them: {spans}")
-    return start_ns, count
+    return slowest.start_time_ns + start_ns, count
