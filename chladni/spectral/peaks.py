@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.ndimage
 import scipy.special
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from chladni.signals.errors import EstimateError
@@ -349,29 +350,42 @@ def _tone(window: Floats, vertex: float) -> tuple[float, float, float]:
 
 
 def _from_resonance(curve: _Curve, line: int, run: NDArray[np.int64]) -> tuple[float, float, float]:
-    """Fit of 1/G by a parabola to the lines above half the peak.
+    """Fit of 1/G to the lines above half the peak: a parabola in frequency, a cubic where there are lines for it.
 
-    Averaged spectra follow a gamma distribution, whose canonical link is 1/G: one step of scoring from a parabola in
-    log G (McCullagh & Nelder 1989, chapter 8) is the fit of 1/G without the bias that inverting noisy lines has.
+    A lone resonance is a parabola near its top; its neighbours skew it, which the cubic term takes up. Averaged
+    spectra follow a gamma distribution, whose canonical link is 1/G: one step of scoring from a polynomial in log G
+    (McCullagh & Nelder 1989, chapter 8) is the fit of 1/G without the bias that inverting noisy lines has.
     """
     x = (curve.frequency_hz[run] - curve.frequency_hz[line]) / curve.spacing_hz
-    power, relative_std = curve.power[run], float(np.median(curve.relative_std[run]))
-    basis = np.vander(x, 3, increasing=True)
+    for terms in (4, 3):
+        fitted = _vertex(x, curve.power[run], terms) if run.size >= 2 * terms or terms == 3 else None
+        if fitted is not None:
+            top, height, gradient = fitted
+            relative_std = float(np.median(curve.relative_std[run])) * np.sqrt(line_correlation(curve.window))
+            frequency_hz = float(curve.frequency_hz[line] + top * curve.spacing_hz)
+            return frequency_hz, float(relative_std * gradient * curve.spacing_hz), height
+    # No maximum inside: so flat and noisy a top lies anywhere above half of it.
+    flat_std_hz = float(np.ptp(x) * curve.spacing_hz / np.sqrt(12))
+    return float(curve.frequency_hz[line]), flat_std_hz, float(curve.power[run].max())
+
+
+def _vertex(x: Floats, power: Floats, terms: int) -> tuple[float, float, float] | None:
+    """Where a fitted 1/G has its minimum, G there, and the vertex's std for lines of relative std 1."""
+    basis = np.vander(x, terms, increasing=True)
     expected = np.exp(basis @ np.linalg.lstsq(basis, np.log(power), rcond=None)[0])
     weighted = basis * expected[:, np.newaxis]
     target = expected * (1 / expected - (power - expected) / expected**2)
-    a, b, c = np.linalg.lstsq(weighted, target, rcond=None)[0]
-    # 1/G has its minimum where G has its maximum; a fit that bends the other way has none.
-    top = -b / (2 * c) if c > 0 else np.nan
-    if not (x[0] <= top <= x[-1] and a + b * top / 2 > 0):
-        # No maximum inside: so flat and noisy a top lies anywhere above half of it.
-        return float(curve.frequency_hz[line]), float(np.ptp(x) * curve.spacing_hz / np.sqrt(12)), float(power.max())
-    covariance = np.linalg.inv(weighted.T @ weighted) * relative_std**2 * line_correlation(curve.window)
-    # Derivative of -b/(2c) by a, b and c.
-    gradient = np.array([0.0, -1 / (2 * c), -top / c])
-    std = np.sqrt(gradient @ covariance @ gradient)
-    height = 1 / (a + b * top / 2)
-    return float(curve.frequency_hz[line] + top * curve.spacing_hz), float(std * curve.spacing_hz), float(height)
+    inverse = Polynomial(np.linalg.lstsq(weighted, target, rcond=None)[0])
+    bend = inverse.deriv(2)
+    vertices = [float(root.real) for root in inverse.deriv().roots() if abs(root.imag) < 1e-9]
+    inside = [root for root in vertices if x[0] <= root <= x[-1] and bend(root) > 0 and inverse(root) > 0]
+    if not inside:
+        return None
+    top = min(inside, key=abs)
+    # The vertex moves by -(d/dx of what a coefficient multiplies) / (second derivative).
+    slopes = np.arange(terms) * top ** np.maximum(np.arange(terms) - 1, 0) / -bend(top)
+    covariance = np.linalg.inv(weighted.T @ weighted)
+    return top, float(1 / inverse(top)), float(np.sqrt(slopes @ covariance @ slopes))
 
 
 def _merged(named: list[tuple[_Found, str, str]], resolution_hz: float, count: int) -> tuple[Peak, ...]:

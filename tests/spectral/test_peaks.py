@@ -246,6 +246,33 @@ def test_the_resonances_of_the_hammered_structure_are_named(shared_data):
     assert peaks[0].frequency_hz == pytest.approx(3295, abs=3)
 
 
+def test_a_neighbouring_mode_that_skews_a_peak_does_not_shift_it():
+    frequency_hz = np.arange(10.0, 150.0, 0.1)
+    fine_hz = np.arange(60.0, 70.0, 1e-4)
+
+    def magnitude(at_hz):
+        strong = 1 / (48.0**2 - at_hz**2 + 0.04j * 48.0 * at_hz)
+        weak = 0.8 / (66.0**2 - at_hz**2 + 0.05j * 66.0 * at_hz)
+        return np.abs(strong - weak)
+
+    true_hz = fine_hz[np.argmax(magnitude(fine_hz))]
+    assert abs(true_hz - 66.0) > 0.1  # the neighbour does skew it
+    values = magnitude(frequency_hz)[np.newaxis, np.newaxis].astype(complex)
+    response = FrequencyResponse(
+        frequency_hz=frequency_hz,
+        values=values,
+        std=1e-3 * np.abs(values),
+        coherence=np.ones((1, frequency_hz.size)),
+        excited=np.ones(frequency_hz.size, dtype=bool),
+        responses=(Channel(name="a", unit="m/s^2"),),
+        references=(Channel(name="f", unit="N"),),
+        provenance=Provenance(window="hann", averages=100, effective_averages=100.0),
+    )
+    found = min(find_response_peaks(response), key=lambda peak: abs(peak.frequency_hz - true_hz))
+    # A tenth of a line: what the cubic leaves. The parabola alone is off by more than a line.
+    assert abs(found.frequency_hz - true_hz) < 0.01
+
+
 @pytest.mark.parametrize("options", [{"count": 0}, {"false_alarm": 0.0}, {"false_alarm": 1.0}])
 def test_arguments_out_of_range_are_refused(options):
     with pytest.raises(EstimateError, match=next(iter(options))):
