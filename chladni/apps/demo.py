@@ -6,16 +6,17 @@ from pathlib import Path
 import numpy as np
 
 from chladni.apps.analyse import analyse
-from chladni.apps.demo_log import LOST_FROM_S, LOST_SENSOR, LOST_TO_S, SHAKEN, DemoLog, make_demo_log, setup_text
+from chladni.apps.demo_log import LOST_FROM_S, LOST_SENSOR, LOST_TO_S, DemoLog, make_demo_log, setup_text
 from chladni.apps.sources import Progress, no_progress
 from chladni.io.atomic import atomic_write
 from chladni.io.log import open_log
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.errors import LogError
-from chladni.signals.peak import Peak
 from chladni.signals.study import Study
 
-RESOLUTION_HZ = 0.25
+RESOLUTION_HZ = 0.125
+# Peaks this far apart, relative, are different ones.
+SAME_PEAK = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,37 +99,62 @@ def _name(body: str) -> str:
     return f"/{body}.accel.linear.x"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Top:
+    """A peak of an exact accelerance."""
+
+    body: str
+    frequency_hz: float
+    height: float
+    prominence_db: float
+
+
 def _peaks_beside_truth(study: Study, made: DemoLog) -> list[Comparison]:
-    """Set the driving point's peaks beside those of the exact accelerance."""
-    fine_hz = np.linspace(5.0, 300.0, 59_001)
-    exact = np.abs(made.accelerance(SHAKEN, fine_hz))
-    tops = np.flatnonzero((exact[1:-1] > exact[:-2]) & (exact[1:-1] > exact[2:])) + 1
-    found = [peak for peak in study.response_peaks if peak.channels[0] == _name(SHAKEN)]
+    """For each natural mode, set the transfer function that shows it best beside the exact one."""
+    tops = [top for body in made.structure.bodies for top in _tops(made, body.name)]
     rows = []
-    for top in tops:
-        nearest = min(found, key=lambda peak: abs(peak.frequency_hz - fine_hz[top]), default=None)
-        rows += _beside(nearest, float(fine_hz[top]), float(exact[top]))
+    for natural_hz in made.modes.frequency_hz:
+        near = [top for top in tops if abs(top.frequency_hz / natural_hz - 1) < SAME_PEAK]
+        clearest = max(near, key=lambda top: top.prominence_db)
+        rows += _beside(study, clearest)
     return rows
 
 
-def _beside(peak: Peak | None, frequency_hz: float, height: float) -> list[Comparison]:
-    """Compare frequency and height; a peak further off than 2 % is another peak."""
-    if peak is None or abs(peak.frequency_hz - frequency_hz) > 0.02 * frequency_hz:
-        peak = None
-    what = f"tool over shaker, peak near {frequency_hz:.0f} Hz"
+def _tops(made: DemoLog, body: str) -> list[_Top]:
+    from scipy.signal import find_peaks
+
+    frequency_hz = np.linspace(5.0, 300.0, 59_001)
+    level_db = 20 * np.log10(np.abs(made.accelerance(body, frequency_hz)))
+    lines, shape = find_peaks(level_db, prominence=0.0)
+    return [
+        _Top(
+            body=body,
+            frequency_hz=float(frequency_hz[line]),
+            height=float(10 ** (level_db[line] / 20)),
+            prominence_db=float(prominence),
+        )
+        for line, prominence in zip(lines, shape["prominences"], strict=True)
+    ]
+
+
+def _beside(study: Study, top: _Top) -> list[Comparison]:
+    mine = [peak for peak in study.response_peaks if peak.channels[0] == _name(top.body)]
+    near = [peak for peak in mine if abs(peak.frequency_hz / top.frequency_hz - 1) < SAME_PEAK]
+    peak = min(near, key=lambda peak: abs(peak.frequency_hz - top.frequency_hz), default=None)
+    what = f"{top.body} over shaker, peak near {top.frequency_hz:.0f} Hz"
     return [
         Comparison(
             what=f"{what}: frequency",
             found=None if peak is None else peak.frequency_hz,
             std=0.0 if peak is None else peak.frequency_std_hz,
-            truth=frequency_hz,
+            truth=top.frequency_hz,
             unit="Hz",
         ),
         Comparison(
             what=f"{what}: height",
             found=None if peak is None else peak.height,
             std=0.0 if peak is None else peak.height_std,
-            truth=height,
+            truth=top.height,
             unit="(m/s^2)/N",
         ),
     ]

@@ -87,11 +87,11 @@ def _print_peaks(out: Output, peaks: "tuple[Peak, ...]") -> None:
         out.line("No peak stands out of the scatter.")
         return
     out.table(
-        "Peaks, the highest first",
-        ["channels, the strongest first", "frequency [Hz]", "density", "unit"],
+        "Peaks, the clearest first",
+        ["strongest in", "frequency [Hz]", "density", "unit"],
         [
             [
-                ", ".join(peak.channels),
+                _names(peak.channels),
                 with_error(peak.frequency_hz, peak.frequency_std_hz),
                 with_error(peak.height, peak.height_std),
                 peak.unit,
@@ -99,3 +99,8 @@ def _print_peaks(out: Output, peaks: "tuple[Peak, ...]") -> None:
             for peak in peaks
         ],
     )
+
+
+def _names(channels: tuple[str, ...]) -> str:
+    """Name the strongest and count the others, whose names would fill the table."""
+    return channels[0] if len(channels) == 1 else f"{channels[0]} and {len(channels) - 1} more"
