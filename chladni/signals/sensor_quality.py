@@ -97,7 +97,7 @@ def sensor_quality(series: TimeSeries) -> tuple[SensorFault, ...]:
       reached smoothly is where a motion turns or rests.
     - dead: constant, or two or three values within 0.1 % of the mean or 0.01 % of the overload.
     - dropouts: the same value for at least eight samples, not at an end of the range, between steps above 0.1 m
-      before and 0.5 m after; in a channel that otherwise moves.
+      before and after; in a channel that otherwise moves.
     - spikes: 30 m and 4 q away and back within three samples (m of the 4096 around), steps of the eight samples
       before and after below a quarter of that. Force channels are left out, where that's a hit.
     - not-a-number: NaN or infinite.
@@ -262,7 +262,7 @@ def _held(record: _Record) -> Ints:
     long = lengths >= _SHORTEST_HOLD - 1
     starts, lengths = starts[long], lengths[long]
     entered = record.step(starts - 1) > 0.1 * record.typical_step
-    left = record.step(starts + lengths) > max(0.5 * record.typical_step, 4 * record.smallest_step)
+    left = record.step(starts + lengths) > max(0.1 * record.typical_step, 4 * record.smallest_step)
     level = record.samples[starts]
     chosen = entered & left & (level != record.high) & (level != record.low)
     return _filled(starts[chosen], lengths[chosen] + 1)
