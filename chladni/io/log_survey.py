@@ -106,7 +106,7 @@ def _stamp_findings(placements: Sequence[Placement]) -> Iterator[str]:
 def _clock_findings(placement: Placement) -> Iterator[str]:
     base, stream = placement.time_base, placement.stream
     if not base.samples:
-        yield f"{stream.label}: no messages"
+        yield f"{stream.label}: no usable messages"
         return
     if base.verdict != "regular" or base.gap_count or base.jumps or base.wander_s * base.rate_hz > 1:
         yield f"{stream.label}: {base.advice}"

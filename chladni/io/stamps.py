@@ -141,6 +141,9 @@ def plausible(stamps_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def _to_ns(raw: NDArray[np.generic], unit_ns: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    if unit_ns == 1 and raw.dtype == np.int64:
+        # What decoders give for a stamp of type time: nothing to convert, and most logs have it.
+        return raw.astype(np.int64, copy=False), np.ones(raw.size, np.bool_)
     numbers = raw.astype(np.float64)
     usable = np.isfinite(numbers) & (np.abs(numbers) * unit_ns < LATEST_NS)
     if raw.dtype.kind in "iu":

@@ -868,7 +868,7 @@ def test_a_silent_topic_and_an_empty_log(tmp_path: Path) -> None:
             0,
             None,
         )
-        assert "/imu: no messages" in content["findings"]
+        assert "/imu: no usable messages" in content["findings"]
 
 
 def test_what_a_truncated_log_still_holds_is_read(tmp_path: Path) -> None:
