@@ -72,6 +72,28 @@ def amplitude_density_unit(unit: str) -> str:
     return f"{printed_unit(unit)}/√Hz" if unit.isalnum() else f"({printed_unit(unit)})/√Hz"
 
 
+def decibel_unit(unit: str) -> str:
+    """Give the unit of a level, with its reference.
+
+    Examples
+    --------
+    >>> decibel_unit("(m/s^2)^2/Hz"), decibel_unit("1/Hz"), decibel_unit("1")
+    ('dB re 1 (m/s²)²/Hz', 'dB re 1/Hz', 'dB re 1')
+    """
+    return f"dB re {printed_unit(unit)}" if unit.startswith("1") else f"dB re 1 {printed_unit(unit)}"
+
+
+def part_of_several(place: int, count: int, feature: str) -> str:
+    """Tell the series (or spectra) of a study apart in plots' titles; nothing when there is only one.
+
+    Examples
+    --------
+    >>> part_of_several(2, 3, "100 Hz"), part_of_several(1, 1, "100 Hz")
+    (' · series 2, 100 Hz', '')
+    """
+    return f" · series {place}, {feature}" if count > 1 else ""
+
+
 def thinned(stretch: int) -> str:
     """Say in a plot's title how a waveform was thinned for drawing; nothing when it wasn't."""
     return "" if stretch == 1 else f" · least and greatest of every {stretch} samples"

@@ -256,6 +256,42 @@ def test_no_two_channels_share_a_path(names: set[str]) -> None:
     assert len(paths) == 2
 
 
+def test_several_references_have_a_page_and_a_shape_each(tmp_path: Path) -> None:
+    response = synthetic.frequency_response()
+    second = Channel(name="/shaker.force.z", unit="N", role="reference")
+    double = replace(
+        response,
+        values=np.concatenate([response.values, 2 * response.values], axis=1),
+        std=np.concatenate([response.std, response.std], axis=1),
+        references=(*response.references, second),
+    )
+    contents = Contents(write_rrd(replace(synthetic.study(), response=double), tmp_path / "two.rrd"))
+    first, other = (
+        contents.scalars(channel_entity(f"/magnitude/reference_{place}/acceleration", synthetic.RESPONSES[0]))
+        for place in (1, 2)
+    )
+    np.testing.assert_allclose(other - first, 20 * np.log10(2), rtol=1e-12)
+    names = contents.view_names()
+    assert names.count("Multiple coherence γ² [1]") == 2
+    assert {"Deflection shape to hammer.x, size normalised", "Deflection shape to shaker.z, size normalised"} <= set(
+        names
+    )
+
+
+def test_series_of_one_quantity_are_told_apart(tmp_path: Path) -> None:
+    series = synthetic.time_series()
+    slower = replace(series, values=series.values[:, ::2], sample_rate_hz=128.0)
+    path = write_rrd(Study(title="two", series=(series, slower)), tmp_path / "two.rrd")
+    assert {"Force [N] · series 1, 256 Hz", "Force [N] · series 2, 128 Hz"} <= set(Contents(path).view_names())
+
+
+def test_waterfall_of_missing_samples_alone_is_drawn(tmp_path: Path) -> None:
+    waterfall = synthetic.waterfall()
+    empty = replace(waterfall, values=np.full_like(waterfall.values, np.nan))
+    path = write_rrd(Study(title="gap", waterfalls=(empty,)), tmp_path / "gap.rrd")
+    assert channel_entity("/waterfall/1", synthetic.FORCE) in Contents(path).entities()
+
+
 def test_an_empty_study_is_a_page_of_findings(tmp_path: Path) -> None:
     path = write_rrd(Study(title="nothing", findings=("no channel",)), tmp_path / "empty.rrd")
     assert "/findings" in Contents(path).entities()

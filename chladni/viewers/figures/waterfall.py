@@ -14,7 +14,7 @@ from chladni.signals.waterfall import Waterfall
 from chladni.viewers.drawing import Floats, block_maximum, decibels_of_power
 from chladni.viewers.figures.sheet import look, plain, sheet
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit
+from chladni.viewers.labels import decibel_unit
 from chladni.viewers.style import Style
 
 PIXELS = 1500
@@ -49,7 +49,7 @@ def _figure(waterfall: Waterfall, group: Group, style: Style) -> Figure:
     stack[-1].set_xlabel("Time [s]")
     if image is not None:
         bar = figure.colorbar(image, ax=stack, aspect=18 * len(stack), pad=0.02)
-        bar.set_label(f"PSD [dB re 1 {printed_unit(power_density_unit(group.unit))}]")
+        bar.set_label(f"PSD [{decibel_unit(power_density_unit(group.unit))}]")
         bar.outline.set_linewidth(0.0)
     return figure
 

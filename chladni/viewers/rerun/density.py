@@ -8,7 +8,7 @@ from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.study import Study
 from chladni.viewers.drawing import decibels_of_power, level_limits
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit
+from chladni.viewers.labels import decibel_unit, part_of_several
 from chladni.viewers.rerun.entities import channel_entity, folder
 from chladni.viewers.rerun.lines import draw_band, draw_line
 from chladni.viewers.rerun.timelines import frequency_axis
@@ -18,23 +18,28 @@ from chladni.viewers.style import Style
 def draw_densities(recording: rr.RecordingStream, study: Study, style: Style) -> list[rrb.View]:
     """Write the densities in decibels and give a view for each group of channels."""
     return [
-        _draw_group(recording, density, group, style, place)
+        _draw_group(recording, study, density, group, style, place)
         for place, density in enumerate(study.densities, start=1)
         for group in groups(density.channels)
     ]
 
 
 def _draw_group(
-    recording: rr.RecordingStream, density: PowerSpectralDensity, group: Group, style: Style, place: int
+    recording: rr.RecordingStream,
+    study: Study,
+    density: PowerSpectralDensity,
+    group: Group,
+    style: Style,
+    place: int,
 ) -> rrb.View:
     parent = folder("density", str(place), group.name)
     for row in group.rows:
         _draw_channel(recording, density, row, parent, style, lines_in_view=len(group.rows))
     levels = decibels_of_power(density.values[list(group.rows)])
-    unit = printed_unit(density.units[group.rows[0]])
+    part = part_of_several(place, len(study.densities), f"to {density.frequency_hz[-1]:g} Hz")
     return rrb.TimeSeriesView(
         origin=parent,
-        name=f"{group.name} PSD [dB re 1 {unit}] · 1 ms = 1 Hz",
+        name=f"{group.name} PSD [{decibel_unit(density.units[group.rows[0]])}] · 1 ms = 1 Hz{part}",
         axis_x=frequency_axis(0.0, float(density.frequency_hz[-1])),
         axis_y=rrb.ScalarAxis(range=level_limits(levels)),
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),

@@ -7,6 +7,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from chladni.viewers.drawing import Floats, decibels_of_amplitude, level_limits, line_breaks, phase_wraps, with_breaks
+from chladni.viewers.labels import decibel_unit
 from chladni.viewers.panels import Panel
 from chladni.viewers.rerun.entities import channel_entity, folder
 from chladni.viewers.rerun.lines import draw_band, draw_line
@@ -33,7 +34,7 @@ def draw_magnitude(recording: rr.RecordingStream, panel: Panel, style: Style) ->
     return _view(
         panel,
         "magnitude",
-        f"{panel.quantity} |H| to {reference} [dB re 1 {panel.unit}] · {estimator} · 1 ms = 1 Hz",
+        f"{panel.quantity} |H| to {reference} [{decibel_unit(panel.unit)}] · {estimator} · 1 ms = 1 Hz",
         draw,
         limits=level_limits(np.concatenate(levels)),
         legend=True,

@@ -69,7 +69,11 @@ def _draw_axes(recording: rr.RecordingStream, path: str, low: Floats, high: Floa
     colours = [GRID_COLOUR] * len(grid) + [AXIS_COLOUR] * len(axes)
     strips = rr.LineStrips2D(grid + axes, colors=colours, radii=rr.Radius.ui_points(0.5), draw_order=-10.0)
     recording.log(path, strips, static=True)
-    places = [(x, high[1]) for x in real] + [(low[0], -y) for y in imaginary] + [(high[0], 0.0), (0.0, low[1])]
+    # Inside the frame, for at its edge a number would be cut; labels hang below their point.
+    inset = np.array([0.04, 0.08]) * (high - low)
+    bottom, left = high[1] - inset[1], low[0] + inset[0]
+    places = [(x, bottom) for x in real] + [(left, -y) for y in imaginary]
+    places += [(high[0] - inset[0], 0.0), (0.0, low[1] + inset[1] / 4)]
     texts = [f"{x:g}" for x in real] + [f"{y:g}" for y in imaginary] + ["Re", "Im"]
     labels = rr.Points2D(
         places,

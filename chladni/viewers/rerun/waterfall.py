@@ -9,7 +9,7 @@ from chladni.signals.study import Study
 from chladni.signals.units import power_density_unit
 from chladni.signals.waterfall import Waterfall
 from chladni.viewers.drawing import block_maximum, decibels_of_power
-from chladni.viewers.labels import printed_unit, reduction
+from chladni.viewers.labels import decibel_unit, reduction
 from chladni.viewers.rerun.entities import channel_entity, folder
 from chladni.viewers.style import Style
 
@@ -40,10 +40,10 @@ def _draw_channel(
     picture = np.where(np.isnan(level), low, level)
     names = (f"time {_span(waterfall.time_s)} s", f"frequency {_span(waterfall.frequency_hz)} Hz")
     recording.log(path, rr.Tensor(picture, dim_names=names, value_range=(low, high)), static=True)
-    unit = printed_unit(power_density_unit(channel.unit))
+    unit = decibel_unit(power_density_unit(channel.unit))
     return rrb.TensorView(
         origin=path,
-        name=f"{style.labels[channel.name]} PSD over time [dB re 1 {unit}], {low:.0f} to {high:.0f}"
+        name=f"{style.labels[channel.name]} PSD over time [{unit}], {low:.0f} to {high:.0f}"
         + reduction(times, lines),
         slice_selection=rrb.TensorSliceSelection(
             width=rr.TensorDimensionSelection(dimension=0),

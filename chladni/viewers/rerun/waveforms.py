@@ -8,7 +8,7 @@ from chladni.signals.study import Study
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.viewers.drawing import thin, without_repeated_gaps
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit, thinned
+from chladni.viewers.labels import part_of_several, printed_unit, thinned
 from chladni.viewers.rerun.entities import channel_entity, folder
 from chladni.viewers.rerun.timelines import send_scalars, time_axis, time_index
 from chladni.viewers.style import Style
@@ -29,7 +29,7 @@ def draw_waveforms(recording: rr.RecordingStream, study: Study, style: Style) ->
     channels = sum(len(series.channels) for series in study.series)
     limit = min(ROWS_OF_A_CHANNEL, ROWS_OF_A_STUDY // max(channels, 1))
     return [
-        _draw_group(recording, series, group, style, limit=limit, place=place)
+        _draw_group(recording, study, series, group, style, limit=limit, place=place)
         for place, series in enumerate(study.series, start=1)
         for group in groups(series.channels)
     ]
@@ -48,11 +48,19 @@ def waveform_view(study: Study, style: Style, name: str) -> rrb.View | None:
 
 
 def _draw_group(
-    recording: rr.RecordingStream, series: TimeSeries, group: Group, style: Style, *, limit: int, place: int
+    recording: rr.RecordingStream,
+    study: Study,
+    series: TimeSeries,
+    group: Group,
+    style: Style,
+    *,
+    limit: int,
+    place: int,
 ) -> rrb.View:
     parent = folder("waveforms", str(place), group.name)
+    part = part_of_several(place, len(study.series), f"{series.sample_rate_hz:g} Hz")
     stretch = max(_draw_channel(recording, series, row, parent, style, limit) for row in group.rows)
-    return _view(series, parent, f"{group.title}{thinned(stretch)}", style, legend=True)
+    return _view(series, parent, f"{group.title}{part}{thinned(stretch)}", style, legend=True)
 
 
 def _view(series: TimeSeries, origin: str, name: str, style: Style, *, legend: bool) -> rrb.View:
