@@ -12,6 +12,8 @@ from chladni.signals.errors import EstimateError
 NEIGHBOURS = 16
 # A log with more candidates than this has no clock worth untangling.
 MAX_CANDIDATES = 1000
+#: A step forward that nobody waits for: eleven days, in a log of seconds to hours. Clocks that start in 1970 do it.
+LEAP_NS = 1_000_000_000_000_000
 _SAMPLE = 200_000
 
 
@@ -19,12 +21,14 @@ _SAMPLE = 200_000
 class ClockJump:
     """A step of the clock between two neighbouring messages.
 
+    How long it took is unknown; one missing sample marks it, so that nothing is averaged across.
+
     Attributes
     ----------
     before_ns, after_ns
         Stamps on either side.
     shift_ns
-        What to add to every later stamp so that time runs on; 0 for a step forward, which may as well be a pause.
+        What to add to every later stamp so that time runs on; 0 for a step forward that may as well be a pause.
     """
 
     before_ns: int
@@ -50,7 +54,7 @@ class Untangled:
     order
         ``[message]`` place of arrival of each, None when none came late.
     jumps
-        Steps back that were undone.
+        Steps back, and leaps forward of more than eleven days, that were undone.
     out_of_order
         Messages that came after a later one.
     duplicates
@@ -85,7 +89,7 @@ def untangle(stamps_ns: NDArray[np.int64]) -> Untangled:
         ``[message]`` int64 nanoseconds, in the order of arrival, at least one.
     """
     time_ns, steps = stamps_ns, np.diff(stamps_ns)
-    if steps.size == 0 or steps.min() >= 0:
+    if steps.size == 0 or (steps.min() >= 0 and steps.max() < LEAP_NS):
         repeats = steps.size - int(np.count_nonzero(steps))
         return Untangled(time_ns=stamps_ns, steps=steps, order=None, jumps=(), out_of_order=0, duplicates=repeats)
     backward = int(np.count_nonzero(steps < 0))
@@ -100,15 +104,16 @@ def untangle(stamps_ns: NDArray[np.int64]) -> Untangled:
         steps=steps,
         order=order,
         jumps=jumps,
-        out_of_order=backward - len(jumps),
+        out_of_order=backward - sum(jump.shift_ns > 0 for jump in jumps),
         duplicates=steps.size - int(np.count_nonzero(steps)),
     )
 
 
 def find_jumps(stamps_ns: NDArray[np.int64]) -> tuple[ClockJump, ...]:
-    """Find where the clock was set back: the messages after stay behind those before."""
+    """Find where the clock was set: the messages after stay behind, or ages ahead of, those before."""
     period_ns = typical_period(stamps_ns)
-    candidates = np.flatnonzero(np.diff(stamps_ns) < -NEIGHBOURS * period_ns)
+    steps = np.diff(stamps_ns)
+    candidates = np.flatnonzero((steps < -NEIGHBOURS * period_ns) | (steps > LEAP_NS))
     if candidates.size > MAX_CANDIDATES:
         return ()
     jumps = []
@@ -116,9 +121,10 @@ def find_jumps(stamps_ns: NDArray[np.int64]) -> tuple[ClockJump, ...]:
         before = stamps_ns[max(0, last + 1 - NEIGHBOURS) : last + 1]
         after = stamps_ns[last + 1 : last + 1 + NEIGHBOURS]
         # One or two messages at an end can't show whether the clock was set or they were late.
-        if min(before.size, after.size) > 2 and np.median(after) < np.median(before):
+        moved = float(np.median(after - before[0]) - np.median(before - before[0]))
+        if min(before.size, after.size) > 2 and (moved < 0 or moved > 0.5 * LEAP_NS):
             at, to = int(stamps_ns[last]), int(stamps_ns[last + 1])
-            jumps.append(ClockJump(before_ns=at, after_ns=to, shift_ns=at - to + round(period_ns)))
+            jumps.append(ClockJump(before_ns=at, after_ns=to, shift_ns=at - to + round(2 * period_ns)))
     return tuple(jumps)
 
 

@@ -84,7 +84,7 @@ def message_index(
         When the time base has no grid.
     """
     clock = _clock(time_base)
-    time_ns, _ = run_on(require_stamps(stamps_ns), _steps_back(time_base))
+    time_ns, _ = run_on(require_stamps(stamps_ns), _steps_undone(time_base))
     order = np.argsort(time_ns, kind="stable")
     sizes = np.ones_like(time_ns) if counts is None else np.asarray(counts, dtype=np.int64)[order]
     index = np.empty_like(time_ns)
@@ -117,7 +117,7 @@ class Placer:
         self._channels = tuple(channels)
         self._max_samples = max_samples
         self._hold = max(_HELD, time_base.smoothing)
-        self._jumps = _steps_back(time_base)
+        self._jumps = _steps_undone(time_base)
         self._jumps_done = 0
         self._last_stamp = np.empty(0, dtype=np.int64)
         self._waiting = _Messages.none(len(self._channels))
@@ -264,5 +264,5 @@ def _clock(base: TimeBase) -> Callable[[NDArray[np.int64], NDArray[np.int64]], N
     )
 
 
-def _steps_back(base: TimeBase) -> tuple[ClockJump, ...]:
+def _steps_undone(base: TimeBase) -> tuple[ClockJump, ...]:
     return tuple(jump for jump in base.jumps if jump.shift_ns)

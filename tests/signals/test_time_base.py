@@ -154,9 +154,20 @@ def test_a_clock_that_is_set_keeps_its_rate(step_s: float) -> None:
     assert base.rate_hz == 100.0
     assert base.out_of_order == 0
     assert [jump.step_s for jump in base.jumps] == [pytest.approx(step_s + 0.01)]
-    # Backward, time runs on as if nothing was missing; forward it may as well be a pause, so it's a gap too.
-    assert base.gap_count == (1 if step_s > 0 else 0)
-    assert base.missing == (360_000 if step_s > 0 else 0)
+    # Backward, a missing sample marks the cut; forward it may as well be a pause, so it's a gap of that length.
+    assert base.gap_count == 1
+    assert base.missing == (360_000 if step_s > 0 else 1)
+
+
+def test_a_clock_that_starts_in_1970_is_a_jump_and_no_gap_of_years() -> None:
+    when = grid(100.0, 4000)
+    when[:1500] -= START_NS
+    base = fit_time_base(when)
+    assert base.rate_hz == 100.0
+    assert len(base.jumps) == 1
+    assert base.jumps[0].step_s > 1.6e9
+    assert base.missing == 1
+    assert base.out_of_order == 0
 
 
 def test_a_log_full_of_steps_back_is_no_clock() -> None:
