@@ -28,8 +28,10 @@ AVERAGINGS = ("linear", "exponential", "peak-hold")
 
 # Segments of one matrix product: enough to make BLAS worth calling, and spectra of at most so many bytes.
 MOST_SEGMENTS_TOGETHER = 128
-BYTES_TOGETHER = 64 << 20
+BYTES_TOGETHER = 32 << 20
+# A matrix of more than this is a mistyped resolution more often than a wish.
 MOST_RESULT_BYTES = 2 << 30
+# More threads than this wait for memory.
 MOST_THREADS = 8
 
 
@@ -87,6 +89,7 @@ class CrossSpectraAccumulator:
         self.averaging = averaging
         self.time_constant_s = time_constant_s
         require_fitting_result(len(self.channels), segmentation.samples)
+        # The window is the first to be made: a wrong name is to be told before any memory is taken.
         self._window = window_samples(segmentation.window, segmentation.samples)
         decay = _decay(averaging, time_constant_s, segmentation.hop / self.sample_rate_hz)
         lines = segmentation.samples // 2 + 1
@@ -115,6 +118,7 @@ class CrossSpectraAccumulator:
             When channels or rate differ from those promised, the block starts before the last one ended, or a
             sample that isn't marked invalid isn't finite.
         """
+        # All that can be refused is refused before anything is changed: a caller may mend the block and go on.
         self._require_agreement(block)
         runs = valid_runs(block)
         require_finite(block, runs)
@@ -126,6 +130,7 @@ class CrossSpectraAccumulator:
                 if first > 0:
                     self._end_run(executor)
                 self._take(block.values[:, first:last], executor)
+            # A block that ends in invalid samples ends the run, even if the next one begins with valid ones.
             if block.samples > (runs[-1][1] if runs else 0):
                 self._end_run(executor)
 
@@ -144,6 +149,7 @@ class CrossSpectraAccumulator:
         with _threads() as executor:
             self.average_held(executor)
             flushed = other.flushed(executor)
+        # This one's held samples stay: its own stream goes on without a seam.
         self.average.merge(flushed.average)
         self.count.merge(flushed.count)
         self.stretch.merge(flushed.stretch)
@@ -156,6 +162,7 @@ class CrossSpectraAccumulator:
         EstimateError
             When not a single whole segment of valid samples has come.
         """
+        # A copy is finished, not this one: a live display asks often, and batches are to fill as before.
         with _threads() as executor:
             flushed = self.flushed(executor)
         if flushed.count.segments == 0:
@@ -184,6 +191,7 @@ class CrossSpectraAccumulator:
             used = step - self._held.samples
             self._held.replace(joined[:, step : joined.shape[1] - missing] if used < 0 else joined[:, :0])
             values = values[:, max(used, 0) :]
+        # With nothing held, batches are views into the block: a whole record is averaged without a copy of it.
         if not self._held.samples:
             while values.shape[1] >= length:
                 self._average_batch(values[:, :length], executor)
@@ -209,6 +217,7 @@ class CrossSpectraAccumulator:
         self._held, self._position = HeldSamples(), 0
 
     def _segments_together(self) -> int:
+        # The number hangs on the shape only, not on the machine: sums are to be the same everywhere.
         bytes_each = 16 * len(self.channels) * (self.segmentation.samples // 2 + 1)
         return min(MOST_SEGMENTS_TOGETHER, max(1, BYTES_TOGETHER // bytes_each))
 
@@ -253,6 +262,7 @@ class CrossSpectraAccumulator:
                 f"the block has channels {_names(block.channels)}, the average {_names(self.channels)}; "
                 "give blocks of the same channels in the same order"
             )
+        # Rates of blocks of one log differ in the last digits when each was fitted for itself.
         if not isclose(block.sample_rate_hz, self.sample_rate_hz, rel_tol=1e-9):
             raise EstimateError(
                 f"the block has {block.sample_rate_hz} samples/s, the average {self.sample_rate_hz}; "
@@ -288,6 +298,7 @@ def _decay(averaging: SegmentAveraging, time_constant_s: float | None, hop_s: fl
     if (averaging == "exponential") != (time_constant_s is not None):
         raise SetupError(f"time_constant_s is for exponential averaging and needed there; averaging is {averaging!r}")
     if time_constant_s is None:
+        # No fading: one formula serves linear and exponential averages.
         return 1.0
     if not 0 < time_constant_s < float("inf"):
         raise SetupError(f"time constant {time_constant_s} s must be finite and above 0")

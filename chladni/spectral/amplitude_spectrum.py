@@ -54,6 +54,7 @@ def amplitude_spectrum(spectra: CrossSpectra, *, quantity: Quantity = "rms") -> 
     power = density.values * spectra.bandwidth_hz
     power_std = density.std * spectra.bandwidth_hz
     rms = np.sqrt(power)
+    # d sqrt(P) = dP / (2 sqrt(P)).
     std = np.divide(power_std, 2 * rms, out=np.sqrt(power_std), where=rms > 0)
     # At 0 Hz a one-sided density has no negative twin: the line is the square of the offset itself.
     gain = np.where(spectra.frequency_hz > 0, np.sqrt(2), 1.0) if quantity == "peak" else np.ones(power.shape[1])

@@ -45,14 +45,17 @@ class WeightedSum:
         """See `SegmentAverage`."""
         count = spectra.shape[1]
         weights = self.decay ** np.arange(count - 1, -1, -1)
+        # A root of the weight on each spectrum puts the whole weight on each product.
         if self.decay != 1:
             spectra = spectra * np.sqrt(weights)[:, np.newaxis]
         self._fade(count)
         self.weight += float(weights.sum())
+        # Seen as reals, the last axis is Re, Im of the first channel, Re, Im of the second, ...
         parts = spectra.view(np.float64)
 
         def accumulate(first: int) -> None:
             lines = parts[first : first + LINES_TOGETHER]
+            # NumPy sees a matrix times its own transpose and calls the symmetric product.
             self.products[first : first + LINES_TOGETHER] += np.matmul(lines.transpose(0, 2, 1), lines)
 
         run_all(accumulate, range(0, len(parts), LINES_TOGETHER), executor)
@@ -76,6 +79,7 @@ class WeightedSum:
         density = np.empty((products.shape[0] // 2, products.shape[1] // 2, products.shape[2]), dtype=np.complex128)
         density.real = products[0::2, 0::2] + products[1::2, 1::2]
         density.imag = products[0::2, 1::2] - products[1::2, 0::2]
+        # The sum of weights, not the number of segments: right from the first segment of an exponential average.
         density /= self.weight
         return density
 
@@ -98,6 +102,7 @@ class PeakHold:
 
         def hold(first: int) -> None:
             lines = slice(first, first + LINES_TOGETHER)
+            # A segment at a time: all at once would take as many matrices as there are segments.
             for segment in spectra[lines].transpose(1, 0, 2):
                 self._keep_larger(lines, segment.conj()[:, :, np.newaxis] * segment[:, np.newaxis, :])
 

@@ -22,6 +22,7 @@ def leading_part(source: Source, samples: int) -> tuple[tuple[TimeSeries, ...], 
     blocks = iter((source,) if isinstance(source, TimeSeries) else source)
     lead: list[TimeSeries] = []
     length = 0
+    # The first blocks are kept and handed out again, so that a source that can be read once is read once.
     for block in blocks:
         lead.append(block)
         length += block.samples
@@ -34,5 +35,6 @@ def leading_part(source: Source, samples: int) -> tuple[tuple[TimeSeries, ...], 
 
 def samples_known(source: Source, lead: tuple[TimeSeries, ...], enough: int) -> int | None:
     """Give the length of the whole source, or None for a stream that goes on after `enough` samples."""
+    # A stream of exactly `enough` samples can't be told from a longer one without reading on.
     length = sum(block.samples for block in lead)
     return length if isinstance(source, TimeSeries) or length < enough else None

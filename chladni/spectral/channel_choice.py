@@ -25,6 +25,7 @@ def choose_channels(
     EstimateError
         When a channel is missing or named twice, none is left as response, or the spectra are peak-held.
     """
+    # Each pair may hold another segment, so that |G_xy|^2 can even exceed G_xx G_yy.
     if spectra.provenance.averaging == "peak-hold":
         raise EstimateError(
             "a peak hold keeps no phase between channels; average linearly for responses and coherence"
@@ -35,6 +36,7 @@ def choose_channels(
         if responses is None
         else _as_names(responses)
     )
+    # A response may be a reference too (its row is then a column of ones and zeros), but none is asked for twice.
     for role, names in (("reference", inputs), ("response", outputs)):
         if not names:
             raise EstimateError(

@@ -43,6 +43,7 @@ def coherence(
     """
     chosen = choose_channels(spectra, references, responses)
     density = np.asarray(spectra.density, dtype=np.complex128)
+    # One formula for both kinds: with one reference the explained power is |G_xy|^2/G_xx.
     solution = solve_lines(density, chosen.references, chosen.responses)
     values = share(solution.explained, auto_densities(density)[chosen.responses])
     kind = "ordinary coherence" if len(chosen.references) == 1 else "multiple coherence"
@@ -97,11 +98,13 @@ def partial_coherence(
     density = np.asarray(spectra.density, dtype=np.complex128)
     rest = conditioned_density(density, removed, kept)
     power = auto_densities(rest)
+    # A channel that the others explain wholly leaves noise of rounding, coherent with nothing or anything.
     left = power > ROUNDING * auto_densities(density)[kept]
     values = np.where(left[0] & left[1:], share(np.abs(rest[0, 1:]) ** 2, power[0] * power[1:]), 0.0)
     return Coherence(
         frequency_hz=spectra.frequency_hz,
         values=values,
+        # Each channel taken out is a parameter fitted to the same averages.
         std=coherence_std(values, spectra.provenance.effective_averages - len(removed)),
         kind="partial",
         responses=tuple(spectra.channels[row] for row in chosen.responses),

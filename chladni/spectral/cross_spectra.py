@@ -62,6 +62,7 @@ def cross_spectra(
     >>> float(round(spectra.density[0, 0, 50].real * spectra.bandwidth_hz, 12))  # RMS^2 of the sine
     1.0
     """
+    # The default segment hangs on the length of the record, which a stream doesn't tell; the lead tells enough of it.
     lead, blocks = leading_part(source, SAMPLES_TO_CHOOSE_FROM)
     first = lead[0]
     plan = plan_segmentation(

@@ -65,11 +65,13 @@ def frequency_response(
     if estimator not in ESTIMATORS:
         raise SetupError(f"estimator {estimator!r} is none of {', '.join(ESTIMATORS)}")
     chosen = choose_channels(spectra, references, responses)
+    # For periodic excitation what repeats is rank one, so that H1, H2 and Hv are all mean over mean.
     density = repeated_density(spectra)
     solution = solve_lines(density, chosen.references, chosen.responses)
     values = _estimate(estimator, density, chosen, solution)
     names = [spectra.channels[row].name for row in chosen.references]
     excited = excited_lines(spectra, names)
+    # The matrix of references is solved as a whole, so that a line must be excited by all of them.
     everywhere = np.logical_and.reduce(excited)
     response = FrequencyResponse(
         frequency_hz=spectra.frequency_hz,
@@ -96,6 +98,7 @@ def _estimate(estimator: Estimator, density: Complex, chosen: ChannelChoice, sol
 
 def _h2(density: Complex, chosen: ChannelChoice) -> Complex:
     if len(chosen.references) == 1:
+        # With one reference every response has an answer of its own.
         return np.stack([_h2_square(density, chosen.references, [row])[0] for row in chosen.responses])
     if len(chosen.references) != len(chosen.responses):
         raise EstimateError(
@@ -130,12 +133,14 @@ def _hv_response(density: Complex, references: list[int], response: int, solvabl
     # The combination of least power, sum of v_i z_i ~ 0, gives y = -sum of (v_x / v_y) x.
     smallest = np.linalg.eigh(matrix)[1][:, :, 0]
     usable &= np.abs(smallest[:, -1]) > 1e-14
+    # Where the response has no part in the combination it doesn't depend on the references at all.
     last = np.where(usable, smallest[:, -1], 1.0)
     values = -smallest[:, :-1] / last[:, None] * scale[:, -1:] / scale[:, :-1]
     return np.asarray(np.where(usable, values.T, np.nan), dtype=np.complex128)
 
 
 def _coherence(spectra: CrossSpectra, chosen: ChannelChoice) -> NDArray[np.float64]:
+    # Of the whole density, scatter included: coherence tells how much of the measured power is explained.
     density = np.asarray(spectra.density, dtype=np.complex128)
     solution = solve_lines(density, chosen.references, chosen.responses)
     return share(solution.explained, auto_densities(density)[chosen.responses])
@@ -148,6 +153,7 @@ def _std(
         std = periodic_response_std(spectra, solution.values[:, 0], chosen.references[0], chosen.responses)
         return np.where(np.isfinite(values), std[:, np.newaxis], np.inf)
     power = auto_densities(np.asarray(spectra.density, dtype=np.complex128))[chosen.responses]
+    # Rounding may leave a perfectly explained response with less than no residual.
     residual = np.maximum(power - solution.explained, 0.0)
     with np.errstate(invalid="ignore"):
         least_squares = response_std(

@@ -26,6 +26,7 @@ class HeldSamples:
 
     def replace_pieces(self, pieces: list[Samples]) -> None:
         """Hold these pieces, which nobody writes to any more."""
+        # A list made anew, not one appended to: copies of the queue share pieces.
         self._pieces = pieces
         self.samples = sum(piece.shape[1] for piece in pieces)
 

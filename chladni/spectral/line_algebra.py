@@ -48,6 +48,7 @@ def solve_lines(density: NDArray[np.complex128], references: list[int], response
     reference = density[np.ix_(references, references)].transpose(2, 0, 1) / (scale[:, :, None] * scale[:, None, :])
     cross = density[np.ix_(references, responses)].transpose(2, 0, 1)
     solvable = _well_conditioned(reference)
+    # Any matrix that can be inverted will do: its answer is thrown away.
     reference[~solvable] = np.eye(len(references))
     inverse = np.linalg.inv(reference)
     answer = inverse @ (cross / scale[:, :, None]) / scale[:, :, None]

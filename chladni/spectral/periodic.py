@@ -67,6 +67,7 @@ def periodic_cross_spectra(source: Source, period: Period) -> CrossSpectra:
     (first, *_), blocks = leading_part(source, 1)
     require_fitting_result(len(first.channels), period.samples)
     scatter = _PeriodScatter(row=first.index(period.channel))
+    # A period at a time: memory holds one, and the matrix, however long the log is.
     for cut in _periods(blocks, period):
         scatter.add(cut)
     if scatter.count < 2:
@@ -99,6 +100,7 @@ class _PeriodScatter:
             self.skipped += 1
             return
         self.count += 1
+        # Deviations from the running mean, before and after it moves: no difference of large sums loses the scatter.
         before = spectra - self.mean
         self.mean += before / self.count
         # One row at a time: the whole outer product would double the memory of the largest array.
@@ -107,6 +109,7 @@ class _PeriodScatter:
             self.products[row] += conjugate * after
 
     def _differs(self, excitation: NDArray[np.complex128]) -> bool:
+        # Twice the limit of the search: the first mean is a single period, with noise of its own.
         residual = np.sum(np.abs(excitation[1:] - self.mean[self.row, 1:]) ** 2)
         return bool(residual > 2 * LARGEST_RESIDUAL * np.sum(np.abs(self.mean[self.row, 1:]) ** 2))
 
@@ -116,6 +119,7 @@ def _spectra(first: TimeSeries, period: Period, scatter: _PeriodScatter) -> Cros
     scale = one_sided_weights(samples) / (rate * samples)
     products = scatter.products
     products *= scale
+    # The mean of products is the product of means and the scatter about them.
     density = scatter.mean.conj()[:, np.newaxis] * scatter.mean[np.newaxis] * scale
     density += products / count
     products /= count - 1
@@ -174,6 +178,7 @@ def _periods(blocks: Iterator[TimeSeries], period: Period) -> Iterator[NDArray[n
         begins = round((block.start_time_ns - start_ns) * block.sample_rate_hz / NS_PER_S)
         if position + good.size != begins:
             _require_later(begins - position - good.size, block)
+            # The period that the break cuts is lost, and counted.
             if good.size:
                 yield None
             held, good, position = held[:, :0], good[:0], begins

@@ -53,6 +53,7 @@ def auto_densities(density: NDArray[np.complexfloating]) -> NDArray[np.float64]:
 def _std(spectra: CrossSpectra, values: NDArray[np.float64]) -> NDArray[np.float64]:
     if spectra.noise_density is None:
         return np.asarray(values / np.sqrt(spectra.provenance.effective_averages), dtype=np.float64)
+    # Scatter of |mean + noise|^2: the noise beats with the mean, and with itself.
     periods = spectra.provenance.averages
     scatter = auto_densities(spectra.noise_density)
     repeated = np.maximum(values - scatter * (periods - 1) / periods, 0.0)

@@ -37,6 +37,7 @@ def half_power_lines(magnitude: NDArray[np.float64], peak: int) -> float:
 
 
 def _crossing(falling: NDArray[np.float64], level: float) -> float:
+    # Written so that NaN, a line that isn't trusted, ends the peak as well.
     below = np.flatnonzero(~(falling > level))
     if below.size == 0 or not np.isfinite(falling[below[0]]):
         return float("inf")
@@ -83,6 +84,7 @@ def _resolution_notes(response: FrequencyResponse) -> list[str]:
 
 def _narrowest_peak(response: FrequencyResponse, row: int) -> tuple[int, float] | None:
     found: list[tuple[float, int]] = []
+    # Peaks of noise are narrow too.
     trusted = response.excited & (response.coherence[row] > TRUSTED_COHERENCE)
     for column in range(len(response.references)):
         magnitude = np.where(trusted, np.abs(response.values[row, column]), np.nan)

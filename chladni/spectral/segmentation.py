@@ -14,6 +14,7 @@ DETRENDS = ("none", "constant", "linear")
 LONGEST_DEFAULT_SEGMENT = 8192
 DEFAULT_DIVISIONS = 16
 SAMPLES_TO_CHOOSE_FROM = DEFAULT_DIVISIONS * LONGEST_DEFAULT_SEGMENT
+# Below it there is no line between 0 Hz and Nyquist that a window leaves alone.
 SHORTEST_SEGMENT = 4
 
 
@@ -118,6 +119,7 @@ def plan_segmentation(
 def _default_samples(samples_available: int | None) -> int:
     if samples_available is None:
         return LONGEST_DEFAULT_SEGMENT
+    # A power of two gives lines that other programs have too, for comparison line by line.
     longest = min(samples_available // DEFAULT_DIVISIONS, LONGEST_DEFAULT_SEGMENT)
     if longest < SHORTEST_SEGMENT:
         if samples_available < 2 * SHORTEST_SEGMENT:
@@ -134,6 +136,7 @@ def _samples_for(resolution_hz: float, sample_rate_hz: float, samples_available:
             f"resolution {resolution_hz} Hz must be above 0 and at most {sample_rate_hz / SHORTEST_SEGMENT:g} Hz, "
             f"a quarter of the sample rate {sample_rate_hz:g} Hz"
         )
+    # What was asked for comes before a length that transforms fast: the transform takes any length.
     samples = round(sample_rate_hz / resolution_hz)
     if samples_available is not None and samples_available < samples:
         raise SetupError(

@@ -19,6 +19,7 @@ def valid_runs(block: TimeSeries) -> list[Run]:
         return []
     if block.valid is None:
         return [(0, block.samples)]
+    # Cross-spectra need all channels at once, so a sample counts only where all are valid.
     good = np.concatenate([[False], block.valid.all(axis=0), [False]])
     edges = np.flatnonzero(good[1:] != good[:-1])
     return [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
@@ -57,6 +58,7 @@ class Stretch:
         """
         if self.end_ns is None:
             return False
+        # Stamps are rounded to nanoseconds and clocks are fitted: half a sample decides which sample comes next.
         late_s = (start_ns - self.end_ns) / NS_PER_S
         if late_s < -0.5 / sample_rate_hz:
             raise EstimateError(
@@ -68,10 +70,12 @@ class Stretch:
     def extend(self, block: TimeSeries, runs: Sequence[Run]) -> None:
         """Take note of a block and its runs."""
         if self.breaks_at(block.start_time_ns, block.sample_rate_hz):
+            # What wasn't recorded isn't skipped: only segments within a stretch are counted.
             self._skipped_before = self.skipped
             self._samples = self._run = self._segments_of_runs = 0
         cursor = 0
         for first, last in runs:
+            # The run before the gap may have begun in an earlier block.
             if first > cursor:
                 self._close_run()
             self._run += last - first
@@ -81,6 +85,7 @@ class Stretch:
             self._close_run()
         self._samples += block.samples
         self.start_ns = block.start_time_ns if self.start_ns is None else self.start_ns
+        # From this block's own start, so that rounding doesn't add up over blocks.
         self.end_ns = block.start_time_ns + round(block.samples / block.sample_rate_hz * NS_PER_S)
 
     def merge(self, other: Self) -> None:

@@ -45,6 +45,7 @@ class EffectiveAverages:
         self.weight = 0.0
         self.correlation = window_correlation(window, hop)
         self.pairs = np.zeros(self.correlation.size)
+        # The weights of two segments m hops apart differ by decay^m.
         self._gains = decay ** np.arange(self.correlation.size)
 
     def add(self, first: int, count: int) -> None:
@@ -78,11 +79,13 @@ class EffectiveAverages:
         self.segments += segments
         if self.decay != 1:
             self.weight *= self.decay**segments
+            # Products of two weights fade twice as fast.
             self.pairs *= self.decay ** (2 * segments)
 
 
 def window_correlation(window: Floats, hop: int) -> Floats:
     """Squared correlation of segment spectra at multiples of the hop, for white noise (Welch 1967); 1 at lag 0."""
+    # Segments farther apart than a window share no sample.
     lags = range(0, window.size, hop)
     overlaps = np.array([window[lag:] @ window[: window.size - lag] for lag in lags])
     return np.asarray((overlaps / overlaps[0]) ** 2, dtype=np.float64)
@@ -116,6 +119,7 @@ def response_std(
     ndarray
         Infinite when there are too few averages to tell, n <= q.
     """
+    # One number of each pair of real and imaginary error lies along H, hence the 2.
     variance = residual_power * inverse_reference_power
     if averages <= references:
         return np.full(variance.shape, np.inf)

@@ -52,6 +52,7 @@ def window_samples(window: Window, samples: int) -> NDArray[np.float64]:
     coefficients = _COSINES.get(_ALIASES.get(window, window)) if isinstance(window, str) else None
     if coefficients is None:
         return _scipy_window(window, samples)
+    # Over N, not N - 1: the period of the window is the segment, as the transform sees it.
     angle = 2 * np.pi * np.arange(samples) / samples
     terms = [(-1) ** order * weight * np.cos(order * angle) for order, weight in enumerate(coefficients)]
     return np.asarray(np.sum(terms, axis=0), dtype=np.float64)
@@ -76,12 +77,14 @@ def noise_bandwidth_bins(samples: NDArray[np.float64]) -> float:
 
 
 def _scipy_window(window: Window, samples: int) -> NDArray[np.float64]:
+    # Imported here, where a window is asked for that isn't among the cheap ones.
     from scipy.signal import get_window
 
     try:
         sampled = np.asarray(get_window(window, samples, fftbins=True), dtype=np.float64)
     except (ValueError, TypeError, IndexError) as error:
         raise SetupError(f"window {window!r} can't be used: {error}{_hint(window)}") from error
+    # Parameters such as NaN pass SciPy unnoticed.
     if not np.all(np.isfinite(sampled)) or np.sum(sampled) == 0:
         raise SetupError(f"window {window!r} over {samples} samples has no finite, non-zero sum; choose another")
     return sampled
