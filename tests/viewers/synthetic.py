@@ -147,7 +147,7 @@ def response_peaks() -> tuple[Peak, ...]:
             height=float(np.abs(response.values[2, 0, line])),
             height_std=float(response.std[2, 0, line]),
             unit="(m/s^2)/N",
-            channels=(RESPONSES[2].name,),
+            channels=(RESPONSES[2].name, FORCE.name),
         ),
     )
 

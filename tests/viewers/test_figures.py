@@ -199,7 +199,7 @@ def test_log_frequency_leaves_out_zero() -> None:
     assert np.asarray(axes.lines[0].get_xdata(), dtype=np.float64).min() > 0
 
 
-def test_several_references_make_a_figure_each_without_named_peaks() -> None:
+def test_several_references_make_a_figure_each_and_name_only_the_peaks_that_say_which() -> None:
     response = synthetic.frequency_response()
     second = Channel(name="/shaker.force.z", unit="N", role="reference")
     double = replace(
@@ -208,10 +208,15 @@ def test_several_references_make_a_figure_each_without_named_peaks() -> None:
         std=np.concatenate([response.std, response.std], axis=1),
         references=(*response.references, second),
     )
-    figures = response_figures(replace(synthetic.study(), response=double))
+    (found,) = synthetic.response_peaks()
+    peak = replace(found, channels=found.channels[:1])
+    named = replace(peak, frequency_hz=31.0, channels=(peak.channels[0], second.name))
+    figures = response_figures(replace(synthetic.study(), response=double, response_peaks=(peak, named)))
     assert list(figures) == ["response 1 Acceleration", "response 2 Acceleration"]
-    assert "Multiple\ncoherence [1]" in texts(figures["response 2 Acceleration"])
-    assert "12.5 Hz" not in texts(figures["response 2 Acceleration"])
+    first, other = (texts(figure) for figure in figures.values())
+    assert "Multiple\ncoherence [1]" in first & other
+    assert "12.5 Hz" not in first | other
+    assert "31 Hz" in other - first
 
 
 def test_names_that_try_to_be_mathematics_are_printed_as_they_are() -> None:

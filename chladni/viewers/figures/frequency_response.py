@@ -76,9 +76,16 @@ def _draw_magnitude(axes: Axes, study: Study, panel: Panel, style: Style) -> Non
 
 
 def _peaks(study: Study, panel: Panel) -> list[Peak]:
-    """Peaks of the functions drawn; none with several references, for a peak doesn't say to which it belongs."""
-    if len(panel.response.references) > 1:
-        return []
+    """Peaks of the functions drawn: those that name a response here, and this reference where they name one."""
     unit = panel.response.unit(panel.group.rows[0], panel.reference)
-    names = {panel.response.responses[row].name for row in panel.group.rows}
-    return [peak for peak in study.response_peaks if peak.unit == unit and set(peak.channels[:1]) <= names]
+    responses = {panel.response.responses[row].name for row in panel.group.rows}
+    reference = panel.response.references[panel.reference].name
+    alone = len(panel.response.references) == 1
+    return [
+        peak
+        for peak in study.response_peaks
+        if peak.unit == unit
+        and set(peak.channels[:1]) <= responses
+        # A peak that doesn't say to which of several references it belongs has a height that may not be on a line.
+        and (alone if len(peak.channels) < 2 else peak.channels[1] == reference)
+    ]

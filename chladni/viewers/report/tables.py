@@ -11,8 +11,8 @@ from chladni.viewers.report.markup import element, escaped, table
 from chladni.viewers.style import Style
 
 
-def peak_table(peaks: Sequence[Peak], style: Style) -> str:
-    """Tabulate peaks with one sigma; empty when there are none."""
+def peak_table(peaks: Sequence[Peak], style: Style, *, channels: str) -> str:
+    """Tabulate peaks with one sigma, the last column under the heading `channels`; empty when there are none."""
     rows = [
         (
             value_with_deviation(peak.frequency_hz, peak.frequency_std_hz),
@@ -22,7 +22,7 @@ def peak_table(peaks: Sequence[Peak], style: Style) -> str:
         )
         for peak in peaks
     ]
-    return table(("Frequency [Hz]", "Height", "Unit", "Channels, strongest first"), rows, numbers=(0, 1))
+    return table(("Frequency [Hz]", "Height", "Unit", channels), rows, numbers=(0, 1))
 
 
 def channel_table(study: Study, style: Style) -> str:

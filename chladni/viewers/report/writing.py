@@ -51,8 +51,10 @@ def _body(study: Study) -> Iterator[str]:
     yield element("h1", escaped(study.title))
     if study.findings:
         yield _section("Findings", element("ul", "".join(element("li", escaped(text)) for text in study.findings)))
-    yield _section("Peaks of the frequency responses", peak_table(study.response_peaks, style))
-    yield _section("Peaks of the spectra", peak_table(study.peaks, style))
+    yield _section(
+        "Peaks of the frequency responses", peak_table(study.response_peaks, style, channels="Response, reference")
+    )
+    yield _section("Peaks of the spectra", peak_table(study.peaks, style, channels="Channels, strongest first"))
     for heading, shown in pictures(study).items():
         yield _section(heading, shown)
     yield _section("Channels", channel_table(study, style))

@@ -42,24 +42,24 @@ def escaped(text: str) -> str:
 def _page(study: Study, style: Style) -> Iterator[str]:
     yield f"# {escaped(study.title)}\n"
     yield from (f"- {escaped(finding)}" for finding in study.findings)
-    yield from _peaks("Peaks of the spectra", study.peaks, style)
-    yield from _peaks("Peaks of the frequency responses", study.response_peaks, style)
+    yield from _peaks("Peaks of the spectra", study.peaks, style, channels="channels")
+    yield from _peaks("Peaks of the frequency responses", study.response_peaks, style, channels="response, reference")
     yield from _method(study)
     yield "\n## How to read the plots\n"
     yield from (f"- {sentence}" for sentence in HOW_TO_READ)
 
 
-def _peaks(title: str, peaks: Sequence[Peak], style: Style) -> Iterator[str]:
+def _peaks(title: str, peaks: Sequence[Peak], style: Style, *, channels: str) -> Iterator[str]:
     if not peaks:
         return
     yield f"\n## {title}\n"
-    yield "| Hz | height | unit | channels |"
+    yield f"| Hz | height | unit | {channels} |"
     yield "|---|---|---|---|"
     for peak in peaks:
         frequency = value_with_deviation(peak.frequency_hz, peak.frequency_std_hz)
         height = value_with_deviation(peak.height, peak.height_std)
-        channels = ", ".join(escaped(style.labels.get(name, name)) for name in peak.channels)
-        yield f"| {frequency} | {height} | {printed_unit(peak.unit)} | {channels} |"
+        names = ", ".join(escaped(style.labels.get(name, name)) for name in peak.channels)
+        yield f"| {frequency} | {height} | {escaped(printed_unit(peak.unit))} | {names} |"
 
 
 def _method(study: Study) -> Iterator[str]:
