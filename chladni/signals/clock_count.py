@@ -59,6 +59,7 @@ def count_messages(tangled: Untangled) -> Counted | None:
     # Chance gives a coherence of 0.055 over windows of 256.
     if by_phase.coherence > 0.09 + 2.5 / np.sqrt(time_ns.size) and _mostly_filled(steps, guess):
         return Counted(count=by_phase, item_size=1, period_ns=guess, in_order=False)
+    # Stamps too late or too scattered for their phase may still count a steady source, if none was lost.
     by_order = count_by_order(time_ns, steps, np.ones_like(time_ns), mean_ns)
     if time_ns.size >= SHORT and order_fano(by_order, mean_ns) > _RANDOM:
         return None

@@ -60,6 +60,7 @@ def fit_clock(count: Count, period_ns: float) -> Clock:
 
     With a single item in every stretch the period given is kept, with infinite sigma.
     """
+    # All first, to learn the scatter; then without what lies beyond it, such as a message held up by the network.
     everything = np.ones(count.time.size)
     slope, starts, residual = _fit_stretches(count, everything, period_ns)
     limit = max(6 * robust_std(residual), 1.0)
@@ -112,6 +113,7 @@ def _fit_stretches(count: Count, kept: Floats, period_ns: float) -> tuple[float,
 
 def _slope_std(count: Count, residual: Floats) -> float:
     stretches = int(count.stretch[-1]) + 1
+    # Each stretch takes one degree of freedom for its start, the slope takes one more.
     mean = np.bincount(count.stretch, count.index) / np.bincount(count.stretch)
     run = count.index - mean[count.stretch]
     leverage = float(run @ run)

@@ -37,11 +37,28 @@ def advice(base: "TimeBase") -> str:
             f"stamps scatter by {base.jitter_s * 1e3:.3g} ms RMS; if the sampling does, amplitudes are 10 % "
             f"uncertain at {limit_hz:.3g} Hz, more above"
         )
+    return "; ".join(_remarks(base)) or "the clock is sound"
+
+
+def _remarks(base: "TimeBase") -> list[str]:
+    remarks = []
+    # A sine wanders out of its line when its phase does: one period of the clock is where that may begin to show.
     if base.wander_s * base.rate_hz > 1:
-        return f"the clock wanders by {base.wander_s * 1e3:.3g} ms; long averages smear sharp peaks"
+        remarks.append(f"the clock wanders by {base.wander_s * 1e3:.3g} ms, so long averages smear sharp peaks")
+    if base.jumps:
+        remarks.append(f"the clock was set ({_counted(len(base.jumps), 'step')})")
     if base.gap_count:
-        return f"{base.missing} samples are missing in {base.gap_count} gaps; averages leave out what touches them"
-    return "the clock is sound"
+        lost = f"{_counted(base.missing, 'sample')} missing in {_counted(base.gap_count, 'gap')}"
+        remarks.append(f"{lost}, averages leave out what touches them")
+    if base.duplicates:
+        remarks.append(f"{_counted(base.duplicates, 'repeated stamp')}, the first message of each is kept")
+    if base.out_of_order:
+        remarks.append(f"{_counted(base.out_of_order, 'message')} late, put in order")
+    return remarks
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def round_rate(rate_hz: float, std_hz: float) -> float | None:
@@ -63,6 +80,7 @@ def round_rate(rate_hz: float, std_hz: float) -> float | None:
 
 
 def _round_number(value: float, std: float) -> float | None:
+    # Two sigma, and never less than the rounding of the division that gave the value.
     within = max(2 * std, 4e-16 * value)
     for digits in range(8):
         decimals = digits - floor(log10(value))
@@ -80,6 +98,7 @@ def _inverse(period: float | None) -> float | None:
 def with_nominal(base: "TimeBase", nominal_hz: float) -> "TimeBase":
     """Take the stated rate where the stamps agree with it or can't judge; else say that they differ."""
     off = base.rate_hz - nominal_hz
+    # A state that the fit can't tell from its own is the better one: it carries no noise from log to log.
     if abs(off) <= max(3 * base.rate_std_hz, 1e-9 * nominal_hz):
         return replace(base, rate_hz=nominal_hz, snapped=True)
     told = f"messages state {nominal_hz:.9g} Hz but their stamps advance at {base.rate_hz:.9g} Hz, which is used"

@@ -91,6 +91,7 @@ def resample(
         raise EstimateError(f"sample rate {sample_rate_hz} Hz must be finite and positive")
     if sample_rate_hz == series.sample_rate_hz and _shift_ns(series, start_time_ns) <= 1:
         return _copied(series, start_time_ns, samples)
+    # Positions of new samples are counted in old ones from here on.
     kernel = _Kernel.between(series.sample_rate_hz, sample_rate_hz)
     low, high = kernel.supported(series.samples)
     per_sample_ns = NS_PER_S / series.sample_rate_hz

@@ -77,6 +77,7 @@ def count_by_phase(time_ns: Ints, steps: Ints, period_ns: float) -> Count:
     resumed = _resumed(steps > (3.5 if scatter < _TIGHT else 64) * period)
     item, stretch = _chosen(time_ns.size, resumed)
     window, starts = _windows(stretch)
+    # Relative to the first, where a double holds nanoseconds exactly for 100 days.
     time = (time_ns[item] - time_ns[0]).astype(np.float64)
     cycles = time / period
     sums = np.add.reduceat(np.exp(2j * np.pi * np.mod(cycles, 1.0)), starts)
@@ -132,6 +133,7 @@ def count_by_order(
 def order_fano(count: Count, period_ns: float) -> float:
     """Variance of the time that many items take, over that of as many random arrivals: 1 is chance, 0 a clock."""
     items = count.time.size
+    # Many windows for a robust scatter, each long enough to average delivery out.
     lag = int(np.clip(items // 16, 1, 512))
     same = np.flatnonzero(count.stretch[lag:] == count.stretch[:-lag])
     if not same.size:
@@ -155,6 +157,7 @@ def _refined_period(time_ns: Ints, period_ns: float, reach: float, *, block: int
     step = 1 / (4 * block * every)
     half = int(np.ceil(reach / step))
     trial = 1 + np.arange(-half, half + 1) * step
+    # Powers of separate blocks add, so that a gap or a step between blocks does no harm.
     power = np.zeros(trial.size)
     for start in np.unique(np.linspace(0, time_ns.size - block, 8).astype(np.int64)):
         part = time_ns[start : start + block]
@@ -166,6 +169,7 @@ def _refined_period(time_ns: Ints, period_ns: float, reach: float, *, block: int
 def _phase_scatter(steps: Ints, period_ns: float) -> float:
     """Robust scatter of intervals about whole periods, relative to the period."""
     turns = steps[:: max(1, steps.size // 200_000)] / period_ns
+    # Over many periods the guess's own error would count as scatter.
     turns = turns[turns < 8]
     return robust_std(turns - np.rint(turns))
 

@@ -208,12 +208,14 @@ def _is_dead(record: _Record) -> bool:
     span = record.high - record.low
     if span == 0:
         return True
+    # Only against an offset or a stated range is a span small: around zero it may be all there is.
     middle = abs(record.high + record.low) / 2
     tiny = span < max(1e-3 * middle, 1e-4 * (record.channel.overload or 0.0))
     return tiny and np.unique(record.samples).size <= 3
 
 
 def _is_coarse(record: _Record) -> bool:
+    # Two values are a switch; a few that rarely change are a state or a command.
     if not 0.3 * record.samples.size < record.still.size < 0.95 * record.samples.size:
         return False
     return 3 <= np.unique(record.samples).size <= 16
@@ -235,6 +237,7 @@ def _plateaus(record: _Record, level: float) -> Ints:
     starts, lengths = _runs(there)
     if lengths.size == 0 or lengths.max() < _SHORTEST_PLATEAU or _rests(record, there):
         return there[:0]
+    # A sine piles up at its ends as well, but no more than 2.4 times as on the next value.
     beside = _count_beside(record, level)
     entered = starts[(lengths >= _SHORTEST_PLATEAU) & (starts > 1)]
     entry = np.maximum(record.step(entered - 1), record.step(entered - 2))
@@ -276,6 +279,7 @@ def _spikes(record: _Record) -> Ints:
     away, back = away[close], back[close]
     samples = record.samples
     there, again = samples[away + 1] - samples[away], samples[back + 1] - samples[back]
+    # Vibration that begins with a leap goes on with others; a spike stands alone.
     around = np.arange(1, _QUIET_AROUND + 1)
     nearby = np.maximum(record.step(away[:, None] - around), record.step(back[:, None] + around)).max(axis=1)
     chosen = (np.abs(there + again) < 0.3 * np.abs(there)) & (nearby < 0.25 * np.abs(there))

@@ -88,6 +88,7 @@ def untangle(stamps_ns: NDArray[np.int64]) -> Untangled:
     stamps_ns
         ``[message]`` int64 nanoseconds, in the order of arrival, at least one.
     """
+    # The usual log passes here without a copy.
     time_ns, steps = stamps_ns, np.diff(stamps_ns)
     if steps.size == 0 or (steps.min() >= 0 and steps.max() < LEAP_NS):
         repeats = steps.size - int(np.count_nonzero(steps))
@@ -138,6 +139,7 @@ def run_on(
     time_ns, done
         Stamps on a clock that runs on, and how many jumps lie behind it.
     """
+    # The pair of stamps tells a jump; its number would depend on where reading began.
     time_ns = stamps_ns + sum(jump.shift_ns for jump in jumps[:done])
     place = 0
     for jump in jumps[done:]:

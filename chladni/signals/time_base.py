@@ -165,6 +165,7 @@ def _fit(stamps: NDArray[np.int64], counts: NDArray[np.int64] | None, nominal_hz
     tangled = untangle(stamps)
     if _stands_still(tangled.steps):
         return _still(stamps, samples)
+    # A single 1 stands for all messages: ten million ones would only cost memory.
     sizes = np.ones(1, dtype=np.int64) if counts is None else counts
     if counts is not None and tangled.order is not None:
         sizes = counts[tangled.order]
@@ -185,6 +186,7 @@ def _measured(tangled: Untangled, counted: Counted, clock: Clock, samples: int) 
     # Messages of a burst are late, none is early: the last one of a burst is the most punctual.
     early_ns = (counted.burst_size - 1) * clock.period_ns
     knots_ns, knots_index = _knots(wander.line_ns - early_ns, index - index[0], wander.pieces, first_ns)
+    # Late by a tenth of a batch is little, though it be many samples.
     relative_jitter = wander.jitter_ns / (clock.period_ns * counted.item_size)
     return TimeBase(
         rate_hz=NS_PER_S / clock.period_ns,

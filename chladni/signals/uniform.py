@@ -147,6 +147,7 @@ class Placer:
                 f"values have shape {values.shape}, but {len(self._channels)} channels and {expected[1]} samples "
                 f"in {stamps.size} messages ask for {expected}"
             )
+        # Whole numbers can't say "missing".
         floating = values if values.dtype.kind == "f" else values.astype(np.float64)
         self._waiting = self._waiting.followed_by(_Messages(self._run_on(stamps), sizes, floating)).in_order()
         ready = self._waiting.time_ns.size - (0 if last else self._hold)
@@ -179,6 +180,7 @@ class Placer:
         return block
 
     def _filled(self, index: NDArray[np.int64], values: NDArray[Any]) -> TimeSeries | None:
+        # The first sample seen opens the grid; later ones that belong before it come too late.
         first = int(index[0]) if self._next is None else self._next
         reached = np.maximum.accumulate(np.concatenate(([first - 1], index)))
         fresh = index > reached[:-1]

@@ -145,6 +145,7 @@ class _Reader:
         return result
 
     def _factor(self) -> Scaled:
+        # Only the bare 1 is a number that units have; anything else is a quantity, or a slip.
         kind, text = self._rest.pop(0) if self._rest else ("", "its end")
         if kind == "symbol":
             result = self._resolve(text)
@@ -175,6 +176,7 @@ class _Reader:
 def _settled(exponents: Exponents) -> Exponents:
     """Move seconds into motion: m * s^-2 becomes m/s^2, (m/s) * s^-1 too; N s/m stays as it is."""
     result = dict(exponents)
+    # Numerators first: in (m/s^2)/(rad/s) over s it's the acceleration that becomes a jerk.
     for factor in sorted(result, key=lambda factor: (-result[factor], factor)):
         symbol, per_second = factor
         power, seconds = result[factor], result.get(SECOND, 0)

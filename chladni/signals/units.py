@@ -85,6 +85,7 @@ def parse_quantity(text: str) -> tuple[float, str]:
     >>> parse_quantity("100 mV/m")
     (0.1, 'V/m')
     """
+    # Cut, because text from a file may be of any length and the message below repeats it.
     match = _QUANTITY.fullmatch(text[:200])
     if match is None or not isfinite(float(match["number"])):
         raise SetupError(f"quantity {text[:60]!r}: begins with no finite number; quantities look like '1.2 kN/mm'")
@@ -168,6 +169,7 @@ def differentiated(unit: str) -> str:
 
 def _derived(unit: str, step: int) -> str:
     exponents = _text(unit)[1]
+    # A motion over a force is a transfer function; integrating it integrates the motion.
     motions = [factor for factor, exponent in exponents.items() if factor[0] in MOTION and exponent == 1]
     verb = "differentiated" if step > 0 else "integrated"
     chain = "m, m/s, m/s^2 or rad, rad/s, rad/s^2, alone or over another unit"

@@ -449,3 +449,15 @@ def test_wrong_counts_are_refused(counts: np.ndarray) -> None:
 def test_a_wrong_nominal_rate_is_refused(rate_hz: float) -> None:
     with pytest.raises(EstimateError, match="nominal rate"):
         fit_batch_time_base(grid(1.0, 2), np.array([1, 1]), nominal_rate_hz=rate_hz)
+
+
+def test_advice_names_everything_that_was_put_right() -> None:
+    when = grid(100.0, 3000)
+    when[1000:] -= 60_000_000_000
+    when[[50, 51]] = when[[51, 50]]
+    when = np.insert(when, 2000, when[2000])
+    advice = fit_time_base(np.delete(when, [400, 401])).advice
+    assert advice == (
+        "the clock was set (1 step); 3 samples missing in 2 gaps, averages leave out what touches them; "
+        "1 repeated stamp, the first message of each is kept; 1 message late, put in order"
+    )
