@@ -78,9 +78,8 @@ def main() -> None:
     elapsed, megabytes, averages, channels = (float(word) for word in output.split())
     print("| log on disk | channels | averages | resident memory | times real time |")
     print("| --- | ---: | ---: | ---: | ---: |")
-    print(
-        f"| {seconds} s, {size:.1f} GB | {channels:.0f} | {averages:.0f} | {megabytes:.0f} MB | {seconds / elapsed:.0f} |"
-    )
+    log = f"{seconds} s, {size:.1f} GB"
+    print(f"| {log} | {channels:.0f} | {averages:.0f} | {megabytes:.0f} MB | {seconds / elapsed:.0f} |")
 
 
 if __name__ == "__main__":

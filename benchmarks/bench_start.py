@@ -8,9 +8,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from chladni.io.mcap.writer import write_mcap
 
 import chladni
+from chladni.io.mcap.writer import write_mcap
 
 PROGRAM = str(Path(sys.executable).with_name("chladni"))
 

@@ -38,10 +38,22 @@ PERIOD_NS = 1_000_000
 START_NS = 1_700_000_000_000_000_000
 
 
+def imu_numbers(messages: int) -> np.ndarray:
+    """Give the 37 doubles of each message: noise in rates and accelerations, a slow turn, constant covariances."""
+    rng = np.random.default_rng(1)
+    numbers = np.zeros((messages, 37))
+    angle = np.linspace(0.0, 20.0, messages)
+    numbers[:, 2], numbers[:, 3] = np.sin(angle / 2), np.cos(angle / 2)
+    for first in (4, 16, 28):
+        numbers[:, [first, first + 4, first + 8]] = 1e-3
+    numbers[:, 13:16] = 0.01 * rng.standard_normal((messages, 3))
+    numbers[:, 25:28] = rng.standard_normal((messages, 3)) + np.array([0.0, 0.0, 9.80665])
+    return numbers
+
+
 def write_imu_log(path: Path, messages: int) -> None:
     """Write `messages` Imu messages at 1 kHz, zstd, chunk CRCs on."""
-    rng = np.random.default_rng(1)
-    numbers = rng.standard_normal((messages, 37))
+    numbers = imu_numbers(messages)
     with path.open("wb") as stream:
         writer = Writer(stream, compression=CompressionType.ZSTD)
         writer.start(profile="ros2")

@@ -8,15 +8,17 @@ import chladni
 
 SURFACE = {
     "Channel", "ChladniError", "Coherence", "CrossSpectra", "EstimateError", "FrequencyResponse", "LogError",
-    "ModelError", "PowerSpectralDensity", "SetupError", "Study", "TimeSeries", "analyse", "coherence", "cross_spectra",
-    "find_peaks", "find_response_peaks", "frf", "load_setup", "open_log", "psd", "show", "waterfall", "write_mcap",
+    "ModelError", "PowerSpectralDensity", "SetupError", "Study", "TimeSeries", "analyse", "coherence",
+    "cross_spectra", "find_peaks", "find_response_peaks", "frf", "load_setup", "open_log", "psd", "show",
+    "waterfall", "write_mcap",
 }  # fmt: skip
 HEAVY = {"numpy", "scipy", "rerun", "matplotlib", "pint", "pydantic", "mcap", "zstandard"}
 
 
 def modules_after(statement: str) -> set[str]:
     code = f"import sys\n{statement}\nprint(*{{name.split('.')[0] for name in sys.modules}})"
-    return set(subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split())
+    finished = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    return set(finished.stdout.split())
 
 
 def test_the_public_surface_is_the_one_that_was_agreed() -> None:

@@ -27,8 +27,7 @@ def soundness_sentences(info: LogInfo) -> tuple[str, ...]:
     rates = sorted({one["rate_hz"] for one in info.to_json()["channels"] if one["rate_hz"]}, reverse=True)
     told = some_of([f"{rate:.6g} Hz" for rate in rates])
     summary = f"{info.duration_s:.6g} s, {len(info.channels)} channels" + (f" at {told}" if told else "")
-    troubles = damage_sentences(info.damage) + info.findings
-    return (f"{summary}. {'No trouble found.' if not troubles else ''}".rstrip(), *troubles)
+    return (f"{summary}. {'No trouble found.' if not info.findings else ''}".rstrip(), *info.findings)
 
 
 def peak_sentences(density: PowerSpectralDensity, peaks: Sequence[Peak]) -> tuple[str, ...]:

@@ -55,9 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = app(args=arguments, prog_name="chladni", standalone_mode=False)
     except (ChladniError, typer.TyperException) as error:
         return _fail(error, UNUSABLE)
-    except BrokenPipeError:
-        # The reader of our output has gone, as with `| head`: nothing is wrong, and nothing more can be said.
-        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115  # must outlive this function
+    except SystemExit:
+        # Typer's way of saying that the reader of our output has gone, as with `| head`: nothing is wrong.
         return SUCCESS
     except (KeyboardInterrupt, typer.Abort):
         return INTERRUPTED

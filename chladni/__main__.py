@@ -1,0 +1,5 @@
+"""Runs ``python -m chladni``."""
+
+from chladni.cli.main import run
+
+run()

@@ -1,0 +1,38 @@
+import pytest
+
+import chladni
+import chladni.viewers.rerun
+from chladni.apps.show import gather, show
+from chladni.signals.errors import SetupError
+from chladni.signals.study import Study
+from tests.arm import FORCE, TOOL, write_arm
+
+
+def test_items_are_gathered_side_by_side(tmp_path):
+    with chladni.open_log(write_arm(tmp_path), setup=tmp_path / "setup.toml") as log:
+        series = log.read([FORCE, TOOL])
+        density, fall = chladni.psd(series), chladni.waterfall(series)
+        response = chladni.frf(series, reference=FORCE)
+        study = gather(series, density, fall, response)
+        both = gather(log, Study(title="other", findings=("later",)))
+    assert study.series == (series,)
+    assert study.densities == (density,)
+    assert study.waterfalls == (fall,)
+    assert study.response is response
+    assert study.response_peaks
+    assert both.title == "arm.mcap, other"
+    assert both.geometry.points
+    assert both.findings[-1] == "later"
+    assert both.response is not None
+
+
+def test_nothing_to_show_is_refused():
+    with pytest.raises(SetupError, match="nothing to show"):
+        show()
+
+
+def test_the_viewer_gets_the_study(monkeypatch):
+    shown = []
+    monkeypatch.setattr(chladni.viewers.rerun, "spawn", shown.append)
+    chladni.show(Study(title="a"))
+    assert [study.title for study in shown] == ["a"]

@@ -1,0 +1,141 @@
+import numpy as np
+import pytest
+from scipy import signal
+
+import chladni
+from chladni.apps import sources
+from chladni.apps.spectra import densities
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError, LogError
+from chladni.signals.testing import assert_close
+from chladni.signals.time_series import TimeSeries
+from tests.arm import FORCE, TOOL, WRIST, write_arm
+
+
+@pytest.fixture(scope="module")
+def arm_log(tmp_path_factory):
+    return write_arm(tmp_path_factory.mktemp("arm"))
+
+
+@pytest.fixture
+def large(monkeypatch):
+    """Treat every log as one that doesn't fit in memory, in blocks of about a second."""
+    monkeypatch.setattr(sources, "IN_MEMORY_BYTES", 0)
+    monkeypatch.setattr(sources, "VALUES_IN_A_BLOCK", 1)
+
+
+def noise(samples=20_000, channels=("a", "b"), rate_hz=500.0):
+    rng = np.random.default_rng(5)
+    return TimeSeries(
+        values=rng.standard_normal((len(channels), samples)),
+        sample_rate_hz=rate_hz,
+        channels=tuple(Channel(name=name, unit="m/s^2") for name in channels),
+    )
+
+
+def test_a_density_is_welchs():
+    series = noise()
+    found = chladni.psd(series, channels=["b"], resolution_hz=1.0)
+    _, expected = signal.welch(series.values[1], 500.0, nperseg=500, noverlap=250, detrend="constant")
+    np.testing.assert_allclose(found.values[0], expected, rtol=1e-12)
+    assert [channel.name for channel in found.channels] == ["b"]
+
+
+def test_a_window_of_time_is_cut_out_of_a_series():
+    found = chladni.psd(noise(), start_s=10.0, end_s=20.0, resolution_hz=1.0, overlap=0.0)
+    assert found.provenance.averages == 10
+
+
+def test_a_log_and_its_samples_have_the_same_density(arm_log):
+    with chladni.open_log(arm_log) as log:
+        assert_close(chladni.psd(log), chladni.psd(log.read()), rtol=1e-12)
+
+
+def test_a_large_log_is_averaged_block_by_block_to_the_same(arm_log, large):
+    with chladni.open_log(arm_log) as log:
+        in_memory = chladni.psd(log.read())
+        assert_close(chladni.psd(log), in_memory, rtol=1e-12)
+        whole = chladni.frf(log.read(), reference=FORCE, resolution_hz=1.0)
+        assert_close(chladni.frf(log, reference=FORCE, resolution_hz=1.0), whole, rtol=1e-9)
+
+
+def test_progress_rises_to_one(arm_log, large):
+    shares = []
+    with chladni.open_log(arm_log) as log:
+        densities(log, channels=[TOOL], progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0, abs=0.05)
+    assert len(shares) > 10
+
+
+def two_rates(folder):
+    fast, slow = noise(8000, ("/fast.accel.linear.x",), 400.0), noise(2000, ("/slow.accel.linear.x",), 100.0)
+    still = TimeSeries(
+        values=np.full((1, 8000), 2.5), sample_rate_hz=400.0, channels=(Channel(name="/still.accel.linear.x"),)
+    )
+    chladni.write_mcap([fast, slow, still], folder / "two.mcap")
+    return folder / "two.mcap"
+
+
+def test_channels_of_different_rates_get_a_density_each(tmp_path):
+    with chladni.open_log(two_rates(tmp_path)) as log:
+        found = densities(log)
+        with pytest.raises(LogError, match="sample_rate_hz"):
+            chladni.psd(log)
+    by_name = {channel.name: density for density in found for channel in density.channels}
+    assert set(by_name) == {"/fast.accel.linear.x", "/slow.accel.linear.x"}
+    assert by_name["/fast.accel.linear.x"].frequency_hz[-1] == 200.0
+    assert by_name["/slow.accel.linear.x"].frequency_hz[-1] == 50.0
+    notes = [note for density in found for note in density.provenance.notes]
+    assert any("never change" in note and "/still" in note for note in notes)
+
+
+def test_a_log_in_which_nothing_moves_is_refused(tmp_path):
+    with chladni.open_log(two_rates(tmp_path)) as log, pytest.raises(EstimateError, match="no channel changes"):
+        densities(log, channels=["/still.accel.linear.x"])
+
+
+def test_responses_default_to_what_moves_on_the_references_clock(tmp_path):
+    with chladni.open_log(two_rates(tmp_path)) as log:
+        with pytest.raises(EstimateError, match="response"):
+            chladni.frf(log, reference="/slow.accel.linear.x")
+        with pytest.raises(LogError, match="different sampling grids"):
+            chladni.frf(log, reference="/slow.accel.linear.x", response="/fast.accel.linear.x")
+
+
+def test_a_response_of_a_series_and_of_its_log_agree(arm_log):
+    with chladni.open_log(arm_log) as log:
+        found = chladni.frf(log, reference=FORCE, response=[TOOL, WRIST], resolution_hz=1.0)
+        series = log.read([FORCE, TOOL, WRIST])
+    assert_close(found, chladni.frf(series, reference=FORCE, resolution_hz=1.0), rtol=1e-12)
+    assert found.values.shape[:2] == (2, 1)
+
+
+def test_a_reference_is_needed(arm_log):
+    with chladni.open_log(arm_log) as log, pytest.raises(EstimateError, match="no reference is given"):
+        chladni.frf(log, reference=[])
+
+
+def test_a_hammer_is_recognised(shared_data):
+    with chladni.open_log(shared_data / "hammer.mcap") as log:
+        found = chladni.frf(log, reference="/daq.hammer")
+        shorter = chladni.frf(log, reference="/daq.hammer", resolution_hz=2.0)
+        told = chladni.frf(log, reference="/daq.hammer", window="hann", resolution_hz=2.0)
+    assert (found.provenance.averaging, found.provenance.averages) == ("impact", 3)
+    rejected = [note for note in found.provenance.notes if "rejected" in note]
+    assert [note.split(" at ")[0] for note in rejected] == ["record 1", "record 3"]
+    assert shorter.frequency_hz[1] == pytest.approx(2.0, rel=1e-3)
+    assert told.provenance.averaging == "linear"
+
+
+@pytest.mark.parametrize(
+    ("level", "frequency_hz", "height"), [(1, 7.324, 0.258), (3, 7.275, 0.233), (5, 7.227, 0.097), (7, 7.227, 0.075)]
+)
+def test_the_aircrafts_torsion_by_default_settings(shared_data, level, frequency_hz, height):
+    with chladni.open_log(shared_data / f"f16_level{level}.mcap") as log:
+        found = chladni.frf(log, reference="/shaker.wrench.force.z", response="/payload_rail.accel.linear.z")
+    peaks = chladni.find_response_peaks(found)
+    torsion = max((peak for peak in peaks if 6.8 < peak.frequency_hz < 7.8), key=lambda peak: peak.height)
+    assert torsion.frequency_hz == pytest.approx(frequency_hz, abs=0.02)
+    assert torsion.height == pytest.approx(height, rel=0.05)
+    assert all(2.0 <= peak.frequency_hz <= 15.0 for peak in peaks)

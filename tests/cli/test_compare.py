@@ -1,0 +1,35 @@
+import pytest
+
+from tests.arm import TOOL, write_arm
+
+
+@pytest.fixture(scope="module")
+def louder_log(tmp_path_factory):
+    """The same machine, its tool's sensor reading half as much again."""
+    return write_arm(tmp_path_factory.mktemp("louder"), gain=1.5, name="louder.mcap")
+
+
+def test_the_same_log_twice_has_not_changed(run, arm_log):
+    outcome = run("compare", arm_log, arm_log, "--json", "-")
+    document = outcome.document
+    assert document["format"] == "chladni.compare/1"
+    assert not any(level["significant"] for level in document["levels"])
+    assert {peak["fate"] for peak in document["peaks"]} == {"unchanged"}
+    assert "nothing that scatter doesn't explain" in outcome.err
+
+
+def test_a_louder_channel_is_found_and_the_others_are_not(run, arm_log, louder_log):
+    outcome = run("compare", arm_log, louder_log, "--json", "-")
+    levels = {level["channel"]: level for level in outcome.document["levels"]}
+    assert levels[TOOL]["change_db"] == pytest.approx(3.52, abs=0.01)  # 20 log10(1.5)
+    assert [name for name, level in levels.items() if level["significant"]] == [TOOL]
+    assert TOOL in outcome.err
+
+
+def test_logs_without_a_common_channel_are_refused(run, arm_log, tmp_path):
+    other = tmp_path / "other.csv"
+    other.write_text("time [s],x [N]\n" + "".join(f"{t / 100},{t % 7}\n" for t in range(2000)))
+    assert run("convert", other, tmp_path / "other.mcap").code == 0
+    outcome = run("compare", arm_log, tmp_path / "other.mcap")
+    assert outcome.code == 2
+    assert "share no channel" in outcome.err

@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+
+import chladni
+from chladni.cli.convert import parse_options
+from tests.arm import TOOL
+
+
+def test_there_and_back(run, arm_log, tmp_path):
+    table, again = tmp_path / "tool.csv", tmp_path / "again.mcap"
+    assert run("convert", arm_log, table, "--channel", TOOL, "--end", 2).code == 0
+    document = run("convert", table, again, "--json", "-").document
+    assert document["format"] == "chladni.convert/1"
+    assert document["samples"] == 2000
+    with chladni.open_log(arm_log) as first, chladni.open_log(again) as second:
+        np.testing.assert_array_equal(second.read().values, first.read([TOOL], end_s=2).values)
+
+
+def test_an_existing_file_is_kept_unless_told(run, arm_log, tmp_path):
+    target = tmp_path / "a.csv"
+    target.write_text("mine")
+    outcome = run("convert", arm_log, target, "--channel", TOOL)
+    assert outcome.code == 2
+    assert "exists already" in outcome.err
+    assert target.read_text() == "mine"
+    assert run("convert", arm_log, target, "--channel", TOOL, "--end", 1, "--overwrite").code == 0
+    assert target.read_text() != "mine"
+
+
+def test_options_of_the_file_kinds(run, tmp_path):
+    table = tmp_path / "a.csv"
+    table.write_text("0,1.5\n1,2.5\n2,3.5\n3,2.5\n")
+    outcome = run("convert", table, tmp_path / "a.mcap", "--read", "time_unit=ms", "--json", "-")
+    assert outcome.code == 0, outcome.err
+    assert outcome.document["duration_s"] == pytest.approx(0.004)
+
+
+@pytest.mark.parametrize("text", ["unit", "=3", "a b=3"])
+def test_an_option_that_is_no_pair_is_told(run, arm_log, tmp_path, text):
+    outcome = run("convert", arm_log, tmp_path / "a.csv", "--read", text)
+    assert outcome.code == 2
+    assert "NAME=VALUE" in outcome.err
+
+
+def test_values_are_read_as_what_they_look_like():
+    assert parse_options(["a=1.5", "b=TRUE", "c=10 V"], "--read") == {"a": 1.5, "b": True, "c": "10 V"}

@@ -1,0 +1,61 @@
+import json
+
+import pytest
+
+CHANNEL_KEYS = {
+    "name", "unit", "encoding", "rate_hz", "samples", "stamp", "stamp_reason", "jitter_s",
+    "gaps", "duplicates", "clipped",
+}  # fmt: skip
+
+
+def test_the_document_holds_what_was_promised(run, arm_log):
+    document = run("info", arm_log, "--json", "-").document
+    assert set(document) >= {"format", "start_time_ns", "duration_s", "channels", "damage"}
+    assert document["format"] == "chladni.info/1"
+    assert document["duration_s"] == pytest.approx(25.0)
+    assert [set(channel) for channel in document["channels"]] == [CHANNEL_KEYS] * 6
+    assert document["damage"] == []
+    force = document["channels"][0]
+    assert (force["name"], force["unit"], force["rate_hz"]) == ("/shaker.wrench.force.x", "N", 1000.0)
+    assert (force["samples"], force["stamp"], force["gaps"]) == (25_000, "header", [])
+    (wrist,) = [channel for channel in document["channels"] if channel["name"].startswith("/wrist")]
+    assert wrist["samples"] == 25_000 - 250
+    assert wrist["gaps"] == [[pytest.approx(19.999), pytest.approx(20.25)]]
+
+
+def test_the_table_goes_to_standard_error_when_json_takes_standard_output(run, arm_log):
+    outcome = run("info", arm_log, "--json", "-")
+    assert "/tool.accel.linear.x" in outcome.err
+    assert outcome.document
+
+
+def test_people_get_a_table_and_findings(run, arm_log, tmp_path):
+    outcome = run("info", arm_log, "--json", tmp_path / "info.json")
+    assert "/tool.accel.linear.x" in outcome.out
+    assert "250 samples missing" in outcome.out
+    assert outcome.err == ""
+    assert json.loads((tmp_path / "info.json").read_text())["format"] == "chladni.info/1"
+
+
+def test_a_damaged_log_is_read_as_far_as_it_is_whole(run, arm_log, tmp_path):
+    whole = arm_log.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: len(whole) // 2])
+    outcome = run("info", cut, "--json", "-")
+    assert outcome.code == 0
+    document = outcome.document
+    assert document["damage"]
+    assert all(set(one) == {"what", "where", "lost_messages"} for one in document["damage"])
+    assert 5_000 < document["channels"][0]["samples"] < 20_000
+    assert "bytes are missing" in outcome.err
+
+
+def test_the_stamp_can_be_forced(run, arm_log):
+    document = run("info", arm_log, "--stamp", "log", "--json", "-").document
+    assert {channel["stamp"] for channel in document["channels"]} == {"log"}
+
+
+def test_a_json_file_that_cannot_be_written_is_told(run, arm_log, tmp_path):
+    outcome = run("info", arm_log, "--json", tmp_path / "no-folder" / "info.json")
+    assert outcome.code == 2
+    assert "no-folder" in outcome.err

@@ -1,0 +1,87 @@
+import subprocess
+import sys
+
+import pytest
+
+import chladni.io.log
+from chladni import __version__
+from chladni.cli.main import DEFECT, INTERRUPTED, SUCCESS, UNUSABLE
+
+
+def test_help_names_every_command(run):
+    outcome = run("--help")
+    assert outcome.code == SUCCESS
+    for command in ("info", "psd", "frf", "view", "compare", "convert", "demo"):
+        assert f"\n  {command} " in outcome.out
+
+
+def test_version(run):
+    assert run("--version").out == f"chladni {__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nonsense"], "No such command 'nonsense'"),
+        (["info"], "Missing argument 'LOG'"),
+        (["info", "a.mcap", "--bogus"], "No such option: --bogus"),
+        (["frf", "a.mcap"], "Missing option '--reference'"),
+        (["psd", "a.mcap", "--resolution", "fine"], "Invalid value for '--resolution'"),
+        (["info", "not-there.mcap"], "not-there.mcap: can't be opened: No such file or directory"),
+    ],
+)
+def test_unusable_input_is_one_line_and_code_2(run, arguments, words):
+    outcome = run(*arguments)
+    assert outcome.code == UNUSABLE
+    assert outcome.out == ""
+    assert words in outcome.err
+    assert outcome.err.startswith("chladni: ")
+    assert outcome.err.count("\n") == 1
+
+
+def test_a_defect_is_one_line_and_code_1(run, arm_log, monkeypatch):
+    def broken(self):
+        raise ZeroDivisionError("two\nlines")
+
+    monkeypatch.setattr(chladni.io.log.Log, "info", broken)
+    outcome = run("info", arm_log)
+    assert outcome.code == DEFECT
+    assert outcome.err == (
+        "chladni: defect of chladni (ZeroDivisionError): two lines; CHLADNI_TRACEBACK=1 shows where\n"
+    )
+
+
+def test_a_traceback_is_shown_when_asked_for(run, monkeypatch):
+    monkeypatch.setenv("CHLADNI_TRACEBACK", "1")
+    outcome = run("info", "not-there.mcap")
+    assert outcome.code == UNUSABLE
+    assert "Traceback (most recent call last)" in outcome.err
+    assert outcome.err.endswith("No such file or directory\n")
+
+
+def test_interrupting_gives_130_and_leaves_nothing_behind(run, arm_log, tmp_path, monkeypatch):
+    import chladni.apps.documents
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(chladni.apps.documents, "psd_document", interrupted)
+    assert run("psd", arm_log, "--json", tmp_path / "psd.json").code == INTERRUPTED
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_reader_that_goes_away_is_no_error(arm_log):
+    # `head -0` closes the pipe before anything is written.
+    command = f"{sys.executable} -m chladni psd {arm_log} --json - | head -c 0"
+    finished = subprocess.run(["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True, check=False)
+    assert finished.returncode == SUCCESS
+    assert "Traceback" not in finished.stderr
+    assert "defect" not in finished.stderr
+
+
+def test_help_is_completed_by_the_shell(monkeypatch):
+    monkeypatch.setenv("_CHLADNI_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", "chladni co")
+    monkeypatch.setenv("COMP_CWORD", "1")
+    finished = subprocess.run([sys.executable, "-m", "chladni"], capture_output=True, text=True, check=False)
+    assert finished.stdout.split() == ["compare", "convert"]

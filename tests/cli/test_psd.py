@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+
+from tests.arm import TOOL, WRIST, short_arm
+
+
+def tool_samples():
+    return next(series.values[0] for series in short_arm().series if series.channels[0].name == TOOL)
+
+
+def test_the_document_holds_what_was_promised(run, arm_log):
+    document = run("psd", arm_log, "--json", "-").document
+    assert document["format"] == "chladni.psd/1"
+    assert document["averages"] > document["effective_averages"] > 1
+    assert len(document["channels"]) == 6
+    for channel in document["channels"]:
+        assert set(channel) >= {"name", "channel_unit", "psd_unit", "psd", "peaks", "rms"}
+        assert len(channel["psd"]) == len(document["frequency_hz"])
+
+
+def test_level_and_peak_are_those_of_the_signal(run, arm_log):
+    document = run("psd", arm_log, "--channel", TOOL, "--resolution", 0.5, "--json", "-").document
+    (tool,) = document["channels"]
+    assert document["frequency_hz"][1] == 0.5
+    assert (tool["channel_unit"], tool["psd_unit"]) == ("m/s^2", "(m/s^2)^2/Hz")
+    # The windowed average of a stationary signal; its level scatters by about 1/sqrt(2 B T) of a resonance.
+    assert tool["rms"] == pytest.approx(tool_samples().std(), rel=0.03)
+    assert tool["peaks"][0]["frequency_hz"] == pytest.approx(short_arm().modes.frequency_hz[-1], rel=0.01)
+
+
+def test_a_part_of_the_log(run, arm_log):
+    document = run("psd", arm_log, "--start", 5, "--end", 15, "--window", "boxcar", "--overlap", 0, "--resolution", 1,
+                   "--channel", TOOL, "--json", "-").document  # fmt: skip
+    assert document["averages"] == 10
+    assert document["window"] == "boxcar"
+    segments = tool_samples()[5000:15000].reshape(10, 1000)
+    power = np.mean((segments - segments.mean(axis=1, keepdims=True)) ** 2)
+    assert document["channels"][0]["rms"] == pytest.approx(np.sqrt(power), rel=1e-9)
+
+
+def test_people_get_levels_peaks_and_what_was_left_out(run, arm_log):
+    outcome = run("psd", arm_log, "--channel", TOOL, "--channel", WRIST, "--resolution", 1)
+    assert "Levels: " in outcome.out
+    assert "Peaks" in outcome.out
+    assert TOOL in outcome.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--channel", "/tool.accel.linear.q"], "/tool.accel.linear.q"),
+        (["--resolution", "0.001"], "needs segments of 1000 s"),
+        (["--resolution", "-1"], "resolution"),
+        (["--overlap", "1"], "overlap"),
+        (["--window", "hand"], "hand"),
+        (["--start", "90"], "between 90.0 s and its end"),
+        (["--setup", "not-there.toml"], "not-there.toml"),
+    ],
+)
+def test_bad_options_are_told_in_one_line(run, arm_log, arguments, words):
+    outcome = run("psd", arm_log, *arguments)
+    assert outcome.code == 2
+    assert words in outcome.err
+    assert outcome.err.count("\n") == 1
+
+
+def test_figures_and_report_are_saved_where_asked(run, arm_log, tmp_path):
+    report = tmp_path / "r.html"
+    outcome = run("psd", arm_log, "--channel", TOOL, "--figures", tmp_path / "figures", "--report", report)
+    assert outcome.code == 0, outcome.err
+    assert list((tmp_path / "figures").glob("psd*.png"))
+    assert TOOL in report.read_text(encoding="utf-8")
