@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import floor, isfinite, log2
 from typing import Literal
 
-from chladni.signals.errors import SetupError
+from chladni.signals.errors import EstimateError, SetupError
 from chladni.spectral.windows import Window
 
 Detrend = Literal["none", "constant", "linear"]
@@ -95,6 +95,8 @@ def plan_segmentation(
 
     Raises
     ------
+    EstimateError
+        When the record is too short for an averaged spectrum.
     SetupError
         When an argument is out of its range, or the resolution needs a longer record.
 
@@ -123,7 +125,7 @@ def _default_samples(samples_available: int | None) -> int:
     longest = min(samples_available // DEFAULT_DIVISIONS, LONGEST_DEFAULT_SEGMENT)
     if longest < SHORTEST_SEGMENT:
         if samples_available < 2 * SHORTEST_SEGMENT:
-            raise SetupError(
+            raise EstimateError(
                 f"{samples_available} samples are too few for an averaged spectrum; take a longer record"
             )
         return SHORTEST_SEGMENT

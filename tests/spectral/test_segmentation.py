@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chladni.signals.errors import SetupError
+from chladni.signals.errors import EstimateError, SetupError
 from chladni.spectral.segmentation import SAMPLES_TO_CHOOSE_FROM, Segmentation, plan_segmentation
 
 
@@ -78,7 +78,7 @@ def test_impossible_wishes_say_what_is_possible(options, words):
 
 
 def test_too_few_samples_and_bad_hops_are_refused():
-    with pytest.raises(SetupError, match="7 samples are too few"):
+    with pytest.raises(EstimateError, match="7 samples are too few"):
         plan_segmentation(100.0, samples_available=7)
     with pytest.raises(SetupError, match="at least 4"):
         Segmentation(samples=3, hop=1)
