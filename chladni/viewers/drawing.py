@@ -11,6 +11,7 @@ Floats = NDArray[np.float64]
 
 def decibels_of_power(power: NDArray[np.floating[Any]]) -> Floats:
     """Give 10 lg(power); NaN, which is drawn as a gap, where the power is not positive."""
+    # Not minus infinity: one such point would stretch every automatic axis.
     positive = np.where(power > 0, power, np.nan)
     return np.asarray(10 * np.log10(positive), dtype=np.float64)
 
@@ -40,9 +41,11 @@ def thin(values: Floats, *, limit: int) -> tuple[NDArray[np.intp], int]:
     """
     if values.size <= limit:
         return np.arange(values.size), 1
+    # Three a stretch at most: the least, the greatest, and a NaN where there is one.
     stretch = ceil(3 * values.size / limit)
     whole = values[: values.size // stretch * stretch].reshape(-1, stretch)
     starts = np.arange(whole.shape[0]) * stretch
+    # argmin would return the NaN itself, and the extreme beside it would be lost.
     missing = np.isnan(whole)
     chosen = [
         starts + np.argmin(np.where(missing, np.inf, whole), axis=1),
@@ -51,6 +54,7 @@ def thin(values: Floats, *, limit: int) -> tuple[NDArray[np.intp], int]:
         # The rest that fills no whole stretch is shorter than one: all of it is drawn.
         np.arange(whole.size, values.size),
     ]
+    # In the order of time; a constant stretch has its extremes in one sample.
     return np.unique(np.concatenate(chosen)), stretch
 
 
@@ -76,6 +80,7 @@ def block_maximum(values: NDArray[Any], *, axis: int, limit: int) -> tuple[NDArr
     if run == 1:
         return values, 1
     starts = np.arange(0, length, run)
+    # fmax, not max: one missing slice must not blank those beside it.
     return np.fmax.reduceat(values, starts, axis=axis), run
 
 
@@ -97,6 +102,7 @@ def line_breaks(frequency_hz: Floats) -> NDArray[np.intp]:
 
     A comb with every second line excited has an even step and is joined; a band left out is not bridged.
     """
+    # Two lines have one step, and nothing to call it unusual by.
     if frequency_hz.size < 3:
         return np.empty(0, dtype=np.intp)
     steps = np.diff(frequency_hz)

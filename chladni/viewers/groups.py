@@ -48,6 +48,7 @@ def groups(channels: Sequence[Channel], *, size: int = LINES_IN_A_PLOT) -> tuple
 
 
 def _pages(unit: str, rows: list[int], size: int) -> list[Group]:
+    # Rounded up in whole numbers.
     pages = -(-len(rows) // size)
     # Pages of equal length read better than full ones and a rest of one.
     length = -(-len(rows) // pages)

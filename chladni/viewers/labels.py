@@ -126,10 +126,12 @@ def short_names(names: Iterable[str]) -> dict[str, str]:
     >>> list(short_names(["/imu/wrist.accel.linear.x", "/imu/base.accel.linear.x", "/f.force.z"]).values())
     ['wrist.x', 'base.x', 'f.z']
     """
+    # In the order given, so that the same log always gets the same labels.
     pending = list(dict.fromkeys(names))
     labels: dict[str, str] = {}
     for shorten in (_leaf, _fields, _whole):
         candidates = {name: shorten(name) for name in pending}
+        # Labels already given count too: a whole name may be the short form of another.
         uses = Counter([*candidates.values(), *labels.values()])
         labels |= {name: label for name, label in candidates.items() if uses[label] == 1}
         pending = [name for name in pending if name not in labels]
@@ -148,6 +150,7 @@ def value_with_deviation(value: float, deviation: float) -> str:
     >>> value_with_deviation(0.25, float("nan"))
     '0.25'
     """
+    # No bound known: digits that suggest one would be a lie.
     if not 0 < deviation < float("inf"):
         return f"{value:.4g}"
     if not 1e-4 <= abs(value) < 1e6:
@@ -184,5 +187,6 @@ def _printable(text: str) -> str:
     shown = "".join(character if character.isprintable() else "\ufffd" for character in text) or "(no name)"
     if len(shown) <= LONGEST_NAME:
         return shown
+    # The end tells channels apart more often than the middle does.
     half = LONGEST_NAME // 2
     return f"{shown[: half - 1]}…{shown[-half:]}"

@@ -59,6 +59,7 @@ class Panel:
 
 def panels(response: FrequencyResponse) -> list[Panel]:
     """Divide the functions into panels, reference by reference; none when no line is excited."""
+    # A plot of no lines would have an axis from nowhere to nowhere.
     if not response.excited.any():
         return []
     return [

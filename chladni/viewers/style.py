@@ -56,6 +56,7 @@ class Style:
     @classmethod
     def of(cls, study: Study) -> Self:
         """Give the style of all pictures of `study`."""
+        # By name: a channel in a series, its density and its response is one channel.
         channels = {channel.name: channel for channel in _channels(study)}
         units: dict[str, list[str]] = {}
         for channel in channels.values():

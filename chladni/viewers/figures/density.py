@@ -67,10 +67,12 @@ def _draw(
     channel = density.channels[row]
     frequency_hz, values, std = density.frequency_hz[shown], density.values[row, shown], density.std[row, shown]
     colour = paint(style.on_light(channel))
+    # A logarithmic axis can't show zero; NaN leaves a gap without a warning.
     positive = np.where(values > 0, values, np.nan)
     axes.plot(frequency_hz, positive, color=colour, label=plain(style.labels[channel.name]))
     if banded:
         bottom = axes.get_ylim()[0]
         upper = np.where(np.isfinite(std), positive + std, np.nan)
+        # Below the frame, not at zero, which a logarithmic axis would clip to a wrong place.
         lower = np.maximum(positive - std, bottom * 1e-3)
         axes.fill_between(frequency_hz, lower, upper, color=colour, alpha=BAND_OPACITY, linewidth=0)

@@ -39,6 +39,7 @@ def _figure(panel: Panel, style: Style) -> Figure:
         )
     axes.axhline(0, color="#888888", linewidth=0.6, zorder=0)
     axes.axvline(0, color="#888888", linewidth=0.6, zorder=0)
+    # Equal, or the circle of a resonance would be an ellipse.
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(f"Re H [{panel.unit}]")
     axes.set_ylabel(f"Im H [{panel.unit}]")

@@ -33,8 +33,10 @@ def label_peaks(axes: Axes, peaks: Iterable[Peak]) -> None:
     low, high = axes.get_xlim()
     shown = [peak for peak in peaks if low <= peak.frequency_hz <= high]
     labelled: list[float] = []
+    # The highest first, so that it is the low ones that lose their label for want of room.
     for peak in sorted(shown, key=lambda peak: -peak.height):
         axes.plot(peak.frequency_hz, peak.height, marker="v", markersize=3, color="black", zorder=4)
+        # Distances on paper, for a logarithmic axis has none in hertz.
         place = axes.transAxes.inverted().transform(axes.transData.transform((peak.frequency_hz, peak.height)))[0]
         if len(labelled) < LABELS and all(abs(place - other) > ROOM for other in labelled):
             labelled.append(place)

@@ -57,6 +57,7 @@ def save_figures(
     LogError
         When the folder can't be made or a file can't be written.
     """
+    # Before drawing: a minute of work shouldn't end in a misspelt format.
     for kind in formats:
         if kind not in FORMATS:
             raise SetupError(f"figure format {kind!r} is none of {', '.join(FORMATS)}")

@@ -49,6 +49,7 @@ _LOOK: dict[Any, Any] = {
 @contextmanager
 def look() -> Iterator[None]:
     """Draw with the look of chladni's figures, whatever the user's own settings are; those come back after."""
+    # From the defaults, not from the user's file: a figure looks the same on every computer.
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_LOOK)
@@ -57,6 +58,7 @@ def look() -> Iterator[None]:
 
 def sheet(heights_in: Sequence[float], **options: Any) -> tuple[Figure, list[Axes]]:
     """Make a figure of stacked axes, one for each height."""
+    # Not through pyplot: that would choose a window system and keep every figure alive.
     figure = Figure(figsize=(WIDTH_IN, sum(heights_in)), layout="constrained")
     axes = figure.subplots(len(heights_in), 1, squeeze=False, height_ratios=list(heights_in), **options)
     return figure, list(axes[:, 0])
@@ -95,6 +97,7 @@ def plain(text: str) -> str:
     >>> plain("_hidden")
     ' _hidden'
     """
+    # matplotlib warns at each missing glyph and draws a box; this is told once, by the mark.
     known = _glyphs()
     shown = "".join(character if ord(character) in known else "\ufffd" for character in text)
     # matplotlib leaves labels that begin with an underscore out of legends.

@@ -40,6 +40,7 @@ def waterfall_figures(study: Study) -> dict[str, Figure]:
 def _figure(waterfall: Waterfall, group: Group, style: Style) -> Figure:
     figure, stack = sheet([1.5] * len(group.rows), sharex=True, sharey=True)
     levels = [_level(waterfall, row) for row in group.rows]
+    # One scale for the figure, so that colours of different channels can be compared.
     limits = _colour_limits(levels)
     image = None
     for axes, row, level in zip(stack, group.rows, levels, strict=True):
@@ -70,6 +71,7 @@ def _colour_limits(levels: list[Floats]) -> tuple[float, float]:
 def _draw(
     axes: Axes, waterfall: Waterfall, level: NDArray[np.float64], limits: tuple[float, float], style: Style
 ) -> AxesImage:
+    # Grey is in no part of the scale: what is missing can't be taken for a low level.
     colours = mpl.colormaps["viridis"].with_extremes(bad=MISSING)
     start_s = (waterfall.start_time_ns - style.origin_ns) / NS_PER_S
     times, lines = waterfall.time_s + start_s, waterfall.frequency_hz

@@ -46,6 +46,7 @@ def _draw(axes: Axes, series: TimeSeries, row: int, style: Style) -> None:
     values = series.values[row].astype(np.float64)
     if series.valid is not None:
         values[~series.valid[row]] = np.nan
+    # Without this an hour would be a file of a hundred megabytes and look the same.
     chosen, _ = thin(values, limit=POINTS)
     start_s = (series.start_time_ns - style.origin_ns) / NS_PER_S
     axes.plot(

@@ -72,6 +72,7 @@ def escaped(text: str) -> str:
     >>> escaped('<script> & "quotes"')
     '&lt;script&gt; &amp; &quot;quotes&quot;'
     """
+    # Quotes too, so that the same function serves attributes.
     return html.escape("".join(character if character.isprintable() else "\ufffd" for character in text))
 
 

@@ -39,6 +39,7 @@ def _channel_rows(study: Study, style: Style) -> Iterator[tuple[str, ...]]:
             yield (*_place(channel, style), f"{series.sample_rate_hz:.6g}", f"{series.duration_s:.6g}")
     others = [channel for density in study.densities for channel in density.channels]
     for channel in others:
+        # Spectra may be shown without their waveforms; their channels are listed all the same.
         if channel.name not in seen:
             seen.add(channel.name)
             yield (*_place(channel, style), "", "")
@@ -52,6 +53,7 @@ def _place(channel: Channel, style: Style) -> tuple[str, ...]:
 
 def method_table(study: Study) -> str:
     """Tabulate how each estimate was made, with the advice that goes with it."""
+    # Series of different rates are often averaged alike; one line says it for all.
     accounts = list(dict.fromkeys(density.provenance for density in study.densities))
     accounts += [] if study.response is None else [study.response.provenance]
     headings = (

@@ -51,10 +51,12 @@ def arrange(views: Views) -> rrb.Blueprint:
         pages.append(_over_time(views))
     if views.responses:
         pages.append(_responses(views))
+    # Nothing is left to heuristics: they would add a view for every entity.
     return rrb.Blueprint(
         rrb.Tabs(*pages, active_tab=0),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
+        # Paused: a file that starts to play runs away from whoever wants to read it.
         rrb.TimePanel(state="collapsed", timeline=TIME, play_state="paused"),
         auto_layout=False,
         auto_views=False,

@@ -74,6 +74,7 @@ def _draw(
 ) -> Callable[[], rrb.View]:
     parent = folder("deflection", f"reference {column + 1}")
     shape = _shape(study, response, rows, column)
+    # One point, or all in one place: any size does, but zero would draw nothing.
     size = float(np.linalg.norm(np.ptp(shape.rest, axis=0))) or 1.0
     _draw_rest(recording, parent, study, shape, size)
     _draw_motion(recording, parent, study, shape, size)
@@ -97,6 +98,7 @@ def _shape(study: Study, response: FrequencyResponse, rows: list[int], column: i
         channel = response.responses[row]
         place = places[str(channel.point)]
         along = response.values[row, column, response.excited]
+        # A triaxial sensor is three channels of one point, each along its own axis.
         motion[:, place] += np.multiply.outer(along, np.array(channel.direction))
         measured[place] = True
     rest = np.array([point.position for point in points], dtype=np.float64)
@@ -121,6 +123,7 @@ def _draw_motion(recording: rr.RecordingStream, parent: str, study: Study, shape
     colours = _colours(shape)
     index = frequency_index(shape.frequency_hz)
     lines, count = shape.frequency_hz.size, shape.measured.sum()
+    # Only measured points get a dot: one without a sensor would seem to stand still.
     dots = rr.Points3D.columns(
         positions=moved[:, shape.measured].reshape(-1, 3),
         colors=colours[:, shape.measured].reshape(-1, 3),
@@ -136,6 +139,7 @@ def _draw_motion(recording: rr.RecordingStream, parent: str, study: Study, shape
     send_columns(recording, f"{parent}/moved/arrows", index, vectors.partition([count] * lines))
     for number, line in enumerate(study.geometry.lines, start=1):
         wire = rr.LineStrips3D.columns(strips=list(moved[:, _places(study, line)]))
+        # Colour and width once; only the places change with frequency.
         wired = rr.LineStrips3D.from_fields(colors=[(225, 225, 225)], radii=0.004 * size)
         recording.log(f"{parent}/moved/line_{number}", wired, static=True)
         send_columns(recording, f"{parent}/moved/line_{number}", index, wire)
@@ -144,6 +148,7 @@ def _draw_motion(recording: rr.RecordingStream, parent: str, study: Study, shape
 
 def _return_to_rest(recording: rr.RecordingStream, parent: str, study: Study, shape: _Shape) -> None:
     """Clear the shape after the last line: a cursor outside the band must not show the last shape for ever."""
+    # One line further, so that the last line itself can still be looked at.
     step_hz = float(np.median(np.diff(shape.frequency_hz))) if shape.frequency_hz.size > 1 else 1.0
     for timeline, ns in frequency_index(shape.frequency_hz[-1:] + step_hz).items():
         recording.set_time(timeline, duration=np.timedelta64(int(ns[0]), "ns"))
@@ -169,6 +174,7 @@ def _colours(shape: _Shape) -> NDArray[np.uint8]:
     """[frequency, point, rgb] from the amplitude in decibels below the greatest of all."""
     amplitude = np.sqrt(np.sum(np.abs(shape.motion) ** 2, axis=2))
     greatest = amplitude.max() or 1.0
+    # A point that does not move at all has the lowest colour.
     level = np.nan_to_num(decibels_of_amplitude(amplitude / greatest), nan=-COLOUR_RANGE_DB)
     place = np.clip(1 + level / COLOUR_RANGE_DB, 0, 1) * (len(SCALE) - 1)
     channels = [np.interp(place, np.arange(len(SCALE)), SCALE[:, part]) for part in range(3)]

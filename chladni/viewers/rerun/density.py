@@ -60,5 +60,6 @@ def _draw_channel(
     values, std = density.values[row], density.std[row]
     level = decibels_of_power(values)
     draw_line(recording, path, density.frequency_hz, level, name=style.labels[channel.name], colour=colour)
+    # An infinite sigma has no upper bound to draw; a lower bound below zero has no decibels.
     bounds = [decibels_of_power(values - std), decibels_of_power(np.where(np.isfinite(std), values + std, np.nan))]
     draw_band(recording, path, density.frequency_hz, bounds, colour=colour, lines_in_view=lines_in_view)

@@ -39,6 +39,7 @@ def draw(recording: rr.RecordingStream, study: Study) -> None:
     recording.send_recording_name(study.title)
     if style.origin_ns:
         recording.send_recording_start_time_nanos(style.origin_ns)
+    # Drawing a part also makes its view, so that no view can point at an entity that was renamed.
     views = Views(
         findings=draw_findings(recording, study, style),
         waveforms=draw_waveforms(recording, study, style),

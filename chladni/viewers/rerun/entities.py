@@ -15,6 +15,7 @@ def folder(*parts: str) -> str:
     >>> folder("waveforms", "Acceleration 2/3")
     '/waveforms/acceleration_2_3'
     """
+    # Anything else than these could be an operator in a query expression, or need escaping.
     return "/" + "/".join(re.sub(r"[^a-z0-9]+", "_", part.lower()).strip("_") for part in parts)
 
 

@@ -35,6 +35,7 @@ def write_rrd(study: Study, path: str | os.PathLike[str]) -> Path:
     # Not rerun's own file sink: on a full disk it only logs the loss, and a later flush waits for ever.
     stream = rr.binary_stream(recording)
     with atomic_write(target) as file:
+        # Inside: a folder that can't be written to is told before the work, not after.
         draw(recording, study)
         file.write(stream.read() or b"")
     return target

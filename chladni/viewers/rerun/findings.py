@@ -35,7 +35,9 @@ def escaped(text: str) -> str:
     >>> escaped("![x](http://a/b.png)")
     '\\!\\[x\\]\\(http\\:\\/\\/a\\/b.png\\)'
     """
+    # A line break would end the table or the list that the text stands in.
     printable = "".join(character if character.isprintable() else " " for character in text)
+    # Every ASCII punctuation mark may be escaped in Markdown, so none needs to be judged.
     return re.sub(r"([!-,/:-@\[-`{-~])", r"\\\1", printable)
 
 

@@ -28,6 +28,7 @@ def draw_magnitude(recording: rr.RecordingStream, panel: Panel, style: Style) ->
         draw_line(recording, path, x, level, name=style.labels[channel.name], colour=colour)
         draw_band(recording, path, x, [low, high], colour=colour, lines_in_view=len(panel.group.rows))
 
+    # From the lines that are drawn: noise on the others must not set the scale.
     levels = [decibels_of_amplitude(np.abs(panel.function(row))) for row in panel.group.rows]
     reference = style.labels[panel.response.references[panel.reference].name]
     estimator = panel.response.provenance.estimator
@@ -46,6 +47,7 @@ def draw_phase(recording: rr.RecordingStream, panel: Panel, style: Style) -> rrb
 
     def draw(row: int, path: str) -> None:
         channel, phase = panel.response.responses[row], np.angle(panel.function(row), deg=True)
+        # Broken also where it jumps from -180 to 180: that is one angle, not a fall.
         breaks = np.union1d(line_breaks(panel.frequency_hz()), phase_wraps(phase))
         x, y = with_breaks(panel.frequency_hz(), phase, breaks)
         draw_line(recording, path, x, y, name=style.labels[channel.name], colour=style.on_dark(channel))
@@ -62,6 +64,7 @@ def draw_coherence(recording: rr.RecordingStream, panel: Panel, style: Style) ->
         draw_line(recording, path, x, y, name=style.labels[channel.name], colour=style.on_dark(channel))
 
     kind = "Coherence γ²" if len(panel.response.references) == 1 else "Multiple coherence γ²"
+    # A little above one, or a perfect coherence would hide under the frame.
     return _view(panel, "coherence", f"{kind} [1]", draw, limits=(0.0, 1.05))
 
 

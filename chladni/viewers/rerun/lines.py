@@ -19,6 +19,7 @@ def draw_line(
     recording: rr.RecordingStream, path: str, frequency_hz: Floats, values: Floats, *, name: str, colour: Colour
 ) -> None:
     """Write one line, ``[frequency]``; NaN breaks it."""
+    # "Max", for the average that is the default would shave off every peak when zoomed out.
     style = rr.SeriesLines(names=name, colors=[colour], widths=1.5, aggregation_policy="Max")
     recording.log(path, style, static=True)
     send_scalars(recording, path, frequency_index(frequency_hz), values)
@@ -34,7 +35,9 @@ def draw_band(
     lines_in_view: int,
 ) -> None:
     """Write the lower and the upper bound of an estimate as thin lines beside it, under ``path``/band."""
+    # Hidden, not left out: one click in the legend brings them back.
     shown = lines_in_view <= BANDS_SHOWN_OF
+    # Two series on an entity of their own, so that the line can be read off without its band.
     style = rr.SeriesLines(
         names=[BAND_NAME, BAND_NAME],
         colors=[(*colour, 110), (*colour, 110)],

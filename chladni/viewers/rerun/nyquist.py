@@ -40,6 +40,7 @@ def _plane(panel: Panel, row: int) -> Floats:
 
 def _square(points: Floats) -> tuple[Floats, Floats]:
     """Corners of a square around the origin and all points, so that circles of resonances look like circles."""
+    # With the origin, from which gain and phase are read.
     finite = np.vstack([points[np.isfinite(points).all(axis=1)], [[0.0, 0.0]]])
     centre = (finite.min(axis=0) + finite.max(axis=0)) / 2
     half = max(float(np.ptp(finite, axis=0).max()) * (0.5 + MARGIN), np.finfo(np.float32).tiny)
@@ -52,6 +53,7 @@ def _draw_curve(
     channel = panel.response.responses[row]
     path, colour = channel_entity(parent, channel), style.on_dark(channel)
     frequency_hz = panel.frequency_hz()
+    # A single point makes no line; the dot at the cursor still shows it.
     strips = [strip for strip in np.split(points, line_breaks(frequency_hz)) if len(strip) > 1]
     lines = rr.LineStrips2D(strips, colors=[colour] * len(strips), radii=rr.Radius.ui_points(1.0))
     recording.log(path, lines, static=True)
@@ -59,6 +61,7 @@ def _draw_curve(
         radii=rr.Radius.ui_points(5.0), colors=[colour], labels=[style.labels[channel.name]]
     )
     recording.log(f"{path}/cursor", dot, static=True)
+    # In single precision, as the viewer draws: seven digits are more than a screen shows.
     send_columns(recording, f"{path}/cursor", frequency_index(frequency_hz), rr.Points2D.columns(positions=points))
 
 
@@ -66,6 +69,7 @@ def _draw_axes(recording: rr.RecordingStream, path: str, low: Floats, high: Floa
     real, imaginary = ticks(low[0], high[0]), ticks(-high[1], -low[1])
     grid = [[(x, low[1]), (x, high[1])] for x in real] + [[(low[0], -y), (high[0], -y)] for y in imaginary]
     axes = [[(low[0], 0.0), (high[0], 0.0)], [(0.0, low[1]), (0.0, high[1])]]
+    # Behind the curves, whatever the order in which entities are drawn.
     colours = [GRID_COLOUR] * len(grid) + [AXIS_COLOUR] * len(axes)
     strips = rr.LineStrips2D(grid + axes, colors=colours, radii=rr.Radius.ui_points(0.5), draw_order=-10.0)
     recording.log(path, strips, static=True)

@@ -47,6 +47,7 @@ def start(
         )
         try:
             _wait_for(process, ports, said, settle_s)
+        # Ctrl-C too must not leave a server behind.
         except BaseException:
             stop(process)
             raise
@@ -68,6 +69,7 @@ def send(study: Study, port: int) -> None:
     recording = new_recording()
     recording.connect_grpc(f"rerun+http://{LOOPBACK}:{port}/proxy")
     draw(recording, study)
+    # Data still on its way would be lost when Python ends.
     recording.flush()
     recording.disconnect()
 

@@ -58,6 +58,7 @@ def _log_look(
     recording: rr.RecordingStream, path: str, abscissa: Floats, widths: NDArray[np.float32], colour: Colour
 ) -> None:
     """Write what all slices share, once."""
+    # By components: the archetype insists on values, which differ from slice to slice.
     places = rr.components.TensorDataBatch(rr.encodings.TensorData(array=abscissa))
     look = [
         places.described(rr.BarChart.descriptor_abscissa()),
@@ -69,6 +70,7 @@ def _log_look(
 
 def _log_bars(recording: rr.RecordingStream, path: str, starts_ns: NDArray[np.int64], bars: NDArray[Any]) -> None:
     """Write the bars of each slice; a slice with missing samples is an empty list, and the chart is empty then."""
+    # Zeros instead would say that nothing vibrated.
     known = ~np.isnan(bars).any(axis=1)
     tensors = TensorColumn(bars[known].astype(np.float32))
     column = rr.ComponentColumn(rr.BarChart.descriptor_values(), tensors, lengths=known.astype(np.int32))
@@ -79,6 +81,7 @@ def _starts_ns(waterfall: Waterfall, style: Style) -> NDArray[np.int64]:
     """Times from which each slice is the nearest to the cursor; the viewer shows the latest before it."""
     hop_s = _step(waterfall.time_s)
     since_origin_ns = waterfall.start_time_ns - style.origin_ns
+    # The first slice is there from second zero, where the cursor is when a file opens.
     starts_s = np.maximum(waterfall.time_s - hop_s / 2, 0.0)
     return np.asarray(np.rint(starts_s * NS_PER_S).astype(np.int64) + since_origin_ns)
 

@@ -22,6 +22,7 @@ def time_index(offsets_ns: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
 
 def frequency_index(frequency_hz: NDArray[np.float64]) -> dict[str, NDArray[np.int64]]:
     """Give the index of rows at frequencies: 1 Hz is 1 ms on both timelines."""
+    # Whole nanoseconds: a millionth of a hertz, finer than any line spacing.
     ticks = np.rint(frequency_hz * NS_PER_HZ).astype(np.int64)
     return {FREQUENCY: ticks, TIME: ticks}
 
@@ -50,7 +51,9 @@ def time_axis(end_ns: int, *, start_ns: int = 0) -> rr.blueprint.TimeAxis:
     boundary = rr.TimeRangeBoundary.absolute
     return rr.blueprint.TimeAxis(
         view_range=rr.TimeRange(
-            start=boundary(seconds=start_ns / 1e9), end=boundary(seconds=max(end_ns, start_ns + 1) / 1e9)
+            # A range without width would leave the viewer to guess one.
+            start=boundary(seconds=start_ns / 1e9),
+            end=boundary(seconds=max(end_ns, start_ns + 1) / 1e9),
         )
     )
 
@@ -61,4 +64,5 @@ def frequency_axis(low_hz: float, high_hz: float) -> rr.blueprint.TimeAxis:
 
 
 def _time_columns(index: dict[str, NDArray[np.int64]], rows: slice) -> list[rr.TimeColumn]:
+    # As timedelta64, which is taken as it is; numbers would go through floating point seconds.
     return [rr.TimeColumn(name, duration=ns[rows].astype("timedelta64[ns]")) for name, ns in index.items()]

@@ -34,6 +34,7 @@ def _draw_channel(
     path = channel_entity(folder("waterfall", str(place)), channel)
     image, times = block_maximum(waterfall.values[row], axis=0, limit=PIXELS)
     image, lines = block_maximum(image, axis=1, limit=PIXELS)
+    # After shortening: fewer logarithms, and the greatest power is the greatest level.
     level = decibels_of_power(image).astype(np.float32)
     low, high = _colour_limits(level)
     # A slice with missing samples has no level; the lowest colour marks it, and the findings name the gap.
@@ -47,8 +48,10 @@ def _draw_channel(
         + reduction(times, lines),
         slice_selection=rrb.TensorSliceSelection(
             width=rr.TensorDimensionSelection(dimension=0),
+            # Low frequencies at the bottom, as everywhere else; images start at the top.
             height=rr.TensorDimensionSelection(dimension=1, invert=True),
         ),
+        # Nearest, because a colour between two lines would be a value that nobody estimated.
         scalar_mapping=rrb.TensorScalarMapping(colormap="viridis", mag_filter="Nearest"),
         view_fit="fill",
     )

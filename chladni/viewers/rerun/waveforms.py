@@ -26,6 +26,7 @@ def draw_waveforms(recording: rr.RecordingStream, study: Study, style: Style) ->
     A series of more samples than a viewer can hold is written as the least and the greatest sample of each stretch,
     and the view's name says so.
     """
+    # One budget for the study: twenty short channels weigh as much as one long one.
     channels = sum(len(series.channels) for series in study.series)
     limit = min(ROWS_OF_A_CHANNEL, ROWS_OF_A_STUDY // max(channels, 1))
     return [
@@ -86,12 +87,14 @@ def _draw_channel(
         aggregation_policy="MinMax",
     )
     recording.log(path, lines, static=True)
+    # A copy, one channel at a time: the series stays as it is, and memory stays bounded.
     values = series.values[row].astype(np.float64)
     if series.valid is not None:
         values[~series.valid[row]] = np.nan
     chosen, stretch = thin(values, limit=limit)
     chosen = chosen[without_repeated_gaps(values[chosen])]
     start_ns = series.start_time_ns - style.origin_ns
+    # From the index, so that no rounding error adds up over an hour.
     offsets_ns = np.rint(chosen / series.sample_rate_hz * NS_PER_S).astype(np.int64) + start_ns
     send_scalars(recording, path, time_index(offsets_ns), values[chosen])
     return stretch

@@ -59,6 +59,7 @@ def serve_web(study: Study, *, port: int = 0) -> WebViewer:
     SetupError
         When the server doesn't start, as when `port` is taken.
     """
+    # The page and the data have a port each, and the page must know that of the data.
     data_port = free_port()
     page_port = port or free_port()
     options = ["--serve-web", "--port", str(data_port), "--web-viewer-port", str(page_port)]
