@@ -28,7 +28,7 @@ AVERAGINGS = ("linear", "exponential", "peak-hold")
 
 # Segments of one matrix product: enough to make BLAS worth calling, and spectra of at most so many bytes.
 MOST_SEGMENTS_TOGETHER = 128
-BYTES_TOGETHER = 32 << 20
+BYTES_TOGETHER = 20 << 20
 # A matrix of more than this is a mistyped resolution more often than a wish.
 MOST_RESULT_BYTES = 2 << 30
 # More threads than this wait for memory.

@@ -40,15 +40,16 @@ def segment_spectra(
     ndarray
         ``[frequency, segment, channel]``, unscaled: X(k) = sum of w(n) x(n) e^{-j 2 pi k n / N}.
     """
-    segments = sliding_window_view(values, segmentation.samples, axis=1)[:, :: segmentation.hop]
-    channels, count = segments.shape[:2]
+    # Segment before channel, as in the result: a group's lines then go to their places in long strides.
+    segments = sliding_window_view(values, segmentation.samples, axis=1)[:, :: segmentation.hop].transpose(1, 0, 2)
+    count, channels = segments.shape[:2]
     spectra = np.empty((segmentation.samples // 2 + 1, count, channels), dtype=np.complex128)
     size = max(1, GROUP_SAMPLES // (channels * segmentation.samples))
 
     def transform(first: int) -> None:
-        group = segments[:, first : first + size]
+        group = segments[first : first + size]
         lines = fft.rfft(_prepare(group, segmentation.detrend, window), axis=-1, overwrite_x=True)
-        spectra[:, first : first + size] = lines.transpose(2, 1, 0)
+        spectra[:, first : first + size] = lines.transpose(2, 0, 1)
 
     run_all(transform, range(0, count, size), executor)
     return spectra
@@ -63,11 +64,13 @@ def run_all(work: Callable[[int], None], starts: Sequence[int], executor: Execut
 def _prepare(
     segments: NDArray[np.floating[Any]], detrend: Detrend, window: NDArray[np.float64]
 ) -> NDArray[np.float64]:
+    # Made here in C order: NumPy would keep the order of the samples in memory, channel before segment.
+    residual = np.empty(segments.shape)
     if detrend == "none":
-        windowed: NDArray[np.float64] = np.multiply(segments, window, dtype=np.float64)
-        return windowed
+        np.multiply(segments, window, out=residual)
+        return residual
     mean = segments.mean(axis=-1, keepdims=True, dtype=np.float64)
-    residual: NDArray[np.float64] = np.subtract(segments, mean, dtype=np.float64)
+    np.subtract(segments, mean, out=residual)
     if detrend == "linear":
         # With the time counted from the middle, slope and mean are independent.
         ramp = np.arange(window.size) - (window.size - 1) / 2
