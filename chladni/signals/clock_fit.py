@@ -55,10 +55,11 @@ class Wander:
     pieces: Ints
 
 
-def fit_clock(count: Count, period_ns: float) -> Clock:
+def fit_clock(count: Count, period_ns: float) -> Clock | None:
     """Fit time = start + period * index with a start for each stretch, outliers left out once.
 
-    With a single item in every stretch the period given is kept, with infinite sigma.
+    With a single item in every stretch the period given is kept, with infinite sigma. None when the slope has nothing
+    to do with the period guessed: then the indices are no count of a clock.
     """
     # All first, to learn the scatter; then without what lies beyond it, such as a message held up by the network.
     everything = np.ones(count.time.size)
@@ -67,6 +68,8 @@ def fit_clock(count: Count, period_ns: float) -> Clock:
     kept = (np.abs(residual) <= limit).astype(np.float64)
     if not kept.all() and np.bincount(count.stretch, kept).min() > 0:
         slope, starts, residual = _fit_stretches(count, kept, slope)
+    if not 0.5 * period_ns < slope < 2 * period_ns:
+        return None
     # Stretches share one grid to the nearest index; what is left of a period stays as an error of the placing.
     shift = np.rint((starts - starts[0]) / slope).astype(np.int64)
     return Clock(

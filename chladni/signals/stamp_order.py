@@ -14,6 +14,8 @@ NEIGHBOURS = 16
 MAX_CANDIDATES = 1000
 #: A step forward that nobody waits for: eleven days, in a log of seconds to hours. Clocks that start in 1970 do it.
 LEAP_NS = 1_000_000_000_000_000
+#: Thirty years: no log lasts as long, so stamps that span more are garbage.
+LONGEST_NS = 1_000_000_000_000_000_000
 _SAMPLE = 200_000
 
 
@@ -121,12 +123,14 @@ def find_jumps(stamps_ns: NDArray[np.int64]) -> tuple[ClockJump, ...]:
     for last in candidates:
         before = stamps_ns[max(0, last + 1 - NEIGHBOURS) : last + 1]
         after = stamps_ns[last + 1 : last + 1 + NEIGHBOURS]
-        # One or two messages at an end can't show whether the clock was set or they were late.
+        # One or two messages at an end can't show whether the clock was set back or they were late.
         moved = float(np.median(after - before[0]) - np.median(before - before[0]))
-        if min(before.size, after.size) > 2 and (moved < 0 or moved > 0.5 * LEAP_NS):
+        set_back = moved < 0 and min(before.size, after.size) > 2
+        if set_back or (moved > 0.5 * LEAP_NS and after.size > 2):
             at, to = int(stamps_ns[last]), int(stamps_ns[last + 1])
             jumps.append(ClockJump(before_ns=at, after_ns=to, shift_ns=at - to + round(2 * period_ns)))
-    return tuple(jumps)
+    # Shifts of garbage could add up to more than 64 bits hold.
+    return tuple(jumps) if sum(abs(jump.shift_ns) for jump in jumps) < 4 * LONGEST_NS else ()
 
 
 def run_on(

@@ -14,7 +14,7 @@ from chladni.signals.clock_verdict import advice, verdict, with_nominal, with_ro
 from chladni.signals.errors import EstimateError
 from chladni.signals.grid_index import choose_smoothing, grid_index
 from chladni.signals.stamp_gaps import list_gaps
-from chladni.signals.stamp_order import ClockJump, Untangled, require_stamps, untangle
+from chladni.signals.stamp_order import LONGEST_NS, ClockJump, Untangled, require_stamps, untangle
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.value import Value, require_shape
 
@@ -165,14 +165,16 @@ def _fit(stamps: NDArray[np.int64], counts: NDArray[np.int64] | None, nominal_hz
     tangled = untangle(stamps)
     if _stands_still(tangled.steps):
         return _still(stamps, samples)
+    if tangled.time_ns[-1] - tangled.time_ns[0] > LONGEST_NS:
+        return _irregular(tangled, samples)
     # A single 1 stands for all messages: ten million ones would only cost memory.
     sizes = np.ones(1, dtype=np.int64) if counts is None else counts
     if counts is not None and tangled.order is not None:
         sizes = counts[tangled.order]
     counted = count_messages(tangled) if counts is None else count_batches(tangled.time_ns, sizes, nominal_hz)
-    if counted is None:
-        return _irregular(stamps, tangled)
-    clock = fit_clock(counted.count, counted.period_ns)
+    clock = None if counted is None else fit_clock(counted.count, counted.period_ns)
+    if counted is None or clock is None:
+        return _irregular(tangled, samples)
     base = _measured(tangled, counted, clock, samples)
     base = _in_order(base, tangled.time_ns, sizes, counted, clock) if counted.in_order else _by_phase(base, tangled)
     base = replace(base, advice=advice(base))
@@ -300,13 +302,13 @@ def _still(stamps: NDArray[np.int64], samples: int) -> TimeBase:
     )
 
 
-def _irregular(stamps: NDArray[np.int64], tangled: Untangled) -> TimeBase:
+def _irregular(tangled: Untangled, samples: int) -> TimeBase:
     span_s = float(tangled.time_ns[-1] - tangled.time_ns[0]) / NS_PER_S
     return TimeBase(
-        rate_hz=(stamps.size - 1) / span_s,
+        rate_hz=(samples - 1) / span_s,
         rate_std_hz=inf,
         start_ns=int(tangled.time_ns[0]),
-        samples=stamps.size,
+        samples=samples,
         verdict="irregular",
         advice="messages come at events and not on a grid; a spectrum needs uniform samples",
         duplicates=tangled.duplicates,

@@ -170,6 +170,21 @@ def test_a_clock_that_starts_in_1970_is_a_jump_and_no_gap_of_years() -> None:
     assert base.out_of_order == 0
 
 
+def test_a_first_stamp_of_zero_spoils_nothing() -> None:
+    when = grid(100.0, 4000)
+    when[0] = 0
+    base = fit_time_base(when)
+    assert base.rate_hz == 100.0
+    assert len(base.jumps) == 1
+
+
+def test_stamps_over_more_than_thirty_years_are_no_clock() -> None:
+    assert fit_time_base(np.arange(10) * 2**58).verdict == "irregular"
+    base = fit_batch_time_base(np.arange(10) * 2**58, np.full(10, 7), nominal_rate_hz=100.0)
+    assert base.verdict == "irregular"
+    assert base.samples == 70
+
+
 def test_a_log_full_of_steps_back_is_no_clock() -> None:
     rng = np.random.default_rng(6)
     base = fit_time_base(stamps(rng.uniform(0, 1000, 20_000)))
