@@ -60,9 +60,7 @@ def adaptive_cross_spectra(
     start = _joined(lead)
     hammer = _hammer(start, references)
     if hammer is not None and window is None and overlap is None:
-        series = _joined(tuple(blocks))
-        record_s = None if resolution_hz is None else 1 / resolution_hz
-        return impact_cross_spectra(series, find_impacts(series, force=hammer, record_s=record_s))
+        return _hits(tuple(blocks), hammer, resolution_hz)
     period = _first_period(start, references)
     chosen = resolution_hz is None and window is None and overlap is None
     if period is not None and period.whole and chosen:
@@ -77,6 +75,17 @@ def adaptive_cross_spectra(
     if period is None:
         return spectra
     return replace(spectra, provenance=spectra.provenance.with_notes(_price(period, spectra)))
+
+
+def _hits(blocks: tuple[TimeSeries, ...], force: str, resolution_hz: float | None) -> CrossSpectra:
+    series = _joined(blocks)
+    record_s = None if resolution_hz is None else 1 / resolution_hz
+    spectra = impact_cross_spectra(series, find_impacts(series, force=force, record_s=record_s))
+    beyond_s = sum(block.duration_s for block in blocks) - series.duration_s
+    if beyond_s * series.sample_rate_hz < 0.5:
+        return spectra
+    note = f"hits after the break in time at {series.duration_s:g} s are not used: {beyond_s:g} s of record"
+    return replace(spectra, provenance=spectra.provenance.with_notes(note))
 
 
 def _hammer(series: TimeSeries, references: str | Sequence[str] | None) -> str | None:

@@ -13,6 +13,8 @@ Mask = NDArray[np.bool_]
 
 # Power below this share of the strongest lines is below what a 16-bit chain can tell from its own errors.
 DYNAMIC_RANGE = 1e-6
+# A hammer's spectrum falls off without a step; 30 dB down, filters and noise of the response make peaks of their own.
+HAMMER_RANGE = 1e-3
 # A step this high (10 dB) in the sorted powers parts a comb or a band from the floor; averaged noise has none.
 FLOOR_STEP = 10.0
 # The lines above the step are the excitation only if they are at least this share of all, else a hum over noise.
@@ -25,7 +27,8 @@ def excited_lines(spectra: CrossSpectra, references: Sequence[str]) -> Mask:
 
     A line counts as excited when its power
 
-    1. is above 1e-6 of the strongest (the 99th percentile of lines, so that one hum doesn't set the scale),
+    1. is above 1e-6 of the strongest (the 99th percentile of lines, so that one hum doesn't set the scale), for hits
+       of a hammer above 1e-3 of it,
     2. stands out of the scatter between periods, for periodic excitation: M |mean|^2 / scatter above the quantile of
        F(2, 2M - 2) that a tenth of a line in the whole spectrum would exceed by chance (Pintelon & Schoukens 2012,
        section 2.5), and
@@ -46,7 +49,8 @@ def excited_lines(spectra: CrossSpectra, references: Sequence[str]) -> Mask:
     """
     rows = [spectra.index(name) for name in references]
     powers = auto_densities(repeated_density(spectra))[rows]
-    mask = powers > DYNAMIC_RANGE * np.percentile(powers, 99, axis=1, keepdims=True)
+    share = HAMMER_RANGE if spectra.provenance.averaging == "impact" else DYNAMIC_RANGE
+    mask = powers > share * np.percentile(powers, 99, axis=1, keepdims=True)
     if spectra.noise_density is not None:
         scatter = auto_densities(spectra.noise_density)[rows]
         mask &= _stands_out(powers, scatter, spectra.provenance.averages)

@@ -164,7 +164,7 @@ def test_a_known_range_finds_clipping_without_a_plateau() -> None:
 
 
 def test_a_motion_that_rests_at_its_end_is_not_clipped() -> None:
-    # Minimum-jerk travel to and fro with a rest of the same length at either end.
+    # Minimum-jerk travel there and back with a rest of the same length at either end.
     phase = np.clip((np.arange(SAMPLES) % 2000) / 1000, 0, 1)
     travel = 10 * phase**3 - 15 * phase**4 + 6 * phase**5
     there = (np.arange(SAMPLES) // 2000) % 2 == 0

@@ -10,7 +10,9 @@ from chladni.signals.testing import assert_close
 from chladni.spectral import adaptive as module
 from chladni.spectral.adaptive import adaptive_cross_spectra
 from chladni.spectral.cross_spectra import cross_spectra
+from chladni.spectral.excitation import excited_lines
 from chladni.spectral.frequency_response import frequency_response
+from chladni.spectral.impact import find_impacts, impact_cross_spectra
 from chladni.spectral.periodic import find_period, periodic_cross_spectra
 from tests.spectral.aircraft import PAYLOAD, SHAKER, aircraft
 from tests.spectral.made_signals import blocks, multisine, noise, part, series
@@ -111,3 +113,49 @@ def test_the_aircraft_by_default_and_by_hann(shared_data):
     # What a window costs: 0.151 is what an analyser that doesn't know better reads.
     assert heights["hann"] < 0.16
     assert any("reads sharp peaks low" in note for note in response.provenance.notes)
+
+
+def hammer_test(seconds=10):
+    """A hit a second, 2 ms long, and an oscillator that rings in between; 5 kHz."""
+    force = np.zeros(seconds * 5000)
+    for hit in range(500, force.size, 5000):
+        force[hit : hit + 10] = 100 * np.hanning(12)[1:-1]
+    time_s = np.arange(5000) / 5000
+    ringing = np.convolve(force, np.exp(-20 * time_s) * np.sin(2 * np.pi * 200 * time_s))[: force.size]
+    return with_role(series(np.stack([force, ringing]) + 1e-4 * noise(2, force.size), rate_hz=5000.0), "a")
+
+
+@pytest.mark.parametrize("references", ["a", ["a"], None])
+def test_the_hits_of_a_hammer_are_averaged(references):
+    source = hammer_test()
+    spectra = adaptive_cross_spectra(source, references=references)
+    assert spectra.provenance.averaging == "impact"
+    assert_close(spectra, impact_cross_spectra(source, find_impacts(source, force="a")), rtol=0)
+    assert_close(adaptive_cross_spectra(blocks(source, [7000] * 7 + [1000])), spectra, rtol=0)
+
+
+def test_the_resolution_sets_the_length_of_a_hits_record():
+    spectra = adaptive_cross_spectra(hammer_test(), references="a", resolution_hz=2.0)
+    assert spectra.provenance.segment_s == 0.5
+
+
+@pytest.mark.parametrize("forced", [{"window": "hann"}, {"overlap": 0.0}])
+def test_a_window_asked_for_is_used_on_hits_too(forced):
+    assert adaptive_cross_spectra(hammer_test(), references="a", **forced).provenance.averaging == "linear"
+
+
+def test_hits_after_a_break_in_time_are_not_used_and_that_is_said():
+    first, second = hammer_test(6), hammer_test(3)
+    later = replace(second, start_time_ns=first.start_time_ns + 60 * 10**9)
+    spectra = adaptive_cross_spectra([first, later], references="a")
+    assert_close(spectra, adaptive_cross_spectra(first, references="a"), rtol=0)
+    assert "hits after the break in time at 6 s are not used: 3 s of record" in spectra.provenance.notes
+
+
+def test_a_hammer_excites_to_30_db_below_its_plateau():
+    spectra = adaptive_cross_spectra(hammer_test(), references="a")
+    power = spectra.density[0, 0].real
+    mask = excited_lines(spectra, ["a"])[0]
+    # The plateau is flat at low frequency, where the 99th percentile is as good as the maximum.
+    np.testing.assert_array_equal(mask, power > 1e-3 * np.percentile(power, 99))
+    assert 500 < spectra.frequency_hz[mask].max() < 2000

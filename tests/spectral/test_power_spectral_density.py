@@ -52,6 +52,6 @@ def test_the_error_bar_of_periods_is_the_scatter_of_many_records():
         lines.append(psd.values[0, 5:127])
         predicted.append(psd.std[0, 5:127])
     ratio = np.std(lines, axis=0) / np.sqrt(np.mean(np.square(predicted), axis=0))
-    # 122 lines, each sigma known to 1/sqrt(2 * 300) = 4 % (somewhat worse where there is noise only, whose power is no
+    # 122 lines, each sigma known to 1/sqrt(2 * 300) = 4 % (worse where there is noise only, whose power is no
     # Gaussian): the mean to 0.5 %; five sigma.
     assert ratio.mean() == pytest.approx(1.0, abs=0.025)

@@ -42,8 +42,7 @@ def measured(series: TimeSeries, rows: tuple[int, ...]) -> NDArray[np.bool_]:
     """Say of each sample whether any of the given rows holds a valid value."""
     if series.valid is None:
         return np.ones(series.samples, dtype=np.bool_)
-    anything: NDArray[np.bool_] = series.valid[list(rows)].any(axis=0)
-    return anything
+    return np.asarray(series.valid[list(rows)].any(axis=0), dtype=np.bool_)
 
 
 def row_with_gaps(series: TimeSeries, row: int, samples: NDArray[np.int64] | slice) -> NDArray[np.floating]:
