@@ -249,11 +249,11 @@ def test_not_a_number_counts_as_missing(tmp_path: Path) -> None:
         assert any(finding.startswith(f"{AXES[2]}: 1 samples are no numbers") for finding in told)
 
 
-def test_stamps_that_leap_for_years_take_no_memory(tmp_path: Path) -> None:
+def test_stamps_that_leap_for_days_take_no_memory(tmp_path: Path) -> None:
     with LogMaker(tmp_path / "a.mcap") as maker:
         channel = maker.ros2("/imu", "sensor_msgs/msg/Imu", IMU)
         for index in range(200):
-            stamp_ns = START_NS + index * 1_000_000 + (10**17 if index >= 100 else 0)
+            stamp_ns = START_NS + index * 1_000_000 + (8 * 10**14 if index >= 100 else 0)
             maker.write(channel, imu(stamp_ns, (1, 0, 0)), stamp_ns)
     with open_log(tmp_path / "a.mcap") as log, pytest.raises(LogError, match="stamps leap"):
         log.read([AXES[0]])
