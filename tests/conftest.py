@@ -4,6 +4,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# How long an example takes depends on what else the machine does; speed is measured in benchmarks/.
+settings.register_profile("chladni", deadline=None)
+settings.load_profile("chladni")
 
 
 @pytest.fixture(scope="session")
