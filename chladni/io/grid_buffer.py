@@ -62,7 +62,9 @@ class GridBuffer:
         self._group = group
         self._channels = channels
         self._first = first
-        self._values = np.full((len(channels), last - first), np.nan, dtype)
+        self._values = np.empty((len(channels), last - first), dtype)
+        # Up to here each row has samples, or NaN. Filling all with NaN first would write most of the memory twice.
+        self._reached = [0] * len(channels)
 
     def put(self, rows: Sequence[int], index: NDArray[np.int64], values: NDArray[np.floating[Any]]) -> None:
         """Lay samples onto the grid; those outside the stretch are left out.
@@ -85,25 +87,43 @@ class GridBuffer:
             start = int(places[0])
             if start < stop:
                 for row, samples in zip(rows, values, strict=True):
+                    self._reach(row, start)
                     self._values[row, start:stop] = samples[: stop - start]
+                    self._reached[row] = max(self._reached[row], stop)
             return
         inside = (places >= 0) & (places < count)
         whole = bool(inside.all())
         for row, samples in zip(rows, values, strict=True):
+            self._reach(row, count)
             self._values[row, places if whole else places[inside]] = samples if whole else samples[inside]
 
     def series(self) -> TimeSeries:
         """Give what has been laid down; what is no finite number counts as not measured."""
-        valid = np.isfinite(self._values)
-        if not valid.all():
+        for row in range(len(self._reached)):
+            self._reach(row, self._values.shape[1])
+        valid = None if _surely_finite(self._values) else np.isfinite(self._values)
+        if valid is not None:
             self._values[~valid] = np.nan
         return TimeSeries(
             values=self._values,
             sample_rate_hz=self._group.rate_hz,
             start_time_ns=self._group.time_ns(self._first),
             channels=self._channels,
-            valid=None if valid.all() else valid,
+            valid=None if valid is None or valid.all() else valid,
         )
+
+    def _reach(self, row: int, place: int) -> None:
+        """Fill with NaN what has not been reached before `place`."""
+        if self._reached[row] < place:
+            self._values[row, self._reached[row] : place] = np.nan
+            self._reached[row] = place
+
+
+def _surely_finite(values: NDArray[np.floating[Any]]) -> bool:
+    """Whether all are finite; False also when they only may not be."""
+    # What isn't finite stays in a sum. It needs one pass and no memory.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.isfinite(values.sum()))
 
 
 def _contiguous(places: NDArray[np.int64]) -> bool:

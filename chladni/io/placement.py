@@ -112,9 +112,9 @@ def _taken(
     stamps_ns: NDArray[np.int64], index: NDArray[np.int64], counts: NDArray[np.int64] | None
 ) -> NDArray[np.int64] | None:
     """Samples at the start of each message whose grid place an earlier message has; None when there are none."""
-    sizes = np.ones(index.size, np.int64) if counts is None else counts
-    if np.all(index[1:] >= index[:-1] + sizes[:-1]):
+    if np.all(index[1:] - index[:-1] >= (1 if counts is None else counts[:-1])):
         return None
+    sizes = np.ones(index.size, np.int64) if counts is None else counts
     order = np.lexsort((stamps_ns, index))
     reached = np.maximum.accumulate(index[order] + sizes[order])
     taken = np.zeros(index.size, np.int64)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.sample_count import Count, count_by_order, count_by_phase, order_fano
+from chladni.signals.sample_count import SAMPLE, Count, count_by_order, count_by_phase, count_even, order_fano
 from chladni.signals.stamp_order import Untangled, typical_period
 from chladni.signals.time_series import NS_PER_S
 
@@ -50,10 +50,12 @@ class Counted:
 def count_messages(tangled: Untangled) -> Counted | None:
     """Count messages of one sample each, by whatever tells their place; None when nothing does."""
     time_ns, steps = tangled.time_ns, tangled.steps
+    if 0 < steps[0] == steps.min() == steps.max():
+        return Counted(count=count_even(time_ns), item_size=1, period_ns=float(steps[0]), in_order=False)
     mean_ns = typical_period(time_ns)
     if np.count_nonzero(steps < 0.25 * mean_ns) > _BURST_SHARE * steps.size:
         return _count_bursts(time_ns, steps, mean_ns)
-    some = steps[:: max(1, steps.size // 200_000)]
+    some = steps[:: max(1, steps.size // SAMPLE)]
     guess = float(np.median(some[some > 0]))
     by_phase = count_by_phase(time_ns, steps, guess)
     # Chance gives a coherence of 0.055 over windows of 256.

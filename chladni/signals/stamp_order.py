@@ -16,7 +16,7 @@ MAX_CANDIDATES = 1000
 LEAP_NS = 1_000_000_000_000_000
 #: Thirty years: no log lasts as long, so stamps that span more are garbage.
 LONGEST_NS = 1_000_000_000_000_000_000
-_SAMPLE = 200_000
+_SAMPLE = 50_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,6 +144,8 @@ def run_on(
         Stamps on a clock that runs on, and how many jumps lie behind it.
     """
     # The pair of stamps tells a jump; its number would depend on where reading began.
+    if not jumps:
+        return stamps_ns, done
     time_ns = stamps_ns + sum(jump.shift_ns for jump in jumps[:done])
     place = 0
     for jump in jumps[done:]:

@@ -236,8 +236,8 @@ def _by_phase(base: TimeBase, tangled: Untangled) -> TimeBase:
     clock = partial(grid_index, knots_ns=base.knots_ns, knots_index=base.knots_index, rate_hz=base.rate_hz)
     smoothing = choose_smoothing(rising_ns, clock, repeats=base.duplicates)
     long = np.flatnonzero(tangled.steps > 1.5 * NS_PER_S / base.rate_hz)
-    end = slice(max(0, rising_ns.size - 4 * smoothing), None)
-    lost = int(clock(rising_ns[end], np.arange(rising_ns.size)[end], smoothing=smoothing)[-1]) + 1 - rising_ns.size
+    end = np.arange(max(0, rising_ns.size - 4 * smoothing), rising_ns.size)
+    lost = int(clock(rising_ns[end], end, smoothing=smoothing)[-1]) + 1 - rising_ns.size
     if smoothing > 1 and lost <= 0 and not base.duplicates:
         # No fewer samples than grid points: their order tells their places better than scattered stamps.
         return replace(base, resumed_ns=rising_ns[:1], resumed_shift=np.zeros(1, dtype=np.int64))

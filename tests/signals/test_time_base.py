@@ -36,6 +36,28 @@ def test_an_ideal_clock_is_told_to_a_billionth(rate_hz: float, samples: int) -> 
     assert base.samples == samples
 
 
+@pytest.mark.parametrize("step_ns", [333_333, 10_000_000])
+@pytest.mark.parametrize("samples", [2, 7, 8, 255, 257, 5000])
+def test_even_stamps_are_a_clock_without_error(step_ns: int, samples: int) -> None:
+    when = START_NS + step_ns * np.arange(samples)
+    base = fit_time_base(when)
+    assert base.rate_hz == pytest.approx(1e9 / step_ns, rel=4e-16)
+    assert base.verdict == ("short" if samples < 8 else "regular")
+    assert (base.start_ns, base.samples, base.missing, base.gap_count) == (START_NS, samples, 0, 0)
+    np.testing.assert_array_equal(base.knots_ns, when[[0, -1]])
+    np.testing.assert_array_equal(base.knots_index, [0, samples - 1])
+    # Residuals are the rounding of nanoseconds since the first stamp, held in doubles.
+    assert base.jitter_s < 1e-9 * step_ns * samples * np.finfo(float).eps
+    # A single stamp one nanosecond off is no longer even, and the fit to all of them says the same.
+    if samples > 8:
+        nearly = when.copy()
+        nearly[samples // 2] += 1
+        fitted = fit_time_base(nearly)
+        assert abs(fitted.rate_hz - base.rate_hz) < 1e-8 * base.rate_hz
+        assert abs(fitted.start_ns - base.start_ns) <= 1
+        np.testing.assert_array_equal(fitted.knots_index, base.knots_index)
+
+
 @pytest.mark.parametrize("relative_jitter", [0.01, 0.1, 0.2, 0.3])
 @pytest.mark.parametrize("law", ["normal", "uniform"])
 @pytest.mark.parametrize("seed", [1, 2, 3])
