@@ -4,9 +4,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chladni.apps.analyse import analyse
-from chladni.apps.demo_log import LOST_FROM_S, LOST_SENSOR, LOST_TO_S, DemoLog, make_demo_log, setup_text
+from chladni.apps.demo_log import (
+    LOST_FROM_S,
+    LOST_SENSOR,
+    LOST_TO_S,
+    SHAKEN,
+    DemoLog,
+    make_demo_log,
+    setup_text,
+)
 from chladni.apps.sources import Progress, no_progress
 from chladni.io.atomic import atomic_write
 from chladni.io.log import open_log
@@ -57,7 +66,7 @@ def run_tour(folder: Path, *, progress: Progress = no_progress) -> Tour:
     LogError
         When the folder can't be made or written to.
     """
-    from chladni.viewers.figures import save_figures
+    from chladni.viewers.figures import Album, save_album
     from chladni.viewers.report import write_report
     from chladni.viewers.rerun import write_rrd
 
@@ -78,9 +87,10 @@ def run_tour(folder: Path, *, progress: Progress = no_progress) -> Tour:
     progress(0.6)
     recording = write_rrd(study, folder / "arm.rrd")
     progress(0.7)
-    report = write_report(study, folder / "report.html")
-    progress(0.8)
-    figures = save_figures(study, folder / "figures")
+    album = Album.of(study)
+    report = write_report(study, folder / "report.html", album=album)
+    progress(0.85)
+    figures = save_album(album, folder / "figures")
     progress(1.0)
     return Tour(
         study=study,
@@ -111,7 +121,7 @@ class _Top:
 
 def _peaks_beside_truth(study: Study, made: DemoLog) -> list[Comparison]:
     """For each natural mode, set the transfer function that shows it best beside the exact one."""
-    tops = [top for body in made.structure.bodies for top in _tops(made, body.name)]
+    tops = _tops(made)
     rows = []
     for natural_hz in made.modes.frequency_hz:
         near = [top for top in tops if abs(top.frequency_hz / natural_hz - 1) < SAME_PEAK]
@@ -120,21 +130,37 @@ def _peaks_beside_truth(study: Study, made: DemoLog) -> list[Comparison]:
     return rows
 
 
-def _tops(made: DemoLog, body: str) -> list[_Top]:
-    from scipy.signal import find_peaks
-
+def _tops(made: DemoLog) -> list[_Top]:
+    """Every peak of every body's exact accelerance."""
     frequency_hz = np.linspace(5.0, 300.0, 59_001)
-    level_db = 20 * np.log10(np.abs(made.accelerance(body, frequency_hz)))
-    lines, shape = find_peaks(level_db, prominence=0.0)
+    accelerance = made.structure.accelerance(frequency_hz)[:, made.structure.body_index(SHAKEN)]
+    levels_db = 20 * np.log10(np.abs(accelerance))
     return [
         _Top(
-            body=body,
+            body=body.name,
             frequency_hz=float(frequency_hz[line]),
             height=float(10 ** (level_db[line] / 20)),
-            prominence_db=float(prominence),
+            prominence_db=_prominence(level_db, line),
         )
-        for line, prominence in zip(lines, shape["prominences"], strict=True)
+        for body, level_db in zip(made.structure.bodies, levels_db, strict=True)
+        for line in _local_maxima(level_db)
     ]
+
+
+def _local_maxima(level: NDArray[np.float64]) -> list[int]:
+    rising = np.diff(level) > 0
+    return (1 + np.flatnonzero(rising[:-1] & ~rising[1:])).tolist()
+
+
+def _prominence(level: NDArray[np.float64], line: int) -> float:
+    """How far one goes down from a peak, to the side that goes down less, before it goes up to somewhere higher.
+
+    `scipy.signal` knows the same, but takes a second to import, and nothing else in the tour needs it.
+    """
+    higher = np.concatenate([[-1], np.flatnonzero(level > level[line]), [level.size]])
+    right = int(np.searchsorted(higher, line))
+    feet = level[higher[right - 1] + 1 : line + 1].min(), level[line : higher[right]].min()
+    return float(level[line] - max(feet))
 
 
 def _beside(study: Study, top: _Top) -> list[Comparison]:

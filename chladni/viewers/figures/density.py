@@ -10,7 +10,7 @@ from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.study import Study
 from chladni.viewers.drawing import decibels_of_power, level_limits
 from chladni.viewers.figures.log_axis import logarithmic
-from chladni.viewers.figures.peak_labels import headroom, label_peaks
+from chladni.viewers.figures.peak_labels import STRIP_POINTS, label_peaks
 from chladni.viewers.figures.sheet import BAND_OPACITY, BANDS_OF, legend, look, paint, plain, sheet
 from chladni.viewers.groups import Group, groups
 from chladni.viewers.labels import printed_unit
@@ -41,23 +41,22 @@ def density_figures(study: Study, *, frequency_scale: Literal["linear", "log"] =
 def _figure(
     study: Study, density: PowerSpectralDensity, group: Group, style: Style, frequency_scale: Literal["linear", "log"]
 ) -> Figure:
-    figure, (axes,) = sheet([HEIGHT_IN])
+    unit = density.units[group.rows[0]]
+    names = {density.channels[row].name for row in group.rows}
+    peaks = [peak for peak in study.peaks if peak.unit == unit and set(peak.channels[:1]) <= names]
+    figure, (axes,) = sheet([HEIGHT_IN], above_points=STRIP_POINTS if peaks else 0.0)
     axes.set_xscale(frequency_scale)
     # A logarithmic axis has no place for zero frequency.
     shown = density.frequency_hz > (0.0 if frequency_scale == "log" else -1.0)
     low, high = level_limits(decibels_of_power(density.values[list(group.rows)][:, shown]))
-    unit = density.units[group.rows[0]]
-    names = {density.channels[row].name for row in group.rows}
-    peaks = [peak for peak in study.peaks if peak.unit == unit and set(peak.channels[:1]) <= names]
-    top = headroom(low, high, height_in=HEIGHT_IN) if peaks else high
-    logarithmic(axes, 10 ** (low / 10), 10 ** (top / 10))
+    logarithmic(axes, 10 ** (low / 10), 10 ** (high / 10))
     for row in group.rows:
         _draw(axes, density, row, shown, style, banded=len(group.rows) <= BANDS_OF)
     axes.set_xlim(density.frequency_hz[shown][0], density.frequency_hz[-1])
-    label_peaks(axes, peaks)
+    named = label_peaks(axes, peaks)
     axes.set_xlabel("Frequency [Hz]")
     axes.set_ylabel(f"Power spectral density [{printed_unit(unit)}]")
-    legend(axes)
+    legend(axes, above_points=named)
     return figure
 
 

@@ -8,13 +8,13 @@ from chladni.signals.peak import Peak
 from chladni.signals.study import Study
 from chladni.viewers.drawing import decibels_of_amplitude, level_limits, line_breaks, phase_wraps, with_breaks
 from chladni.viewers.figures.log_axis import logarithmic
-from chladni.viewers.figures.peak_labels import headroom, label_peaks
+from chladni.viewers.figures.peak_labels import STRIP_POINTS, label_peaks
 from chladni.viewers.figures.sheet import BAND_OPACITY, BANDS_OF, legend, look, paint, plain, sheet
 from chladni.viewers.panels import Panel, panels
 from chladni.viewers.style import Style
 
 CONVENTION = "H = Y/X, e^{+jωt}"
-MAGNITUDE_IN = 2.4
+HEIGHTS_IN = (2.5, 1.35, 1.1)
 
 
 def response_figures(study: Study) -> dict[str, Figure]:
@@ -33,8 +33,11 @@ def response_figures(study: Study) -> dict[str, Figure]:
 
 
 def _figure(study: Study, panel: Panel, style: Style) -> Figure:
-    figure, (magnitude, phase, coherence) = sheet([MAGNITUDE_IN, 1.15, 1.1], sharex=True)
-    _draw_magnitude(magnitude, study, panel, style)
+    peaks = _peaks(study, panel)
+    figure, (magnitude, phase, coherence) = sheet(
+        HEIGHTS_IN, above_points=STRIP_POINTS if peaks else 0.0, sharex=True
+    )
+    _draw_magnitude(magnitude, peaks, panel, style)
     for row in panel.group.rows:
         colour = paint(style.on_light(panel.response.responses[row]))
         angle = np.angle(panel.function(row), deg=True)
@@ -51,12 +54,10 @@ def _figure(study: Study, panel: Panel, style: Style) -> Figure:
     return figure
 
 
-def _draw_magnitude(axes: Axes, study: Study, panel: Panel, style: Style) -> None:
+def _draw_magnitude(axes: Axes, peaks: list[Peak], panel: Panel, style: Style) -> None:
     magnitudes = np.array([np.abs(panel.function(row)) for row in panel.group.rows])
     low, high = level_limits(decibels_of_amplitude(magnitudes))
-    peaks = _peaks(study, panel)
-    top = headroom(low, high, height_in=MAGNITUDE_IN) if peaks else high
-    logarithmic(axes, 10 ** (low / 20), 10 ** (top / 20))
+    logarithmic(axes, 10 ** (low / 20), 10 ** (high / 20))
     frequency_hz = panel.frequency_hz()
     axes.set_xlim(frequency_hz[0], frequency_hz[-1])
     breaks = line_breaks(frequency_hz)
@@ -71,8 +72,8 @@ def _draw_magnitude(axes: Axes, study: Study, panel: Panel, style: Style) -> Non
             axes.fill_between(x, curves[:, 1], curves[:, 2], color=colour, alpha=BAND_OPACITY, linewidth=0)
     reference = plain(style.labels[panel.response.references[panel.reference].name])
     axes.set_ylabel(f"{panel.quantity} |H| [{panel.unit}]\n{panel.response.provenance.estimator}, to {reference}")
-    label_peaks(axes, peaks)
-    legend(axes)
+    named = label_peaks(axes, peaks)
+    legend(axes, above_points=named)
 
 
 def _peaks(study: Study, panel: Panel) -> list[Peak]:

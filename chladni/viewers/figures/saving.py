@@ -1,34 +1,16 @@
-"""Figures of a study, written to a folder."""
+"""Figures, written to a folder."""
 
 import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from chladni.io.atomic import atomic_write
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.study import Study
-from chladni.viewers.figures.density import density_figures
-from chladni.viewers.figures.frequency_response import response_figures
-from chladni.viewers.figures.nyquist import nyquist_figures
-from chladni.viewers.figures.rendering import rendered
-from chladni.viewers.figures.waterfall import waterfall_figures
-from chladni.viewers.figures.waveforms import waveform_figures
+from chladni.viewers.figures.album import Album
 
 FORMATS = ("png", "svg", "pdf")
-
-
-def study_figures(study: Study) -> dict[str, Figure]:
-    """Draw every figure that the study has data for, by name."""
-    return {
-        **waveform_figures(study),
-        **density_figures(study),
-        **response_figures(study),
-        **nyquist_figures(study),
-        **waterfall_figures(study),
-    }
 
 
 def save_figures(
@@ -58,6 +40,26 @@ def save_figures(
         When the folder can't be made or a file can't be written.
     """
     # Before drawing: a minute of work shouldn't end in a misspelt format.
+    target = _prepared(folder, formats)
+    return save_album(Album.of(study), target, formats=formats)
+
+
+def save_album(
+    album: Album, folder: str | os.PathLike[str], *, formats: Sequence[str] = ("png", "svg")
+) -> list[Path]:
+    """Write the figures of an album as `save_figures` does those of a study; what is rendered already is reused."""
+    target = _prepared(folder, formats)
+    written = []
+    for name in album.figures:
+        for kind in formats:
+            path = target / f"{file_name(name)}.{kind}"
+            with atomic_write(path) as file:
+                file.write(album.rendered(name, kind))
+            written.append(path)
+    return written
+
+
+def _prepared(folder: str | os.PathLike[str], formats: Sequence[str]) -> Path:
     for kind in formats:
         if kind not in FORMATS:
             raise SetupError(f"figure format {kind!r} is none of {', '.join(FORMATS)}")
@@ -68,14 +70,7 @@ def save_figures(
         raise LogError(
             f"{target}: can't be made a folder ({error.strerror}); name another for the figures"
         ) from error
-    written = []
-    for name, figure in study_figures(study).items():
-        for kind in formats:
-            path = target / f"{file_name(name)}.{kind}"
-            with atomic_write(path) as file:
-                file.write(rendered(figure, kind))
-            written.append(path)
-    return written
+    return target
 
 
 def file_name(name: str) -> str:

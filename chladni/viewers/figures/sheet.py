@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont
 from matplotlib.ft2font import FT2Font
+from matplotlib.transforms import ScaledTranslation
 
 from chladni.viewers.style import Colour
 
@@ -56,16 +57,16 @@ def look() -> Iterator[None]:
         yield
 
 
-def sheet(heights_in: Sequence[float], **options: Any) -> tuple[Figure, list[Axes]]:
-    """Make a figure of stacked axes, one for each height."""
+def sheet(heights_in: Sequence[float], *, above_points: float = 0.0, **options: Any) -> tuple[Figure, list[Axes]]:
+    """Make a figure of stacked axes, one for each height, with some points more for what stands above the first."""
     # Not through pyplot: that would choose a window system and keep every figure alive.
-    figure = Figure(figsize=(WIDTH_IN, sum(heights_in)), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, sum(heights_in) + above_points / 72), layout="constrained")
     axes = figure.subplots(len(heights_in), 1, squeeze=False, height_ratios=list(heights_in), **options)
     return figure, list(axes[:, 0])
 
 
-def legend(axes: Axes) -> None:
-    """Put the legend above the axes, where it can't cover data."""
+def legend(axes: Axes, *, above_points: float = 0.0) -> None:
+    """Put the legend above the axes, where it can't cover data, and above what stands there already."""
     handles, labels = axes.get_legend_handles_labels()
     if handles:
         axes.legend(
@@ -73,6 +74,7 @@ def legend(axes: Axes) -> None:
             labels,
             loc="lower left",
             bbox_to_anchor=(0.0, 1.0),
+            bbox_transform=axes.transAxes + ScaledTranslation(0, above_points / 72, axes.figure.dpi_scale_trans),
             ncols=LEGEND_COLUMNS,
             frameon=False,
             borderaxespad=0.2,

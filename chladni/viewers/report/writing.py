@@ -6,13 +6,14 @@ from pathlib import Path
 
 from chladni.io.atomic import atomic_write
 from chladni.signals.study import Study
+from chladni.viewers.figures import Album
 from chladni.viewers.report.markup import PAGE, element, escaped
 from chladni.viewers.report.pictures import pictures
 from chladni.viewers.report.tables import channel_table, method_table, peak_table
 from chladni.viewers.style import Style
 
 
-def write_report(study: Study, path: str | os.PathLike[str]) -> Path:
+def write_report(study: Study, path: str | os.PathLike[str], *, album: Album | None = None) -> Path:
     """Write the report of a study as one HTML file, whole or not at all.
 
     Parameters
@@ -21,6 +22,8 @@ def write_report(study: Study, path: str | os.PathLike[str]) -> Path:
         What to report.
     path
         File to write; one that exists is replaced.
+    album
+        The study's figures when they are drawn already.
 
     Returns
     -------
@@ -34,19 +37,19 @@ def write_report(study: Study, path: str | os.PathLike[str]) -> Path:
     """
     target = Path(path)
     with atomic_write(target) as file:
-        file.write(report_html(study).encode())
+        file.write(report_html(study, album=album).encode())
     return target
 
 
-def report_html(study: Study) -> str:
+def report_html(study: Study, *, album: Album | None = None) -> str:
     """Give the report of a study as HTML: findings, tables and figures, no script and nothing to fetch.
 
     Everything that came from the log is escaped, and the page's own policy forbids scripts and requests.
     """
-    return PAGE.substitute(title=escaped(study.title), body="\n".join(_body(study)))
+    return PAGE.substitute(title=escaped(study.title), body="\n".join(_body(study, album or Album.of(study))))
 
 
-def _body(study: Study) -> Iterator[str]:
+def _body(study: Study, album: Album) -> Iterator[str]:
     style = Style.of(study)
     yield element("h1", escaped(study.title))
     if study.findings:
@@ -55,7 +58,7 @@ def _body(study: Study) -> Iterator[str]:
         "Peaks of the frequency responses", peak_table(study.response_peaks, style, channels="Response, reference")
     )
     yield _section("Peaks of the spectra", peak_table(study.peaks, style, channels="Channels, strongest first"))
-    for heading, shown in pictures(study).items():
+    for heading, shown in pictures(album).items():
         yield _section(heading, shown)
     yield _section("Channels", channel_table(study, style))
     yield _section("Method", method_table(study))

@@ -1,0 +1,52 @@
+"""Figures in sections, each drawn once and rendered once in each format, whoever asks for it."""
+
+from collections.abc import Mapping
+from typing import Self
+
+from matplotlib.figure import Figure
+
+from chladni.signals.study import Study
+from chladni.viewers.figures.density import density_figures
+from chladni.viewers.figures.frequency_response import response_figures
+from chladni.viewers.figures.nyquist import nyquist_figures
+from chladni.viewers.figures.rendering import rendered
+from chladni.viewers.figures.waterfall import waterfall_figures
+from chladni.viewers.figures.waveforms import waveform_figures
+
+
+class Album:
+    """Figures that are shown in several places, as those of a study in its report and in files.
+
+    Attributes
+    ----------
+    sections
+        Figures by name, by the name of their section.
+    """
+
+    def __init__(self, sections: Mapping[str, Mapping[str, Figure]]) -> None:
+        self.sections = sections
+        self._rendered: dict[tuple[str, str], bytes] = {}
+
+    @classmethod
+    def of(cls, study: Study) -> Self:
+        """Draw every figure that the study has data for: waveforms, densities, responses, nyquist, waterfalls."""
+        return cls(
+            {
+                "waveforms": waveform_figures(study),
+                "densities": density_figures(study),
+                "responses": response_figures(study),
+                "nyquist": nyquist_figures(study),
+                "waterfalls": waterfall_figures(study),
+            }
+        )
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        """Every figure, by name."""
+        return {name: figure for section in self.sections.values() for name, figure in section.items()}
+
+    def rendered(self, name: str, kind: str) -> bytes:
+        """Give one figure as ``png``, ``svg`` or ``pdf``."""
+        if (name, kind) not in self._rendered:
+            self._rendered[name, kind] = rendered(self.figures[name], kind)
+        return self._rendered[name, kind]
