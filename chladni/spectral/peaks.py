@@ -248,9 +248,11 @@ def _significant(curve: _Curve, min_prominence_db: float, false_alarm: float) ->
     # Half of the false alarms for each of the two tests.
     chance = false_alarm / (2 * power.size)
     loud = (scipy.special.chdtrc(freedom, freedom * over_floor) <= chance) & curve.trusted & (curve.relative_std <= 1)
+    # Once for all peaks: inverting the chi-squared distribution is most of the work here.
+    sure = power * freedom / scipy.special.chdtri(freedom, 1 - UPPER_BOUND_CHANCE)
     found = []
     for line in np.flatnonzero(loud & _maxima(curve)):
-        valley = _valley(curve, int(line))
+        valley = _valley(power, sure, int(line))
         ratio, pairs = power[line] / power[valley], abs(int(line) - valley)
         surprise = scipy.special.fdtrc(freedom[line], freedom[valley], ratio)
         if surprise * pairs <= chance and 10 * np.log10(ratio) >= min_prominence_db:
@@ -275,13 +277,12 @@ def _floor(curve: _Curve) -> Floats:
     return np.asarray(median * freedom / scipy.special.chdtri(freedom, 0.5), dtype=np.float64)
 
 
-def _valley(curve: _Curve, line: int) -> int:
+def _valley(power: Floats, sure: Floats, line: int) -> int:
     """Deepest line between a peak and the next higher one, on the side where that is less deep.
 
-    Lines are as deep as they surely are: the deepest of all, an antiresonance, may be one of which nothing is known.
+    Lines are as deep as they surely are (`sure`, an upper bound of each): the deepest of all, an antiresonance, may
+    be one of which nothing is known.
     """
-    power, freedom = curve.power, 2 / curve.relative_std**2
-    sure = power * freedom / scipy.special.chdtri(freedom, 1 - UPPER_BOUND_CHANCE)
     higher = np.flatnonzero(power > power[line])
     left, right = higher[higher < line], higher[higher > line]
     first = int(left[-1]) if left.size else 0
