@@ -283,13 +283,17 @@ def _valley(power: Floats, sure: Floats, line: int) -> int:
     Lines are as deep as they surely are (`sure`, an upper bound of each): the deepest of all, an antiresonance, may
     be one of which nothing is known.
     """
-    higher = np.flatnonzero(power > power[line])
-    left, right = higher[higher < line], higher[higher > line]
-    first = int(left[-1]) if left.size else 0
-    last = int(right[0]) if right.size else power.size - 1
+    first, last = _realm(power, line)
     before = first + int(np.argmin(sure[first : line + 1]))
     after = line + int(np.argmin(sure[line : last + 1]))
     return before if sure[before] > sure[after] else after
+
+
+def _realm(power: Floats, line: int) -> tuple[int, int]:
+    """Next higher line on either side of a peak; the ends where none is higher."""
+    higher = np.flatnonzero(power > power[line])
+    left, right = higher[higher < line], higher[higher > line]
+    return int(left[-1]) if left.size else 0, int(right[0]) if right.size else power.size - 1
 
 
 def _located(curve: _Curve, line: int, over_floor: float) -> _Found:
@@ -321,7 +325,13 @@ def _above_half(curve: _Curve, line: int) -> NDArray[np.int64]:
     at = line - start
     low = np.flatnonzero(smooth < smooth[at] / 2)
     left, right = low[low < at], low[low > at]
-    return start + np.arange(left[-1] + 1 if left.size else 0, right[0] if right.size else smooth.size)
+    # Smoothed, the slope of a higher peak nearby looks like this one's: the run ends in the valley between them.
+    first, last = _realm(curve.power, line)
+    before = first + int(np.argmin(curve.power[first : line + 1])) if first else 0
+    after = line + int(np.argmin(curve.power[line : last + 1])) if last < curve.power.size - 1 else last
+    begin = start + (int(left[-1]) + 1 if left.size else 0)
+    end = start + (int(right[0]) if right.size else smooth.size)
+    return np.arange(max(begin, before), min(end, after + 1))
 
 
 def _from_three(curve: _Curve, line: int) -> tuple[float, float, float]:
@@ -367,7 +377,7 @@ def _from_resonance(curve: _Curve, line: int, run: NDArray[np.int64]) -> tuple[f
             return frequency_hz, float(relative_std * gradient * curve.spacing_hz), height
     # No maximum inside: so flat and noisy a top lies anywhere above half of it.
     flat_std_hz = float(np.ptp(x) * curve.spacing_hz / np.sqrt(12))
-    return float(curve.frequency_hz[line]), flat_std_hz, float(curve.power[run].max())
+    return float(curve.frequency_hz[line]), flat_std_hz, float(curve.power[line])
 
 
 def _vertex(x: Floats, power: Floats, terms: int) -> tuple[float, float, float] | None:

@@ -295,3 +295,27 @@ def test_the_torsion_of_the_aircraft_is_read_as_published(shared_data, level, fr
     assert peaks[0].frequency_hz == pytest.approx(frequency_hz, abs=0.02)
     assert peaks[0].height == pytest.approx(height, rel=0.05)
     assert all(2 < peak.frequency_hz < 15 for peak in peaks)
+
+
+def test_few_averages_do_not_lend_a_weak_peak_the_height_of_its_neighbour():
+    # Harmonics of a falling line spectrum with three averages: lines scatter by 60 %, and are smoothed over.
+    frequency_hz = np.arange(0.0, 60.0) / 10
+    values = np.full(frequency_hz.size, 1e-3)
+    heights = {5: 1e7, 15: 4e5, 26: 5e4, 36: 8e3}
+    for line, height in heights.items():
+        values[line - 1 : line + 2] = [0.3 * height, height, 0.3 * height]
+    psd = PowerSpectralDensity(
+        frequency_hz=frequency_hz,
+        values=values[None],
+        std=0.59 * values[None],
+        channels=(Channel(name="force", unit="N"),),
+        bandwidth_hz=0.15,
+        provenance=Provenance(window="hann"),
+    )
+    found = find_peaks(psd)
+    assert [round(10 * peak.frequency_hz) for peak in found] == list(heights)
+    for peak, height in zip(found, heights.values(), strict=True):
+        # A tone between lines shows up to 1.4 dB less on its nearest line (Hann's scalloping).
+        assert height <= peak.height * (1 + 1e-9) <= 1.4 * height
+        # It lies within the lines that are its own, not those up to the neighbour a hertz away.
+        assert peak.frequency_std_hz < 0.5
