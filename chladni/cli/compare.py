@@ -12,6 +12,7 @@ from chladni.cli.words import number, with_error
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from chladni.apps.compare import LogComparison
     from chladni.signals.comparison import LevelChange, PeakChange
 
 UNCHANGED = "nothing that scatter doesn't explain"
@@ -32,6 +33,7 @@ def compare(
     setup: options.Setup = None,
     stamp: options.Stamp = "auto",
     json: options.Json = None,
+    figures: options.Figures = None,
 ) -> None:
     """Levels, spectra and transfer functions of two logs side by side, with what is significant."""
     from chladni.apps.compare import compare_logs
@@ -55,7 +57,17 @@ def compare(
         _print_peaks(out, "Peaks of the transfer functions", found.response.peaks)
         out.lines(found.response.notes)
     out.lines(found.notes)
+    if figures is not None:
+        _save_figures(out, found, figures)
     out.json(comparison_document(found))
+
+
+def _save_figures(out: Output, found: "LogComparison", folder: Path) -> None:
+    from chladni.viewers.figures import Album, comparison_figures, save_album
+
+    album = Album({"comparison": comparison_figures(found.densities, found.response)})
+    for path in save_album(album, folder):
+        out.line(f"figure: {path}")
 
 
 def _print_levels(out: Output, changes: "Sequence[LevelChange]") -> None:

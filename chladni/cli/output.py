@@ -50,15 +50,18 @@ class Output:
 
     def pictures(self, study: "Study", *, figures: Path | None, report: Path | None) -> None:
         """Save figures and report where they were asked for, and say where they are."""
-        if figures is not None:
-            from chladni.viewers.figures import save_figures
+        if figures is None and report is None:
+            return
+        from chladni.viewers.figures import Album, save_album
 
-            for path in save_figures(study, figures):
+        album = Album.of(study)
+        if figures is not None:
+            for path in save_album(album, figures):
                 self.line(f"figure: {path}")
         if report is not None:
             from chladni.viewers.report import write_report
 
-            write_report(study, report)
+            write_report(study, report, album=album)
             self.line(f"report: {report}")
 
     def json(self, content: Mapping[str, Any]) -> None:

@@ -1,6 +1,6 @@
 """What all pictures of one study share: a label and a colour for each channel, and the start of its clock."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Self
 
@@ -56,8 +56,13 @@ class Style:
     @classmethod
     def of(cls, study: Study) -> Self:
         """Give the style of all pictures of `study`."""
+        return cls.of_channels(_channels(study), origin_ns=min(_starts(study), default=0))
+
+    @classmethod
+    def of_channels(cls, drawn: Iterable[Channel], *, origin_ns: int = 0) -> Self:
+        """Give the style of pictures of these channels, which may come several times."""
         # By name: a channel in a series, its density and its response is one channel.
-        channels = {channel.name: channel for channel in _channels(study)}
+        channels = {channel.name: channel for channel in drawn}
         units: dict[str, list[str]] = {}
         for channel in channels.values():
             units.setdefault(channel.unit, []).append(channel.name)
@@ -66,7 +71,7 @@ class Style:
         return cls(
             labels=short_names(channels),
             numbers={name: place % len(ON_DARK) for place, name in enumerate(ordered)},
-            origin_ns=min(_starts(study), default=0),
+            origin_ns=origin_ns,
         )
 
     def on_dark(self, channel: Channel) -> Colour:

@@ -4,6 +4,7 @@ Importing this package costs half a second, so it's imported where a figure is w
 """
 
 from chladni.viewers.figures.album import Album
+from chladni.viewers.figures.comparison import comparison_figures
 from chladni.viewers.figures.density import density_figures
 from chladni.viewers.figures.frequency_response import response_figures
 from chladni.viewers.figures.nyquist import nyquist_figures
@@ -13,6 +14,7 @@ from chladni.viewers.figures.waveforms import waveform_figures
 
 __all__ = [
     "Album",
+    "comparison_figures",
     "density_figures",
     "nyquist_figures",
     "response_figures",
