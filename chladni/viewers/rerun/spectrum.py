@@ -17,8 +17,8 @@ from chladni.viewers.rerun.tensors import TensorColumn
 from chladni.viewers.rerun.timelines import send_columns, time_index
 from chladni.viewers.style import Colour, Style
 
-# A bar narrower than a pixel can't be seen; a chart is rarely wider than this.
-BARS = 1024
+# A bar narrower than a pixel can't be seen, and charts are rarely wider; more than the 1025 lines of a usual slice.
+BARS = 1280
 SLICES = 1024
 
 
