@@ -65,6 +65,7 @@ class GridBuffer:
         self._values = np.empty((len(channels), last - first), dtype)
         # Up to here each row has samples, or NaN. Filling all with NaN first would write most of the memory twice.
         self._reached = [0] * len(channels)
+        self._finite = True
 
     def put(self, rows: Sequence[int], index: NDArray[np.int64], values: NDArray[np.floating[Any]]) -> None:
         """Lay samples onto the grid; those outside the stretch are left out.
@@ -82,6 +83,7 @@ class GridBuffer:
         count = self._values.shape[1]
         if not places.size:
             return
+        self._finite = self._finite and _surely_finite(values)
         if places[0] >= 0 and places[-1] == places[0] + places.size - 1 and _contiguous(places):
             stop = min(count, int(places[-1]) + 1)
             start = int(places[0])
@@ -101,7 +103,7 @@ class GridBuffer:
         """Give what has been laid down; what is no finite number counts as not measured."""
         for row in range(len(self._reached)):
             self._reach(row, self._values.shape[1])
-        valid = None if _surely_finite(self._values) else np.isfinite(self._values)
+        valid = None if self._finite else np.isfinite(self._values)
         if valid is not None:
             self._values[~valid] = np.nan
         return TimeSeries(
@@ -117,11 +119,12 @@ class GridBuffer:
         if self._reached[row] < place:
             self._values[row, self._reached[row] : place] = np.nan
             self._reached[row] = place
+            self._finite = False
 
 
 def _surely_finite(values: NDArray[np.floating[Any]]) -> bool:
     """Whether all are finite; False also when they only may not be."""
-    # What isn't finite stays in a sum. It needs one pass and no memory.
+    # What isn't finite stays in a sum, which needs no memory, and brings into the cache what is copied next.
     with np.errstate(over="ignore", invalid="ignore"):
         return bool(np.isfinite(values.sum()))
 

@@ -154,10 +154,9 @@ class Stream:
         self, decoded: Decoded, stamps_ns: NDArray[np.int64], keep: NDArray[np.bool_], lost: dict[str, int]
     ) -> Piece:
         columns = [_column(decoded, source) for source in self.sources]
-        anywhere = np.zeros(len(keep), np.bool_)
-        for _, present in columns:
-            anywhere |= True if present is None else present
-        keep = keep & anywhere
+        somewhere = [present for _, present in columns if present is not None]
+        if len(somewhere) == len(columns):
+            keep = keep & np.logical_or.reduce(somewhere)
         values = np.empty((len(columns), int(np.count_nonzero(keep))), np.result_type(*(v for v, _ in columns)))
         whole = bool(keep.all())
         for row, (numbers, present) in enumerate(columns):

@@ -11,7 +11,7 @@ import numpy as np
 
 from chladni.io.decoding.assemble import joined, scattered
 from chladni.io.decoding.columns import Column, Decoded, Strings, outside_buffer, require_known
-from chladni.io.decoding.cursor import Cursor
+from chladni.io.decoding.cursor import Cursor, uniform
 from chladni.io.decoding.interned import intern_blocks
 from chladni.io.decoding.layout import Layouts
 from chladni.io.decoding.schema import Array, leaves, tree_of
@@ -33,10 +33,11 @@ HEADER_BYTES: Final = 4
 COMPACT_BYTES: Final = 256
 """Bytes a message for each column asked for, up to which irregular messages are first copied side by side."""
 
-_BYTE: Final = np.dtype(np.uint8)
+_UINT16: Final = np.dtype(np.uint16)
 _CDR: Final = WireRules(max_alignment=8, terminated=True)
 _ROS1: Final = WireRules(max_alignment=1, terminated=False)
 
+_PLAIN_FORMS: Final[dict[int, Literal["<", ">"]]] = {0: ">", 1: "<"}
 _OTHER_FORMS: Final = {
     2: "PL_CDR (parameter list)", 3: "PL_CDR (parameter list)",
     6: "XCDR2", 7: "XCDR2", 8: "delimited XCDR2", 9: "delimited XCDR2",
@@ -122,7 +123,8 @@ class BinaryDecoder:
         """Decode the fields named; see `chladni.io.decoding.columns.Decoder`."""
         require_known(paths, self.fields, schema_name=self.record.name)
         batch = _Batch(messages)
-        cursor = batch.cursor(byte_order="<")
+        # The header of CDR is big-endian, whatever comes behind it.
+        cursor = batch.cursor(byte_order=">" if self._encapsulated else "<")
         cursor.compact(COMPACT_BYTES * len(paths))
         if self._encapsulated:
             self._pass_header(cursor)
@@ -134,19 +136,23 @@ class BinaryDecoder:
     def _pass_header(self, cursor: Cursor) -> None:
         """Move to the bodies of CDR messages; the header gives the byte order."""
         cursor.claim(HEADER_BYTES, "the CDR header")
-        first, forms = cursor.take_block(_BYTE, 2).astype(np.int64).T
-        forms = forms + 256 * first
-        if len(forms) and (forms == forms[0]).all() and int(forms[0]) in _OTHER_FORMS:
-            raise LogError(
-                f"{self.record.name}: messages are in {_OTHER_FORMS[int(forms[0])]}; plain CDR (little or big "
-                "endian) is supported, record with a middleware that writes it"
-            )
+        forms = uniform(cursor.take(_UINT16).astype(np.int64))
+        if isinstance(forms, int):
+            if forms in _OTHER_FORMS:
+                raise LogError(
+                    f"{self.record.name}: messages are in {_OTHER_FORMS[forms]}; plain CDR (little or big endian) is "
+                    "supported, record with a middleware that writes it"
+                )
+            if forms in _PLAIN_FORMS:
+                cursor.enter(HEADER_BYTES, _PLAIN_FORMS[forms])
+                return
+            forms = np.full(len(cursor), forms)
         kept = cursor.drop(forms > 1, "the header names no plain CDR")
         forms = forms if kept is None else forms[kept]
         # One writer has one byte order: a message that differs from most is damaged, not foreign.
         order = 1 if 2 * np.count_nonzero(forms) >= len(forms) else 0
         cursor.drop(forms != order, "the byte order differs from most messages")
-        cursor.enter(HEADER_BYTES, "<" if order else ">")
+        cursor.enter(HEADER_BYTES, _PLAIN_FORMS[order])
 
     def _column(self, leaf: Leaf, pieces: list[Piece], batch: _Batch, cursor: Cursor) -> Column:
         info, bad = leaf.info, batch.bad

@@ -98,7 +98,9 @@ class Walk:
                 self._put(wanted, self._nanoseconds(kind))
                 self.cursor.advance(8)
             case Text():
-                self._put(wanted, self._text(kind))
+                position, content = self._text(kind)
+                start = self.cursor.base + position
+                self._put(wanted, np.stack([start, np.broadcast_to(content, start.shape)], axis=1))
             case Array():
                 self._array(kind, wanted)
 
@@ -133,8 +135,8 @@ class Walk:
         self.cursor.advance(4)
         return length
 
-    def _text(self, text: Text) -> NDArray[np.int64]:
-        """Move over a string; gives first byte and number of bytes of its characters in each message."""
+    def _text(self, text: Text) -> tuple[int | NDArray[np.int64], int | NDArray[np.int64]]:
+        """Move over a string; gives the place and the number of bytes of its characters."""
         if text.wide:
             raise LogError(
                 "wstring: writers disagree on its width (2 or 4 bytes a character), so fields after it can't be "
@@ -151,9 +153,9 @@ class Walk:
         if text.bound is not None:
             kept = cursor.drop(np.broadcast_to(content > text.bound, len(cursor)), "a string exceeds its bound")
             length, content = _kept(length, kept), _kept(content, kept)
-        start = cursor.base + cursor.position
+        place = cursor.position
         cursor.advance(length)
-        return np.stack([start, np.broadcast_to(content, start.shape)], axis=1)
+        return place, content
 
     def _array(self, array: Array, wanted: Tree | Leaf | None) -> None:
         counts = self._counts(array)
