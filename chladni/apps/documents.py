@@ -138,7 +138,7 @@ def _channel_density(density: PowerSpectralDensity, name: str) -> Document:
             }
             for peak in find_peaks(alone)
         ],
-        "rms": float(total_rms(alone).rms[0, 0]),
+        "rms": finite(float(total_rms(alone).rms[0, 0])),
     }
 
 

@@ -2,8 +2,10 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chladni.io.log import Log
 from chladni.signals.time_series import TimeSeries
@@ -33,7 +35,7 @@ def no_progress(share: float) -> None:
 
 
 class Watched:
-    """Passes blocks on, and remembers which channels moved at all and how far it is."""
+    """Passes blocks on, and remembers which channels moved at all, by how much, and how far it is."""
 
     def __init__(
         self, names: Sequence[str], blocks: Iterable[TimeSeries], *, duration_s: float, progress: Progress
@@ -44,6 +46,7 @@ class Watched:
         self._progress = progress
         self._lowest: dict[str, float] = {}
         self._highest: dict[str, float] = {}
+        self._moments: dict[str, tuple[int, float, float]] = {}
 
     def __iter__(self) -> Iterator[TimeSeries]:
         done_s = 0.0
@@ -57,6 +60,11 @@ class Watched:
         """Names of the channels that showed one value only."""
         return tuple(name for name in self._lowest if not self._lowest[name] < self._highest[name])
 
+    def variance(self, name: str) -> float:
+        """Variance of a channel over all its samples; 0 before any came."""
+        samples, _, squares = self._moments.get(name, (0, 0.0, 0.0))
+        return squares / samples if samples else 0.0
+
     def _watch(self, block: TimeSeries) -> None:
         # fmin and fmax look past the NaN of missing samples.
         lowest = np.fmin.reduce(block.values, axis=1, initial=np.inf)
@@ -64,6 +72,20 @@ class Watched:
         for channel, low, high in zip(block.channels, lowest.tolist(), highest.tolist(), strict=True):
             self._lowest[channel.name] = min(low, self._lowest.get(channel.name, np.inf))
             self._highest[channel.name] = max(high, self._highest.get(channel.name, -np.inf))
+        for channel, row in zip(block.channels, block.values, strict=True):
+            self._moments[channel.name] = _with_moments(self._moments.get(channel.name, (0, 0.0, 0.0)), row)
+
+
+def _with_moments(known: tuple[int, float, float], row: NDArray[np.floating[Any]]) -> tuple[int, float, float]:
+    """Add samples to a count, a mean and a sum of squared deviations (Chan, Golub & LeVeque 1983, eq. 2.1)."""
+    finite = row[np.isfinite(row)].astype(np.float64, copy=False)
+    if not finite.size:
+        return known
+    samples, mean, squares = known
+    fresh_mean = float(finite.mean())
+    apart, total = fresh_mean - mean, samples + finite.size
+    squares += float(np.square(finite - fresh_mean).sum()) + apart**2 * samples * finite.size / total
+    return total, mean + apart * finite.size / total, squares
 
 
 def watched_grids(

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from chladni.apps.sources import Progress, Span, Watched, no_progress, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
@@ -12,10 +14,14 @@ from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.adaptive import adaptive_cross_spectra
+from chladni.spectral.bands import total_rms
 from chladni.spectral.blocks import Source
 from chladni.spectral.frequency_response import Estimator, frequency_response
 from chladni.spectral.power_spectral_density import power_spectral_density
 from chladni.spectral.windows import Window
+
+# A tenth of the variance is half a decibel: less than that is lost at the ends of any record.
+MISSING_TOLD = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,7 +128,7 @@ def densities(
         try:
             found.append(_density(grid, averaging or Averaging()))
         except EstimateError as error:
-            left_out.append(str(error))
+            left_out.append(f"{some_of(grid.names)}: {error}")
     if not found:
         raise EstimateError(f"{log.path.name}: no spectrum could be made: {'; '.join(left_out)}")
     noted = replace(found[0], provenance=found[0].provenance.with_notes(*left_out))
@@ -219,20 +225,50 @@ def transfer(
     # A path may be written in more than one way; the channels that come back have one name each.
     references = source.names(references)
     grid = _grid_of(source, references, names, span, progress)
-    spectra = _without_constant(averaging.spectra(grid, references), grid, keep=(*references, *(responses or ())))
-    return frequency_response(
-        spectra,
-        references=references,
-        responses=None if responses is None else source.names(responses),
-        estimator=estimator,
-    )
+    named = None if responses is None else source.names(responses)
+    try:
+        spectra = averaging.spectra(grid, references)
+        _require_moving(grid, references)
+        spectra = _without_constant(spectra, grid, keep=(*references, *(named or ())))
+        return frequency_response(spectra, references=references, responses=named, estimator=estimator)
+    except EstimateError as error:
+        raise EstimateError(f"{source.path.name}: {error}") from error
+
+
+def _require_moving(watched: Watched, references: Sequence[str]) -> None:
+    """Raise `EstimateError` when a reference never changes: all lines would be masked, and nobody told why."""
+    dead = [name for name in references if name in watched.constant()]
+    if dead:
+        raise EstimateError(f"{some_of(dead)} never changes, so it excites nothing; name another reference")
 
 
 def _density(source: TimeSeries | Watched, averaging: Averaging) -> PowerSpectralDensity:
     spectra = averaging.spectra(source, None)
-    if isinstance(source, Watched):
-        spectra = _without_constant(spectra, source, keep=())
-    return power_spectral_density(spectra)
+    if not isinstance(source, Watched):
+        return power_spectral_density(spectra)
+    density = power_spectral_density(_without_constant(spectra, source, keep=()))
+    return replace(density, provenance=density.provenance.with_notes(*_missing_variance(density, source)))
+
+
+def _missing_variance(density: PowerSpectralDensity, watched: Watched) -> tuple[str, ...]:
+    """Say so when much of a signal is slower than the segments: its levels and peaks leave that out."""
+    account = density.provenance
+    # Whole periods and hits leave out on purpose, skipped segments for another reason, which is told.
+    if account.averaging != "linear" or account.skipped:
+        return ()
+    within = np.square(total_rms(density).rms[:, 0])
+    whole = np.array([watched.variance(channel.name) for channel in density.channels])
+    share = 1 - within / np.maximum(whole, np.finfo(float).tiny)
+    missing = [channel.name for channel, one in zip(density.channels, share, strict=True) if one > MISSING_TOLD]
+    if not missing:
+        return ()
+    spacing_hz = float(density.frequency_hz[1] - density.frequency_hz[0])
+    note = (
+        f"{some_of(missing)}: up to {share.max():.0%} of the variance isn't in the spectrum: it is slower than the "
+        f"segments of {account.segment_s:.4g} s, or at the ends of the record; if it isn't drift, ask for finer than "
+        f"{spacing_hz:.3g} Hz"
+    )
+    return (note,)
 
 
 def _of_series(series: TimeSeries, names: Sequence[str] | None, span: Span) -> TimeSeries:

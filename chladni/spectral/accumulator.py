@@ -18,7 +18,7 @@ from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.spectral.averaging import PeakHold, SegmentAverage, WeightedSum
 from chladni.spectral.held_samples import HeldSamples
 from chladni.spectral.segment_spectra import segment_spectra
-from chladni.spectral.segmentation import Segmentation
+from chladni.spectral.segmentation import SHORTEST_SEGMENT, Segmentation
 from chladni.spectral.stretches import Stretch, valid_runs
 from chladni.spectral.uncertainty import EffectiveAverages
 from chladni.spectral.windows import noise_bandwidth_bins, window_name, window_samples
@@ -246,14 +246,24 @@ class CrossSpectraAccumulator:
             averaging=self.averaging,
             detrend=self.segmentation.detrend,
             skipped=self.stretch.skipped,
+            notes=self._notes(count.segments),
         )
 
+    def _notes(self, averages: int) -> tuple[str, ...]:
+        skipped = self.stretch.skipped
+        if not skipped:
+            return ()
+        return (f"{skipped} of {averages + skipped} segments are left out: samples are missing in them",)
+
     def _nothing_averaged(self) -> str:
-        samples = self.segmentation.samples
+        samples, longest = self.segmentation.samples, self.stretch.longest_run
+        where = f"valid in all of {len(self.channels)} channels" if len(self.channels) > 1 else "valid"
+        remedy = "leave out the channels that have gaps"
+        if longest >= SHORTEST_SEGMENT:
+            remedy = f"ask for {self.sample_rate_hz / longest:.3g} Hz or coarser, or {remedy}"
         return (
             f"no segment of {samples / self.sample_rate_hz:g} s ({samples} samples) fits between gaps: the longest "
-            f"stretch valid in all of {len(self.channels)} channels has {self.stretch.longest_run} samples; "
-            "ask for a coarser resolution or leave out the channels that have gaps"
+            f"stretch {where} has {longest} samples; {remedy}"
         )
 
     def _require_agreement(self, block: TimeSeries) -> None:

@@ -4,7 +4,7 @@ from scipy import signal
 
 import chladni
 from chladni.apps import sources
-from chladni.apps.spectra import densities
+from chladni.apps.spectra import Averaging, densities
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, LogError
 from chladni.signals.testing import assert_close
@@ -139,3 +139,61 @@ def test_the_aircrafts_torsion_by_default_settings(shared_data, level, frequency
     assert torsion.frequency_hz == pytest.approx(frequency_hz, abs=0.02)
     assert torsion.height == pytest.approx(height, rel=0.05)
     assert all(2.0 <= peak.frequency_hz <= 15.0 for peak in peaks)
+
+
+def log_of(tmp_path, rows, *, rate_hz=200.0, valid=None):
+    channels = tuple(Channel(name=f"/{name}.accel.linear.x", unit="m/s^2") for name in rows)
+    series = TimeSeries(values=np.stack(list(rows.values())), sample_rate_hz=rate_hz, channels=channels, valid=valid)
+    chladni.write_mcap([series], tmp_path / "made.mcap")
+    return chladni.open_log(tmp_path / "made.mcap")
+
+
+def test_variance_slower_than_the_segments_is_told(tmp_path):
+    # A press moves at 0.5 Hz for 23 s: segments chosen by the record's length hold two thirds of a stroke.
+    time_s = np.arange(4600) / 200
+    rows = {"stroke": np.sin(np.pi * time_s), "noise": np.random.default_rng(1).standard_normal(time_s.size)}
+    with log_of(tmp_path, rows) as log:
+        (coarse,), (fine,) = densities(log), densities(log, averaging=Averaging(resolution_hz=0.1))
+    (note,) = coarse.provenance.notes
+    within = coarse.values[0].sum() * coarse.frequency_hz[1]
+    assert note.startswith("/stroke.accel.linear.x: up to ")
+    assert f"{1 - within / rows['stroke'].var():.0%} of the variance" in note
+    assert "finer than 0.781 Hz" in note
+    assert not fine.provenance.notes
+
+
+def test_the_variance_of_a_large_log_is_watched_block_by_block(tmp_path, large):
+    rows = {"stroke": 7 + np.sin(np.pi * np.arange(4600) / 200)}
+    with log_of(tmp_path, rows) as log:
+        (grid,) = sources.watched_grids(log, None, sources.Span())
+        assert len(list(grid)) > 1
+        assert grid.variance("/stroke.accel.linear.x") == pytest.approx(rows["stroke"].var(), rel=1e-12)
+        assert grid.variance("/none") == 0
+
+
+def test_segments_that_a_gap_costs_are_told(tmp_path):
+    rows = {"a": np.random.default_rng(2).standard_normal(4096)}
+    valid = np.ones((1, 4096), dtype=bool)
+    valid[0, 1000:1010] = False
+    with log_of(tmp_path, rows, valid=valid) as log:
+        (found,) = densities(log)
+    account = found.provenance
+    assert account.skipped > 0
+    total = account.averages + account.skipped
+    assert account.notes == (f"{account.skipped} of {total} segments are left out: samples are missing in them",)
+
+
+def test_no_segment_between_gaps_says_which_resolution_would_do(tmp_path):
+    valid = np.ones((1, 4000), dtype=bool)
+    valid[0, 7::50] = False
+    rows = {"a": np.random.default_rng(3).standard_normal(4000)}
+    with log_of(tmp_path, rows, rate_hz=100.0, valid=valid) as log:
+        with pytest.raises(EstimateError, match=r"/a\.accel.*ask for 2\.04 Hz or coarser"):
+            densities(log)
+        assert densities(log, averaging=Averaging(resolution_hz=2.04))
+
+
+def test_a_reference_that_never_changes_is_refused(tmp_path):
+    rows = {"dead": np.zeros(4000), "a": np.random.default_rng(4).standard_normal(4000)}
+    with log_of(tmp_path, rows) as log, pytest.raises(EstimateError, match=r"made\.mcap: /dead.*excites nothing"):
+        chladni.frf(log, reference="/dead.accel.linear.x")
