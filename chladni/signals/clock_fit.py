@@ -6,6 +6,7 @@ Each stretch between gaps has an intercept of its own, because a source that pau
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chladni.signals.sample_count import WINDOW, Count, Floats, Ints, robust_std
 
@@ -62,10 +63,9 @@ def fit_clock(count: Count, period_ns: float) -> Clock | None:
     to do with the period guessed: then the indices are no count of a clock.
     """
     # All first, to learn the scatter; then without what lies beyond it, such as a message held up by the network.
-    everything = np.ones(count.time.size)
-    slope, starts, residual = _fit_stretches(count, everything, period_ns)
+    slope, starts, residual = _fit_stretches(count, None, period_ns)
     limit = max(6 * robust_std(residual), 1.0)
-    kept = (np.abs(residual) <= limit).astype(np.float64)
+    kept = np.abs(residual) <= limit
     if not kept.all() and np.bincount(count.stretch, kept).min() > 0:
         slope, starts, residual = _fit_stretches(count, kept, slope)
     if not 0.5 * period_ns < slope < 2 * period_ns:
@@ -101,31 +101,41 @@ def measure_wander(count: Count, clock: Clock) -> Wander:
     )
 
 
-def _fit_stretches(count: Count, kept: Floats, period_ns: float) -> tuple[float, Floats, Floats]:
-    # About each stretch's own mean and the slope guessed, so that large numbers cost no digits.
-    weight = np.bincount(count.stretch, kept)
-    reduced = count.time - period_ns * count.index
-    mean_index = np.bincount(count.stretch, kept * count.index) / weight
-    mean_time = np.bincount(count.stretch, kept * reduced) / weight
-    run = count.index - mean_index[count.stretch]
-    rise = reduced - mean_time[count.stretch]
-    leverage = float((kept * run) @ run)
-    correction = float((kept * run) @ rise) / leverage if leverage else 0.0
-    return period_ns + correction, mean_time - correction * mean_index, rise - correction * run
+def _fit_stretches(count: Count, kept: NDArray[np.bool_] | None, period_ns: float) -> tuple[float, Floats, Floats]:
+    # About each stretch's own mean and the slope guessed, so that large numbers cost no digits. In place, because
+    # memory that is new costs several times what the arithmetic does.
+    run = count.index.astype(np.float64)
+    rise = count.time - period_ns * run
+    mean_index, mean_time = (_stretch_means(values, kept, count.stretch) for values in (run, rise))
+    run -= mean_index[count.stretch]
+    rise -= mean_time[count.stretch]
+    weighted = run if kept is None else kept * run
+    leverage = float(weighted @ run)
+    correction = float(weighted @ rise) / leverage if leverage else 0.0
+    run *= correction
+    rise -= run
+    return period_ns + correction, mean_time - correction * mean_index, rise
+
+
+def _stretch_means(values: Floats, kept: NDArray[np.bool_] | None, stretch: Ints) -> Floats:
+    if kept is None:
+        return np.bincount(stretch, values) / np.bincount(stretch)
+    return np.bincount(stretch, kept * values) / np.bincount(stretch, kept)
 
 
 def _slope_std(count: Count, residual: Floats) -> float:
     stretches = int(count.stretch[-1]) + 1
     # Each stretch takes one degree of freedom for its start, the slope takes one more.
-    mean = np.bincount(count.stretch, count.index) / np.bincount(count.stretch)
-    run = count.index - mean[count.stretch]
+    run = count.index.astype(np.float64)
+    run -= _stretch_means(run, None, count.stretch)[count.stretch]
     leverage = float(run @ run)
     freedom = residual.size - stretches - 1
     if not leverage or freedom < 1:
         return float("inf")
     variance = float(residual @ residual) / freedom * leverage
     # Scores summed over ever longer blocks see correlation that single items don't, up to an eighth of the log.
-    scores = np.add.reduceat(residual * run, count.starts)
+    run *= residual
+    scores = np.add.reduceat(run, count.starts)
     while scores.size >= 8:
         variance = max(variance, float(scores @ scores))
         scores = np.add.reduceat(scores, np.arange(0, scores.size, 2))
