@@ -97,4 +97,6 @@ class Output:
         try:
             yield show
         finally:
-            bar.stop()
+            # Some versions of rich print an empty line when a bar that never started is stopped.
+            if bar.live.is_started:
+                bar.stop()
