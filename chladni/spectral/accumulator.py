@@ -34,6 +34,9 @@ MOST_RESULT_BYTES = 2 << 30
 # More threads than this wait for memory.
 MOST_THREADS = 8
 
+# The transform of N samples has N times their summed squares at most, and squares of many segments are added up.
+MOST_POWER = 1e290
+
 
 class CrossSpectraAccumulator:
     """Running average of cross-spectra; mutable, the result is a frozen `CrossSpectra`.
@@ -326,19 +329,24 @@ def require_fitting_result(channels: int, samples: int) -> None:
 
 
 def require_finite(block: TimeSeries, runs: Sequence[tuple[int, int]]) -> None:
-    """Raise `EstimateError` naming channel and time when a sample within the runs isn't finite."""
+    """Raise `EstimateError` naming the channel when samples within the runs aren't finite, or too large to square."""
     for first, last in runs:
-        # One sum a channel is many times cheaper than asking each sample; an overflow is infinite too, and found.
+        values = block.values[:, first:last]
+        # One sum a channel is many times cheaper than asking each sample; what isn't finite stays so.
         with np.errstate(over="ignore", invalid="ignore"):
-            sums = block.values[:, first:last].sum(axis=1, dtype=np.float64)
-        for row in np.flatnonzero(~np.isfinite(sums)):
-            bad = np.flatnonzero(~np.isfinite(block.values[row, first:last]))
-            if bad.size:
+            power = np.einsum("ij,ij->i", values, values, dtype=np.float64)
+        for row in np.flatnonzero(~(power < MOST_POWER)):
+            bad = np.flatnonzero(~np.isfinite(values[row]))
+            if not bad.size:
                 raise EstimateError(
-                    f"channel {block.channels[row].name!r} is {block.values[row, first + bad[0]]} at "
-                    f"{block.times_ns()[first + bad[0]] / NS_PER_S:.6f} s and {bad.size - 1} more times without "
-                    "being marked invalid; mark such samples in `valid`"
+                    f"channel {block.channels[row].name!r} holds values up to {np.abs(values[row]).max():.3g}, whose "
+                    "squares are too large for a number; leave the channel out"
                 )
+            raise EstimateError(
+                f"channel {block.channels[row].name!r} is {values[row, bad[0]]} at "
+                f"{block.times_ns()[first + bad[0]] / NS_PER_S:.6f} s and {bad.size - 1} more times without "
+                "being marked invalid; mark such samples in `valid`"
+            )
 
 
 def _names(channels: Sequence[Channel]) -> str:

@@ -226,3 +226,11 @@ def test_many_batches_are_scipys():
 def test_one_sided_weights_double_all_but_zero_and_nyquist():
     np.testing.assert_array_equal(one_sided_weights(6), [1, 2, 2, 1])
     np.testing.assert_array_equal(one_sided_weights(5), [1, 2, 2])
+
+
+def test_values_whose_squares_overflow_are_refused_by_name():
+    values = WHOLE.values.copy()
+    values[1] *= 1e200
+    name = WHOLE.channels[1].name
+    with pytest.raises(EstimateError, match=rf"'{name}' holds values up to \d\.\d+e\+200.*leave the channel out"):
+        accumulate([replace(WHOLE, values=values)])
