@@ -47,3 +47,14 @@ def test_the_gate_runs_the_command_that_the_readme_gives():
         "python3 -m venv .venv && .venv/bin/pip install -e '.[dev]' && .venv/bin/python -m pytest",
     ]
     assert "README.md" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def test_functions_that_the_guide_names_exist():
+    from importlib import import_module
+
+    guide = (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
+    paths = set(re.findall(r"`(chladni(?:\.[a-z_]+)+\.[A-Za-z_]+)`", guide))
+    assert len(paths) > 8
+    for path in paths:
+        module, name = path.rsplit(".", 1)
+        assert hasattr(import_module(module), name), path
