@@ -7,12 +7,14 @@ import numpy as np
 
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.time_series import TimeSeries
+from chladni.spectral.accumulator import require_finite
 from chladni.spectral.blocks import Source, leading_part
 from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.impact import find_impacts, impact_cross_spectra, is_impact_test
 from chladni.spectral.period import Period, find_period
 from chladni.spectral.periodic import periodic_cross_spectra
 from chladni.spectral.segmentation import Detrend
+from chladni.spectral.stretches import valid_runs
 from chladni.spectral.windows import Window
 
 DEFAULT_WINDOW = "hann"
@@ -58,6 +60,8 @@ def adaptive_cross_spectra(
     """
     lead, blocks = leading_part(source, SAMPLES_EXAMINED)
     start = _joined(lead)
+    # Said once and by name, before periods and hits are looked for in what no number holds.
+    require_finite(start, valid_runs(start))
     hammer = _hammer(start, references)
     if hammer is not None and window is None and overlap is None:
         return _hits(tuple(blocks), hammer, resolution_hz)

@@ -201,5 +201,5 @@ def test_a_reference_that_never_changes_is_refused(tmp_path):
 
 def test_values_too_large_to_square_are_an_error_that_names_their_channel(tmp_path):
     rows = {"broken": 1e200 * np.random.default_rng(5).standard_normal(4000)}
-    with log_of(tmp_path, rows) as log, pytest.raises(EstimateError, match="/broken.* holds values up to"):
+    with log_of(tmp_path, rows) as log, pytest.raises(EstimateError, match=r"/broken.* holds values up to"):
         densities(log)
