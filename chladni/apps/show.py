@@ -12,7 +12,11 @@ from chladni.signals.time_series import TimeSeries
 from chladni.signals.waterfall import Waterfall
 from chladni.spectral.peaks import find_peaks, find_response_peaks
 
-Shown = Log | Study | TimeSeries | PowerSpectralDensity | FrequencyResponse | Waterfall
+Analysed = Study | TimeSeries | PowerSpectralDensity | FrequencyResponse | Waterfall
+Shown = Log | Analysed
+
+# Title of a study that no log has given its name yet.
+NAMELESS = "chladni"
 
 
 def show(*items: Shown) -> None:
@@ -34,19 +38,24 @@ def show(*items: Shown) -> None:
 
 
 def gather(*items: Shown) -> Study:
-    """Put items into one study; a later transfer function replaces an earlier one."""
+    """Put items into one study; a later transfer function replaces an earlier one, with a finding that says so."""
     if not items:
         raise SetupError("nothing to show; give a log, a series, a spectrum or a transfer function")
-    study = Study(title="chladni")
-    for item in items:
-        study = _with(study, item)
+    studies = [analyse(item) if isinstance(item, Log) else item for item in items]
+    several = sum(isinstance(item, Study) for item in studies) > 1
+    study = Study(title=NAMELESS)
+    for item in studies:
+        study = _with(study, _labelled(item) if several and isinstance(item, Study) else item)
     return study
 
 
-def _with(study: Study, item: Shown) -> Study:
+def _labelled(study: Study) -> Study:
+    """Name the log in its findings, which are about to stand beside those of others."""
+    return replace(study, findings=tuple(f"{study.title}: {finding}" for finding in study.findings))
+
+
+def _with(study: Study, item: Analysed) -> Study:
     match item:
-        case Log():
-            return _joined(study, analyse(item))
         case Study():
             return _joined(study, item)
         case TimeSeries():
@@ -61,8 +70,13 @@ def _with(study: Study, item: Shown) -> Study:
 
 
 def _joined(first: Study, second: Study) -> Study:
+    replaced: tuple[str, ...] = ()
+    if first.response is not None and second.response is not None:
+        replaced = (
+            f"The transfer functions shown are those of {second.title}; view the other log alone for its own.",
+        )
     return Study(
-        title=second.title if first.title == "chladni" else f"{first.title}, {second.title}",
+        title=second.title if first.title == NAMELESS else f"{first.title}, {second.title}",
         series=first.series + second.series,
         densities=first.densities + second.densities,
         waterfalls=first.waterfalls + second.waterfalls,
@@ -70,5 +84,5 @@ def _joined(first: Study, second: Study) -> Study:
         peaks=first.peaks + second.peaks,
         response_peaks=second.response_peaks if second.response is not None else first.response_peaks,
         geometry=second.geometry if second.geometry.points else first.geometry,
-        findings=first.findings + second.findings,
+        findings=(*first.findings, *second.findings, *replaced),
     )

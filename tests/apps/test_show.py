@@ -22,7 +22,8 @@ def test_items_are_gathered_side_by_side(tmp_path):
     assert study.response_peaks
     assert both.title == "arm.mcap, other"
     assert both.geometry.points
-    assert both.findings[-1] == "later"
+    assert both.findings[-1] == "other: later"
+    assert all(finding.startswith("arm.mcap: ") for finding in both.findings[:-1])
     assert both.response is not None
 
 
@@ -36,3 +37,13 @@ def test_the_viewer_gets_the_study(monkeypatch):
     monkeypatch.setattr(chladni.viewers.rerun, "spawn", shown.append)
     chladni.show(Study(title="a"))
     assert [study.title for study in shown] == ["a"]
+
+
+def test_transfer_functions_that_are_not_shown_are_told(tmp_path):
+    with chladni.open_log(write_arm(tmp_path)) as log:
+        response = chladni.frf(log, reference=FORCE)
+    first = Study(title="first.mcap", response=response, findings=("sound",))
+    alone, both = gather(first), gather(first, Study(title="second.mcap", response=response))
+    assert alone.findings == ("sound",)
+    assert both.findings[0] == "first.mcap: sound"
+    assert "those of second.mcap" in both.findings[-1]
