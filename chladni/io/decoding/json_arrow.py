@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from chladni.io.decoding.json_stream import Span
     from chladni.io.decoding.schema import Tree
 
-BLOCK_BYTES: Final = 1 << 20
-"""Bytes that one thread parses at a time."""
+BLOCK_BYTES: Final = 1 << 18
+"""Bytes that one thread parses at a time; a chunk usually holds a megabyte, so that several share it."""
 
 LARGEST_TIME_S: Final = 9_000_000_000
 """Seconds (the year 2255) beyond which nanoseconds come near the end of 64 bits; left to exact arithmetic."""
