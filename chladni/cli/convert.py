@@ -1,6 +1,6 @@
 """``chladni convert``: files of other programs to MCAP and back."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -9,6 +9,8 @@ import typer
 from chladni.cli import options
 from chladni.cli.output import Output
 from chladni.cli.words import count, number
+
+OptionValue = str | float | bool | list[str] | dict[str, str]
 
 Option = Annotated[
     list[str] | None,
@@ -40,7 +42,8 @@ def convert(
 ) -> None:
     """Convert csv, wav, mat, npz and universal files to MCAP and back.
 
-    For example --read time_unit=ms of a csv file, or --write binary=false of a universal file.
+    For example --read time_unit=ms --read names=time,force,tip --read units=force:N,tip:g of a csv file, or --write
+    binary=false of a universal file.
     """
     from chladni.io.convert import convert as convert_file
 
@@ -76,21 +79,40 @@ def convert(
     )
 
 
-def parse_options(texts: Sequence[str], flag: str) -> dict[str, str | float | bool]:
+def parse_options(texts: Sequence[str], flag: str) -> dict[str, OptionValue]:
     """Read ``name=value`` pairs; values that look like numbers or truth values are those.
+
+    ``names`` is a list with commas, ``units`` one of ``column:unit``.
 
     Examples
     --------
     >>> parse_options(["time_unit=ms", "binary=false"], "--read")
     {'time_unit': 'ms', 'binary': False}
+    >>> parse_options(["names=t,force", "units=force:N"], "--read")
+    {'names': ['t', 'force'], 'units': {'force': 'N'}}
     """
-    pairs: dict[str, str | float | bool] = {}
+    pairs: dict[str, OptionValue] = {}
     for text in texts:
         name, equals, value = text.partition("=")
         if not equals or not name.isidentifier():
             raise typer.BadParameter(f"{flag} {text!r} is not of the form NAME=VALUE")
-        pairs[name] = _value(value)
+        pairs[name] = _LISTS.get(name, _value)(value)
     return pairs
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",")]
+
+
+def _units(text: str) -> dict[str, str]:
+    # A column's name may hold a colon, a unit doesn't.
+    pairs = [entry.rpartition(":") for entry in _names(text)]
+    if any(not column or not unit for column, _, unit in pairs):
+        raise typer.BadParameter(f"units {text!r} are not of the form COLUMN:UNIT,COLUMN:UNIT")
+    return {column: unit for column, _, unit in pairs}
+
+
+_LISTS: dict[str, Callable[[str], OptionValue]] = {"names": _names, "units": _units}
 
 
 def _value(text: str) -> str | float | bool:

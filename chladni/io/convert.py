@@ -114,7 +114,7 @@ def _require_paths(source: Path, target: Path, *, overwrite: bool) -> None:
     if target.exists() and target.samefile(source):
         raise SetupError(f"{target}: is the source itself; name another target")
     if target.exists() and not overwrite:
-        raise LogError(f"{target}: exists already; ask for overwriting or name another file")
+        raise LogError(f"{target}: exists already; ask for overwriting (--overwrite) or name another file")
 
 
 def _read(

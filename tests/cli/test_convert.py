@@ -44,3 +44,28 @@ def test_an_option_that_is_no_pair_is_told(run, arm_log, tmp_path, text):
 
 def test_values_are_read_as_what_they_look_like():
     assert parse_options(["a=1.5", "b=TRUE", "c=10 V"], "--read") == {"a": 1.5, "b": True, "c": "10 V"}
+
+
+def test_columns_of_a_table_without_titles_get_names_and_units(run, tmp_path):
+    table, target = tmp_path / "a.csv", tmp_path / "a.mcap"
+    table.write_text("0,1.5,7\n1,2.5,8\n2,3.5,9\n3,2.5,8\n")
+    refused = run("convert", table, target)
+    assert refused.code == 2
+    assert "--read time_unit=ms" in refused.err
+    options = ("--read", "time_unit=ms", "--read", "names=t,force, tip", "--read", "units=force:N,tip:g")
+    assert run("convert", table, target, *options).code == 0
+    with chladni.open_log(target) as log:
+        assert [(channel.name, channel.unit) for channel in log.channels] == [
+            ("/daq.force", "N"),
+            ("/daq.tip", "m/s^2"),
+        ]
+        np.testing.assert_allclose(log.read().values[1], np.array([7, 8, 9, 8]) * 9.80665)
+
+
+def test_units_that_are_no_pairs_are_told(run, tmp_path):
+    table = tmp_path / "a.csv"
+    table.write_text("t [s],a\n0,1\n1,2\n")
+    outcome = run("convert", table, tmp_path / "a.mcap", "--read", "units=N,m")
+    assert outcome.code == 2
+    assert "COLUMN:UNIT" in outcome.err
+    assert outcome.err.count("\n") == 1

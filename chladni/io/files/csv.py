@@ -270,8 +270,8 @@ def _stamps_ns(path: Path, title: _Title, times: NDArray[np.float64], time_unit:
     if unit not in TIME_UNITS_NS:
         said = f"the unit {unit!r}" if unit else "no unit"
         raise SetupError(
-            f"{path}: column {title.name!r} rises like a time but has {said}; give the time unit, one of "
-            f"{', '.join(TIME_UNITS_NS)}, or name the column time [s]"
+            f"{path}: column {title.name!r} rises like a time but has {said}; give time_unit "
+            f"(--read time_unit=ms), one of {', '.join(TIME_UNITS_NS)}, or name the column time [s]"
         )
     bad = np.flatnonzero(~np.isfinite(times))
     if bad.size:
