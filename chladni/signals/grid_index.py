@@ -78,7 +78,7 @@ def choose_smoothing(time_ns: Ints, clock: Callable[..., Ints], *, repeats: int)
     """
     allowed = 1e-3 + 1.1 * repeats / time_ns.size
     slices = min(_SLICES, -(-time_ns.size // _SLICE))
-    places = np.unique(np.linspace(0, max(0, time_ns.size - _SLICE), slices).astype(np.int64))
+    places = np.linspace(0, max(0, time_ns.size - _SLICE), slices).astype(np.int64)
     for smoothing in SMOOTHINGS:
         collisions = items = 0
         for place in places:

@@ -64,7 +64,7 @@ def count_even(time_ns: Ints) -> Count:
     time_ns
         ``[message]`` evenly rising, at least 2.
     """
-    item = np.unique(np.linspace(0, time_ns.size - 1, WINDOW).astype(np.int64))
+    item = np.linspace(0, time_ns.size - 1, min(time_ns.size, WINDOW)).astype(np.int64)
     return Count(
         time=(time_ns[item] - time_ns[0]).astype(np.float64),
         index=item,
