@@ -144,12 +144,37 @@ def _read_log(
     from chladni.io.log import open_log
 
     with _call(open_log, source, options) as log:
-        if sample_rate_hz is None:
-            series = tuple(log.read_groups(channels, start_s=start_s, end_s=end_s))
-        else:
-            series = (log.read(channels, start_s=start_s, end_s=end_s, sample_rate_hz=sample_rate_hz),)
+        series = tuple(log.read_groups(channels, start_s=start_s, end_s=end_s))
         notes = tuple(f"{source}: {loss.what}" for loss in log.damage)
-    return FileContents(series=series, notes=notes)
+        if sample_rate_hz is None:
+            return FileContents(series=series, notes=notes)
+        joined, note = _on_one_grid(series, sample_rate_hz)
+        return FileContents(
+            series=(joined if channels is None else joined.select(log.names(channels)),), notes=(*notes, note)
+        )
+
+
+def _on_one_grid(series: tuple[TimeSeries, ...], sample_rate_hz: float) -> tuple[TimeSeries, str]:
+    """Resample, and say how true that is and what it costs."""
+    from chladni.signals.resampling import join_resampled
+
+    found = join_resampled(series, sample_rate_hz=sample_rate_hz)
+    valid_s = [seconds for part in series for seconds in _valid_s(part)]
+    lost_s = max(before - after for before, after in zip(valid_s, _valid_s(found.series), strict=True))
+    note = (
+        f"resampled to {sample_rate_hz:g} Hz: true to {found.error:.1g} of the amplitude up to "
+        f"{found.usable_hz:.4g} Hz, falling off above"
+    )
+    if lost_s * sample_rate_hz > 1:
+        note += f"; up to {lost_s:.3g} s of a channel are left out: at its ends, at gaps, and where others have none"
+    return found.series, note
+
+
+def _valid_s(part: TimeSeries) -> list[float]:
+    """Seconds of samples that each channel has."""
+    if part.valid is None:
+        return [part.duration_s] * len(part.channels)
+    return [int(count) / part.sample_rate_hz for count in part.valid.sum(axis=1)]
 
 
 def _cut(

@@ -137,6 +137,14 @@ def test_several_rates_need_one_for_a_table(tmp_path: Path) -> None:
     assert not (tmp_path / "a.csv").exists()
     done = convert(source, tmp_path / "a.csv", sample_rate_hz=100.0)
     assert len(done.channels) == 3
+    # 0.8 of the lower Nyquist frequency, as the resampler promises; its kernel needs samples on both sides.
+    (note,) = done.notes
+    assert "resampled to 100 Hz" in note
+    assert "up to 40 Hz" in note
+    assert "s of a channel are left out" in note
+    # In the order asked for.
+    picked = convert(source, tmp_path / "b.csv", channels=["/slow.value", PATHS[0]], sample_rate_hz=100.0)
+    assert picked.channels == ("/slow.value", PATHS[0])
 
 
 @pytest.mark.parametrize(
