@@ -7,6 +7,7 @@ from chladni.io.loss import Loss
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.unit_text import with_unit
 
 MOST_PEAKS_TOLD = 5
 
@@ -44,7 +45,7 @@ def response_sentences(response: FrequencyResponse, peaks: Sequence[Peak]) -> tu
     if not peaks:
         return (f"No transfer function from {reference} has a peak on its excited lines.",)
     told = [
-        f"{peak.frequency_hz:.5g} Hz ({peak.channels[0]}, {peak.height:.3g} {peak.unit})"
+        f"{peak.frequency_hz:.5g} Hz ({peak.channels[0]}, {with_unit(f'{peak.height:.3g}', peak.unit)})"
         for peak in peaks[:MOST_PEAKS_TOLD]
     ]
     return (f"Highest peaks over {reference}: {', '.join(told)}.",)

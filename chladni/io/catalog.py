@@ -20,6 +20,7 @@ from chladni.io.stream import Stream
 from chladni.io.topic import Topic, read_heads, topics_of
 from chladni.io.topic_channels import TopicChannels, topic_channels
 from chladni.signals.errors import LogError, SetupError
+from chladni.signals.unit_text import in_unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -239,7 +240,7 @@ def with_setup(source: ChannelSource, setup: ChannelSetup | None) -> ChannelSour
         overload, overload_unit = setup.overload
         if overload_unit != unit:
             raise SetupError(
-                f"{setup.place}: {setup.path} range: it is in {overload_unit}, the channel in {unit}; "
+                f"{setup.place}: {setup.path} range: it is {in_unit(overload_unit)}, the channel {in_unit(unit)}; "
                 "give the range in the channel's unit, or the channel's unit"
             )
     refined = replace(

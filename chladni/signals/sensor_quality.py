@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.unit_text import with_unit
 
 FaultKind = Literal["clipped", "dead", "dropouts", "spikes", "not-a-number", "coarse"]
 Samples = NDArray[np.floating[Any]]
@@ -140,7 +141,7 @@ def _faults_of(record: _Record, place: Ints | None) -> list[SensorFault]:
         channel,
         "clipped",
         _clipped(record),
-        f"are cut off, at {record.low:.6g} or {record.high:.6g} {channel.unit}; use a larger range",
+        f"are cut off, at {record.low:.6g} or {with_unit(f'{record.high:.6g}', channel.unit)}; use a larger range",
         place,
     )
     faults += _fault(
@@ -148,7 +149,8 @@ def _faults_of(record: _Record, place: Ints | None) -> list[SensorFault]:
     )
     faults += _fault(channel, "spikes", _spikes(record), "leap away and back; check connectors and grounding", place)
     if _is_coarse(record):
-        told = f"move in coarse steps of {record.smallest_step:.3g} {channel.unit}; use a smaller range"
+        step = with_unit(f"{record.smallest_step:.3g}", channel.unit)
+        told = f"move in coarse steps of {step}; use a smaller range"
         faults += _fault(channel, "coarse", np.arange(record.samples.size), told, place)
     return faults
 
@@ -156,9 +158,10 @@ def _faults_of(record: _Record, place: Ints | None) -> list[SensorFault]:
 def _dead_sentence(record: _Record) -> str:
     if record.low == record.high == 0:
         return "is 0 throughout; the sensor isn't connected or nobody fills this field"
+    level = with_unit(f"{record.low:.6g}", record.channel.unit)
     if record.low == record.high:
-        return f"is {record.low:.6g} {record.channel.unit} throughout; check cable and supply, or leave it out"
-    return f"moves by its last digit only, at {record.low:.6g} {record.channel.unit}; check cable, supply and range"
+        return f"is {level} throughout; check cable and supply, or leave it out"
+    return f"moves by its last digit only, at {level}; check cable, supply and range"
 
 
 def _fault(

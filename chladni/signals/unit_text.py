@@ -77,6 +77,28 @@ def write(exponents: Exponents) -> str:
     return f"{' '.join(above) or '1'}/{denominator}"
 
 
+def with_unit(number: str, unit: str) -> str:
+    """Put a unit behind a number in a sentence; nothing for the unit of pure numbers.
+
+    Examples
+    --------
+    >>> with_unit("2000", "N"), with_unit("2000", "1")
+    ('2000 N', '2000')
+    """
+    return number if unit == "1" else f"{number} {unit}"
+
+
+def in_unit(unit: str) -> str:
+    """Say in a sentence which unit something is in.
+
+    Examples
+    --------
+    >>> f"'a' is {in_unit('N')}, 'b' {in_unit('1')}"
+    "'a' is in N, 'b' without unit"
+    """
+    return "without unit" if unit == "1" else f"in {unit}"
+
+
 def combined(left: Scaled, right: Scaled, *, power: int = 1) -> Scaled:
     """Multiply a scaled unit by another one raised to a power.
 

@@ -13,6 +13,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.unit_text import in_unit
 from chladni.spectral.bands import BandLevels, total_rms
 from chladni.spectral.peaks import find_peaks, find_response_peaks
 from chladni.spectral.third_octave import third_octave_levels
@@ -288,7 +289,7 @@ def _matched(
     for name in both:
         if old[name] != new[name]:
             raise EstimateError(
-                f"{name!r} is in {old[name]} before and in {new[name]} after; state one unit for both"
+                f"{name!r} is {in_unit(old[name])} before and {in_unit(new[name])} after; state one unit for both"
             )
     return both, tuple(name for name in old if name not in new), tuple(name for name in new if name not in old)
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.unit_text import in_unit
 from chladni.signals.units import differentiated, integrated
 
 Form = Literal["accelerance", "mobility", "receptance"]
@@ -88,7 +89,7 @@ def convert_form(response: FrequencyResponse, form: Form) -> FrequencyResponse:
 def _motion_order(channel: Channel) -> int:
     if channel.unit not in MOTION_ORDER:
         raise EstimateError(
-            f"{channel.name!r} in {channel.unit} is no motion; accelerance, mobility and receptance exist for "
+            f"{channel.name!r} {in_unit(channel.unit)} is no motion; accelerance, mobility and receptance exist for "
             f"{', '.join(MOTION_ORDER)} only: select such responses, or state the unit in the setup file"
         )
     return MOTION_ORDER[channel.unit]

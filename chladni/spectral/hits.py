@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.unit_text import with_unit
 from chladni.spectral.force_pulses import NOISE_SIGMAS, Pulses, is_clipped, typical_peak
 
 # At equal noise, a hit of a quarter of the usual force has a sixteenth of the usual ratio of signal to noise power.
@@ -116,7 +117,7 @@ class Judge:
             x = np.nan_to_num(values.astype(np.float64))
             limited = channel.overload is not None and bool(np.any(np.abs(x) >= channel.overload))
             if limited or any(is_clipped(side, int(np.argmax(side))) for side in (x, -x)):
-                over.append(f"{channel.name} reads up to {np.abs(x).max():.4g} {channel.unit}")
+                over.append(f"{channel.name} reads up to {with_unit(f'{np.abs(x).max():.4g}', channel.unit)}")
         return f"overload: {', '.join(over)}" if over else ""
 
     def _double_hit(self, at: int, inside: slice) -> str:
@@ -131,9 +132,9 @@ class Judge:
         if not others:
             return ""
         second = max(others, key=lambda top: float(force[top]))
-        unit = self.pulses.unit
+        height = with_unit(f"{force[second]:.3g}", self.pulses.unit)
         return (
-            f"double hit: a second pulse of {force[second]:.3g} {unit} ({force[second] / force[peak]:.0%}), "
+            f"double hit: a second pulse of {height} ({force[second] / force[peak]:.0%}), "
             f"{(second - peak) / self.series.sample_rate_hz * 1e3:.1f} ms after the first"
         )
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.unit_text import in_unit
 from chladni.spectral.frequency_response import frequency_response
 
 
@@ -46,13 +47,15 @@ def transmissibility(
     else:
         chosen = [responses] if isinstance(responses, str) else list(responses)
     if not chosen:
-        raise EstimateError(f"no channel but {reference!r} is in {unit}; transmissibility needs two in one unit")
+        raise EstimateError(
+            f"no channel but {reference!r} is {in_unit(unit)}; transmissibility needs two in one unit"
+        )
     # Checked before arithmetic: a ratio of velocity to acceleration is 1/omega in disguise.
     for name in chosen:
         other = spectra.channels[spectra.index(name)].unit
         if other != unit:
             raise EstimateError(
-                f"{name!r} is in {other}, {reference!r} in {unit}: transmissibility needs one unit; "
+                f"{name!r} is {in_unit(other)}, {reference!r} {in_unit(unit)}: transmissibility needs one unit; "
                 "integrate or differentiate one of them, or ask for a frequency response"
             )
     response = frequency_response(spectra, references=reference, responses=chosen)

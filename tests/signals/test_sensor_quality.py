@@ -266,6 +266,11 @@ def test_too_few_samples_say_nothing(samples: int) -> None:
     assert faults_of(np.zeros((1, samples))) == ()
 
 
+def test_a_channel_without_unit_is_told_in_bare_numbers() -> None:
+    assert "steps of 1;" in only(faults_of(np.round(0.8 * smooth()), unit="1")).sentence
+    assert "at -0.5 or 0.5;" in only(faults_of(SOUND["sine"].clip(-0.5, 0.5), unit="1")).sentence
+
+
 def test_faults_come_by_channel() -> None:
     values = np.stack((noise(), np.zeros(SAMPLES), SOUND["sine"].clip(-0.5, 0.5)))
     channels = tuple(Channel(name=name) for name in "abc")

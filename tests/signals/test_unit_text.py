@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chladni.signals.errors import SetupError
-from chladni.signals.unit_text import combined, read, symbol_as_written, write
+from chladni.signals.unit_text import combined, in_unit, read, symbol_as_written, with_unit, write
 
 SYMBOLS = ("m", "s", "rad", "N", "V", "kg", "Hz")
 factors = st.tuples(st.sampled_from(SYMBOLS), st.integers(-4, 4))
@@ -132,3 +132,8 @@ def test_scales_multiply_and_stay_bounded() -> None:
         combined((1.0, {}), kilo, power=99)
     with pytest.raises(SetupError, match="1e150"):
         combined((1.0, {}), (1e-12, {("N", 0): 1}), power=-99)
+
+
+@pytest.mark.parametrize(("unit", "amount", "place"), [("N", "3 N", "in N"), ("1", "3", "without unit")])
+def test_people_read_no_unit_where_there_is_none(unit: str, amount: str, place: str) -> None:
+    assert (with_unit("3", unit), in_unit(unit)) == (amount, place)

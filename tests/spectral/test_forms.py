@@ -102,7 +102,7 @@ def test_rotation_follows_its_own_units():
 
 def test_what_is_no_motion_is_refused_by_name():
     strain = replace(oscillator("mobility"), responses=(Channel(name="/gauge.strain", unit="1"),))
-    with pytest.raises(EstimateError, match=r"'/gauge.strain' in 1 is no motion"):
+    with pytest.raises(EstimateError, match=r"'/gauge.strain' without unit is no motion"):
         convert_form(strain, "receptance")
 
 
