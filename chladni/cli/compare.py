@@ -7,7 +7,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.output import Output
-from chladni.cli.words import number, with_error
+from chladni.cli.words import number, unit, with_error
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -79,7 +79,7 @@ def _print_levels(out: Output, changes: "Sequence[LevelChange]") -> None:
                 one.channel,
                 with_error(one.before, one.before_std),
                 with_error(one.after, one.after_std),
-                one.unit,
+                unit(one.unit),
                 with_error(one.change_db, one.change_std_db),
                 "yes" if one.significant else "no",
             ]

@@ -9,7 +9,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.output import Output
-from chladni.cli.words import number, with_error
+from chladni.cli.words import number, unit, with_error
 
 if TYPE_CHECKING:
     from chladni.apps.demo import Comparison
@@ -63,4 +63,4 @@ def has_display() -> bool:
 
 def _row(one: "Comparison") -> list[str]:
     found = "not found" if one.found is None else with_error(one.found, one.std)
-    return [one.what, found, number(one.truth, digits=5), one.unit]
+    return [one.what, found, number(one.truth, digits=5), unit(one.unit)]

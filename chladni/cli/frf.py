@@ -6,7 +6,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.output import Output
-from chladni.cli.words import number, with_error
+from chladni.cli.words import number, unit, with_error
 
 if TYPE_CHECKING:
     from chladni.signals.frequency_response import FrequencyResponse
@@ -86,10 +86,19 @@ def _print_peaks(out: Output, response: "FrequencyResponse", peaks: "tuple[Peak,
     if not peaks:
         out.line("No peak stands out of the scatter on the excited lines.")
         return
+    # A single reference is the same in every row, and its place is the title.
+    alone = len(response.references) == 1
     out.table(
-        "Peaks of the magnitude, the highest first",
-        ["response / reference", "frequency [Hz]", "magnitude", "unit", "phase [deg]", "coherence"],
-        [[" / ".join(peak.channels), *_at_peak(response, peak)] for peak in peaks],
+        f"Peaks of the magnitude{f' over {response.references[0].name}' if alone else ''}, the highest first",
+        [
+            "response" if alone else "response / reference",
+            "frequency [Hz]",
+            "magnitude",
+            "unit",
+            "phase [deg]",
+            "coherence",
+        ],
+        [[" / ".join(peak.channels[: 1 if alone else 2]), *_at_peak(response, peak)] for peak in peaks],
     )
 
 
@@ -101,7 +110,7 @@ def _at_peak(response: "FrequencyResponse", peak: "Peak") -> list[str]:
     return [
         with_error(peak.frequency_hz, peak.frequency_std_hz),
         with_error(peak.height, peak.height_std),
-        peak.unit,
+        unit(peak.unit),
         f"{np.angle(response.values[row, column, line], deg=True):.0f}",
         f"{response.coherence[row, line]:.3f}",
     ]

@@ -1,7 +1,11 @@
 """``chladni info``: whether the log is sound."""
 
+from typing import Any
+
 from chladni.cli import options
+from chladni.cli.channel_rows import grouped_rows
 from chladni.cli.output import Output
+from chladni.cli.words import NOTHING, count, number, unit
 
 
 def info(
@@ -12,7 +16,6 @@ def info(
     json: options.Json = None,
 ) -> None:
     """Channels, rates, duration, time base and damage of a log."""
-    from chladni.cli.words import count, number
     from chladni.io.log import open_log
 
     out = Output(json)
@@ -21,21 +24,22 @@ def info(
     content = found.to_json()
     out.table(
         f"{log.name}: {number(found.duration_s)} s",
-        ["channel", "unit", "rate [Hz]", "samples", "jitter [s]", "gaps", "duplicates", "clipped", "stamp"],
-        [
-            [
-                channel["name"],
-                channel["unit"],
-                number(channel["rate_hz"], digits=9),
-                count(channel["samples"]),
-                number(channel["jitter_s"], digits=2),
-                count(len(channel["gaps"])),
-                count(channel["duplicates"]),
-                count(channel["clipped"]),
-                channel["stamp"],
-            ]
-            for channel in content["channels"]
-        ],
+        ["channel", "unit", "rate [Hz]", "samples", "jitter [s]", "stamp", "trouble"],
+        grouped_rows([_row(channel) for channel in content["channels"]]),
     )
     out.lines(found.findings)
     out.json(content)
+
+
+def _row(channel: dict[str, Any]) -> list[str]:
+    # One column for what is mostly nothing: three of zeros took the room that names need.
+    trouble = {"gaps": len(channel["gaps"]), "duplicates": channel["duplicates"], "clipped": channel["clipped"]}
+    return [
+        channel["name"],
+        unit(channel["unit"]),
+        number(channel["rate_hz"], digits=9),
+        count(channel["samples"]),
+        number(channel["jitter_s"], digits=2),
+        channel["stamp"],
+        ", ".join(f"{count(times)} {what}" for what, times in trouble.items() if times) or NOTHING,
+    ]

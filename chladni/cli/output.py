@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -41,7 +42,16 @@ class Output:
 
     def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """Print a table; the first column is text, the others line up to the right."""
-        table = Table(title=escape(title), title_justify="left", title_style="bold")
+        # Without vertical lines: long channel names need the room in a terminal of 100 columns.
+        table = Table(
+            title=escape(title),
+            title_justify="left",
+            title_style="bold",
+            box=box.SIMPLE_HEAD,
+            show_edge=False,
+            pad_edge=False,
+            collapse_padding=True,
+        )
         for number, column in enumerate(columns):
             table.add_column(escape(column), justify="right" if number else "left", overflow="fold")
         for row in rows:

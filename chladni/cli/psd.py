@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from chladni.cli import options
 from chladni.cli.output import Output
-from chladni.cli.words import number, with_error
+from chladni.cli.words import number, unit, with_error
 
 if TYPE_CHECKING:
     from chladni.apps.documents import Document
@@ -68,7 +68,7 @@ def _print_levels(out: Output, density: "PowerSpectralDensity", document: "Docum
         f"{account.segment_s:.6g} s, window {account.window}, lines {number(spacing_hz)} Hz apart",
         ["channel", "RMS", "unit", "highest peak [Hz]", "density there", "unit"],
         [
-            [one["name"], number(one["rms"]), one["channel_unit"], *_highest(one)]
+            [one["name"], number(one["rms"]), unit(one["channel_unit"]), *_highest(one)]
             for one in document["channels"]
             if one["name"] in names
         ],
@@ -77,9 +77,9 @@ def _print_levels(out: Output, density: "PowerSpectralDensity", document: "Docum
 
 def _highest(channel: "Document") -> list[str]:
     if not channel["peaks"]:
-        return ["-", "-", channel["psd_unit"]]
+        return ["-", "-", unit(channel["psd_unit"])]
     peak = channel["peaks"][0]
-    return [number(peak["frequency_hz"], digits=6), number(peak["psd"]), channel["psd_unit"]]
+    return [number(peak["frequency_hz"], digits=6), number(peak["psd"]), unit(channel["psd_unit"])]
 
 
 def _print_peaks(out: Output, peaks: "tuple[Peak, ...]") -> None:
@@ -94,7 +94,7 @@ def _print_peaks(out: Output, peaks: "tuple[Peak, ...]") -> None:
                 _names(peak.channels),
                 with_error(peak.frequency_hz, peak.frequency_std_hz),
                 with_error(peak.height, peak.height_std),
-                peak.unit,
+                unit(peak.unit),
             ]
             for peak in peaks
         ],

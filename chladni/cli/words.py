@@ -29,6 +29,17 @@ def count(value: int | None) -> str:
     return NOTHING if value is None else f"{value:,}".replace(",", " ")
 
 
+def unit(text: str) -> str:
+    """Give a unit, a dash for the unit of pure numbers and of channels that say none.
+
+    Examples
+    --------
+    >>> unit("m/s^2"), unit("1")
+    ('m/s^2', '-')
+    """
+    return NOTHING if text == "1" else text
+
+
 def with_error(value: float, std: float) -> str:
     """Give a value to the digits that its one sigma allows.
 

@@ -59,3 +59,13 @@ def test_a_json_file_that_cannot_be_written_is_told(run, arm_log, tmp_path):
     outcome = run("info", arm_log, "--json", tmp_path / "no-folder" / "info.json")
     assert outcome.code == 2
     assert "no-folder" in outcome.err
+
+
+def test_many_channels_are_grouped_in_the_table_and_listed_in_the_document(run, tmp_path):
+    columns = ",".join(f"a{number} [N]" for number in range(20))
+    rows = "".join(f"{row / 100}," + ",".join(f"{(row * 7 + n) % 11}" for n in range(20)) + "\n" for row in range(50))
+    (tmp_path / "wide.csv").write_text(f"time [s],{columns}\n{rows}")
+    assert run("convert", tmp_path / "wide.csv", tmp_path / "wide.mcap").code == 0
+    outcome = run("info", tmp_path / "wide.mcap", "--json", "-")
+    assert [channel["name"] for channel in outcome.document["channels"]] == [f"/daq.a{n}" for n in range(20)]
+    assert "/daq.{a0..19} " in outcome.err
