@@ -12,6 +12,7 @@ from chladni.io.log import Log
 from chladni.signals.comparison import DensityComparison, ResponseComparison
 from chladni.signals.errors import EstimateError
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.provenance import Provenance
 from chladni.spectral.comparison import compare_densities, compare_responses
 
 Densities = tuple[PowerSpectralDensity, ...]
@@ -67,28 +68,42 @@ def compare_logs(
     EstimateError
         When the logs share no channel at the same sample rate.
     """
-    pairs, notes = _matched_densities(before, after, channels, resolution_hz)
+    pairs = _matched_densities(before, after, channels, resolution_hz)
     progress(0.5)
     compared = tuple(compare_densities(old, new) for old, new in pairs)
     moving = [channel for comparison in compared for channel in comparison.channels]
     chosen = tuple(references or excitations(moving))
-    response, reasons = _response(before, after, channels, chosen, resolution_hz) if chosen else (None, ())
+    transferred = _responses(before, after, channels, chosen, resolution_hz)
     progress(1.0)
-    return LogComparison(densities=compared, response=response, notes=(*notes, *reasons))
+    accounts = [(one.provenance, other.provenance) for one, other in pairs]
+    return LogComparison(
+        densities=compared,
+        response=transferred.comparison,
+        notes=(*_told([*accounts, *transferred.accounts]), *transferred.reasons),
+    )
+
+
+def _told(accounts: Sequence[tuple[Provenance, Provenance]]) -> tuple[str, ...]:
+    """Give each note once; what holds for one log only says for which."""
+    old = dict.fromkeys(note for before, _ in accounts for note in before.notes)
+    new = dict.fromkeys(note for _, after in accounts for note in after.notes)
+    return (
+        *(note for note in old if note in new),
+        *(f"before: {note}" for note in old if note not in new),
+        *(f"after: {note}" for note in new if note not in old),
+    )
 
 
 def _matched_densities(
     before: Log, after: Log, channels: Sequence[str] | None, resolution_hz: float | None
-) -> tuple[list[tuple[PowerSpectralDensity, PowerSpectralDensity]], tuple[str, ...]]:
+) -> list[tuple[PowerSpectralDensity, PowerSpectralDensity]]:
     old, new = _averaged(before, channels, resolution_hz), _averaged(after, channels, resolution_hz)
     pairs = [(one, other) for one in old for other in new if _share_rate(one, other)]
     if not pairs:
         raise EstimateError(
             f"{before.path.name} and {after.path.name} share no channel at the same sample rate; nothing to compare"
         )
-    matched = [_on_one_axis(before, after, one, other) for one, other in pairs]
-    notes = [note for pair in matched for density in pair for note in density.provenance.notes]
-    return matched, tuple(dict.fromkeys(notes))
+    return [_on_one_axis(before, after, one, other) for one, other in pairs]
 
 
 def _averaged(log: Log, channels: Sequence[str] | None, resolution_hz: float | None) -> Densities:
@@ -118,24 +133,27 @@ def _on_one_axis(
     return (_averaged(before, common, spacing_hz)[0], _averaged(after, common, spacing_hz)[0])
 
 
-def _response(
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Transferred:
+    """Transfer functions compared, how both were made, and why there are none."""
+
+    comparison: ResponseComparison | None = None
+    accounts: tuple[tuple[Provenance, Provenance], ...] = ()
+    reasons: tuple[str, ...] = ()
+
+
+def _responses(
     before: Log, after: Log, channels: Sequence[str] | None, references: Sequence[str], resolution_hz: float | None
-) -> tuple[ResponseComparison | None, tuple[str, ...]]:
+) -> _Transferred:
     responses = None if channels is None else [name for name in channels if name not in references]
-    if responses == []:
-        return None, ()
+    if not references or responses == []:
+        return _Transferred()
+    averaging = Averaging(resolution_hz=resolution_hz)
     try:
         old, new = (
-            transfer(
-                log,
-                references,
-                responses,
-                estimator="H1",
-                averaging=Averaging(resolution_hz=resolution_hz),
-                span=Span(),
-            )
+            transfer(log, references, responses, estimator="H1", averaging=averaging, span=Span())
             for log in (before, after)
         )
-        return compare_responses(old, new), (*old.provenance.notes, *new.provenance.notes)
+        return _Transferred(comparison=compare_responses(old, new), accounts=((old.provenance, new.provenance),))
     except EstimateError as error:
-        return None, (f"transfer functions to {', '.join(references)} were not compared: {error}",)
+        return _Transferred(reasons=(f"transfer functions to {', '.join(references)} were not compared: {error}",))
