@@ -24,13 +24,18 @@ _COSINES: dict[str, tuple[float, ...]] = {
 _ALIASES = {"rectangular": "boxcar", "rect": "boxcar", "box": "boxcar", "ones": "boxcar", "hanning": "hann"}
 
 
+# Windows that need parameters, with common ones.
+_PARAMETERS = {"kaiser": "8.6", "tukey": "0.25", "gaussian": "100", "chebwin": "100", "dpss": "2.5"}
+
+
 def window_samples(window: Window, samples: int) -> NDArray[np.float64]:
     """Sample a window, periodic (one sample short of symmetric), as averaging of spectra wants it.
 
     Parameters
     ----------
     window
-        Name, or tuple of name and parameters, as in `scipy.signal.get_window`: ``"hann"``, ``("kaiser", 8.6)``.
+        Name, or tuple of name and parameters, as in `scipy.signal.get_window`: ``"hann"``, ``("kaiser", 8.6)``; or
+        both in one text as `window_name` writes it: ``"kaiser 8.6"``.
     samples
         Length, at least 1.
 
@@ -49,6 +54,7 @@ def window_samples(window: Window, samples: int) -> NDArray[np.float64]:
     >>> window_samples("hann", 4)
     array([0. , 0.5, 1. , 0.5])
     """
+    window = _parted(window)
     coefficients = _COSINES.get(_ALIASES.get(window, window)) if isinstance(window, str) else None
     if coefficients is None:
         return _scipy_window(window, samples)
@@ -69,6 +75,17 @@ def window_name(window: Window) -> str:
     if isinstance(window, str):
         return _ALIASES.get(window, window)
     return " ".join(str(part) for part in window)
+
+
+def _parted(window: Window) -> Window:
+    """Part a name from the numbers behind it; anything else stays, and is refused by name later."""
+    if not isinstance(window, str) or len(window.split()) < 2:
+        return window
+    name, *parameters = window.split()
+    try:
+        return (name, *map(float, parameters))
+    except ValueError:
+        return window
 
 
 def noise_bandwidth_bins(samples: NDArray[np.float64]) -> float:
@@ -92,5 +109,7 @@ def _scipy_window(window: Window, samples: int) -> NDArray[np.float64]:
 
 def _hint(window: Window) -> str:
     name = window if isinstance(window, str) else str(window[0] if window else "")
+    if name in _PARAMETERS:
+        return f"; it needs its parameters, such as '{name} {_PARAMETERS[name]}'"
     near = difflib.get_close_matches(name, [*_COSINES, *_ALIASES, "kaiser", "tukey", "gaussian", "bartlett"])
     return f"; did you mean {', '.join(near)}?" if near and name not in near else ""

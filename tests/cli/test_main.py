@@ -26,6 +26,7 @@ def test_version(run):
         (["info"], "Missing argument 'LOG'"),
         (["info", "a.mcap", "--bogus"], "No such option: --bogus"),
         (["frf", "a.mcap"], "Missing option '--reference'"),
+        (["psd", "a.mcap", "--stamp", "foo"], "Invalid value for '--stamp': 'foo' is not one of"),
         (["psd", "a.mcap", "--resolution", "fine"], "Invalid value for '--resolution'"),
         (["info", "not-there.mcap"], "not-there.mcap: can't be opened: No such file or directory"),
     ],

@@ -51,3 +51,15 @@ def test_a_window_that_sums_to_nothing_is_refused():
 def test_names_are_written_plainly():
     assert window_name("rect") == "boxcar"
     assert window_name(("tukey", 0.25)) == "tukey 0.25"
+
+
+def test_parameters_may_stand_behind_the_name():
+    np.testing.assert_array_equal(window_samples("kaiser 8.6", 64), window_samples(("kaiser", 8.6), 64))
+    with pytest.raises(SetupError, match="'force \\+ 5/s' can't be used"):
+        window_samples("force + 5/s", 64)
+
+
+@pytest.mark.parametrize("window", ["kaiser", ("kaiser", "wide")])
+def test_a_window_without_its_parameters_says_how_they_are_given(window):
+    with pytest.raises(SetupError, match=r"such as 'kaiser 8\.6'"):
+        window_samples(window, 64)
