@@ -86,10 +86,14 @@ def _print_peaks(out: Output, response: "FrequencyResponse", peaks: "tuple[Peak,
     if not peaks:
         out.line("No peak stands out of the scatter on the excited lines.")
         return
+    from chladni.spectral.peaks import MOST_PEAKS
+
+    functions = [peak.channels for peak in peaks]
+    cut = f", {MOST_PEAKS} a function at most" if max(map(functions.count, functions)) == MOST_PEAKS else ""
     # A single reference is the same in every row, and its place is the title.
     alone = len(response.references) == 1
     out.table(
-        f"Peaks of the magnitude{f' over {response.references[0].name}' if alone else ''}, the highest first",
+        f"Peaks of the magnitude{f' over {response.references[0].name}' if alone else ''}, the highest first{cut}",
         [
             "response" if alone else "response / reference",
             "frequency [Hz]",

@@ -44,9 +44,6 @@ class Output:
         """Print a table; the first column is text, the others line up to the right."""
         # Without vertical lines: long channel names need the room in a terminal of 100 columns.
         table = Table(
-            title=escape(title),
-            title_justify="left",
-            title_style="bold",
             box=box.SIMPLE_HEAD,
             show_edge=False,
             pad_edge=False,
@@ -56,6 +53,8 @@ class Output:
             table.add_column(escape(column), justify="right" if number else "left", overflow="fold")
         for row in rows:
             table.add_row(*(escape(cell) for cell in row))
+        # Not as the table's own title, which would wrap at the table's width.
+        self.line(title, style="bold")
         self.console.print(table)
 
     def pictures(self, study: "Study", *, figures: Path | None, report: Path | None) -> None:

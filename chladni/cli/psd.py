@@ -86,8 +86,12 @@ def _print_peaks(out: Output, peaks: "tuple[Peak, ...]") -> None:
     if not peaks:
         out.line("No peak stands out of the scatter.")
         return
+    from chladni.spectral.peaks import MOST_PEAKS
+
+    # Heights in different units have no order; those are ranked by how far they stand out.
+    order = "highest" if len({peak.unit for peak in peaks}) == 1 else "clearest"
     out.table(
-        "Peaks, the clearest first",
+        f"Peaks, the {order} first{f', {len(peaks)} at most' if len(peaks) == MOST_PEAKS else ''}",
         ["strongest in", "frequency [Hz]", "density", "unit"],
         [
             [

@@ -30,6 +30,8 @@ COHERENT_BY_CHANCE = 1e-3
 UPPER_BOUND_CHANCE = 1e-3
 
 Floats = NDArray[np.float64]
+# A person reads so many; more are given when asked for.
+MOST_PEAKS = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,7 +63,7 @@ class _Found:
 def find_peaks(
     density: PowerSpectralDensity,
     *,
-    count: int = 10,
+    count: int = MOST_PEAKS,
     min_prominence_db: float = 3.0,
     false_alarm: float = 0.01,
 ) -> tuple[Peak, ...]:
@@ -131,7 +133,7 @@ def find_peaks(
 def find_response_peaks(
     response: FrequencyResponse,
     *,
-    count: int = 10,
+    count: int = MOST_PEAKS,
     min_prominence_db: float = 3.0,
     false_alarm: float = 0.01,
 ) -> tuple[Peak, ...]:

@@ -1,6 +1,9 @@
 import numpy as np
 import pytest
 
+from chladni.io.mcap.writer import write_mcap
+from chladni.signals.channel import Channel
+from chladni.signals.time_series import TimeSeries
 from tests.arm import TOOL, WRIST, short_arm
 
 
@@ -70,3 +73,19 @@ def test_figures_and_report_are_saved_where_asked(run, arm_log, tmp_path):
     assert outcome.code == 0, outcome.err
     assert list((tmp_path / "figures").glob("psd*.png"))
     assert TOOL in report.read_text(encoding="utf-8")
+
+
+def test_a_table_that_is_cut_says_so_and_how_it_is_ordered(run, tmp_path):
+    # Twelve tones in noise, in one unit and in two.
+    time_s = np.arange(40_000) / 1000
+    row = sum(np.sin(2 * np.pi * 35 * number * time_s) for number in range(1, 13))
+    noisy = row + 0.1 * np.random.default_rng(1).standard_normal((2, time_s.size))
+    units = {"a": ("m/s^2", "m/s^2"), "b": ("m/s^2", "N")}
+    for name, pair in units.items():
+        channels = tuple(Channel(name=f"/c{number}.value", unit=unit) for number, unit in enumerate(pair))
+        write_mcap([TimeSeries(values=noisy, sample_rate_hz=1000.0, channels=channels)], tmp_path / f"{name}.mcap")
+    alike = run("psd", tmp_path / "a.mcap", "--window", "hann").out
+    assert "Peaks, the highest first, 10 at most" in alike
+    assert "Peaks, the clearest first, 10 at most" in run("psd", tmp_path / "b.mcap", "--window", "hann").out
+    # The title is one line, however narrow the table is.
+    assert any(line.startswith("Levels: ") and line.rstrip().endswith("Hz apart") for line in alike.splitlines())
