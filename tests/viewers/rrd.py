@@ -15,25 +15,27 @@ class Contents:
     def __init__(self, path: Path) -> None:
         reader = RrdReader(path)
         (recording,), (blueprint,) = reader.recordings(), reader.blueprints()
-        self._rows: dict[str, list[dict[str, Any]]] = {}
-        self._static: dict[str, dict[str, Any]] = {}
+        # Kept as they are until a test asks: a file has ten times the rows that any test looks at.
+        self._batches: dict[str, list[pa.RecordBatch]] = {}
+        self._static: dict[str, list[pa.RecordBatch]] = {}
         for chunk in reader.stream(store=recording):
-            rows = _rows(chunk.to_record_batch())
-            if chunk.is_static:
-                self._static.setdefault(chunk.entity_path, {}).update(rows[0])
-            else:
-                self._rows.setdefault(chunk.entity_path, []).extend(rows)
+            kept = self._static if chunk.is_static else self._batches
+            kept.setdefault(chunk.entity_path, []).append(chunk.to_record_batch())
         self.blueprint = [row for chunk in reader.stream(store=blueprint) for row in _rows(chunk.to_record_batch())]
 
     def entities(self) -> set[str]:
-        return set(self._rows) | set(self._static)
+        return set(self._batches) | set(self._static)
 
     def static(self, entity: str) -> dict[str, Any]:
-        return self._static[entity]
+        return {key: value for batch in self._static[entity] for key, value in _rows(batch)[0].items()}
 
     def column(self, entity: str, name: str) -> list[Any]:
         """One column of an entity's rows in the order of time; None where a row lacks it."""
-        rows = sorted(self._rows[entity], key=lambda row: row["time"])
+        batches = [
+            batch.select([key for key in ("time", name) if key in batch.schema.names])
+            for batch in self._batches[entity]
+        ]
+        rows = sorted((row for batch in batches for row in _rows(batch)), key=lambda row: row["time"])
         return [row.get(name) for row in rows]
 
     def times(self, entity: str, timeline: str) -> NDArray[np.int64]:

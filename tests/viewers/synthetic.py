@@ -1,6 +1,7 @@
 """A study with known contents: two modes, three accelerometers and a force, all in closed form."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,7 @@ def frequencies() -> NDArray[np.float64]:
     return np.arange(int(RATE_HZ * SEGMENT_S / 2) + 1) / SEGMENT_S
 
 
+@cache
 def time_series() -> TimeSeries:
     rng = np.random.default_rng(1787)
     samples = int(RATE_HZ * DURATION_S)
@@ -69,6 +71,7 @@ def time_series() -> TimeSeries:
     return TimeSeries(values=values, sample_rate_hz=RATE_HZ, start_time_ns=START_NS, channels=(FORCE, *RESPONSES))
 
 
+@cache
 def density() -> PowerSpectralDensity:
     f = frequencies()
     values = np.vstack([np.full((1, f.size), FORCE_DENSITY), np.abs(accelerance(f)) ** 2 * FORCE_DENSITY])
@@ -82,6 +85,7 @@ def density() -> PowerSpectralDensity:
     )
 
 
+@cache
 def waterfall() -> Waterfall:
     f = frequencies()
     time_s = SEGMENT_S / 2 + np.arange(10) * SEGMENT_S
@@ -98,6 +102,7 @@ def waterfall() -> Waterfall:
     )
 
 
+@cache
 def frequency_response() -> FrequencyResponse:
     """Excited from 2 to 100 Hz only; outside there's garbage that no picture may show."""
     f = frequencies()
@@ -152,6 +157,7 @@ def response_peaks() -> tuple[Peak, ...]:
     )
 
 
+@cache
 def study() -> Study:
     return Study(
         title="arm.mcap",
@@ -182,6 +188,7 @@ HOSTILE_NAMES = (
 )
 
 
+@cache
 def hostile_study() -> Study:
     """The same measurement repeated under names that try to break paths, markup and mathematics."""
     base = time_series()

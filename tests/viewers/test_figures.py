@@ -28,7 +28,7 @@ from chladni.viewers.figures import (
     waveform_figures,
 )
 from chladni.viewers.figures.log_axis import power_of_ten
-from chladni.viewers.figures.peak_labels import LABELS
+from chladni.viewers.figures.peak_labels import LABELS, label_peaks
 from chladni.viewers.figures.rendering import rendered
 from chladni.viewers.figures.sheet import plain
 from chladni.viewers.style import Style
@@ -177,6 +177,32 @@ def test_no_text_is_cut_off_and_no_peak_label_touches_the_legend(figures: dict[s
             labels = [text for text in axes.texts if text.get_text().endswith("Hz")]
             for label in labels if shown else []:
                 assert not label.get_window_extent(renderer).overlaps(shown.get_window_extent(renderer)), name
+
+
+def test_names_stand_above_the_frame_and_leave_the_frame_to_the_data(figures: dict[str, Figure]) -> None:
+    for name in (PSD, RESPONSE):
+        axes = figures[name].axes[0]
+        renderer = FigureCanvasAgg(figures[name]).get_renderer()
+        figures[name].draw(renderer)
+        frame = axes.get_window_extent(renderer)
+        labels = [text for text in axes.texts if text.get_text().endswith("Hz")]
+        assert labels
+        assert all(label.get_window_extent(renderer).y0 >= frame.y1 for label in labels)
+        # A twentieth of the span above the highest line, as below the lowest.
+        highest = max(float(np.nanmax(np.asarray(line.get_ydata(), dtype=np.float64))) for line in axes.lines)
+        low, high = np.log10(axes.get_ylim())
+        assert (high - np.log10(highest)) / (high - low) < 0.06
+
+
+@pytest.mark.parametrize(
+    ("frequency_hz", "text"), [(0.12345, "0.1235 Hz"), (24.672, "24.67 Hz"), (12345.6, "12346 Hz")]
+)
+def test_frequencies_are_printed_without_powers_of_ten(frequency_hz: float, text: str) -> None:
+    (peak, *_) = synthetic.peaks()
+    axes = Figure().subplots()
+    axes.set_xlim(0, 2 * frequency_hz)
+    label_peaks(axes, [replace(peak, frequency_hz=frequency_hz)])
+    assert [label.get_text() for label in axes.texts] == [text]
 
 
 def test_names_of_crowded_peaks_do_not_overlap() -> None:

@@ -1,5 +1,6 @@
 """The HTML report: whole in itself, escaped, and as a browser shows it."""
 
+import base64
 import io
 import shutil
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ from matplotlib.image import imread
 
 from chladni.signals.errors import LogError
 from chladni.signals.study import Study
+from chladni.viewers.figures import Album
 from chladni.viewers.report import report_html, write_report
 from chladni.viewers.report.markup import element, escaped, table
 from tests.viewers import synthetic
@@ -134,6 +136,15 @@ def test_advice_of_the_estimators_is_printed_once() -> None:
 def test_report_is_the_same_every_time() -> None:
     study = Study(title="psd", densities=(synthetic.density(),))
     assert report_html(study) == report_html(study)
+
+
+def test_figures_that_are_drawn_already_are_used() -> None:
+    nothing = Album.of(Study(title="nothing"))
+    assert "img" not in Page(report_html(synthetic.study(), album=nothing)).tags
+    album = Album.of(Study(title="psd", densities=(synthetic.density(),)))
+    page = report_html(Study(title="psd"), album=album)
+    for name in album.figures:
+        assert base64.b64encode(album.rendered(name, "svg")).decode() in page
 
 
 def test_writing_is_whole_or_not_at_all(tmp_path: Path) -> None:
