@@ -1,10 +1,10 @@
 """Decodes one chunk: checksum, decompression, message index or record walk."""
 
-import zlib
 from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
+from isal import isal_zlib
 from numpy.typing import NDArray
 
 from chladni.io.mcap.damage import Damage
@@ -121,7 +121,7 @@ def _check_crc(content: bytes | memoryview, crc: int, rules: ChunkRules) -> None
     # The checksum of nothing is 0, the same as no checksum.
     if not rules.check_crc or not content:
         return
-    if crc and zlib.crc32(content) != crc:
+    if crc and isal_zlib.crc32(content) != crc:
         raise _UnreadableChunkError("the chunk's checksum is wrong")
     if crc == 0 and rules.checksum_expected:
         raise _UnreadableChunkError("the chunk carries no checksum, unlike others of this log")

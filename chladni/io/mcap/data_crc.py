@@ -1,8 +1,7 @@
 """The checksum over all data of a log, the only protection of messages outside chunks."""
 
-import zlib
-
 import numpy as np
+from isal import isal_zlib
 from numpy.typing import NDArray
 
 from chladni.io.mcap.log_file import LogFile
@@ -35,7 +34,7 @@ class DataCrc:
         """Take in bytes that have been read already, and those of the file before them."""
         self._read_to(offset)
         if self._position == offset:
-            self._crc = zlib.crc32(content.data, self._crc)
+            self._crc = isal_zlib.crc32(content.data, self._crc)
             self._position += len(content)
 
     def _read_to(self, offset: int) -> None:
@@ -43,7 +42,7 @@ class DataCrc:
             block = self._file.read(self._position, min(_BLOCK_BYTES, offset - self._position))
             if not block:
                 return
-            self._crc = zlib.crc32(block, self._crc)
+            self._crc = isal_zlib.crc32(block, self._crc)
             self._position += len(block)
 
     def is_right(self) -> bool:
