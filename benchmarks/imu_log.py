@@ -51,16 +51,17 @@ def imu_numbers(messages: int) -> np.ndarray:
     return numbers
 
 
-def write_imu_log(path: Path, messages: int) -> None:
-    """Write `messages` Imu messages at 1 kHz, zstd, chunk CRCs on."""
+def write_imu_log(path: Path, messages: int, *, jitter_ns: int = 0) -> None:
+    """Write `messages` Imu messages at 1 kHz, zstd, chunk CRCs on; their stamps scatter by one sigma `jitter_ns`."""
     numbers = imu_numbers(messages)
+    scatter = np.rint(jitter_ns * np.random.default_rng(5).standard_normal(messages)).astype(np.int64)
     with path.open("wb") as stream:
         writer = Writer(stream, compression=CompressionType.ZSTD)
         writer.start(profile="ros2")
         schema = writer.register_schema("sensor_msgs/msg/Imu", "ros2msg", IMU_DEFINITION.encode())
         channel = writer.register_channel("/imu", "cdr", schema)
         for index in range(messages):
-            stamp = START_NS + index * PERIOD_NS
+            stamp = START_NS + index * PERIOD_NS + int(scatter[index])
             seconds, nanoseconds = divmod(stamp, 1_000_000_000)
             # "imu\0" is four bytes long, so the doubles start at 16 after the four bytes of the encapsulation.
             header = struct.pack("<4siII4s", b"\0\1\0\0", seconds, nanoseconds, 4, b"imu\0")
