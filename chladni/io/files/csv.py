@@ -258,7 +258,9 @@ def _time_column(
 
 def _known_rate(path: Path, sample_rate_hz: float | None) -> float:
     if sample_rate_hz is None:
-        raise SetupError(f"{path}: no column is called time, and the first one doesn't rise; give the sample rate")
+        raise SetupError(
+            f"{path}: no column is called time, and the first isn't one; give the sample rate (--rate HZ)"
+        )
     return sample_rate_hz
 
 

@@ -39,6 +39,8 @@ _UNITS = 164
 # Fewest characters or bytes that a value of each ordinate type takes in a file: single, double, complex.
 _LEAST_BYTES = {2: 4, 4: 8, 5: 8, 6: 16}
 _SINGLE = 2
+# Enough for a last line and the blanks or zeros behind it.
+_TAIL_BYTES = 4096
 
 
 def read_uff(path: Path | str, *, units: Mapping[str, str] | None = None) -> FileContents:
@@ -76,7 +78,7 @@ def read_uff(path: Path | str, *, units: Mapping[str, str] | None = None) -> Fil
     names = _names([headers[number] for number in records])
     _require_known(path, names, units)
     system = next((header for header in headers if header.get("type") == _UNITS), None)
-    notes = _left_out(path, headers, [number for number in functions if number not in records])
+    notes = _cut_off(path) + _left_out(path, headers, [number for number in functions if number not in records])
     # Records of one measurement share their time axis; others in the same file may not.
     groups: dict[tuple[Any, ...], list[tuple[Dataset, Channel]]] = {}
     for number, name in zip(records, names, strict=True):
@@ -142,11 +144,28 @@ def _uff(path: Path) -> Any:
         raise LogError(f"{path}: this universal file can't be read: {error}") from error
 
 
+def _cut_off(path: Path) -> tuple[str, ...]:
+    """Say so when the file ends anywhere but behind a dataset; pyuff passes over what isn't closed."""
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - _TAIL_BYTES))
+        tail = file.read().rstrip(b" \t\r\n\0\x1a")
+    # Behind binary values the closing line begins without a line break.
+    if tail.endswith(b"    -1") or tail.rpartition(b"\n")[2].strip() == b"-1":
+        return ()
+    note = (
+        f"{path}: doesn't end with the line -1 that closes a dataset; it was cut off, and what stands after the last "
+        "whole dataset is lost."
+    )
+    return (note,)
+
+
 def _headers(path: Path, file: Any) -> list[Dataset]:
     """Read what is in front of the data, and check that the data it announces are there."""
     count = int(file.get_n_sets())
     if count == 0:
-        raise LogError(f"{path}: holds no dataset between lines of -1; is it a universal file?")
+        raise LogError(
+            f"{path}: holds no whole dataset between lines of -1; is it a universal file, or was it cut off?"
+        )
     headers = []
     for number, kind in enumerate(file.get_set_types()):
         if kind not in (_FUNCTION_AT_NODE, _UNITS):

@@ -207,7 +207,8 @@ def test_a_rate_that_contradicts_the_record_is_not_believed() -> None:
 @pytest.mark.parametrize(
     ("content", "match"),
     [
-        ("hello", "holds no dataset"),
+        ("hello", "holds no whole dataset"),
+        (text_set()[:300], "or was it cut off"),
         ("    -1\n    15\n    -1\n", r"datasets 15 \(1\)"),
         (text_set(count=10**9), "announces 1000000000 values"),
         (text_set(count=9), "announces 9 values and holds 3"),
@@ -227,3 +228,16 @@ def test_damaged_files_are_told_in_one_line(tmp_path: Path, content: str, match:
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="no such file"):
         read_uff(tmp_path / "a.uff")
+
+
+def test_a_file_that_was_cut_off_gives_its_whole_datasets_and_says_so(tmp_path: Path) -> None:
+    whole = text_set(id1="first") + text_set(id1="second")
+    for name, content in (("whole", whole), ("padded", whole + "\n \0"), ("cut", whole[: -len(text_set()) // 3])):
+        (tmp_path / f"{name}.uff").write_text(content)
+    for name in ("whole", "padded"):
+        found = read_uff(tmp_path / f"{name}.uff")
+        assert [channel.name for series in found.series for channel in series.channels] == ["first", "second"]
+        assert not [note for note in found.notes if "cut off" in note]
+    found = read_uff(tmp_path / "cut.uff")
+    assert [channel.name for series in found.series for channel in series.channels] == ["first"]
+    assert "cut.uff: doesn't end with the line -1" in found.notes[0]
