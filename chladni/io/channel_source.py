@@ -17,7 +17,10 @@ from chladni.signals.units import si_factor
 
 UNKNOWN_UNIT: Final = "1"
 
-_COMMENT = re.compile(r"^\s*[\w/<>=\[\]]+\s+(?P<field>\w+)\s*(?:=[^#]*)?#\s*(?P<comment>.*?)\s*$", re.MULTILINE)
+# Blanks of one line only: a comment on the next line belongs to the next field.
+_COMMENT = re.compile(
+    r"^[ \t]*[\w/<>=\[\]]+[ \t]+(?P<field>\w+)[ \t]*(?:=[^#\n]*)?#[ \t]*(?P<comment>.*?)[ \t\r]*$", re.MULTILINE
+)
 _IN_BRACKETS = re.compile(r"\[\s*([^\[\]]{1,30}?)\s*\]")
 # A comment that is nothing but one of these is a unit; anything longer is prose and needs brackets.
 _BARE_UNITS = frozenset(
