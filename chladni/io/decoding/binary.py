@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from chladni.io.decoding.columns import EncodedMessages, StringValue
     from chladni.io.decoding.piece import Piece
-    from chladni.io.decoding.schema import FieldInfo, Leaf, Record
+    from chladni.io.decoding.schema import FieldInfo, Leaf, Record, Tree
 
 HEADER_BYTES: Final = 4
 """Bytes of the CDR encapsulation header; alignment counts from its end."""
@@ -113,6 +113,7 @@ class BinaryDecoder:
         self._encapsulated = encapsulated
         self._rules = _CDR if encapsulated else _ROS1
         self._layouts = Layouts(self._rules.max_alignment)
+        self._asked: tuple[tuple[str, ...], Tree] = ((), {})
 
     def informed_by(self, messages: EncodedMessages) -> BinaryDecoder:
         """Give this decoder: the definition tells all fields."""
@@ -121,7 +122,7 @@ class BinaryDecoder:
 
     def columns(self, messages: EncodedMessages, paths: Sequence[str]) -> Decoded:
         """Decode the fields named; see `chladni.io.decoding.columns.Decoder`."""
-        require_known(paths, self.fields, schema_name=self.record.name)
+        tree = self._tree(tuple(paths))
         batch = _Batch(messages)
         # The header of CDR is big-endian, whatever comes behind it.
         cursor = batch.cursor(byte_order=">" if self._encapsulated else "<")
@@ -129,9 +130,18 @@ class BinaryDecoder:
         if self._encapsulated:
             self._pass_header(cursor)
         walk = Walk(cursor, rules=self._rules, layouts=self._layouts)
-        walk.record(self.record, tree_of([self._leaves[path] for path in paths]), last=True)
+        walk.record(self.record, tree, last=True)
         columns = {path: self._column(self._leaves[path], walk.pieces.get(path, []), batch, cursor) for path in paths}
         return Decoded(columns=columns, bad=batch.bad, reasons=dict(batch.reasons))
+
+    def _tree(self, paths: tuple[str, ...]) -> Tree:
+        # Batch after batch is asked for the same.
+        asked, tree = self._asked
+        if paths != asked:
+            require_known(paths, self.fields, schema_name=self.record.name)
+            tree = tree_of([self._leaves[path] for path in paths])
+            self._asked = (paths, tree)
+        return tree
 
     def _pass_header(self, cursor: Cursor) -> None:
         """Move to the bodies of CDR messages; the header gives the byte order."""
