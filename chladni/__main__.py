@@ -1,5 +1,5 @@
 """Runs ``python -m chladni``."""
 
-from chladni.cli.main import run
+from chladni.cli.entry import run
 
 run()

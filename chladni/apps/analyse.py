@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from chladni.apps.findings import peak_sentences, response_sentences, soundness_sentences
+from chladni.apps.findings import peak_sentence, response_sentences, soundness_sentences
 from chladni.apps.sources import Progress, Span, is_small, no_progress
 from chladni.apps.spectra import Averaging, densities, transfer
+from chladni.apps.unit_peaks import unit_peaks
 from chladni.io.log import Log
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
@@ -15,7 +16,7 @@ from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.study import Study
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.waterfall import Waterfall
-from chladni.spectral.peaks import find_peaks, find_response_peaks
+from chladni.spectral.peaks import find_response_peaks
 from chladni.spectral.waterfall import waterfall
 
 if TYPE_CHECKING:
@@ -95,10 +96,10 @@ def _study(
     falls: tuple[Waterfall, ...],
     soundness: tuple[str, ...],
 ) -> Study:
-    peaks = [find_peaks(density) for density in found]
+    peaks = [unit_peaks(density) for density in found]
     findings = list(soundness)
     for density, named in zip(found, peaks, strict=True):
-        findings += [*peak_sentences(density, named), *density.provenance.notes]
+        findings += [*(peak_sentence(group) for group in named), *density.provenance.notes]
     response_peaks: tuple[Peak, ...] = ()
     if response is not None:
         response_peaks = find_response_peaks(response)
@@ -109,7 +110,7 @@ def _study(
         densities=found,
         waterfalls=falls,
         response=response,
-        peaks=tuple(peak for named in peaks for peak in named),
+        peaks=tuple(peak for named in peaks for group in named for peak in group.peaks),
         response_peaks=response_peaks,
         geometry=log.geometry,
         findings=tuple(dict.fromkeys([*findings, *shown.notes])),

@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
+from chladni.apps.unit_peaks import UnitPeaks
 from chladni.io.log_info import LogInfo, some_of
 from chladni.io.loss import Loss
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
-from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.unit_text import with_unit
 
 MOST_PEAKS_TOLD = 5
@@ -31,12 +31,15 @@ def soundness_sentences(info: LogInfo) -> tuple[str, ...]:
     return (f"{summary}. {'No trouble found.' if not info.findings else ''}".rstrip(), *info.findings)
 
 
-def peak_sentences(density: PowerSpectralDensity, peaks: Sequence[Peak]) -> tuple[str, ...]:
-    """Say which frequencies are in the channels."""
-    if not peaks:
-        return (f"No peak stands out of the scatter in {some_of([one.name for one in density.channels])}.",)
-    told = [f"{peak.frequency_hz:.5g} Hz ({some_of(peak.channels, count=1)})" for peak in peaks[:MOST_PEAKS_TOLD]]
-    return (f"Strongest frequencies: {', '.join(told)}.",)
+def peak_sentence(found: UnitPeaks) -> str:
+    """Say which frequencies are in the channels of one unit."""
+    if not found.peaks:
+        return f"No peak stands out of the scatter in {some_of(found.channels)}."
+    told = [
+        f"{peak.frequency_hz:.5g} Hz ({some_of(peak.channels, count=1)})" for peak in found.peaks[:MOST_PEAKS_TOLD]
+    ]
+    where = "" if found.unit == "1" else f" in {found.unit}"
+    return f"Strongest frequencies{where}: {', '.join(told)}."
 
 
 def response_sentences(response: FrequencyResponse, peaks: Sequence[Peak]) -> tuple[str, ...]:

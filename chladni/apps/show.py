@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from chladni.apps.analyse import analyse
+from chladni.apps.unit_peaks import unit_peaks
 from chladni.io.log import Log
 from chladni.signals.errors import SetupError
 from chladni.signals.frequency_response import FrequencyResponse
@@ -10,7 +11,7 @@ from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.study import Study
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.waterfall import Waterfall
-from chladni.spectral.peaks import find_peaks, find_response_peaks
+from chladni.spectral.peaks import find_response_peaks
 
 Analysed = Study | TimeSeries | PowerSpectralDensity | FrequencyResponse | Waterfall
 Shown = Log | Analysed
@@ -61,7 +62,7 @@ def _with(study: Study, item: Analysed) -> Study:
         case TimeSeries():
             return replace(study, series=(*study.series, item))
         case PowerSpectralDensity():
-            peaks = (*study.peaks, *find_peaks(item))
+            peaks = (*study.peaks, *(peak for group in unit_peaks(item) for peak in group.peaks))
             return replace(study, densities=(*study.densities, item), peaks=peaks)
         case Waterfall():
             return replace(study, waterfalls=(*study.waterfalls, item))

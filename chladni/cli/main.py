@@ -65,11 +65,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code if isinstance(code, int) else SUCCESS
 
 
-def run() -> None:
-    """Entry point of the installed program."""
-    sys.exit(main())
-
-
 def _fail(error: Exception, code: int) -> int:
     if os.environ.get("CHLADNI_TRACEBACK"):
         import traceback

@@ -8,7 +8,7 @@ from chladni.cli.words import number, unit, with_error
 
 if TYPE_CHECKING:
     from chladni.apps.documents import Document
-    from chladni.signals.peak import Peak
+    from chladni.apps.unit_peaks import UnitPeaks
     from chladni.signals.power_spectral_density import PowerSpectralDensity
 
 
@@ -32,9 +32,9 @@ def psd(
     from chladni.apps.findings import damage_sentences
     from chladni.apps.sources import Span
     from chladni.apps.spectra import Averaging, densities
+    from chladni.apps.unit_peaks import unit_peaks
     from chladni.io.log import open_log
     from chladni.signals.study import Study
-    from chladni.spectral.peaks import find_peaks
 
     out = Output(json)
     with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name) as progress:
@@ -48,13 +48,15 @@ def psd(
         damage = damage_sentences(opened.damage)
         geometry = opened.geometry
     document = psd_document(found)
-    peaks = tuple(find_peaks(density) for density in found)
-    for density, named in zip(found, peaks, strict=True):
+    named = [group for density in found for group in unit_peaks(density)]
+    for density in found:
         _print_levels(out, density, document)
-        _print_peaks(out, named)
+    for group in named:
+        _print_peaks(out, group)
     notes = tuple(note for density in found for note in density.provenance.notes)
     out.lines((*damage, *notes))
-    study = Study(title=log.name, densities=found, peaks=sum(peaks, ()), geometry=geometry, findings=damage + notes)
+    peaks = tuple(peak for group in named for peak in group.peaks)
+    study = Study(title=log.name, densities=found, peaks=peaks, geometry=geometry, findings=damage + notes)
     out.pictures(study, figures=figures, report=report)
     out.json(document)
 
@@ -82,16 +84,16 @@ def _highest(channel: "Document") -> list[str]:
     return [number(peak["frequency_hz"], digits=6), number(peak["psd"]), unit(channel["psd_unit"])]
 
 
-def _print_peaks(out: Output, peaks: "tuple[Peak, ...]") -> None:
-    if not peaks:
-        out.line("No peak stands out of the scatter.")
-        return
+def _print_peaks(out: Output, found: "UnitPeaks") -> None:
     from chladni.spectral.peaks import MOST_PEAKS
 
-    # Heights in different units have no order; those are ranked by how far they stand out.
-    order = "highest" if len({peak.unit for peak in peaks}) == 1 else "clearest"
+    where = "" if found.unit == "1" else f" in {found.unit}"
+    if not found.peaks:
+        out.line(f"No peak stands out of the scatter{where}.")
+        return
+    at_most = f", {MOST_PEAKS} at most" if len(found.peaks) == MOST_PEAKS else ""
     out.table(
-        f"Peaks, the {order} first{f', {len(peaks)} at most' if len(peaks) == MOST_PEAKS else ''}",
+        f"Peaks{where}, the highest first{at_most}",
         ["strongest in", "frequency [Hz]", "density", "unit"],
         [
             [
@@ -100,7 +102,7 @@ def _print_peaks(out: Output, peaks: "tuple[Peak, ...]") -> None:
                 with_error(peak.height, peak.height_std),
                 unit(peak.unit),
             ]
-            for peak in peaks
+            for peak in found.peaks
         ],
     )
 

@@ -19,7 +19,7 @@ from chladni.spectral.peaks import find_peaks, find_response_peaks
 from chladni.spectral.third_octave import third_octave_levels
 
 # Peaks further apart than this share of their frequency, or this many lines, are not the same peak.
-SAME_PEAK_SHARE = 0.1
+SAME_PEAK_SHARE = 0.05
 SAME_PEAK_LINES = 3.0
 # A shift of 3.5 sigma happens by chance once in 2000 peaks; even were sigma 20 % too small, once in 280.
 MOVED_SIGMAS = 3.5
@@ -58,12 +58,12 @@ def compare_densities(
     The ratio of two estimates with nu = 2 (G/std)^2 degrees of freedom each follows F(nu_after, nu_before) when
     nothing changed (Bendat & Piersol 2010, section 4.2.4). Many lines are judged together after Benjamini & Hochberg
     (1995). A peak has moved when its shift exceeds 3.5 sigma; it appeared or vanished when it has no partner within
-    10 % and its lines changed significantly.
+    5 % and its lines changed significantly.
     """
     _require_share(false_discovery)
     names, only_before, only_after = _matched(before.channels, after.channels, "channel")
     _require_same_lines(before.frequency_hz, after.frequency_hz)
-    first, second = _selected(before, names), _selected(after, names)
+    first, second = before.select(names), after.select(names)
     surprise = _ratio_surprise(first.values, first.std, second.values, second.std)
     # All channels in one family: the share of false ones is promised for the whole comparison.
     significant = _discoveries(surprise, false_discovery)
@@ -227,7 +227,7 @@ def _density_peaks(
     changes: list[PeakChange] = []
     for row, channel in enumerate(before.channels):
         # One channel at a time, since a peak shared with others carries the frequency of the strongest one.
-        old, new = (find_peaks(_selected(d, [channel.name]), count=PEAKS_A_CHANNEL) for d in (before, after))
+        old, new = (find_peaks(d.select([channel.name]), count=PEAKS_A_CHANNEL) for d in (before, after))
         changes += _fates(old, new, before.frequency_hz, significant[row])
     return tuple(changes)
 
@@ -292,12 +292,6 @@ def _matched(
                 f"{name!r} is {in_unit(old[name])} before and {in_unit(new[name])} after; state one unit for both"
             )
     return both, tuple(name for name in old if name not in new), tuple(name for name in new if name not in old)
-
-
-def _selected(density: PowerSpectralDensity, names: Sequence[str]) -> PowerSpectralDensity:
-    rows = [[channel.name for channel in density.channels].index(name) for name in names]
-    channels = tuple(density.channels[row] for row in rows)
-    return replace(density, values=density.values[rows], std=density.std[rows], channels=channels)
 
 
 def _functions(response: FrequencyResponse, answers: Sequence[str], sources: Sequence[str]) -> FrequencyResponse:
