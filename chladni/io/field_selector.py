@@ -19,6 +19,7 @@ from chladni.io.message_path import (
     MessagePath,
     Operator,
     near_matches,
+    quoted,
 )
 from chladni.signals.errors import LogError
 
@@ -118,7 +119,7 @@ class _Walk:
     def take(self, step: FieldStep | IndexStep | KeyStep | FilterStep) -> None:
         match step:
             case FieldStep(name=name):
-                self._prefix = _joined(self._prefix, name)
+                self._prefix = _joined(self._prefix, quoted(name))
                 self._at_slice = False
             case IndexStep(index=index):
                 self._enter_array()

@@ -17,7 +17,7 @@ _FILTER = re.compile(
     r"""\{\s*(?P<field>[^\s=!<>{}"']+)\s*(?P<operator>==|!=|<=|>=|<|>)\s*"""
     r"""(?:"(?P<double>(?:[^"\\]|\\.)*)"|'(?P<single>(?:[^'\\]|\\.)*)'|(?P<bare>[^\s{}"']+))\s*\}"""
 )
-_PLAIN_NAME = re.compile(r'[^.\[\]{}"\s]+')
+_PLAIN_NAME = re.compile(r'(?!@)[^.\[\]{}"\s]+')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,7 +160,7 @@ def _topic_of(text: str, topics: Collection[str]) -> tuple[str, int]:
 def _next_step(text: str, position: int) -> tuple[Step, int]:
     if found := _NAME.match(text, position):
         name = found[2] if found[1] is None else _unescaped(found[1])
-        if name.startswith("@"):
+        if found[1] is None and name.startswith("@"):
             raise LogError(f"{text!r}: functions such as .{name} aren't supported in a path; name the field itself")
         return FieldStep(name=name), found.end()
     if found := _BRACKET.match(text, position):

@@ -697,6 +697,29 @@ def test_protobuf(tmp_path: Path) -> None:
         assert series.start_time_ns == START_NS
 
 
+def test_json_fields_with_odd_names_or_that_messages_lack(tmp_path: Path) -> None:
+    x = noise(3, 200)
+    names = ["we ird", "a.b", "y", "never there"]
+    schema = {"type": "object", "properties": {name: {"type": "number"} for name in names}}
+    for given in (schema, None):
+        with LogMaker(tmp_path / "a.mcap") as maker:
+            channel = maker.json("/j", given)
+            for index in range(200):
+                row = dict(zip(names[:3], x[:, index].tolist(), strict=True))
+                if index % 10 == 3:
+                    row["we ird"] = None
+                maker.write(channel, row, START_NS + index * 10_000_000)
+        with open_log(tmp_path / "a.mcap") as log:
+            channels = [one.name for one in log.channels][:3]
+            assert channels == ['/j."we ird"', '/j."a.b"', "/j.y"]
+            series = log.read(channels)
+            assert np.array_equal(series.values[1:], x[1:])
+            assert np.flatnonzero(np.isnan(series.values[0])).tolist() == list(range(3, 200, 10))
+            assert log.info().damage == ()
+            with pytest.raises(LogError, match='did you mean "we ird"'):
+                log.read(["/j.weird"])
+
+
 def test_json_without_schema_and_an_unknown_encoding(tmp_path: Path) -> None:
     with LogMaker(tmp_path / "a.mcap") as maker:
         known = maker.json("/a")

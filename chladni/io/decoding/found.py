@@ -64,7 +64,9 @@ def found_of(leaf: Leaf, rows: Sequence[Sequence[object]]) -> Found:
     if leaf.info.kind == "string":
         return Found(values=interned(cast("list[StringValue]", values)), counts=counts)
     if not isinstance(leaf.type, Array):
-        return Found(values=np.array(values, leaf.info.dtype), counts=counts)
+        # A number that is missing is NaN, for which integers and truth values have no room.
+        incomplete = leaf.info.dtype != np.float32 and any(isinstance(value, float) for value in values)
+        return Found(values=np.array(values, np.float64 if incomplete else leaf.info.dtype), counts=counts)
     # Elements of all arrays of a message belong to it.
     arrays = cast("Sequence[Sequence[Sequence[float]]]", rows)
     counts = np.array([sum(map(len, row)) for row in arrays], np.int64)

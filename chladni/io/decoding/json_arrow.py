@@ -15,7 +15,7 @@ import numpy as np
 
 from chladni.io.decoding.columns import Strings
 from chladni.io.decoding.found import Found
-from chladni.io.decoding.json_schema import NANOSECONDS, SECONDS
+from chladni.io.decoding.json_schema import FLOAT, NANOSECONDS, SECONDS
 from chladni.io.decoding.schema import Array, FieldType, Leaf, Primitive, Stamp, Text, tree_of
 
 if TYPE_CHECKING:
@@ -100,10 +100,13 @@ def _arrow_type(kind: FieldType, pa: ModuleType) -> pa.DataType:
 
 
 def _found(table: pa.Table, leaf: Leaf) -> Found | None:
-    array = _complete(table.column(leaf.names[0]).combine_chunks())
+    array = table.column(leaf.names[0]).combine_chunks()
     for name in leaf.names[1:]:
-        array = None if array is None else _complete(array.field(name))
-    if array is None:
+        if array.null_count:
+            return None
+        array = array.field(name)
+    if array.null_count and leaf.type != FLOAT:
+        # A key that is missing, or null itself: the rules say what becomes of the message.
         return None
     match leaf.type:
         case Array():
@@ -119,13 +122,13 @@ def _found(table: pa.Table, leaf: Leaf) -> Found | None:
 
 
 def _complete(array: pa.Array) -> pa.Array | None:
-    # A null is a key that is missing, or null itself: the rules say which message is bad for it.
     return None if array.null_count else array
 
 
 def _of_numbers(array: pa.Array) -> Found | None:
     values = array.to_numpy(zero_copy_only=False)
-    return Found(values=values) if values.dtype.kind != "f" or np.isfinite(values).all() else None
+    # Nulls of a double become NaN, which is what the rules make of them.
+    return None if values.dtype.kind == "f" and np.isinf(values).any() else Found(values=values)
 
 
 def _of_lists(array: pa.Array) -> Found | None:

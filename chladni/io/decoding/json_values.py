@@ -25,8 +25,8 @@ _INT64: Final = range(-(2**63), 2**63)
 def load_message(content: bytes) -> object:
     """Parse one message.
 
-    ``NaN`` and ``Infinity``, which JSON doesn't know but many writers write, are let through here: only where such
-    a value is asked for is the message bad. Of a key that is given twice the last counts.
+    ``NaN`` and ``Infinity``, which JSON doesn't know but many writers write, are let through here: only where an
+    infinite value is asked for is the message bad. Of a key that is given twice the last counts.
 
     Raises
     ------
@@ -43,6 +43,9 @@ def load_message(content: bytes) -> object:
 def extract(message: object, leaves: Sequence[Leaf]) -> list[list[Value]]:
     """Values of each leaf in one message: one, or, below a list of objects, any number.
 
+    A number that is absent or null is NaN, whatever its type: fields of JSON objects are optional, and one that a
+    message lacks says nothing against those beside it. True and false are 1 and 0 where a number belongs.
+
     Parameters
     ----------
     message : object
@@ -52,13 +55,13 @@ def extract(message: object, leaves: Sequence[Leaf]) -> list[list[Value]]:
     Raises
     ------
     ValueError
-        Says which field is missing, null, of another type, or not finite.
+        Says which field is of another type or infinite, or which time, text or list is missing.
     """
     return [[_value(found, leaf.type, leaf) for found in _reached(message, leaf)] for leaf in leaves]
 
 
 def _reached(message: object, leaf: Leaf) -> list[object]:
-    places = [message]
+    places: list[object] = [_object(message, leaf)]
     for name, lists in zip(leaf.names, leaf.lists, strict=True):
         places = [_member(place, name, leaf) for place in places]
         for _ in range(lists):
@@ -67,10 +70,13 @@ def _reached(message: object, leaf: Leaf) -> list[object]:
 
 
 def _member(place: object, name: str, leaf: Leaf) -> object:
-    value = place.get(name) if isinstance(place, dict) else None
-    if value is None:
-        raise ValueError(f"no value for {leaf.info.path}")
-    return value
+    return None if place is None else _object(place, leaf).get(name)
+
+
+def _object(found: object, leaf: Leaf) -> dict[str, object]:
+    if isinstance(found, dict):
+        return found
+    raise ValueError(f"{leaf.info.path}: no object where one belongs")
 
 
 def _list(found: object, leaf: Leaf) -> list[object]:
@@ -82,6 +88,8 @@ def _list(found: object, leaf: Leaf) -> list[object]:
 def _value(found: object, kind: FieldType, leaf: Leaf) -> Value:
     if isinstance(kind, Array):
         return tuple(_scalar(element, kind.element, leaf) for element in _list(found, leaf))
+    if isinstance(kind, Primitive) and (found is None or (isinstance(found, float) and math.isnan(found))):
+        return math.nan
     return _scalar(found, kind, leaf)
 
 
@@ -93,24 +101,26 @@ def _scalar(found: object, kind: FieldType, leaf: Leaf) -> Scalar:
         return _nanoseconds(found, leaf)
     if isinstance(kind, Primitive) and isinstance(found, int | float):
         return _number(found, kind, leaf)
+    if found is None:
+        raise ValueError(f"no value for {leaf.info.path}")
     raise ValueError(f"{leaf.info.path} is no {leaf.info.kind}")
 
 
 def _number(found: float, kind: Primitive, leaf: Leaf) -> Scalar:
-    # Python counts True as 1; JSON doesn't.
-    if isinstance(found, bool) != (kind.dtype == np.bool_):
-        raise ValueError(f"{leaf.info.path} is no {leaf.info.kind}")
-    if isinstance(found, bool):
-        return found
-    return _finite(found, leaf) if kind.dtype == np.float64 else _whole(found, leaf)
+    if kind.dtype == np.bool_:
+        if isinstance(found, bool):
+            return found
+        raise ValueError(f"{leaf.info.path} is no bool")
+    # Controllers write switches as true and false under schemas that know numbers only.
+    return _double(found, leaf) if kind.dtype == np.float64 else _whole(found, leaf)
 
 
-def _finite(found: float, leaf: Leaf) -> float:
+def _double(found: float, leaf: Leaf) -> float:
     try:
         value = float(found)
     except OverflowError as error:
         raise ValueError(f"{leaf.info.path} exceeds the range of a double") from error
-    if not math.isfinite(value):
+    if math.isinf(value):
         raise ValueError(f"{leaf.info.path} isn't finite")
     return value
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from chladni.io.message_path import quoted
 from chladni.signals.errors import LogError
 
 if TYPE_CHECKING:
@@ -93,7 +94,8 @@ class FieldInfo:
     Parameters
     ----------
     path : str
-        Names joined by dots; a list of messages on the way is marked: ``transforms[].transform.translation.x``.
+        Names joined by dots, in quotes where a path would read them otherwise; a
+        list of messages on the way is marked: ``transforms[].transform.translation.x``.
         An array of numbers or strings is one leaf and carries no mark: ``position``.
     kind : {"number", "bool", "string", "time", "duration"}
         Times and durations are whole nanoseconds, whatever the wire holds.
@@ -182,7 +184,9 @@ class _Way:
     array: int | Literal["dynamic"] | None = None
 
     def into(self, member: Member) -> _Way:
-        path = f"{self.path}.{member.name}" if self.path else member.name
+        # JSON keys may hold dots and blanks.
+        name = quoted(member.name)
+        path = f"{self.path}.{name}" if self.path else name
         return _Way(path, (*self.names, member.name), (*self.lists, 0), self.array)
 
     def opened(self, length: int | None, *, marked: bool) -> _Way:
