@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.unit_text import with_unit
+from chladni.signals.wording import counted
 
 FaultKind = Literal["clipped", "dead", "dropouts", "spikes", "not-a-number", "coarse"]
 Samples = NDArray[np.floating[Any]]
@@ -28,6 +29,8 @@ _LEAP_BLOCK = 4096
 _WIDEST_SPIKE = 3
 _QUIET_AROUND = 8
 _FEWEST = 16
+# What the whole record shows isn't counted.
+_THROUGHOUT = ("dead", "coarse")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +47,7 @@ class SensorFault:
         Samples concerned.
     first_s
         Time of the first one, seconds from the start of the series.
-    sentence
+    what, remedy
         What was found, and what to do.
     """
 
@@ -52,7 +55,14 @@ class SensorFault:
     kind: FaultKind
     count: int
     first_s: float
-    sentence: str
+    what: str
+    remedy: str
+
+    @property
+    def sentence(self) -> str:
+        """What was found in which channel and how often, and what to do."""
+        often = "" if self.kind in _THROUGHOUT else f" in {counted(self.count, 'sample')}"
+        return f"{self.channel}: {self.what}{often}; {self.remedy}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -95,7 +105,8 @@ def sensor_quality(series: TimeSeries) -> tuple[SensorFault, ...]:
 
     - clipped: at or above 99.9 % of the channel's overload; or at least three samples in a row at the very top (or
       bottom), three times as many there as on the value next to it, reached with a step above 0.1 m and 4 q. A top
-      reached smoothly is where a motion turns or rests.
+      reached smoothly is where a motion turns or rests, and an end at exactly 0 is that of a quantity of one sign
+      (a speed, a level), which no larger range would move.
     - dead: constant, or two or three values within 0.1 % of the mean or 0.01 % of the overload.
     - dropouts: the same value for at least eight samples, not at an end of the range, between steps above 0.1 m
       before and after; in a channel that otherwise moves.
@@ -119,7 +130,7 @@ def _channel_faults(
         finite = np.isfinite(values)
         # NaN marked as missing is how a gap looks; infinity never is.
         faulty = ~finite if valid is None else np.isinf(values) | (~finite & valid)
-        told = "are no numbers; estimates leave out what touches them"
+        told = ("is no number", "estimates leave out what touches them")
         faults += _fault(channel, "not-a-number", np.flatnonzero(faulty), told)
         valid = finite if valid is None else valid & finite
     place = None
@@ -136,42 +147,37 @@ def _faults_of(record: _Record, place: Ints | None) -> list[SensorFault]:
     channel = record.channel
     if _is_dead(record):
         everything = np.arange(record.samples.size)
-        return _fault(channel, "dead", everything, _dead_sentence(record), place)
-    faults = _fault(
-        channel,
-        "clipped",
-        _clipped(record),
-        f"are cut off, at {record.low:.6g} or {with_unit(f'{record.high:.6g}', channel.unit)}; use a larger range",
-        place,
-    )
-    faults += _fault(
-        channel, "dropouts", _held(record), "are held or zero while the signal moves; check transmission", place
-    )
-    faults += _fault(channel, "spikes", _spikes(record), "leap away and back; check connectors and grounding", place)
+        return _fault(channel, "dead", everything, _dead_told(record), place)
+    clipped, what = _clipped(record)
+    faults = _fault(channel, "clipped", clipped, (what, "use a larger range"), place)
+    told = ("is held or zero amid motion", "check transmission")
+    faults += _fault(channel, "dropouts", _held(record), told, place)
+    told = ("leaps away and back", "check connectors and grounding")
+    faults += _fault(channel, "spikes", _spikes(record), told, place)
     if _is_coarse(record):
         step = with_unit(f"{record.smallest_step:.3g}", channel.unit)
-        told = f"move in coarse steps of {step}; use a smaller range"
+        told = (f"moves in coarse steps of {step}", "use a smaller range")
         faults += _fault(channel, "coarse", np.arange(record.samples.size), told, place)
     return faults
 
 
-def _dead_sentence(record: _Record) -> str:
+def _dead_told(record: _Record) -> tuple[str, str]:
     if record.low == record.high == 0:
-        return "is 0 throughout; the sensor isn't connected or nobody fills this field"
+        return "is 0 throughout", "the sensor isn't connected or nobody fills this field"
     level = with_unit(f"{record.low:.6g}", record.channel.unit)
     if record.low == record.high:
-        return f"is {level} throughout; check cable and supply, or leave it out"
-    return f"moves by its last digit only, at {level}; check cable, supply and range"
+        return f"is {level} throughout", "check cable and supply, or leave it out"
+    return f"moves by its last digit only, at {level}", "check cable, supply and range"
 
 
 def _fault(
-    channel: Channel, kind: FaultKind, samples: Ints, told: str, place: Ints | None = None
+    channel: Channel, kind: FaultKind, samples: Ints, told: tuple[str, str], place: Ints | None = None
 ) -> list[SensorFault]:
     if not samples.size:
         return []
-    first = int(samples[0] if place is None else place[samples[0]])
-    sentence = f"{channel.name}: {told}" if kind == "dead" else f"{channel.name}: {samples.size} samples {told}"
-    return [SensorFault(channel=channel.name, kind=kind, count=samples.size, first_s=float(first), sentence=sentence)]
+    first = float(samples[0] if place is None else place[samples[0]])
+    what, remedy = told
+    return [SensorFault(channel=channel.name, kind=kind, count=samples.size, first_s=first, what=what, remedy=remedy)]
 
 
 def _record(channel: Channel, samples: Samples) -> _Record:
@@ -224,14 +230,17 @@ def _is_coarse(record: _Record) -> bool:
     return 3 <= np.unique(record.samples).size <= 16
 
 
-def _clipped(record: _Record) -> Ints:
+def _clipped(record: _Record) -> tuple[Ints, str]:
+    """Give the samples beyond the range, and what to say of them."""
+    unit = record.channel.unit
     if record.channel.overload is not None:
         limit = _NEAR_OVERLOAD * record.channel.overload
         if max(record.high, -record.low) >= limit:
-            return np.flatnonzero(np.abs(record.samples) >= limit)
-    at_top = _plateaus(record, record.high)
-    at_bottom = _plateaus(record, record.low)
-    return np.sort(np.concatenate((at_top, at_bottom)))
+            reached = with_unit(f"{record.channel.overload:.6g}", unit)
+            return np.flatnonzero(np.abs(record.samples) >= limit), f"reaches its range of {reached}"
+    ends = {level: _plateaus(record, level) for level in (record.low, record.high) if level != 0}
+    levels = " and ".join(f"{level:.6g}" for level, there in ends.items() if there.size)
+    return np.sort(np.concatenate([*ends.values()])), f"is cut off at {with_unit(levels, unit)}"
 
 
 def _plateaus(record: _Record, level: float) -> Ints:

@@ -149,6 +149,27 @@ def test_clipping_on_one_side() -> None:
     assert fault.count == np.count_nonzero(clipped == 0.8)
 
 
+def test_only_the_end_that_is_cut_off_is_named() -> None:
+    fault = only(faults_of(np.minimum(SOUND["sine"], 0.8)))
+    assert fault.sentence == f"/imu.x: is cut off at 0.8 m/s^2 in {fault.count} samples; use a larger range"
+    ranged = only(faults_of(np.minimum(SOUND["sine"], 0.8), overload=0.8))
+    assert ranged.what == "reaches its range of 0.8 m/s^2"
+
+
+def test_one_sample_is_told_in_the_singular() -> None:
+    values = noise()
+    values[5000] += 80.0
+    assert "leaps away and back in 1 sample;" in only(faults_of(values)).sentence
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_quantity_of_one_sign_that_rests_at_zero_is_not_clipped(sign: float) -> None:
+    # A pump that is switched off: its speed leaps to zero, and there is no speed below.
+    speed = 1800 + 20 * noise(15, 20_000)
+    speed[(np.arange(20_000) % 1000) < 60] = 0.0
+    assert faults_of(sign * speed) == ()
+
+
 def test_three_overloaded_samples_of_one_hit_are_enough() -> None:
     hit = impacts(40)
     hit[1018:1021] = 20.0
@@ -268,7 +289,7 @@ def test_too_few_samples_say_nothing(samples: int) -> None:
 
 def test_a_channel_without_unit_is_told_in_bare_numbers() -> None:
     assert "steps of 1;" in only(faults_of(np.round(0.8 * smooth()), unit="1")).sentence
-    assert "at -0.5 or 0.5;" in only(faults_of(SOUND["sine"].clip(-0.5, 0.5), unit="1")).sentence
+    assert "at -0.5 and 0.5 in " in only(faults_of(SOUND["sine"].clip(-0.5, 0.5), unit="1")).sentence
 
 
 def test_faults_come_by_channel() -> None:
