@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from chladni.apps.compare import LogComparison
     from chladni.signals.comparison import LevelChange, PeakChange
 
+MOST_ROWS = 25
 UNCHANGED = "nothing that scatter doesn't explain"
 
 
@@ -101,6 +102,8 @@ def _print_peaks(out: Output, title: str, changes: "Sequence[PeakChange]") -> No
             number(None if one.after is None else one.after.frequency_hz, digits=5),
             with_error(one.shift_hz, one.shift_std_hz) if one.fate == "moved" else "-",
         ]
-        for one in told
+        for one in told[:MOST_ROWS]
     ]
+    if len(told) > MOST_ROWS:
+        title = f"{title}: {MOST_ROWS} of {len(told)} changes, all of them with --json"
     out.table(title, ["channels", "what", "before [Hz]", "after [Hz]", "shift [Hz]"], rows)

@@ -23,7 +23,9 @@ SAME_PEAK_SHARE = 0.05
 SAME_PEAK_LINES = 3.0
 # A shift of 3.5 sigma happens by chance once in 2000 peaks; even were sigma 20 % too small, once in 280.
 MOVED_SIGMAS = 3.5
+# Peaks looked at on each side, and how many of the highest are told: one of these may be among the lower ones there.
 PEAKS_A_CHANNEL = 30
+PEAKS_TOLD = 10
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -58,7 +60,7 @@ def compare_densities(
     The ratio of two estimates with nu = 2 (G/std)^2 degrees of freedom each follows F(nu_after, nu_before) when
     nothing changed (Bendat & Piersol 2010, section 4.2.4). Many lines are judged together after Benjamini & Hochberg
     (1995). A peak has moved when its shift exceeds 3.5 sigma; it appeared or vanished when it has no partner within
-    5 % and its lines changed significantly.
+    5 % and its lines changed significantly. The ten highest peaks of each channel or function on either side are told.
     """
     _require_share(false_discovery)
     names, only_before, only_after = _matched(before.channels, after.channels, "channel")
@@ -266,7 +268,8 @@ def _fates(old: Sequence[Peak], new: Sequence[Peak], frequency_hz: Floats, signi
     come = [peak for k, peak in enumerate(new) if k not in partners.values() and changed(peak)]
     changes += [PeakChange(fate="vanished", before=p, after=None, shift_hz=np.nan, shift_std_hz=np.nan) for p in gone]
     changes += [PeakChange(fate="appeared", before=None, after=p, shift_hz=np.nan, shift_std_hz=np.nan) for p in come]
-    return changes
+    high = {id(peak) for peak in (*old[:PEAKS_TOLD], *new[:PEAKS_TOLD])}
+    return [change for change in changes if {id(change.before), id(change.after)} & high]
 
 
 def _moved_or_not(before: Peak, after: Peak) -> PeakChange:

@@ -1,5 +1,10 @@
+from types import SimpleNamespace
+
 import pytest
 
+from chladni.cli import compare
+from chladni.signals.comparison import PeakChange
+from chladni.signals.peak import Peak
 from tests.arm import TOOL, write_arm
 
 
@@ -41,3 +46,13 @@ def test_figures_are_saved_where_asked_for(run, arm_log, louder_log, tmp_path):
     names = ["change-of-psd-1-acceleration.png", "change-of-psd-1-acceleration.svg"]
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == names
     assert all(name in outcome.out.replace("\n", "") for name in names)
+
+
+def test_a_long_list_of_changes_is_cut_with_a_word(run, monkeypatch):
+    monkeypatch.setattr(compare, "MOST_ROWS", 2)
+    peak = Peak(frequency_hz=10.0, frequency_std_hz=0.1, height=1.0, height_std=0.1, unit="N", channels=("a",))
+    gone = PeakChange(fate="vanished", before=peak, after=None, shift_hz=float("nan"), shift_std_hz=float("nan"))
+    told = []
+    out = SimpleNamespace(table=lambda title, _columns, rows: told.append((title, len(rows))))
+    compare._print_peaks(out, "Peaks", [gone] * 5)
+    assert told == [("Peaks: 2 of 5 changes, all of them with --json", 2)]

@@ -216,3 +216,17 @@ def test_functions_are_matched_by_name():
     same = compare_responses(one, one)
     assert not same.significant.any()
     np.testing.assert_allclose(same.change_db[np.isfinite(same.change_db)], 0, atol=1e-12)
+
+
+def test_only_the_highest_peaks_of_either_side_are_told():
+    random = np.random.default_rng(4)
+    time_s = np.arange(40_000) / RATE_HZ
+    tones = [np.sin(2 * np.pi * 12 * number * time_s) * 0.9**number for number in range(1, 16)]
+    before, after = (sum(tones) + 1e-3 * random.standard_normal(time_s.size) for _ in range(2))
+    # A tone far below the others comes up; the fifteen that stay are not all told, this one isn't at all.
+    faint = 1e-2 * np.sin(2 * np.pi * 237 * time_s)
+    result = compare_densities(density([before]), density([after + faint]))
+    assert len(result.peaks) == 10
+    assert {peak.fate for peak in result.peaks} == {"unchanged"}
+    loud = compare_densities(density([before]), density([after + 100 * faint]))
+    assert [peak.fate for peak in loud.peaks].count("appeared") == 1
