@@ -60,7 +60,8 @@ def compare_densities(
     The ratio of two estimates with nu = 2 (G/std)^2 degrees of freedom each follows F(nu_after, nu_before) when
     nothing changed (Bendat & Piersol 2010, section 4.2.4). Many lines are judged together after Benjamini & Hochberg
     (1995). A peak has moved when its shift exceeds 3.5 sigma; it appeared or vanished when it has no partner within
-    5 % and its lines changed significantly. The ten highest peaks of each channel or function on either side are told.
+    5 % and its lines changed significantly. The ten highest peaks of each channel or function on either side are
+    told.
     """
     _require_share(false_discovery)
     names, only_before, only_after = _matched(before.channels, after.channels, "channel")
