@@ -148,8 +148,8 @@ def _faults_of(record: _Record, place: Ints | None) -> list[SensorFault]:
     if _is_dead(record):
         everything = np.arange(record.samples.size)
         return _fault(channel, "dead", everything, _dead_told(record), place)
-    clipped, what = _clipped(record)
-    faults = _fault(channel, "clipped", clipped, (what, "use a larger range"), place)
+    clipped, told = _clipped(record)
+    faults = _fault(channel, "clipped", clipped, told, place)
     told = ("is held or zero amid motion", "check transmission")
     faults += _fault(channel, "dropouts", _held(record), told, place)
     told = ("leaps away and back", "check connectors and grounding")
@@ -230,17 +230,20 @@ def _is_coarse(record: _Record) -> bool:
     return 3 <= np.unique(record.samples).size <= 16
 
 
-def _clipped(record: _Record) -> tuple[Ints, str]:
+def _clipped(record: _Record) -> tuple[Ints, tuple[str, str]]:
     """Give the samples beyond the range, and what to say of them."""
     unit = record.channel.unit
     if record.channel.overload is not None:
         limit = _NEAR_OVERLOAD * record.channel.overload
         if max(record.high, -record.low) >= limit:
             reached = with_unit(f"{record.channel.overload:.6g}", unit)
-            return np.flatnonzero(np.abs(record.samples) >= limit), f"reaches its range of {reached}"
+            there = np.flatnonzero(np.abs(record.samples) >= limit)
+            return there, (f"reaches its range of {reached}", "use a larger range")
     ends = {level: _plateaus(record, level) for level in (record.low, record.high) if level != 0}
     levels = " and ".join(f"{level:.6g}" for level, there in ends.items() if there.size)
-    return np.sort(np.concatenate([*ends.values()])), f"is cut off at {with_unit(levels, unit)}"
+    # A tank that is full stays at 100 %; samples alone can't tell that from a sensor at its limit.
+    told = (f"is cut off at {with_unit(levels, unit)}", "use a larger range, unless the quantity itself ends there")
+    return np.sort(np.concatenate([*ends.values()])), told
 
 
 def _plateaus(record: _Record, level: float) -> Ints:

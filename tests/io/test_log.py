@@ -245,7 +245,7 @@ def test_not_a_number_counts_as_missing(tmp_path: Path) -> None:
         np.testing.assert_array_equal(np.argwhere(~series.valid), [[1, 7], [2, 9]])
         assert np.isnan(series.values[2, 9])
         told = log.info().findings
-        assert f"{AXES[1]}: 1 of 300 samples are not a number; they count as missing" in told
+        assert f"{AXES[1]}: 1 of 300 samples not a number; they count as missing" in told
         assert any(finding.startswith(f"{AXES[2]}: is no number in 1 sample; ") for finding in told)
 
 
