@@ -1,6 +1,7 @@
 """The ``chladni`` program: its commands, and one place that turns errors into a line and an exit code."""
 
 import os
+import re
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -18,6 +19,7 @@ from chladni.cli.view import view
 from chladni.signals.errors import ChladniError
 
 SUCCESS, DEFECT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
+MOST_MISTAKES = 3
 
 app = typer.Typer(
     name="chladni",
@@ -72,8 +74,20 @@ def _fail(error: Exception, code: int) -> int:
         traceback.print_exception(error)
     text = error.format_message() if isinstance(error, typer.TyperException) else str(error)
     # Typer hands on how its own validation calls a wrong choice.
-    line = " ".join(text.replace("Value error, ", "").split())
+    text = text.replace("Value error, ", "")
+    line = " ".join((_mistakes(text.splitlines()) if isinstance(error, ChladniError) else text).split())
     if code == DEFECT:
         line = f"defect of chladni ({type(error).__name__}): {line}; CHLADNI_TRACEBACK=1 shows where"
     print(f"chladni: {line}", file=sys.stderr)  # noqa: T201  # the one line that a failure prints
     return code
+
+
+def _mistakes(lines: Sequence[str]) -> str:
+    """Several mistakes of one file, the first few with their lines, as one line."""
+    told = list(lines[:MOST_MISTAKES])
+    if place := re.match(r".+?:(?=\d+: )", lines[0] if lines else ""):
+        # All have the same long path in front.
+        told[1:] = [line.replace(place[0], "line ", 1) for line in told[1:]]
+    if len(lines) > MOST_MISTAKES:
+        told.append(f"and {len(lines) - MOST_MISTAKES} more mistakes")
+    return "; ".join(told)

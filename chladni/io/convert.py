@@ -4,14 +4,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from chladni.io.files.contents import FileContents
+from chladni.io.mcap.log_file import DATA_SUFFIXES
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
 
 LOG_SUFFIX = ".mcap"
-FILE_SUFFIXES = (".csv", ".txt", ".wav", ".mat", ".npz", ".uff", ".unv")
+FILE_SUFFIXES: Final = DATA_SUFFIXES
 """Suffixes of data files that are read and written, besides that of logs."""
 
 

@@ -199,7 +199,7 @@ class LogReader:
                 self._require_uniform(placement)
         groups = group_placements([one for one in placements if one.time_base.uniform and one.index.size])
         if not groups:
-            raise LogError(f"{self.container.path.name}: no channel has uniform samples {self.window.told}")
+            raise LogError(self._nothing_uniform(placements))
         for group in groups:
             self._require_filled(group)
         return groups
@@ -216,6 +216,15 @@ class LogReader:
             told = [(grid_rows(group, self.order).channels, group.rate_hz) for group in groups]
             raise LogError(f"{several_grids(self.container.path.name, told)}, or read channels that share one")
         return groups[0]
+
+    def _nothing_uniform(self, placements: Sequence[Placement]) -> str:
+        reasons = [
+            f"{one.stream.label}: {one.time_base.advice if one.time_base.samples else 'no sample'}"
+            for one in placements
+        ]
+        more = f"; and {len(reasons) - 3} more" if len(reasons) > 3 else ""
+        told = f"{'; '.join(reasons[:3])}{more}"
+        return f"{self.container.path.name}: no channel has uniform samples {self.window.told}: {told}"
 
     def _require_uniform(self, placement: Placement) -> None:
         base, label = placement.time_base, placement.stream.label
@@ -281,7 +290,8 @@ def several_grids(file: str, told: Iterable[tuple[Sequence[Channel], float]]) ->
     grids = [f"{_names(channels)} at {rate_hz:.6g} Hz" for channels, rate_hz in told]
     return (
         f"{file}: channels have {len(grids)} different sampling grids: {'; '.join(grids)}; "
-        "bring them to one by band-limited resampling with sample_rate_hz=, take each alone with read_groups()"
+        f"bring them to one by band-limited resampling with sample_rate_hz= (chladni convert {file} OUT.mcap "
+        "--rate HZ), take each alone with read_groups()"
     )
 
 

@@ -262,6 +262,8 @@ class CrossSpectraAccumulator:
         samples, longest = self.segmentation.samples, self.stretch.longest_run
         where = f"valid in all of {len(self.channels)} channels" if len(self.channels) > 1 else "valid"
         remedy = "leave out the channels that have gaps"
+        if not longest and len(self.channels) == 1:
+            return "no sample is a number (all are NaN); leave the channel out"
         if longest >= SHORTEST_SEGMENT:
             remedy = f"ask for {self.sample_rate_hz / longest:.3g} Hz or coarser, or {remedy}"
         return (

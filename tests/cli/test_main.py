@@ -40,6 +40,19 @@ def test_unusable_input_is_one_line_and_code_2(run, arguments, words):
     assert outcome.err.count("\n") == 1
 
 
+def test_several_mistakes_of_a_setup_file_are_told_apart_in_one_line(run, arm_log, tmp_path):
+    setup = tmp_path / "setup.toml"
+    tables = "".join(f'[[channel]]\npath = "/x{n}"\nunti = "V"\n' for n in range(5))
+    setup.write_text(f'format = "chladni.setup/1"\n{tables}')
+    outcome = run("info", arm_log, "--setup", setup)
+    assert outcome.code == UNUSABLE
+    assert outcome.err == (
+        f"chladni: {setup}:4: [[channel]] 1 unti: unknown key; did you mean unit?; "
+        "line 7: [[channel]] 2 unti: unknown key; did you mean unit?; "
+        "line 10: [[channel]] 3 unti: unknown key; did you mean unit?; and 2 more mistakes\n"
+    )
+
+
 def test_a_defect_is_one_line_and_code_1(run, arm_log, monkeypatch):
     def broken(self):
         raise ZeroDivisionError("two\nlines")

@@ -505,6 +505,28 @@ def test_events_are_refused_with_a_reason(tmp_path: Path) -> None:
         assert any(finding.startswith("/events: ") for finding in info.findings)
 
 
+def test_when_nothing_is_uniform_each_topic_says_why(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    columns = {"/one": (np.array([START_NS]), range(1))}
+    for name in ("/e1", "/e2", "/e3"):
+        columns[name] = (START_NS + np.cumsum(rng.exponential(0.05, 300) * 1e9).astype(np.int64), range(300))
+    write_scalars(tmp_path / "a.mcap", columns)
+    with open_log(tmp_path / "a.mcap") as log, pytest.raises(LogError) as caught:
+        log.read()
+    told = str(caught.value).removeprefix("a.mcap: no channel has uniform samples in the log: ")
+    assert told.startswith("/one: no rate without at least two stamps; /e1: ")
+    assert told.endswith("; and 1 more")
+
+
+def test_channels_on_several_grids_are_refused_with_the_remedy_of_either_surface(tmp_path: Path) -> None:
+    fast, slow = START_NS + np.arange(1000) * 10**7, START_NS + np.arange(300) * 33 * 10**6
+    write_scalars(tmp_path / "a.mcap", {"/a": (fast, range(1000)), "/b": (slow, range(300))})
+    with open_log(tmp_path / "a.mcap") as log, pytest.raises(LogError, match="different sampling grids") as caught:
+        log.read()
+    for remedy in ("sample_rate_hz=", "read_groups()", "chladni convert a.mcap OUT.mcap --rate HZ"):
+        assert remedy in str(caught.value)
+
+
 # --- names, filters, batch messages ------------------------------------------------------------------------------
 
 
@@ -883,7 +905,7 @@ def test_a_silent_topic_and_an_empty_log(tmp_path: Path) -> None:
     with open_log(tmp_path / "a.mcap") as log:
         with pytest.raises(LogError, match="/imu has no sample in the log"):
             log.read([AXES[0]])
-        with pytest.raises(LogError, match="no channel has uniform samples in the log"):
+        with pytest.raises(LogError, match="no channel has uniform samples in the log: /imu: no sample"):
             log.read()
         content = log.info().to_json()
         assert (content["duration_s"], content["channels"][0]["samples"], content["channels"][0]["rate_hz"]) == (

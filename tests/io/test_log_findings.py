@@ -11,6 +11,8 @@ from chladni.io.log_findings import damage_finding
 from chladni.io.loss import Loss
 from tests.make_logs import START_NS, LogMaker
 
+NOBODY_FILLS = "0 throughout; sensors that aren't connected, or fields that nobody fills"
+
 
 def findings_of(path: Path, rows: Mapping[str, Sequence[Mapping[str, float | None]]]) -> tuple[str, ...]:
     """Findings of a log of JSON messages, by topic, at 100 Hz."""
@@ -51,8 +53,7 @@ def test_topics_and_channels_that_share_a_sentence_share_a_finding(tmp_path: Pat
     found = findings_of(tmp_path / "a.mcap", rows)
     assert found == (
         "/a.x, /b.x, /c.x and 2 more: leaps away and back in 1 to 2 samples each; check connectors and grounding",
-        "/a.zero, /b.zero, /c.zero and 2 more: 0 throughout; sensors that aren't connected, or fields that nobody "
-        "fills",
+        f"/a.zero, /b.zero, /c.zero and 2 more: {NOBODY_FILLS}",
         "/a.set, /b.set, /c.set and 2 more: constant; settings, fields that aren't measured, or dead sensors",
         "the log gives no unit for /a.x, /a.zero, /a.set and 12 more; a setup file can",
     )

@@ -141,6 +141,14 @@ def test_only_gaps_is_an_error_that_says_how_long_the_longest_stretch_is():
     assert average.stretch.skipped == PLAN.count(400)
 
 
+def test_a_channel_without_any_number_is_told_as_such():
+    missing = with_gaps(series(noise(1, 200)), (0, 0, 200))
+    average = CrossSpectraAccumulator(missing.channels, missing.sample_rate_hz, PLAN)
+    average.update(missing)
+    with pytest.raises(EstimateError, match="no sample is a number"):
+        average.result()
+
+
 def test_an_empty_block_and_a_wholly_invalid_one_change_nothing_but_the_count():
     average = accumulate([part(WHOLE, 0, 100), part(WHOLE, 100, 100), with_gaps(part(WHOLE, 100, 200), (0, 0, 100))])
     assert average.result().provenance.averages == PLAN.count(100)
