@@ -61,8 +61,13 @@ def count_messages(tangled: Untangled) -> Counted | None:
     # Chance gives a coherence of 0.055 over windows of 256.
     if by_phase.coherence > 0.09 + 2.5 / np.sqrt(time_ns.size) and _mostly_filled(steps, guess):
         return Counted(count=by_phase, item_size=1, period_ns=guess, in_order=False)
-    # Stamps too late or too scattered for their phase may still count a steady source, if none was lost.
-    by_order = count_by_order(time_ns, steps, np.ones_like(time_ns), mean_ns)
+    return count_late_messages(tangled)
+
+
+def count_late_messages(tangled: Untangled) -> Counted | None:
+    """Count messages in order: too late or scattered for their phase, they may still come from a steady source."""
+    time_ns, mean_ns = tangled.time_ns, typical_period(tangled.time_ns)
+    by_order = count_by_order(time_ns, tangled.steps, np.ones_like(time_ns), mean_ns)
     if time_ns.size >= SHORT and order_fano(by_order, mean_ns) > _RANDOM:
         return None
     return Counted(count=by_order, item_size=1, period_ns=mean_ns, in_order=True)

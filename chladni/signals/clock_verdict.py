@@ -4,6 +4,9 @@ from dataclasses import replace
 from math import floor, log10, pi
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from chladni.signals.clock_count import SHORT, Counted
 
 if TYPE_CHECKING:
@@ -11,6 +14,8 @@ if TYPE_CHECKING:
 
 # Scatter, relative to the period, above which samples placed on a grid deserve a warning.
 JITTERED = 0.05
+#: Advice where nothing speaks for a clock.
+EVENTS = "messages come at events and not on a grid; a spectrum needs uniform samples"
 
 
 def verdict(counted: Counted, *, relative_jitter: float) -> "Verdict":
@@ -38,6 +43,16 @@ def advice(base: "TimeBase") -> str:
             f"uncertain at {limit_hz:.3g} Hz, more above"
         )
     return "; ".join(_remarks(base)) or "the clock is sound"
+
+
+def uneven(steps_ns: NDArray[np.int64]) -> str:
+    """Give the advice for stamps that are near a clock, but keep no rate that all of them would fit."""
+    low_ms, high_ms = np.percentile(steps_ns, [5, 95]) * 1e-6
+    return (
+        f"no single rate fits the stamps: intervals run from {low_ms:.4g} to {high_ms:.4g} ms (5 to 95 %), mean "
+        f"{steps_ns.mean() * 1e-6:.4g} ms; a spectrum needs uniform samples, so resample the signal at even times "
+        "first, or take a part that keeps its rate"
+    )
 
 
 def _remarks(base: "TimeBase") -> list[str]:

@@ -1,5 +1,6 @@
 """Time base: rate, start and soundness of a clock, from the stamps of messages."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf, isfinite, pi
@@ -8,15 +9,21 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.clock_count import Counted, count_batches, count_messages
+from chladni.signals.clock_check import grid_agrees
+from chladni.signals.clock_count import Counted, count_batches, count_late_messages, count_messages
 from chladni.signals.clock_fit import Clock, fit_clock, measure_wander
-from chladni.signals.clock_verdict import advice, verdict, with_nominal, with_round_rate
+from chladni.signals.clock_verdict import EVENTS, advice, uneven, verdict, with_nominal, with_round_rate
 from chladni.signals.errors import EstimateError
 from chladni.signals.grid_index import choose_smoothing, grid_index
 from chladni.signals.stamp_gaps import list_gaps
 from chladni.signals.stamp_order import LONGEST_NS, ClockJump, Untangled, require_stamps, untangle
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.value import Value, require_shape
+
+# Share of a period below which the second of two messages has no point of its own.
+_AT_ONCE = 0.05
+# Share of the messages that may find no free point; with more, the source was faster than the grid for a while.
+_CROWD = 0.01
 
 Verdict = Literal["regular", "jittered", "bursts", "irregular", "still", "short"]
 
@@ -41,8 +48,8 @@ class TimeBase(Value):
         Samples (messages, or all samples of batch messages) that the stamps stand for.
     verdict
         ``regular``; ``jittered`` (scatter above 5 % of a period); ``bursts`` (several messages nearly at once, then
-        silence: samples are counted in order); ``irregular`` (event-driven, no grid); ``still`` (stamps don't
-        move); ``short`` (fewer than eight, too few to judge).
+        silence: samples are counted in order); ``irregular`` (events, or no one rate: no grid); ``still`` (stamps
+        don't move); ``short`` (fewer than eight, too few to judge).
     advice
         One sentence on what that means for spectra.
     snapped
@@ -56,7 +63,8 @@ class TimeBase(Value):
     gap_count, missing
         All gaps, and the grid points without a sample.
     duplicates, out_of_order
-        Messages with the stamp of another one; messages that came after a later one.
+        Messages with the stamp of another one, or too near it to have a grid point of their own; messages that came
+        after a later one.
     jumps
         Steps of the clock: back, and implausibly far forward (which may also be a pause, and is a gap too).
     burst_size
@@ -115,6 +123,8 @@ class TimeBase(Value):
 def fit_time_base(stamps_ns: NDArray[Any]) -> TimeBase:
     """Fit rate and start to message stamps, ignoring jitter, gaps, repeats, disorder, clock steps and bursts.
 
+    A grid that would contradict the stamps is not given: see `chladni.signals.clock_check.grid_agrees`.
+
     Parameters
     ----------
     stamps_ns
@@ -172,13 +182,31 @@ def _fit(stamps: NDArray[np.int64], counts: NDArray[np.int64] | None, nominal_hz
     if counts is not None and tangled.order is not None:
         sizes = counts[tangled.order]
     counted = count_messages(tangled) if counts is None else count_batches(tangled.time_ns, sizes, nominal_hz)
+    base = _on_grid(tangled, sizes, counted, samples, nominal_hz)
+    if base is None and counts is None and counted is not None and not counted.in_order:
+        # Phases that only seemed to agree: the order may still tell.
+        base = _on_grid(tangled, sizes, count_late_messages(tangled), samples, nominal_hz)
+    if base is not None:
+        return base
+    return _irregular(tangled, samples, EVENTS if counted is None else uneven(tangled.steps))
+
+
+def _on_grid(
+    tangled: Untangled, sizes: NDArray[np.int64], counted: Counted | None, samples: int, nominal_hz: float | None
+) -> TimeBase | None:
+    """Fit a grid to what was counted; None when there is none, or it tells another time than the stamps."""
     clock = None if counted is None else fit_clock(counted.count, counted.period_ns)
     if counted is None or clock is None:
-        return _irregular(tangled, samples)
+        return None
     base = _measured(tangled, counted, clock, samples)
     base = _in_order(base, tangled.time_ns, sizes, counted, clock) if counted.in_order else _by_phase(base, tangled)
     base = replace(base, advice=advice(base))
-    return with_round_rate(base) if nominal_hz is None else with_nominal(base, nominal_hz)
+    # Over a long gap even a small step of the rate would move what comes after.
+    settled = with_round_rate(base) if nominal_hz is None else with_nominal(base, nominal_hz)
+    for one in (settled, base):
+        if grid_agrees(one, tangled.time_ns, sizes):
+            return one
+    return None
 
 
 def _measured(tangled: Untangled, counted: Counted, clock: Clock, samples: int) -> TimeBase:
@@ -235,11 +263,19 @@ def _by_phase(base: TimeBase, tangled: Untangled) -> TimeBase:
     rising_ns = tangled.time_ns
     clock = partial(grid_index, knots_ns=base.knots_ns, knots_index=base.knots_index, rate_hz=base.rate_hz)
     smoothing = choose_smoothing(rising_ns, clock, repeats=base.duplicates)
+    lost = _points_lost(rising_ns, clock, smoothing)
+    if smoothing > 1 and lost < 0:
+        # Two messages for one point of the grid, though not with the very same stamp, are a repeat as well.
+        repeats = int(np.count_nonzero(tangled.steps < _AT_ONCE * NS_PER_S / base.rate_hz))
+        if repeats > base.duplicates and repeats + lost >= 0:
+            base = replace(base, duplicates=repeats)
+            smoothing = choose_smoothing(rising_ns, clock, repeats=repeats)
+            lost = _points_lost(rising_ns, clock, smoothing)
     long = np.flatnonzero(tangled.steps > 1.5 * NS_PER_S / base.rate_hz)
-    end = np.arange(max(0, rising_ns.size - 4 * smoothing), rising_ns.size)
-    lost = int(clock(rising_ns[end], end, smoothing=smoothing)[-1]) + 1 - rising_ns.size
-    if smoothing > 1 and lost <= 0 and not base.duplicates:
-        # No fewer samples than grid points: their order tells their places better than scattered stamps.
+    crowded = -lost > max(1, _CROWD * rising_ns.size)
+    if smoothing > 1 and (crowded or -1 <= lost <= 0) and not base.duplicates:
+        # As many samples as grid points: their order tells their places better than scattered stamps. With a few
+        # more they follow the stamps and leave those out; with many more this is no grid, as the check will find.
         return replace(base, resumed_ns=rising_ns[:1], resumed_shift=np.zeros(1, dtype=np.int64))
     if smoothing == 1:
         after, before = (clock(rising_ns[place], place) for place in (long + 1, long))
@@ -256,6 +292,12 @@ def _by_phase(base: TimeBase, tangled: Untangled) -> TimeBase:
         jumps=base.jumps + gaps.leaps,
         smoothing=smoothing,
     )
+
+
+def _points_lost(rising_ns: NDArray[np.int64], clock: Callable[..., NDArray[np.int64]], smoothing: int) -> int:
+    """Grid points that no message has; negative when there are more messages than points."""
+    end = np.arange(max(0, rising_ns.size - 4 * smoothing), rising_ns.size)
+    return int(clock(rising_ns[end], end, smoothing=smoothing)[-1]) + 1 - rising_ns.size
 
 
 def _knots(
@@ -302,7 +344,7 @@ def _still(stamps: NDArray[np.int64], samples: int) -> TimeBase:
     )
 
 
-def _irregular(tangled: Untangled, samples: int) -> TimeBase:
+def _irregular(tangled: Untangled, samples: int, told: str = EVENTS) -> TimeBase:
     span_s = float(tangled.time_ns[-1] - tangled.time_ns[0]) / NS_PER_S
     return TimeBase(
         rate_hz=(samples - 1) / span_s,
@@ -310,7 +352,7 @@ def _irregular(tangled: Untangled, samples: int) -> TimeBase:
         start_ns=int(tangled.time_ns[0]),
         samples=samples,
         verdict="irregular",
-        advice="messages come at events and not on a grid; a spectrum needs uniform samples",
+        advice=told,
         duplicates=tangled.duplicates,
         out_of_order=tangled.out_of_order,
         jumps=tangled.jumps,
