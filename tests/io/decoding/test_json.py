@@ -267,7 +267,8 @@ def test_damaged_bytes_give_what_the_rules_give(content: list[bytes], at: int, c
         return
     assert not block.bad[0].any(), "the fast path may refuse more than the rules, never less"
     for fast, slow in zip(found, (column[0] for column in block.found), strict=True):
-        assert np.array_equal(fast.values, slow.values)
+        # A key that was damaged is a number that is missing.
+        assert np.array_equal(fast.values, slow.values, equal_nan=True)
 
 
 @pytest.mark.parametrize(
