@@ -8,6 +8,7 @@ from chladni.io.loss import Loss
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
 from chladni.signals.unit_text import with_unit
+from chladni.signals.wording import counted
 
 MOST_PEAKS_TOLD = 5
 
@@ -19,7 +20,7 @@ def damage_sentences(losses: Sequence[Loss]) -> tuple[str, ...]:
 
 def _damage_sentence(loss: Loss) -> str:
     where = "" if loss.offset is None else f" at byte {loss.offset} ({loss.record})"
-    lost = "an unknown number of messages" if loss.lost_messages is None else f"{loss.lost_messages} messages"
+    lost = "an unknown number of messages" if loss.lost_messages is None else counted(loss.lost_messages, "message")
     return f"Damage{where}: {loss.what}; {lost} lost."
 
 
@@ -27,7 +28,7 @@ def soundness_sentences(info: LogInfo) -> tuple[str, ...]:
     """Say whether the log is sound: its length, damage, and every trouble of its clocks and sensors."""
     rates = sorted({one["rate_hz"] for one in info.to_json()["channels"] if one["rate_hz"]}, reverse=True)
     told = some_of([f"{rate:.6g} Hz" for rate in rates])
-    summary = f"{info.duration_s:.6g} s, {len(info.channels)} channels" + (f" at {told}" if told else "")
+    summary = f"{info.duration_s:.6g} s, {counted(len(info.channels), 'channel')}" + (f" at {told}" if told else "")
     return (f"{summary}. {'No trouble found.' if not info.findings else ''}".rstrip(), *info.findings)
 
 

@@ -299,6 +299,6 @@ def _without_constant(spectra: CrossSpectra, watched: Watched, *, keep: Sequence
     moving = [channel.name for channel in spectra.channels if channel.name not in constant]
     if not moving:
         raise EstimateError(f"no channel changes: {some_of(constant)}; nothing to make a spectrum of")
-    note = f"{len(constant)} channels never change and are left out: {some_of(constant)}"
+    note = f"channels that never change are left out: {some_of(constant)}"
     chosen = spectra.select(moving)
     return replace(chosen, provenance=chosen.provenance.with_notes(note))

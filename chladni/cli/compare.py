@@ -8,6 +8,7 @@ import typer
 from chladni.cli import options
 from chladni.cli.output import Output
 from chladni.cli.words import number, unit, with_error
+from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -92,7 +93,7 @@ def _print_levels(out: Output, changes: "Sequence[LevelChange]") -> None:
 def _print_peaks(out: Output, title: str, changes: "Sequence[PeakChange]") -> None:
     told = [one for one in changes if one.fate != "unchanged"]
     if not told:
-        out.line(f"{title}: {UNCHANGED}; {len(changes)} peaks stayed.")
+        out.line(f"{title}: {UNCHANGED}; {counted(len(changes), 'peak')} stayed.")
         return
     rows: list[list[Any]] = [
         [

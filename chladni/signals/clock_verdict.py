@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.clock_count import SHORT, Counted
+from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
     from chladni.signals.time_base import TimeBase, Verdict
@@ -30,7 +31,7 @@ def verdict(counted: Counted, *, relative_jitter: float) -> "Verdict":
 def advice(base: "TimeBase") -> str:
     """Give one sentence on what the verdict means for spectra."""
     if base.verdict == "short":
-        return f"{base.samples} samples are too few to judge the clock; state the rate if you know it"
+        return f"{counted(base.samples, 'sample')}: too few to judge the clock by; state the rate if you know it"
     if base.verdict == "bursts":
         return (
             f"messages come in bursts of about {base.burst_size}, so samples are counted in order and a lost one "
@@ -61,19 +62,15 @@ def _remarks(base: "TimeBase") -> list[str]:
     if base.wander_s * base.rate_hz > 1:
         remarks.append(f"the clock wanders by {base.wander_s * 1e3:.3g} ms, so long averages smear sharp peaks")
     if base.jumps:
-        remarks.append(f"the clock was set ({_counted(len(base.jumps), 'step')})")
+        remarks.append(f"the clock was set ({counted(len(base.jumps), 'step')})")
     if base.gap_count:
-        lost = f"{_counted(base.missing, 'sample')} missing in {_counted(base.gap_count, 'gap')}"
+        lost = f"{counted(base.missing, 'sample')} missing in {counted(base.gap_count, 'gap')}"
         remarks.append(f"{lost}, averages leave out what touches them")
     if base.duplicates:
-        remarks.append(f"{_counted(base.duplicates, 'repeated stamp')}, the first message of each is kept")
+        remarks.append(f"{counted(base.duplicates, 'repeated stamp')}, the first message of each is kept")
     if base.out_of_order:
-        remarks.append(f"{_counted(base.out_of_order, 'message')} late, put in order")
+        remarks.append(f"{counted(base.out_of_order, 'message')} late, put in order")
     return remarks
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def round_rate(rate_hz: float, std_hz: float) -> float | None:
