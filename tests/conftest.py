@@ -16,6 +16,7 @@ def shared_data() -> Path:
     """The folder of measured logs; tests that need it are skipped with a reason where it is absent."""
     beside_the_project = Path(__file__).parents[2] / "shared" / "data"
     folder = Path(os.environ.get("CHLADNI_DATA", beside_the_project))
-    if not folder.is_dir():
+    # A folder that may not be looked into counts as absent, where is_dir would raise.
+    if not os.access(folder, os.R_OK | os.X_OK):
         pytest.skip(f"measured logs not found in {folder}; set CHLADNI_DATA to their folder")
     return folder
