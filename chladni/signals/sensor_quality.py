@@ -29,6 +29,7 @@ _LEAP_BLOCK = 4096
 _WIDEST_SPIKE = 3
 _QUIET_AROUND = 8
 _FEWEST = 16
+_CHANCE = 0.05
 # What the whole record shows isn't counted.
 _THROUGHOUT = ("dead", "coarse")
 
@@ -104,7 +105,8 @@ def sensor_quality(series: TimeSeries) -> tuple[SensorFault, ...]:
     Rules, with q the smallest step seen and m the median step between neighbours:
 
     - clipped: at or above 99.9 % of the channel's overload; or at least three samples in a row at the very top (or
-      bottom), three times as many there as on the value next to it, reached with a step above 0.1 m and 4 q. A top
+      bottom), three times as many there as on the value next to it, reached with a step above 0.1 m and 4 q, and
+      no more by chance than once in 20 where values repeat elsewhere (or reached with a step above 3 m). A top
       reached smoothly is where a motion turns or rests, and an end at exactly 0 is that of a quantity of one sign
       (a speed, a level), which no larger range would move.
     - dead: constant, or two or three values within 0.1 % of the mean or 0.01 % of the overload.
@@ -257,8 +259,17 @@ def _plateaus(record: _Record, level: float) -> Ints:
     entered = starts[(lengths >= _SHORTEST_PLATEAU) & (starts > 1)]
     entry = np.maximum(record.step(entered - 1), record.step(entered - 2))
     kinked = entry > max(0.1 * record.typical_step, 4 * record.smallest_step)
+    if _by_chance(record, there, lengths) and not np.any(entry > 3 * record.typical_step):
+        return there[:0]
     cut_off = there.size >= 3 * beside and kinked.size > 0 and np.count_nonzero(kinked) >= 0.5 * kinked.size
     return there if cut_off else there[:0]
+
+
+def _by_chance(record: _Record, ends: Ints, lengths: Ints) -> bool:
+    """Whether one of these runs may be as long as it is because values repeat everywhere."""
+    at_end = int(np.sum(lengths - 1))
+    repeating = (record.still.size - at_end) / max(1, record.samples.size - ends.size)
+    return bool(lengths.size * repeating ** (int(lengths.max()) - 1) > _CHANCE)
 
 
 def _count_beside(record: _Record, level: float) -> int:

@@ -172,6 +172,19 @@ def test_a_quantity_of_one_sign_that_rests_at_zero_is_not_clipped(sign: float) -
     assert faults_of(sign * speed) == ()
 
 
+def test_three_equal_samples_at_an_end_are_chance_where_every_fourth_repeats() -> None:
+    # A controller is read faster than it measures.
+    rng = np.random.default_rng(16)
+    level = np.round(50 + 5 * np.sin(np.arange(3000) / 100) + 0.5 * rng.normal(size=3000), 1)
+    level = np.repeat(level, 1 + (rng.random(3000) < 1 / 3))
+    low = level.argmin()
+    level[low - 1 : low + 5] = level[low] + np.array([0.6, 0.5, -0.1, -0.1, -0.1, 0.6])
+    assert faults_of(level) == ()
+    for place in range(500, 2500, 100):
+        level[place : place + 3] = level[low] - 5.0
+    assert faults_of(level)[0].kind == "clipped"
+
+
 def test_three_overloaded_samples_of_one_hit_are_enough() -> None:
     hit = impacts(40)
     hit[1018:1021] = 20.0
