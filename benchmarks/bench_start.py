@@ -27,7 +27,7 @@ def shortest_s(command: list[str], repeats: int = 5) -> float:
 
 def small_log(path: Path) -> None:
     """Write a log of about a megabyte."""
-    values = np.random.default_rng(4).standard_normal((3, 10_000))
+    values = np.random.default_rng(4).standard_normal((3, 20_000))
     channels = tuple(chladni.Channel(name=f"/imu.linear_acceleration.{axis}", unit="m/s^2") for axis in "xyz")
     write_mcap(chladni.TimeSeries(values=values, sample_rate_hz=1000.0, channels=channels), path)
 
