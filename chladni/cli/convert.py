@@ -46,6 +46,7 @@ def convert(
     binary=false of a universal file.
     """
     from chladni.io.convert import convert as convert_file
+    from chladni.signals.wording import counted
 
     out = Output(json)
     written = convert_file(
@@ -61,7 +62,7 @@ def convert(
         writing=parse_options(write or (), "--write"),
     )
     out.line(
-        f"wrote {written.target}: {len(written.channels)} channels, {count(written.samples)} samples, "
+        f"wrote {written.target}: {counted(len(written.channels), 'channel')}, samples: {count(written.samples)}, "
         f"{number(written.duration_s, digits=6)} s"
     )
     out.lines((*written.notes, *written.losses))

@@ -8,7 +8,8 @@ from tests.arm import TOOL
 
 def test_there_and_back(run, arm_log, tmp_path):
     table, again = tmp_path / "tool.csv", tmp_path / "again.mcap"
-    assert run("convert", arm_log, table, "--channel", TOOL, "--end", 2).code == 0
+    written = run("convert", arm_log, table, "--channel", TOOL, "--end", 2)
+    assert written.out.startswith(f"wrote {table}: 1 channel, samples: 2 000, 2 s")
     document = run("convert", table, again, "--json", "-").document
     assert document["format"] == "chladni.convert/1"
     assert document["samples"] == 2000
