@@ -17,7 +17,7 @@ from chladni.signals.errors import LogError
     [
         (b"#ROSBAG V2.0\n" + bytes(50), "a ROS 1 bag; convert it with 'mcap convert in.bag out.mcap'"),
         (b"SQLite format 3\0" + bytes(50), "a ROS 2 .db3 bag; convert it"),
-        (gzip.compress(b"log"), "gzip; unpack it with gunzip"),
+        (gzip.compress(b"log", mtime=0), "gzip; unpack it with gunzip"),
         (zstandard.compress(b"log" * 10), "zstd; unpack it with 'zstd -d'"),
         (lz4.frame.compress(b"log" * 10), "lz4; unpack it with 'lz4 -d'"),
         (b"PK\x03\x04" + bytes(50), "a zip archive"),
