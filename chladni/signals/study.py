@@ -4,8 +4,11 @@ from dataclasses import dataclass, field
 
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry
+from chladni.signals.mode_set import ModeSet
+from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.relative_motion import RelativeMotion
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.waterfall import Waterfall
 
@@ -30,6 +33,12 @@ class Study:
         Named peaks of the densities, the highest first.
     response_peaks
         Named peaks of the transfer functions, the highest first.
+    modes
+        Natural modes, or None when none were looked for.
+    validation
+        Checks of the modes, or None.
+    relative_motion
+        Motion between neighbours in each mode, the greatest first.
     geometry
         Where the points sit; empty when no setup file was given.
     findings
@@ -43,5 +52,8 @@ class Study:
     response: FrequencyResponse | None = None
     peaks: tuple[Peak, ...] = ()
     response_peaks: tuple[Peak, ...] = ()
+    modes: ModeSet | None = None
+    validation: ModeValidation | None = None
+    relative_motion: tuple[RelativeMotion, ...] = ()
     geometry: Geometry = field(default_factory=Geometry)
     findings: tuple[str, ...] = ()

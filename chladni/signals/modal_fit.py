@@ -1,0 +1,51 @@
+"""Frequency responses synthesised from modes, and how far they are from the measured ones."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.value import Value, require_frequency_axis, require_shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModalFit(Value):
+    """Synthesis of the functions that the modes were identified from.
+
+    Attributes
+    ----------
+    frequency_hz
+        ``[line]`` the lines that were fitted.
+    synthesised
+        ``[response, reference, line]`` complex, in the form and unit of the measured functions.
+    lower_residual, upper_residual
+        ``[response, reference]`` complex: what modes below and above the band leave, as receptance
+        lower/(j omega)^2 + upper (Maia & Silva 1997, section 4.3).
+    error
+        Root of the summed squares of (measured - synthesised) over that of measured, over all functions and lines.
+    function_error
+        ``[response, reference]`` the same of each function.
+    bands_hz
+        ``[band, 2]`` low and high end of each band, one around each mode, without gaps between.
+    band_error
+        ``[band]`` the same over all functions in each band.
+    """
+
+    frequency_hz: NDArray[np.float64]
+    synthesised: NDArray[np.complexfloating[Any, Any]]
+    lower_residual: NDArray[np.complexfloating[Any, Any]]
+    upper_residual: NDArray[np.complexfloating[Any, Any]]
+    error: float
+    function_error: NDArray[np.float64]
+    bands_hz: NDArray[np.float64]
+    band_error: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        require_frequency_axis(self.frequency_hz)
+        functions = self.function_error.shape
+        require_shape("synthesised", self.synthesised, (*functions, self.frequency_hz.size), "functions x lines")
+        for name in ("lower_residual", "upper_residual"):
+            require_shape(name, getattr(self, name), functions, "responses x references")
+        require_shape("bands_hz", self.bands_hz, (self.band_error.size, 2), "bands x (low, high)")
+        self._freeze()

@@ -1,0 +1,54 @@
+"""Poles over model orders, as an analyst looks at them."""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.errors import EstimateError
+from chladni.signals.value import Value, require_frequency_axis, require_shape
+
+PoleStatus = Literal["new", "frequency", "damping", "vector"]
+POLE_STATUSES: tuple[PoleStatus, ...] = get_args(PoleStatus)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StabilisationDiagram(Value):
+    """Poles of all model orders above an indicator function.
+
+    Attributes
+    ----------
+    order, frequency_hz, damping_ratio
+        ``[pole]`` the oscillating poles on the stable side, by order.
+    status
+        ``[pole]`` index into `POLE_STATUSES`: nothing agrees with the order below, the frequency does, the damping does
+        too, the vector (participation or shape) does too.
+    mode
+        ``[pole]`` row of the mode that the pole was taken for, -1 for none.
+    indicator_hz, indicator
+        ``[line]`` and ``[curve, line]``: singular values of the frequency responses (CMIF) or of the cross-spectra, the
+        greatest first; the diagram is drawn over them.
+    indicator_name, indicator_unit
+        What the curves are.
+    """
+
+    order: NDArray[np.int64]
+    frequency_hz: NDArray[np.float64]
+    damping_ratio: NDArray[np.float64]
+    status: NDArray[np.int64]
+    mode: NDArray[np.int64]
+    indicator_hz: NDArray[np.float64]
+    indicator: NDArray[np.float64]
+    indicator_name: str
+    indicator_unit: str
+
+    def __post_init__(self) -> None:
+        for name in ("frequency_hz", "damping_ratio", "status", "mode"):
+            require_shape(name, getattr(self, name), self.order.shape, "poles")
+        if np.any((self.status < 0) | (self.status >= len(POLE_STATUSES))):
+            raise EstimateError(f"status must index {POLE_STATUSES}")
+        require_frequency_axis(self.indicator_hz)
+        curves = self.indicator.shape[:1]
+        require_shape("indicator", self.indicator, (*curves, self.indicator_hz.size), "curves x lines")
+        self._freeze()
