@@ -22,8 +22,8 @@ class PoleTable(Value):
     pole
         ``[pole]`` in rad/s, Re < 0 < Im.
     vector
-        ``[pole, component]`` complex, length 1: participation factors of a fit of frequency responses, shapes of a fit
-        of responses.
+        ``[pole, component]`` complex, length 1: participation factors of a fit of frequency responses, shapes of a
+        fit of responses.
     frequency_std_hz, damping_std
         ``[pole]`` one sigma of natural frequency and damping ratio where the method knows it, else None.
     """

@@ -21,8 +21,8 @@ class ModalScale(Value):
         ``[mode]`` complex a_r, kg rad/s for forces and translations: participation_j = shapes_j / a_r at every
         reference j that is a driving point (Maia & Silva 1997, section 2.4).
     modal_mass, modal_mass_std
-        ``[mode]`` Re(a_r / (2 j omega_d)), kg for forces and translations, and one sigma of it. A shape over the square
-        root of its modal mass has unit modal mass.
+        ``[mode]`` Re(a_r / (2 j omega_d)), kg for forces and translations, and one sigma of it. A shape over the
+        square root of its modal mass has unit modal mass.
     """
 
     response: str

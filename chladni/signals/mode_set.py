@@ -31,8 +31,8 @@ class ModeSet(Value):
     shapes
         ``[mode, channel]`` complex displacement of each channel along its own direction, largest component 1.
     shape_std
-        ``[mode, channel]`` complex: one sigma of the real part + j one sigma of the imaginary part; 0 at the component
-        that is 1 by convention.
+        ``[mode, channel]`` complex: one sigma of the real part + j one sigma of the imaginary part; 0 at the
+        component that is 1 by convention.
     channels
         One for each column of `shapes`.
     references

@@ -22,13 +22,13 @@ class StabilisationDiagram(Value):
     order, frequency_hz, damping_ratio
         ``[pole]`` the oscillating poles on the stable side, by order.
     status
-        ``[pole]`` index into `POLE_STATUSES`: nothing agrees with the order below, the frequency does, the damping does
-        too, the vector (participation or shape) does too.
+        ``[pole]`` index into `POLE_STATUSES`: nothing agrees with the order below, the frequency does, the damping
+        does too, the vector (participation or shape) does too.
     mode
         ``[pole]`` row of the mode that the pole was taken for, -1 for none.
     indicator_hz, indicator
-        ``[line]`` and ``[curve, line]``: singular values of the frequency responses (CMIF) or of the cross-spectra, the
-        greatest first; the diagram is drawn over them.
+        ``[line]`` and ``[curve, line]``: singular values of the frequency responses (CMIF) or of the cross-spectra,
+        the greatest first; the diagram is drawn over them.
     indicator_name, indicator_unit
         What the curves are.
     """
