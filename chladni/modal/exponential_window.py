@@ -211,7 +211,7 @@ def _notes(modes: ModeSet, damping_ratio: Floats, damping_std: Floats, decay_per
     notes += [
         f"the mode at {modes.frequency_hz[row]:.5g} Hz is left out: its damping ratio of "
         f"{modes.damping_ratio[row]:.3g} is less than the {removed[row]:.3g} that the window of {decay_per_s:g}/s "
-        f"adds ({damping_ratio[row]:.2g} +- {damping_std[row]:.1g} would remain); take a slower window or longer records"
+        f"adds ({damping_ratio[row]:.2g} +- {damping_std[row]:.1g} would remain); take a slower window"
         for row in np.flatnonzero(damping_ratio <= 0)
     ]
     if modes.participation is not None and all(channel.unit not in MOTION_ORDER for channel in modes.channels):
