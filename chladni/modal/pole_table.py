@@ -26,6 +26,8 @@ class PoleTable(Value):
         fit of responses.
     frequency_std_hz, damping_std
         ``[pole]`` one sigma of natural frequency and damping ratio where the method knows it, else None.
+    notes
+        What was left out of the fit, such as orders that the lines don't determine, and why.
     """
 
     orders: NDArray[np.int64]
@@ -34,6 +36,7 @@ class PoleTable(Value):
     vector: NDArray[np.complex128]
     frequency_std_hz: NDArray[np.float64] | None = None
     damping_std: NDArray[np.float64] | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         require_shape("pole", self.pole, self.order.shape, "poles")

@@ -1,0 +1,90 @@
+"""Denominators of all orders, and their roots."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.errors import EstimateError
+
+
+def denominators(matrix: NDArray[np.complex128], references: int, orders: range) -> Iterator[NDArray[np.complex128]]:
+    """Solve for the coefficients alpha_1 to alpha_k of each order k, alpha_0 being the identity.
+
+    Parameters
+    ----------
+    matrix
+        Reduced normal matrix of the highest order.
+    references
+        Size of its blocks.
+    orders
+        Rising.
+
+    Yields
+    ------
+    ``[k, reference, reference]``.
+
+    Notes
+    -----
+    With the Cholesky factor L of M without its first block row and column, and y = -L^-1 M_10, the coefficients of
+    order k are the leading part of L^-H times that of y: one factorisation serves every order.
+
+    With alpha_0 fixed, the roots z that only model noise lie outside the unit circle, that is among unstable poles,
+    while fixing alpha_k would draw them inside (Cauberghe, Guillaume, Verboven, Vanlanduyt and Parloo 2005).
+    """
+    from scipy.linalg import solve_triangular
+
+    try:
+        factor = np.linalg.cholesky(matrix[references:, references:])
+    except np.linalg.LinAlgError:
+        raise EstimateError(
+            f"the lines don't determine polynomials of order {orders[-1]}: lower max_order or widen the band"
+        ) from None
+    inverse = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
+    right = -inverse @ matrix[references:, :references]
+    for order in orders:
+        size = order * references
+        yield (inverse[:size, :size].conj().T @ right[:size]).reshape(order, references, references)
+
+
+def stable_roots(coefficients: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Roots z of det(I + sum alpha_r z^r) within the unit circle.
+
+    Parameters
+    ----------
+    coefficients
+        ``[k, reference, reference]`` alpha_1 to alpha_k.
+
+    Notes
+    -----
+    1/z are the eigenvalues of the block companion matrix of alpha_1 to alpha_k, which is monic: no coefficient is
+    divided by.
+    """
+    order, references = coefficients.shape[:2]
+    companion = np.zeros((order * references, order * references), dtype=np.complex128)
+    # Transposed blocks have the same determinant.
+    companion[:references] = -coefficients.transpose(2, 0, 1).reshape(references, -1)
+    below = np.arange((order - 1) * references)
+    companion[below + references, below] = 1
+    inverse = np.linalg.eigvals(companion)
+    return np.asarray(1 / inverse[np.abs(inverse) > 1])
+
+
+def participation(coefficients: NDArray[np.complex128], roots: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Row vectors L with L A(z) = 0 at each root: how strongly each reference drives that pole.
+
+    Returns
+    -------
+    ``[root, reference]`` of length 1.
+
+    Notes
+    -----
+    H = B A^-1, and near a root A^-1 is v L/(z - root), so that the residue's row space is L.
+    """
+    order, references = coefficients.shape[:2]
+    if references == 1:
+        return np.ones((roots.size, 1), dtype=np.complex128)
+    powers = roots[:, None] ** np.arange(1, order + 1)
+    value = np.eye(references) + np.tensordot(powers, coefficients, axes=1)
+    left = np.linalg.svd(value)[0]
+    return np.asarray(left[:, :, -1].conj())
