@@ -1,0 +1,80 @@
+"""Normal equations of a matrix-fraction fit of frequency responses, reduced to the denominator."""
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from chladni.modal.line_weights import WeightedLines
+from chladni.modal.unit_circle import UnitCircle
+
+# Powers of z on an arc are nearly dependent, more so on lines with gaps: this part of the mean diagonal keeps the
+# numerators' matrix positive definite above rounding.
+NUMERATOR_RIDGE = 1e-13
+# Without noise the denominator's matrix is singular, and any of many denominators fits. A ridge just above rounding
+# picks the shortest, whose surplus poles are unstable as they are under noise (Kumaresan and Tufts 1982).
+DENOMINATOR_RIDGE = 3e-13
+# Complex numbers held for one chunk of responses: 64 MB.
+CHUNK = 4_000_000
+
+
+def reduced_normal_matrix(lines: WeightedLines, circle: UnitCircle, order: int) -> NDArray[np.complex128]:
+    """Assemble M, whose quadratic form is the least-squares cost of a denominator with the best numerators.
+
+    Parameters
+    ----------
+    lines
+        Frequency responses and their weights.
+    circle
+        Where the lines lie.
+    order
+        Of denominator and numerators.
+
+    Returns
+    -------
+    ``[(order + 1) references, (order + 1) references]``, hermitian positive definite. Its leading blocks belong to
+    the lower orders of the denominator, with numerators of the full order.
+
+    Notes
+    -----
+    The right matrix fraction H(z) A(z) = B(z) with A = sum alpha_r z^r, B_o = sum beta_or z^r, is linear in the
+    coefficients; for each output o the normal equations have the blocks R_o, S_o, T_o, and eliminating the
+    numerators leaves M = sum_o T_o - S_o^H R_o^-1 S_o (Guillaume et al. 2003, equations 9 to 14). On lines at
+    z = exp(j angle) every block depends on the difference of its row and column only and is read off one FFT
+    (Cauberghe 2004, section 3.3).
+    """
+    power = lines.weight**2
+    references = lines.values.shape[1]
+    # Sum over the responses before the FFT: there are references^2 of these, however many responses.
+    squares = np.einsum("ok,oik,ojk->ijk", power, np.conj(lines.values), lines.values, optimize=True)
+    blocks = _toeplitz(circle.moments(squares, order), order)
+    matrix = np.array(blocks.transpose(2, 0, 3, 1), order="C").reshape((order + 1) * references, -1)
+    matrix[np.diag_indices_from(matrix)] *= 1 + DENOMINATOR_RIDGE
+    chunk = max(1, CHUNK // (references * max((order + 1) ** 2, circle.length)))
+    for start in range(0, lines.weight.shape[0], chunk):
+        part = slice(start, start + chunk)
+        numerators = _toeplitz(circle.moments(power[part], order), order)
+        cross = _toeplitz(circle.moments(power[part, None] * lines.values[part], order), order)
+        matrix -= _eliminated(numerators, cross)
+    return np.asarray((matrix + matrix.conj().T) / 2)
+
+
+def _toeplitz(moments: NDArray[np.complex128], order: int) -> NDArray[np.complex128]:
+    """``[..., row, column]`` with the moment of lag row - column, from ``[..., lag]``; a view."""
+    return sliding_window_view(moments, order + 1, axis=-1)[..., ::-1]
+
+
+def _eliminated(numerators: NDArray[np.complex128], cross: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Sum over the responses of S^H R^-1 S, by the Cholesky factors of R."""
+    responses, size = numerators.shape[:2]
+    matrix = numerators.copy()
+    diagonal = np.einsum("orr->or", matrix)
+    # A response without a usable line has R = 0 and S = 0: any positive diagonal makes it vanish.
+    diagonal += np.where(diagonal.real > 0, NUMERATOR_RIDGE * diagonal.real, 1.0)
+    stacked = np.array(cross.transpose(0, 2, 3, 1), order="C").reshape(responses, size, -1)
+    from scipy.linalg import solve_triangular
+
+    factor = np.linalg.cholesky(matrix)
+    for response in range(responses):
+        stacked[response] = solve_triangular(factor[response], stacked[response], lower=True, check_finite=False)
+    tall = stacked.reshape(responses * size, -1)
+    return np.asarray(tall.conj().T @ tall)
