@@ -1,16 +1,18 @@
 """Harmonics of rotating machines among responses, told from modes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.modal.narrow_band_kurtosis import NarrowBands, chance_of_kurtosis, independent_samples, narrow_bands
+from chladni.modal.narrow_band_kurtosis import narrow_bands
+from chladni.modal.steady_line import steady_lines
+from chladni.modal.tones import Tone, even_tones, same_tone, steady_tones
 from chladni.signals.errors import EstimateError
 from chladni.signals.machine_harmonic import MachineHarmonic
 from chladni.signals.time_series import TimeSeries
-from chladni.spectral.leakage import leakage, named_window
+from chladni.spectral.stretches import valid_runs
 
 Floats = NDArray[np.float64]
 
@@ -20,21 +22,8 @@ WIDENINGS = (1, 4, 16)
 SHORTEST_SEGMENT = 32
 # A line closer to 0 Hz holds the record's trend.
 FIRST_LINE = 5
-# The sine has half the power of its band or more; with less, whatever else rings there would be named by it.
-MOST_KURTOSIS = 2.625
-# Leakage of a strong sine is a sine too; a second one must stand this far above it.
-OVER_LEAKAGE = 4.0
-MAIN_LOBE_LINES = 2.5
+# Multiples of a machine's speed that are named as such.
 MOST_MULTIPLE = 40
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Tone:
-    """A sine found, with the half width of the band in which another would be the same one."""
-
-    frequency_hz: float
-    width_hz: float
-    reason: str
 
 
 def machine_harmonics(
@@ -60,8 +49,8 @@ def machine_harmonics(
         among all the bands that are looked at.
     least_damping
         Damping ratio below which no mode of the structure lies, above 0. A mode rings so evenly that few samples of
-        its amplitude are independent: about 4 pi least_damping f T in a record of T seconds. Below 8 of them nothing
-        is called a harmonic.
+        its amplitude are independent, about 4 pi least_damping f T in a record of T seconds, and its line is narrow:
+        the fewer, the less is called a harmonic.
 
     Returns
     -------
@@ -76,8 +65,15 @@ def machine_harmonics(
 
     Notes
     -----
-    The amplitude of a sine stays, that of a random response comes and goes: in a narrow band a sine has the kurtosis
-    1.5, Gaussian noise 3 whatever the damping of the mode that shapes it (Jacobsen, Andersen & Brincker 2007).
+    Two signs give a sine away, each with half of `false_alarm`. Its amplitude stays, where that of a random response
+    comes and goes: in a narrow band a sine has the kurtosis 1.5, Gaussian noise 3 whatever the damping of the mode
+    that shapes it (Jacobsen, Andersen & Brincker 2007); the speed may wander within the band. And if its frequency
+    stays, its line in the spectrum of the whole record is narrower than that of any mode: damping near zero.
+
+    A steady sine is found when its mean square is above about 70 G/T, with G the one-sided density of the random
+    response around it and T the length of the record: on top of a mode that has all of the power, when
+    (RMS of the sine / RMS of the response)^2 is above 70/(pi zeta f T), -4 dB at 1 % and 6000 cycles. One that
+    wanders needs more than half of the power in a band of 24/T or wider, and less the shorter the record.
     Responses to periodic excitation (multisine, sweep that repeats) are harmonics throughout.
 
     Examples
@@ -94,17 +90,41 @@ def machine_harmonics(
     [12.5]
     """
     _require_arguments(series, band_hz, false_alarm, least_damping)
-    longest = series.samples // LONGEST_SEGMENT_SHARE
+    longest = _longest_run(series) // LONGEST_SEGMENT_SHARE
     lengths = [2 * (longest // widening // 2) for widening in WIDENINGS]
+    found: list[Tone] = []
     scales = [narrow_bands(series, length) for length in lengths if length >= SHORTEST_SEGMENT]
-    looked_at = [_lines(bands, candidates_hz, band_hz) for bands in scales]
-    tests = len(series.channels) * sum(np.count_nonzero(lines) for lines in looked_at)
-    found: list[_Tone] = []
+    looked_at = [_lines(bands.frequency_hz, candidates_hz, band_hz) for bands in scales]
+    tests = max(sum(int(lines.sum()) for lines in looked_at), 1) * len(series.channels)
     for bands, lines in zip(scales, looked_at, strict=True):
-        for tone in _tones(series, bands, lines, false_alarm / max(tests, 1), least_damping):
-            if not any(_same(tone, other) for other in found):
-                found.append(tone)
-    return _named(found)
+        even = even_tones(series, bands, lines, chance=false_alarm / 2 / tests, least_damping=least_damping)
+        found += [tone for tone in even if not any(same_tone(tone, other) for other in found)]
+    return _named(_with_steady(found, series, candidates_hz, band_hz, false_alarm / 2, least_damping))
+
+
+def _with_steady(
+    even: list[Tone],
+    series: TimeSeries,
+    candidates_hz: Sequence[float] | Floats | None,
+    band_hz: tuple[float, float] | None,
+    false_alarm: float,
+    least_damping: float,
+) -> list[Tone]:
+    """Add the sines that are narrow lines of the whole record, and what that tells of those found already."""
+    record = steady_lines(series, least_damping)
+    lines = _lines(record.frequency_hz, candidates_hz, band_hz)
+    tests = max(int(lines.sum()), 1) * len(series.channels)
+    found, refined = list(even), set[int]()
+    for tone in steady_tones(series, record, lines, chance=false_alarm / tests, least_damping=least_damping):
+        row = next((row for row, other in enumerate(found) if same_tone(tone, other)), None)
+        if row is None:
+            found.append(tone)
+        elif row < len(even) and row not in refined:
+            # The strongest line comes first and has the finer frequency; those beside it are its wandering.
+            both = f"{found[row].reason}, and {tone.reason}"
+            found[row] = replace(found[row], frequency_hz=tone.frequency_hz, reason=both)
+            refined.add(row)
+    return found
 
 
 def _require_arguments(
@@ -116,76 +136,36 @@ def _require_arguments(
         raise EstimateError(f"least_damping is {least_damping}; it must lie between 0 and 1, such as 0.001")
     if band_hz is not None and not 0 <= band_hz[0] < band_hz[1]:
         raise EstimateError(f"band_hz is {band_hz}; give its low and its high end, low below high")
-    if series.samples < LONGEST_SEGMENT_SHARE * SHORTEST_SEGMENT:
+    longest = _longest_run(series)
+    if longest < LONGEST_SEGMENT_SHARE * SHORTEST_SEGMENT:
         raise EstimateError(
-            f"{series.samples} samples are too few to tell sines from modes; at least "
+            f"{longest} valid samples in a row are too few to tell sines from modes; at least "
             f"{LONGEST_SEGMENT_SHARE * SHORTEST_SEGMENT} are needed"
         )
 
 
+def _longest_run(series: TimeSeries) -> int:
+    return max((last - first for first, last in valid_runs(series)), default=0)
+
+
 def _lines(
-    bands: NarrowBands, candidates_hz: Sequence[float] | Floats | None, band_hz: tuple[float, float] | None
+    frequency_hz: Floats, candidates_hz: Sequence[float] | Floats | None, band_hz: tuple[float, float] | None
 ) -> NDArray[np.bool_]:
     """Lines that are looked at."""
-    frequency_hz, spacing_hz = bands.frequency_hz, 1 / bands.segment_s
     chosen = np.arange(frequency_hz.size) >= FIRST_LINE
     # The last line is real: its amplitude is no complex Gaussian number.
     chosen[-1] = False
     if band_hz is not None:
         chosen &= (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
     if candidates_hz is not None:
-        near = np.abs(frequency_hz[:, None] - np.asarray(candidates_hz, dtype=np.float64)[None, :])
-        chosen &= np.any(near <= spacing_hz, axis=1)
+        near = np.zeros(frequency_hz.size, dtype=np.bool_)
+        for candidate_hz in candidates_hz:
+            near |= np.abs(frequency_hz - candidate_hz) <= 1.5 * frequency_hz[1]
+        chosen &= near
     return chosen
 
 
-def _tones(
-    series: TimeSeries, bands: NarrowBands, lines: NDArray[np.bool_], chance: float, least_damping: float
-) -> list[_Tone]:
-    """Sines in the lines of one width of band, the surest channel of each."""
-    independent = independent_samples(bands, least_damping)
-    chances = chance_of_kurtosis(bands.kurtosis, independent[np.newaxis])
-    sure = (chances <= chance) & (bands.kurtosis <= MOST_KURTOSIS) & lines
-    tones: list[_Tone] = []
-    for channel in np.argsort(chances.min(axis=1), kind="stable"):
-        for line in _separate(bands.power[channel], sure[channel]):
-            reason = (
-                f"kurtosis {bands.kurtosis[channel, line]:.2f} of {series.channels[channel].name} in a band of "
-                f"{1.5 / bands.segment_s:.3g} Hz (a sine has 1.5, noise 3; {independent[line]:.0f} independent samples)"
-            )
-            frequency_hz = _between_lines(bands.power[channel], line) / bands.segment_s
-            tone = _Tone(frequency_hz=frequency_hz, width_hz=MAIN_LOBE_LINES / bands.segment_s, reason=reason)
-            if not any(_same(tone, other) for other in tones):
-                tones.append(tone)
-    return tones
-
-
-def _separate(power: Floats, sure: NDArray[np.bool_]) -> list[int]:
-    """Lines of separate sines: the strongest first, without those that its leakage explains."""
-    left, found, window = np.flatnonzero(sure), [], named_window("hann")
-    while left.size:
-        line = int(left[np.argmax(power[left])])
-        found.append(line)
-        away = np.abs(left - line)
-        leaked = OVER_LEAKAGE * power[line] * leakage(window, np.maximum(away - 0.5, 0.0))
-        left = left[(away > MAIN_LOBE_LINES) & (power[left] > leaked)]
-    return found
-
-
-def _between_lines(power: Floats, line: int) -> float:
-    """Where a sine lies, in lines, from the two largest amplitudes of its Hann main lobe."""
-    before, top, after = np.sqrt(power[line - 1 : line + 2])
-    side, sign = (after, 1) if after >= before else (before, -1)
-    ratio = side / top if top > 0 else 0.5
-    # |W(1 - d)| / |W(d)| = (1 + d) / (2 - d); noise may push it beyond the next line, where it can't be.
-    return line + sign * float(np.clip((2 * ratio - 1) / (ratio + 1), 0.0, 0.5))
-
-
-def _same(one: _Tone, other: _Tone) -> bool:
-    return abs(one.frequency_hz - other.frequency_hz) <= max(one.width_hz, other.width_hz)
-
-
-def _named(tones: list[_Tone]) -> tuple[MachineHarmonic, ...]:
+def _named(tones: list[Tone]) -> tuple[MachineHarmonic, ...]:
     """Add to each reason of which other tone it is a multiple."""
     tones = sorted(tones, key=lambda tone: tone.frequency_hz)
     named = []
@@ -198,7 +178,7 @@ def _named(tones: list[_Tone]) -> tuple[MachineHarmonic, ...]:
     return tuple(named)
 
 
-def _multiple_of(tone: _Tone, base: _Tone) -> bool:
+def _multiple_of(tone: Tone, base: Tone) -> bool:
     order = round(tone.frequency_hz / base.frequency_hz)
     # A sine's frequency is known to a fraction of its band, and the base's error grows with the order.
     tolerance_hz = 0.1 * (tone.width_hz + order * base.width_hz)
