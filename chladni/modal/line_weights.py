@@ -30,6 +30,8 @@ class WeightedLines(Value):
         ``[response, line]``, zero where a line of a response is unusable.
     reference_scale
         ``[reference]``.
+    noise_power
+        ``[reference, line]`` variance expected of the weighted values, summed over the responses; zero where unknown.
     notes
         What was left out, and why.
     """
@@ -38,6 +40,7 @@ class WeightedLines(Value):
     values: NDArray[np.complexfloating[Any, Any]]
     weight: NDArray[np.float64]
     reference_scale: NDArray[np.float64]
+    noise_power: NDArray[np.float64]
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -56,13 +59,19 @@ def weighted_lines(
     band_hz
         Lowest and highest line, inclusive; None for all. The line at 0 Hz is never used: few sensors measure it.
     weighting
-        ``std``: inverse of one sigma, root mean square over the references; where no response knows its sigma, as
-        ``uniform``: each response by the inverse of its rms; ``relative``: inverse of the magnitude.
+        ``std``: inverse of one sigma, root mean square over the references, times the root of the magnitude that the
+        responses have together on a line; where no response knows its sigma, as ``uniform``: each response by the inverse of its rms;
+        ``relative``: inverse of the magnitude.
 
     Raises
     ------
     EstimateError
         When fewer than four lines are left, the band is empty, or the weighting unknown.
+
+    Notes
+    -----
+    The error B - H A of a linear fit has the sigma of H times abs(A), and A is small where H peaks: its best weight
+    goes towards abs(H)/sigma. The geometric mean of that and 1/sigma serves weak modes as well.
     """
     if weighting not in get_args(Weighting):
         raise EstimateError(f"weighting {weighting!r} is none of {', '.join(get_args(Weighting))}")
@@ -71,14 +80,12 @@ def weighted_lines(
     values = np.asarray(np.where(usable[:, None], response.values[..., chosen], 0), dtype=np.complex128)
     if not np.any(values):
         raise EstimateError("the frequency responses are zero or not finite on every line used: nothing to fit")
-    weight, scale, notes = _weights(response, values, usable, chosen, weighting)
-    return WeightedLines(
-        frequency_hz=response.frequency_hz[chosen],
-        values=values / scale[:, None],
-        weight=weight,
-        reference_scale=scale,
-        notes=notes,
-    )
+    std = response.std[..., chosen]
+    known = np.isfinite(std) & usable[:, None]
+    frequency_hz = response.frequency_hz[chosen]
+    if weighting == "std" and np.any(std[known] > 0):
+        return _by_std(response, frequency_hz, values, np.where(known, std, np.nan))
+    return _by_magnitude(frequency_hz, values, usable, relative=weighting == "relative")
 
 
 def _lines(response: FrequencyResponse, band_hz: tuple[float, float] | None) -> NDArray[np.intp]:
@@ -97,42 +104,52 @@ def _lines(response: FrequencyResponse, band_hz: tuple[float, float] | None) -> 
     return chosen
 
 
-def _weights(
-    response: FrequencyResponse,
-    values: NDArray[Any],
-    usable: NDArray[np.bool_],
-    chosen: NDArray[np.intp],
-    weighting: Weighting,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[str, ...]]:
-    std = response.std[..., chosen]
-    known = np.isfinite(std) & usable[:, None]
-    if weighting == "std" and np.any(std[known] > 0):
-        return _by_std(response, std, known)
+def _by_magnitude(
+    frequency_hz: NDArray[np.float64], values: NDArray[np.complex128], usable: NDArray[np.bool_], *, relative: bool
+) -> WeightedLines:
     scale = _or_one(_rms(values, (0, 2)))
-    level = _rms(values / scale[:, None], (1,))
+    scaled = values / scale[:, None]
+    level = _rms(scaled, (1,))
     typical = _or_one(_rms(level, (1,)))[:, None]
-    if weighting == "relative":
-        return usable / np.hypot(level, FLOOR * typical), scale, ()
-    return usable / typical, scale, ()
+    return WeightedLines(
+        frequency_hz=frequency_hz,
+        values=scaled,
+        weight=usable / (np.hypot(level, FLOOR * typical) if relative else typical),
+        reference_scale=scale,
+        noise_power=np.zeros(values.shape[1:]),
+    )
 
 
 def _by_std(
-    response: FrequencyResponse, std: NDArray[np.float64], known: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[str, ...]]:
-    positive = np.where(known & (std > 0), std, np.nan)
-    scale = np.array([_median(positive[:, reference]) for reference in range(std.shape[1])])
-    usable: NDArray[np.bool_] = np.all(known, axis=1)
-    level = _rms(np.where(usable[:, None], std, 0) / scale[:, None], (1,))
-    floor = np.array([_median(np.where(row > 0, row, np.nan)) for row in level])[:, None]
+    response: FrequencyResponse,
+    frequency_hz: NDArray[np.float64],
+    values: NDArray[np.complex128],
+    std: NDArray[np.float64],
+) -> WeightedLines:
+    scale = np.array([_typical(std[:, reference]) for reference in range(std.shape[1])])
+    scaled, sigma = values / scale[:, None], std / scale[:, None]
+    usable = np.isfinite(sigma).all(axis=1)
+    level = np.where(usable, _rms(sigma, (1,)), 1.0)
+    floor = np.array([_typical(np.where(good, row, np.nan)) for row, good in zip(level, usable, strict=True)])
+    steady = usable / np.hypot(level, FLOOR * floor[:, None])
+    magnitude = _rms(scaled, (1,))
+    weight = steady * np.sqrt(_rms(magnitude / _or_one(_rms(magnitude, (1,)))[:, None], (0,)))
     without = [channel.name for channel, lines in zip(response.responses, usable, strict=True) if not lines.any()]
     notes = (f"not used for the poles, as no line has a finite std: {', '.join(without)}",) if without else ()
-    return usable / np.hypot(level, FLOOR * floor), scale, notes
+    return WeightedLines(
+        frequency_hz=frequency_hz,
+        values=scaled,
+        weight=weight,
+        reference_scale=scale,
+        noise_power=np.einsum("ok,oik->ik", weight**2, np.where(usable[:, None], sigma, 0) ** 2),
+        notes=notes,
+    )
 
 
-def _median(numbers: NDArray[np.float64]) -> float:
-    """Median without the NaN, 1 where nothing is left."""
-    left = numbers[np.isfinite(numbers)]
-    return float(np.median(left)) if left.size else 1.0
+def _typical(std: NDArray[np.float64]) -> float:
+    """Median of the positive numbers, 1 where there are none; NaN counts for nothing."""
+    positive = std[std > 0]
+    return float(np.median(positive)) if positive.size else 1.0
 
 
 def _rms(values: NDArray[Any], axis: tuple[int, ...]) -> NDArray[np.float64]:

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from chladni.modal.companion import denominators, participation, stable_roots
 from chladni.modal.line_weights import WeightedLines, Weighting, weighted_lines
-from chladni.modal.reduced_normal_equations import reduced_normal_matrix
 from chladni.modal.pole_table import PoleTable
+from chladni.modal.reduced_normal_equations import reduced_normal_matrix
 from chladni.modal.unit_circle import UnitCircle, unit_circle
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse

@@ -5,6 +5,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from chladni.modal.line_weights import WeightedLines
+from chladni.modal.noise_compensation import without_noise
 from chladni.modal.unit_circle import UnitCircle
 
 # Powers of z on an arc are nearly dependent, more so on lines with gaps: this part of the mean diagonal keeps the
@@ -40,7 +41,8 @@ def reduced_normal_matrix(lines: WeightedLines, circle: UnitCircle, order: int) 
     coefficients; for each output o the normal equations have the blocks R_o, S_o, T_o, and eliminating the
     numerators leaves M = sum_o T_o - S_o^H R_o^-1 S_o (Guillaume et al. 2003, equations 9 to 14). On lines at
     z = exp(j angle) every block depends on the difference of its row and column only and is read off one FFT
-    (Cauberghe 2004, section 3.3).
+    (Cauberghe 2004, section 3.3). Most of what noise of the known std contributes is taken off, see
+    `chladni.modal.noise_compensation`.
     """
     power = lines.weight**2
     references = lines.values.shape[1]
@@ -48,14 +50,17 @@ def reduced_normal_matrix(lines: WeightedLines, circle: UnitCircle, order: int) 
     squares = np.einsum("ok,oik,ojk->ijk", power, np.conj(lines.values), lines.values, optimize=True)
     blocks = _toeplitz(circle.moments(squares, order), order)
     matrix = np.array(blocks.transpose(2, 0, 3, 1), order="C").reshape((order + 1) * references, -1)
-    matrix[np.diag_indices_from(matrix)] *= 1 + DENOMINATOR_RIDGE
+    diagonal = np.diag_indices_from(matrix)
+    ridge = DENOMINATOR_RIDGE * matrix[diagonal].real
     chunk = max(1, CHUNK // (references * max((order + 1) ** 2, circle.length)))
     for start in range(0, lines.weight.shape[0], chunk):
         part = slice(start, start + chunk)
         numerators = _toeplitz(circle.moments(power[part], order), order)
         cross = _toeplitz(circle.moments(power[part, None] * lines.values[part], order), order)
         matrix -= _eliminated(numerators, cross)
-    return np.asarray((matrix + matrix.conj().T) / 2)
+    matrix = without_noise((matrix + matrix.conj().T) / 2, lines, circle, order)
+    matrix[diagonal] += ridge
+    return matrix
 
 
 def _toeplitz(moments: NDArray[np.complex128], order: int) -> NDArray[np.complex128]:
