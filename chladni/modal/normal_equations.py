@@ -1,80 +1,125 @@
-"""Normal equations of a matrix-fraction fit of frequency responses, reduced to the denominator."""
+"""Weighted normal equations of the modal model, for every response at once."""
+
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from chladni.modal.line_weights import WeightedLines
-from chladni.modal.unit_circle import UnitCircle
+Complex = NDArray[np.complex128]
+Floats = NDArray[np.float64]
 
-# Powers of z on an arc are nearly dependent, more so on lines with gaps: this part of the mean diagonal keeps the
-# numerators' matrix positive definite above rounding.
-NUMERATOR_RIDGE = 1e-13
-# Without noise the denominator's matrix is singular, and any of many denominators fits. A ridge just above rounding
-# picks the shortest, whose surplus poles are unstable as they are under noise (Kumaresan and Tufts 1982).
-DENOMINATOR_RIDGE = 1e-14
-# Complex numbers held for one chunk of responses: 64 MB.
-CHUNK = 4_000_000
+# Largest table of products of basis functions, in numbers (128 MB); beyond it weights are averaged over neighbours.
+LARGEST_TABLE = 2**24
+# Largest set of Gram matrices held at once, in numbers.
+LARGEST_BATCH = 2**23
+# Directions weaker than this, relative to the strongest, can't be told from rounding.
+WEAKEST = 1e-13
 
 
-def reduced_normal_matrix(lines: WeightedLines, circle: UnitCircle, order: int) -> NDArray[np.complex128]:
-    """Assemble M, whose quadratic form is the least-squares cost of a denominator with the best numerators.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ProductTable:
+    """Products of all pairs of basis functions, summed over blocks of neighbouring lines.
+
+    Weights differ from function to function, products don't: with the table, the Gram matrices of all functions are
+    one matrix product. Blocks are single lines unless the table would be too large; then weights are averaged within
+    a block, which alters the curvature that steps and error bars come from a little and the solution not at all.
+
+    Attributes
+    ----------
+    products
+        ``[block, column, column]`` Re(conj(P_a) P_b).
+    block
+        Lines in a block.
+    """
+
+    products: Floats
+    block: int
+
+    @property
+    def columns(self) -> int:
+        """Number of basis functions."""
+        return self.products.shape[-1]
+
+    def batches(self, responses: int, references: int) -> list[slice]:
+        """Cut the responses so that their Gram matrices fit in memory."""
+        size = max(1, LARGEST_BATCH // (references * self.columns**2))
+        return [slice(first, min(first + size, responses)) for first in range(0, responses, size)]
+
+    def gram(self, weights: Floats) -> Floats:
+        """Give ``[..., column, column]`` from weights ``[..., line]``."""
+        blocks = len(self.products)
+        padded = np.zeros((*weights.shape[:-1], blocks * self.block))
+        padded[..., : weights.shape[-1]] = weights
+        means = padded.reshape(*weights.shape[:-1], blocks, self.block).mean(axis=-1)
+        table = self.products.reshape(blocks, -1)
+        return np.asarray((means @ table).reshape(*weights.shape[:-1], self.columns, self.columns), dtype=np.float64)
+
+
+def product_table(functions: Complex) -> ProductTable:
+    """Tabulate the products of basis functions ``[column, line]``."""
+    columns, lines = functions.shape
+    block = max(1, -(-lines * columns**2 // LARGEST_TABLE))
+    blocks = -(-lines // block)
+    padded = np.zeros((columns, blocks * block), dtype=np.complex128)
+    padded[:, :lines] = functions
+    parts = padded.reshape(columns, blocks, block).transpose(1, 2, 0)
+    stacked = np.concatenate([parts.real, parts.imag], axis=1)
+    return ProductTable(products=stacked.transpose(0, 2, 1) @ stacked, block=block)
+
+
+def projections(functions: Complex, weighted: Complex) -> Floats:
+    """Give ``[..., column]``: Re of the sum over lines of conj(P_a) times `weighted` ``[..., line]``."""
+    rows = weighted.reshape(-1, weighted.shape[-1])
+    answer = rows.real @ functions.real.T + rows.imag @ functions.imag.T
+    return np.asarray(answer.reshape(*weighted.shape[:-1], len(functions)), dtype=np.float64)
+
+
+def rotated(pairs: Floats, factors: Complex) -> Floats:
+    """Turn columns for Re, Im of a product into columns for Re, Im of its second factor, given the first.
 
     Parameters
     ----------
-    lines
-        Frequency responses and their weights.
-    circle
-        Where the lines lie.
-    order
-        Of denominator and numerators.
-
-    Returns
-    -------
-    ``[(order + 1) references, (order + 1) references]``, hermitian positive definite. Its leading blocks belong to
-    the lower orders of the denominator, with numerators of the full order.
-
-    Notes
-    -----
-    The right matrix fraction H(z) A(z) = B(z) with A = sum alpha_r z^r, B_o = sum beta_or z^r, is linear in the
-    coefficients; for each output o the normal equations have the blocks R_o, S_o, T_o, and eliminating the
-    numerators leaves M = sum_o T_o - S_o^H R_o^-1 S_o (Guillaume et al. 2003, equations 9 to 14). On lines at
-    z = exp(j angle) every block depends on the difference of its row and column only and is read off one FFT
-    (Cauberghe 2004, section 3.3).
+    pairs
+        ``[..., 2 mode]`` columns (or elements of a gradient) for Re and Im of factor times unknown.
+    factors
+        ``[..., mode]`` complex; broadcasts.
     """
-    power = lines.weight**2
-    references = lines.values.shape[1]
-    # Sum over the responses before the FFT: there are references^2 of these, however many responses.
-    squares = np.einsum("ok,oik,ojk->ijk", power, np.conj(lines.values), lines.values, optimize=True)
-    blocks = _toeplitz(circle.moments(squares, order), order)
-    matrix = np.array(blocks.transpose(2, 0, 3, 1), order="C").reshape((order + 1) * references, -1)
-    matrix[np.diag_indices_from(matrix)] *= 1 + DENOMINATOR_RIDGE
-    chunk = max(1, CHUNK // (references * max((order + 1) ** 2, circle.length)))
-    for start in range(0, lines.weight.shape[0], chunk):
-        part = slice(start, start + chunk)
-        numerators = _toeplitz(circle.moments(power[part], order), order)
-        cross = _toeplitz(circle.moments(power[part, None] * lines.values[part], order), order)
-        matrix -= _eliminated(numerators, cross)
-    return np.asarray((matrix + matrix.conj().T) / 2)
+    # For a = f d: the columns g0, g1 of a give Re(conj(f)(g0 + j g1)) for Re d and Im(...) for Im d.
+    whole = np.ascontiguousarray(pairs).view(np.complex128)
+    return np.ascontiguousarray(whole * factors.conj()).view(np.float64)
 
 
-def _toeplitz(moments: NDArray[np.complex128], order: int) -> NDArray[np.complex128]:
-    """``[..., row, column]`` with the moment of lag row - column, from ``[..., lag]``; a view."""
-    return sliding_window_view(moments, order + 1, axis=-1)[..., ::-1]
+def rotated_rows(matrix: Floats, factors: Complex) -> Floats:
+    """Do the same to the rows of ``[..., 2 mode, column]``."""
+    return np.swapaxes(rotated(np.swapaxes(matrix, -1, -2), factors[..., np.newaxis, :]), -1, -2)
 
 
-def _eliminated(numerators: NDArray[np.complex128], cross: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Sum over the responses of S^H R^-1 S, by the Cholesky factors of R."""
-    responses, size = numerators.shape[:2]
-    matrix = numerators.copy()
-    diagonal = np.einsum("orr->or", matrix)
-    # A response without a usable line has R = 0 and S = 0: any positive diagonal makes it vanish.
-    diagonal += np.where(diagonal.real > 0, NUMERATOR_RIDGE * diagonal.real, 1.0)
-    stacked = np.array(cross.transpose(0, 2, 3, 1), order="C").reshape(responses, size, -1)
-    from scipy.linalg import solve_triangular
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SymmetricSolver:
+    """Inverse of each of a stack of symmetric positive matrices, scaled to a unit diagonal before.
 
-    factor = np.linalg.cholesky(matrix)
-    for response in range(responses):
-        stacked[response] = solve_triangular(factor[response], stacked[response], lower=True, check_finite=False)
-    tall = stacked.reshape(responses * size, -1)
-    return np.asarray(tall.conj().T @ tall)
+    Attributes
+    ----------
+    inverse
+        ``[..., row, row]``; directions that the data say nothing about are left at zero.
+    deficient
+        ``[...]`` how many such directions there are.
+    """
+
+    inverse: Floats
+    deficient: NDArray[np.int64]
+
+
+def symmetric_inverse(matrices: Floats) -> SymmetricSolver:
+    """Invert a stack of symmetric non-negative matrices."""
+    diagonal = np.einsum("...aa->...a", matrices)
+    scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    scaled = matrices * scale[..., :, np.newaxis] * scale[..., np.newaxis, :]
+    strengths, directions = np.linalg.eigh(scaled)
+    strong = strengths > WEAKEST * strengths.shape[-1]
+    gains = np.where(strong, 1 / np.where(strong, strengths, 1.0), 0.0)
+    inverse = (directions * gains[..., np.newaxis, :]) @ np.swapaxes(directions, -1, -2)
+    return SymmetricSolver(
+        inverse=inverse * scale[..., :, np.newaxis] * scale[..., np.newaxis, :],
+        deficient=np.count_nonzero(~strong, axis=-1),
+    )

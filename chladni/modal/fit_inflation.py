@@ -1,0 +1,80 @@
+"""What the scatter of a fit is larger than by, against that of independent lines of known variance."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.modal.line_information import line_correlation_factor
+from chladni.modal.lsfd import ShapeSolution
+from chladni.modal.model_lines import ModelLines
+from chladni.signals.provenance import Provenance
+
+Floats = NDArray[np.float64]
+
+# A misfit is told from chance beyond this many of its own sigmas.
+SIGNIFICANT = 3.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Misfit:
+    """How far the model is off, against what noise explains.
+
+    Attributes
+    ----------
+    chi_square
+        Weighted sum of squares over degrees of freedom, 1 for noise of the stated variance.
+    inflation
+        ``[mode]`` factor on variances, at least 1.
+    """
+
+    chi_square: float
+    inflation: NDArray[np.float64]
+
+
+def misfit(lines: ModelLines, solution: ShapeSolution, provenance: Provenance) -> Misfit:
+    """Compare what the model leaves with the noise, over all lines and near each mode."""
+    correlation = line_correlation_factor(provenance)
+    spared, efficiency = _estimated_weights(lines, provenance)
+    normalised = lines.weights * np.abs(solution.residual) ** 2 / (2 * spared)
+    used = lines.weights > 0
+    parameters = solution.coefficients.size + 2 * solution.participation.size
+    free = max(used.sum() - parameters / 2, 1.0)
+    chi_square = float(normalised.sum() / free)
+    local = [_excess(normalised, share, correlation) for share in _shares(lines, solution)]
+    overall = _excess(normalised, used.astype(float), correlation)
+    inflation = correlation * efficiency * np.maximum(np.array(local), overall)
+    return Misfit(chi_square=chi_square, inflation=inflation)
+
+
+def _estimated_weights(lines: ModelLines, provenance: Provenance) -> tuple[float, float]:
+    """Expected chi-square, and factor on variances, where weights are estimates from few averages.
+
+    With nu = 2 (n - q) degrees of freedom the mean of sigma^2/s^2 is nu/(nu - 2), and the weighted estimate scatters
+    by nu/(nu - 4) more than the weights say (Pintelon & Schoukens 2012, section 12.3, with complex n).
+    """
+    freedom = 2 * (provenance.effective_averages - lines.values.shape[1])
+    if not lines.weighted or provenance.effective_averages <= 0 or freedom <= 4:
+        return 1.0, 1.0
+    return freedom / (freedom - 2), freedom / (freedom - 4)
+
+
+def _shares(lines: ModelLines, solution: ShapeSolution) -> list[Floats]:
+    """``[response, reference, line]`` for each mode: how much a line says about its pole."""
+    slopes = np.abs(solution.basis.slopes) ** 2
+    density = slopes[0::2] + slopes[1::2]
+    residues = solution.shapes[:, :, np.newaxis] * solution.participation[:, np.newaxis]
+    return [
+        lines.weights * np.abs(residue)[..., np.newaxis] ** 2 * line
+        for residue, line in zip(residues, density, strict=True)
+    ]
+
+
+def _excess(normalised: Floats, share: Floats, correlation: float) -> float:
+    total = share.sum()
+    if total <= 0:
+        return 1.0
+    mean = float((share * normalised).sum() / total)
+    # Mean of independent squares with unequal shares: its own sigma tells chance from misfit.
+    scatter = float(np.sqrt(correlation * (share**2).sum()) / total)
+    return mean if mean > 1 + SIGNIFICANT * scatter else 1.0

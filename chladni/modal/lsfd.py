@@ -1,0 +1,210 @@
+"""Least-squares frequency domain: shapes and residuals for given poles and participation."""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.modal.modal_basis import ModalBasis, modal_basis
+from chladni.modal.modal_model import ModalModel
+from chladni.modal.model_lines import ModelLines, model_lines
+from chladni.modal.normal_equations import (
+    SymmetricSolver,
+    product_table,
+    projections,
+    rotated,
+    rotated_rows,
+    symmetric_inverse,
+)
+from chladni.signals.errors import EstimateError
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.value import require_shape
+
+Complex = NDArray[np.complex128]
+Floats = NDArray[np.float64]
+
+# Rounds that bring the solution from the precision of normal equations to that of the data.
+REFINEMENTS = 6
+RESIDUAL_COLUMNS = 4
+
+
+def least_squares_frequency_domain(
+    response: FrequencyResponse,
+    poles: NDArray[np.complexfloating],
+    participation: NDArray[np.complexfloating] | None = None,
+    *,
+    band_hz: tuple[float, float] | None = None,
+) -> ModalModel:
+    """Fit shapes, lower and upper residuals to frequency responses, for given poles.
+
+    Parameters
+    ----------
+    response
+        Motions over excitations, all in one form (accelerance, mobility, receptance). Lines count by 1/std^2; lines
+        that aren't excited or have no value don't count. Where no `std` is known all lines of a function count alike.
+    poles
+        ``[mode]`` in rad/s, Re < 0 < Im.
+    participation
+        ``[mode, reference]``, rows of any length but zero; None for a single reference.
+    band_hz
+        Lines to fit, default all.
+
+    Returns
+    -------
+    ModalModel
+        With the participation that was given: each shape carries the scale of the receptance.
+
+    Raises
+    ------
+    EstimateError
+        When poles and participation don't fit to each other or to the response, or no line is left.
+
+    Notes
+    -----
+    Peeters, Van der Auweraer, Guillaume & Leuridan (2004), eq. 14, with real and imaginary parts as unknowns, since a
+    shape enters with its conjugate. Averages of windowed segments are fitted with the modes as the window shows them
+    (see `LagWindow`), so that shapes and residuals are those of the structure.
+    """
+    lines = model_lines(response, band_hz)
+    poles, vectors = checked_modes(response, poles, participation)
+    basis = modal_basis(lines, poles)
+    return solve_shapes(lines, basis, vectors).model(poles)
+
+
+def checked_modes(
+    response: FrequencyResponse,
+    poles: NDArray[np.complexfloating],
+    participation: NDArray[np.complexfloating] | None,
+) -> tuple[Complex, Complex]:
+    """Check and convert poles and participation; see `least_squares_frequency_domain`."""
+    poles = np.asarray(poles, dtype=np.complex128)
+    references = len(response.references)
+    if participation is None:
+        if references != 1:
+            raise EstimateError(f"{references} references need participation vectors; give [mode, reference]")
+        participation = np.ones((poles.size, 1))
+    vectors = np.asarray(participation, dtype=np.complex128)
+    require_shape("participation", vectors, (poles.size, references), "modes x references")
+    for pole in poles:
+        if not (np.isfinite(pole) and pole.real < 0 < pole.imag):
+            raise EstimateError(f"pole {pole:.6g} rad/s is no decaying oscillation; Re < 0 < Im is asked for")
+    if not np.all(np.isfinite(vectors)) or not np.all(np.any(vectors != 0, axis=1)):
+        raise EstimateError("participation vectors must be finite, none of them zero")
+    return poles, vectors
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShapeSolution:
+    """Shapes and residuals, and what the equations leave of the data.
+
+    Attributes
+    ----------
+    coefficients
+        ``[response, column]``: Re, Im of each mode's shape, then for each reference four residual coefficients.
+    participation
+        ``[mode, reference]`` that the shapes were solved for.
+    residual
+        ``[response, reference, line]`` measured minus model.
+    equations
+        Inverse of each response's normal equations.
+    basis
+        The functions that the coefficients combine.
+    """
+
+    coefficients: Floats
+    participation: Complex
+    residual: Complex
+    equations: SymmetricSolver
+    basis: ModalBasis
+
+    @property
+    def shapes(self) -> Complex:
+        """``[mode, response]``."""
+        modes = len(self.participation)
+        return np.ascontiguousarray(self.coefficients[:, : 2 * modes]).view(np.complex128).T
+
+    def model(self, poles: Complex) -> ModalModel:
+        """Give the model in terms of lower and upper residual."""
+        responses, references = len(self.coefficients), self.participation.shape[1]
+        modes = len(self.participation)
+        tail = np.ascontiguousarray(self.coefficients[:, 2 * modes :]).view(np.complex128)
+        terms = tail.reshape(responses, references, 2) @ self.basis.residual_terms
+        return ModalModel(
+            poles=poles,
+            shapes=self.shapes.copy(),
+            participation=self.participation,
+            lower=terms[..., 0].copy(),
+            upper=terms[..., 1].copy(),
+        )
+
+
+def solve_shapes(lines: ModelLines, basis: ModalBasis, participation: Complex) -> ShapeSolution:
+    """Solve the normal equations of every response, then again for what is left of the data."""
+    functions = np.concatenate([basis.modes, basis.residuals])
+    table = product_table(functions)
+    responses, references, _ = lines.values.shape
+    size = 2 * len(participation) + RESIDUAL_COLUMNS * references
+    inverse, deficient = np.empty((responses, size, size)), np.empty(responses, dtype=np.int64)
+    for batch in table.batches(responses, references):
+        part = symmetric_inverse(shape_equations(table.gram(lines.weights[batch]), participation))
+        inverse[batch], deficient[batch] = part.inverse, part.deficient
+    equations = SymmetricSolver(inverse=inverse, deficient=deficient)
+    coefficients = np.zeros((responses, size))
+    residual = np.asarray(lines.values, dtype=np.complex128)
+    for _ in range(REFINEMENTS):
+        gradient = shape_gradient(projections(functions, lines.weights * residual), participation)
+        step = np.einsum("iab,ib->ia", inverse, gradient)
+        coefficients += step
+        residual = lines.values - synthesis(basis, coefficients, participation)
+        if np.all(np.abs(step) <= 1e-14 * np.abs(coefficients).max(axis=-1, keepdims=True)):
+            break
+    return ShapeSolution(
+        coefficients=coefficients,
+        participation=participation,
+        residual=residual,
+        equations=equations,
+        basis=basis,
+    )
+
+
+def synthesis(basis: ModalBasis, coefficients: Floats, participation: Complex) -> Complex:
+    """``[response, reference, line]`` that coefficients make."""
+    modes, references = participation.shape
+    shapes = np.ascontiguousarray(coefficients[:, : 2 * modes]).view(np.complex128)
+    residues = np.ascontiguousarray(shapes[:, np.newaxis] * participation.T)
+    tails = coefficients[:, 2 * modes :].reshape(len(coefficients), references, RESIDUAL_COLUMNS)
+    weights = np.concatenate([residues.view(np.float64), tails], axis=-1)
+    functions = np.concatenate([basis.modes, basis.residuals])
+    rows = weights.reshape(-1, len(functions))
+    # Two real products cost half of a complex one.
+    total = np.empty((len(rows), functions.shape[1]), dtype=np.complex128)
+    total.real, total.imag = rows @ functions.real, rows @ functions.imag
+    return total.reshape(len(coefficients), references, -1)
+
+
+def shape_equations(gram: Floats, participation: Complex) -> Floats:
+    """Normal matrix of each response from the Gram matrices ``[response, reference, column, column]``."""
+    modes, references = participation.shape
+    head, size = 2 * modes, 2 * modes + RESIDUAL_COLUMNS * references
+    matrix = np.zeros((len(gram), size, size))
+    for j in range(references):
+        vector = participation[:, j]
+        tail = slice(head + RESIDUAL_COLUMNS * j, head + RESIDUAL_COLUMNS * (j + 1))
+        matrix[:, :head, :head] += rotated_rows(rotated(gram[:, j, :head, :head], vector), vector)
+        matrix[:, :head, tail] = rotated_rows(gram[:, j, :head, head:], vector)
+        matrix[:, tail, :head] = np.swapaxes(matrix[:, :head, tail], -1, -2)
+        matrix[:, tail, tail] = gram[:, j, head:, head:]
+    return matrix
+
+
+def shape_gradient(projected: Floats, participation: Complex) -> Floats:
+    """Right-hand side of each response from projections ``[response, reference, column]``."""
+    head = 2 * len(participation)
+    shapes = sum(rotated(projected[:, j, :head], vector) for j, vector in enumerate(participation.T))
+    return np.concatenate([np.asarray(shapes), projected[:, :, head:].reshape(len(projected), -1)], axis=1)
+
+
+def band_of(lines: ModelLines) -> tuple[float, float]:
+    """Lowest and highest |s| of the lines, as frequencies in Hz."""
+    return float(lines.s.imag[0] / (2 * pi)), float(lines.s.imag[-1] / (2 * pi))

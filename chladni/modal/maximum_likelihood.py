@@ -1,0 +1,121 @@
+"""Maximum-likelihood refinement of a modal model (MLMM)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.modal.fit_covariance import fitted_modes
+from chladni.modal.fit_inflation import misfit
+from chladni.modal.fitted_modes import FittedModes
+from chladni.modal.lsfd import ShapeSolution, checked_modes, solve_shapes
+from chladni.modal.modal_basis import modal_basis
+from chladni.modal.modal_model import ModalModel
+from chladni.modal.model_lines import ModelLines, model_lines
+from chladni.modal.reduced_equations import ReducedEquations, reduced_equations
+from chladni.signals.frequency_response import FrequencyResponse
+
+Complex = NDArray[np.complex128]
+Floats = NDArray[np.float64]
+
+# A step that moves no pole by more than this share of its decay rate ends the iteration.
+CONVERGED = 1e-7
+FIRST_DAMPING, LARGEST_DAMPING = 1e-6, 1e6
+
+
+def refine(
+    response: FrequencyResponse,
+    model: ModalModel,
+    *,
+    band_hz: tuple[float, float] | None = None,
+    max_iterations: int = 25,
+) -> FittedModes:
+    """Fit poles, participation, shapes and residuals together, so that the misfit weighs least against the noise.
+
+    Parameters
+    ----------
+    response
+        As for `least_squares_frequency_domain`.
+    model
+        Where to begin: poles and participation; shapes and residuals are solved for.
+    band_hz
+        Lines to fit, default all.
+    max_iterations
+        Steps, at least 0.
+
+    Returns
+    -------
+    FittedModes
+        Modes that leave the band, lose their decay or run into another mode are left out, and a note says so.
+
+    Raises
+    ------
+    EstimateError
+        As `least_squares_frequency_domain`.
+
+    Notes
+    -----
+    El-Kafafy, De Troyer, Peeters & Guillaume (2014): Gauss-Newton with Levenberg's damping on poles and participation
+    for the cost sum |H - model|^2/var. Shapes and residuals enter linearly and are eliminated (Golub & Pereyra 1973,
+    in the approximation of Kaufman 1975).
+    """
+    lines = model_lines(response, band_hz)
+    poles, vectors = checked_modes(response, model.poles, model.participation)
+    state = _minimise(lines, _State.at(lines, poles, _unit_largest(vectors)), max_iterations)
+    found = misfit(lines, state.solution, response.provenance)
+    return fitted_modes(
+        lines,
+        state.poles,
+        state.solution,
+        inflation=found.inflation,
+        chi_square=found.chi_square if lines.weighted else float("nan"),
+        kept=np.arange(poles.size),
+        notes=(),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _State:
+    poles: Complex
+    participation: Complex
+    solution: ShapeSolution
+    cost: float
+
+    @classmethod
+    def at(cls, lines: ModelLines, poles: Complex, participation: Complex) -> "_State":
+        solution = solve_shapes(lines, modal_basis(lines, poles), participation)
+        cost = float(np.sum(lines.weights * np.abs(solution.residual) ** 2))
+        return cls(poles=poles, participation=participation, solution=solution, cost=cost)
+
+
+def _minimise(lines: ModelLines, state: _State, max_iterations: int) -> _State:
+    damping = FIRST_DAMPING
+    for _ in range(max_iterations):
+        equations = reduced_equations(lines, state.solution)
+        found = _step(lines, state, equations, damping)
+        if found is None:
+            break
+        trial, damping = found
+        moved = np.abs(trial.poles - state.poles) / -state.poles.real
+        state = trial
+        if moved.max() < CONVERGED:
+            break
+    return state
+
+
+def _step(
+    lines: ModelLines, state: _State, equations: ReducedEquations, damping: float
+) -> tuple[_State, float] | None:
+    while damping < LARGEST_DAMPING:
+        poles, participation = equations.moved(state.poles, state.participation, damping)
+        if np.all(poles.real < 0) and np.all(poles.imag > 0):
+            trial = _State.at(lines, poles, participation)
+            if trial.cost <= state.cost:
+                return trial, max(damping / 10, 1e-12)
+        damping *= 10
+    return None
+
+
+def _unit_largest(vectors: Complex) -> Complex:
+    largest = np.argmax(np.abs(vectors), axis=1)[:, np.newaxis]
+    return vectors / np.take_along_axis(vectors, largest, axis=1)
