@@ -1,7 +1,8 @@
 """Frequency response functions between channels, each with its uncertainty."""
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,17 @@ class FrequencyResponse(Value):
     def unit(self, response: int, reference: int) -> str:
         """Unit of one function, such as ``(m/s^2)/N``."""
         return quotient(self.responses[response].unit, self.references[reference].unit)
+
+    def select(self, responses: Sequence[str]) -> Self:
+        """Give the functions of the named responses, in the order asked for."""
+        rows = [find_channel(self.responses, name, role="response") for name in responses]
+        return replace(
+            self,
+            values=self.values[rows],
+            std=self.std[rows],
+            coherence=self.coherence[rows],
+            responses=tuple(self.responses[row] for row in rows),
+        )
 
     def function(self, response: str, reference: str) -> tuple[int, int]:
         """Indices of the function between two named channels; `EstimateError` when it isn't there."""
