@@ -26,6 +26,9 @@ def assert_close(actual: Value, expected: Value, *, rtol: float, atol: float = 0
 def _assert_field(name: str, found: Any, wanted: Any, rtol: float, atol: float) -> None:
     if isinstance(wanted, Provenance):
         return
+    if isinstance(wanted, Value) and isinstance(found, Value):
+        assert_close(found, wanted, rtol=rtol, atol=atol)
+        return
     if isinstance(wanted, np.ndarray) != isinstance(found, np.ndarray):
         raise AssertionError(f"{name}: {found!r} is not {wanted!r}")
     if isinstance(wanted, np.ndarray) and wanted.dtype.kind in "fc":
