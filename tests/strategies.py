@@ -12,8 +12,15 @@ from chladni.signals.coherence import Coherence
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry, Point
+from chladni.signals.machine_harmonic import MachineHarmonic
+from chladni.signals.modal_fit import ModalFit
+from chladni.signals.modal_scale import ModalScale
+from chladni.signals.mode_set import ModeSet
+from chladni.signals.mode_validation import ModeValidation
+from chladni.signals.order_spread import OrderSpread
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
+from chladni.signals.stabilisation_diagram import POLE_STATUSES, StabilisationDiagram
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.waterfall import Waterfall
 
@@ -219,3 +226,121 @@ def geometries(draw: st.DrawFn) -> Geometry:
     coordinate = st.floats(-10.0, 10.0)
     points = tuple(Point(name=name, position=draw(st.tuples(*[coordinate] * 3))) for name in point_names)
     return Geometry(points=points, lines=(tuple(point_names),))
+
+
+@st.composite
+def modal_scales(draw: st.DrawFn, modes: int) -> ModalScale:
+    """Modal masses of a driving point."""
+    return ModalScale(
+        response=draw(names),
+        reference=draw(names),
+        modal_a=draw(complexes((modes,))),
+        modal_mass=draw(reals((modes,), st.floats(1e-3, 1e6))),
+        modal_mass_std=draw(reals((modes,), positive)),
+    )
+
+
+@st.composite
+def order_spreads(draw: st.DrawFn, modes: int) -> OrderSpread:
+    """Scatter over model orders."""
+    return OrderSpread(
+        orders=draw(hnp.arrays(np.int64, modes, elements=st.integers(1, 100))),
+        frequency_hz=draw(reals((modes,), st.floats(0.1, 1e4))),
+        frequency_std_hz=draw(reals((modes,), positive)),
+        damping_ratio=draw(reals((modes,), st.floats(0.0, 1.0))),
+        damping_std=draw(reals((modes,), st.floats(0.0, 1.0))),
+    )
+
+
+@st.composite
+def modal_fits(draw: st.DrawFn, responses: int, references: int, *, modes: int = 1) -> ModalFit:
+    """Synthesised functions, with one band for each mode."""
+    frequency_hz = draw(frequency_axes())
+    functions = (responses, references)
+    edges = np.linspace(0.0, max(float(frequency_hz[-1]), 1.0), modes + 1)
+    return ModalFit(
+        frequency_hz=frequency_hz,
+        synthesised=draw(complexes((*functions, frequency_hz.size))),
+        lower_residual=draw(complexes(functions)),
+        upper_residual=draw(complexes(functions)),
+        error=draw(st.floats(0.0, 1.0)),
+        function_error=draw(reals(functions, st.floats(0.0, 1.0))),
+        bands_hz=np.stack([edges[:-1], edges[1:]], axis=1),
+        band_error=draw(reals((modes,), st.floats(0.0, 1.0))),
+    )
+
+
+@st.composite
+def stabilisation_diagrams(draw: st.DrawFn, modes: int) -> StabilisationDiagram:
+    """Poles over orders, under one or two curves."""
+    poles = draw(st.integers(0, 8))
+    axis = draw(frequency_axes())
+    return StabilisationDiagram(
+        order=np.sort(draw(hnp.arrays(np.int64, poles, elements=st.integers(2, 60)))),
+        frequency_hz=draw(reals((poles,), st.floats(0.1, 1e3))),
+        damping_ratio=draw(reals((poles,), st.floats(1e-4, 0.5))),
+        status=draw(hnp.arrays(np.int64, poles, elements=st.integers(0, len(POLE_STATUSES) - 1))),
+        mode=draw(hnp.arrays(np.int64, poles, elements=st.integers(-1, modes - 1))),
+        indicator_hz=axis,
+        indicator=draw(reals((draw(st.integers(1, 2)), axis.size), positive)),
+        indicator_name="CMIF",
+        indicator_unit="(m/s^2)/N",
+    )
+
+
+@st.composite
+def shape_arrays(draw: st.DrawFn, modes: int, columns: int) -> NDArray[np.complex128]:
+    """``[mode, channel]`` complex shapes whose largest component is exactly 1."""
+    part = reals((modes, columns), st.floats(-1.0, 1.0, width=32))
+    raw = draw(part) + 1j * draw(part)
+    rows = np.arange(modes)
+    largest = np.argmax(np.abs(raw), axis=1) if modes else np.zeros(0, dtype=int)
+    pivot = raw[rows, largest]
+    raw[rows, largest] = pivot = np.where(np.abs(pivot) < 1e-3, 1.0, pivot)
+    raw /= pivot[:, np.newaxis]
+    raw[rows, largest] = 1.0
+    return raw
+
+
+@st.composite
+def mode_sets(draw: st.DrawFn, *, min_modes: int = 0, max_modes: int = 4, max_channels: int = 4) -> ModeSet:
+    """Modes with error bars; scale, scatter, fit and diagram now and then."""
+    modes = draw(st.integers(min_modes, max_modes))
+    inputs = draw(st.integers(0, 2))
+    everything = draw(channel_tuples(count=inputs + draw(st.integers(1, max_channels))))
+    references, responses = everything[:inputs], everything[inputs:]
+    shapes = draw(shape_arrays(modes, len(responses)))
+    spread_of_shapes = draw(reals((2, *shapes.shape), st.floats(0.0, 0.5)))
+    rich = draw(st.booleans())
+    scaled, fitted = rich and inputs > 0, rich and inputs > 0 and modes > 0
+    return ModeSet(
+        frequency_hz=np.sort(draw(reals((modes,), st.floats(0.1, 1e4)))),
+        frequency_std_hz=draw(reals((modes,), st.floats(0.0, 10.0))),
+        damping_ratio=draw(reals((modes,), st.floats(1e-5, 0.9))),
+        damping_std=draw(reals((modes,), st.floats(0.0, 0.1))),
+        shapes=shapes,
+        shape_std=spread_of_shapes[0] + 1j * spread_of_shapes[1],
+        channels=responses,
+        references=references,
+        participation=draw(complexes((modes, inputs))) if inputs else None,
+        scale=draw(modal_scales(modes)) if scaled else None,
+        spread=draw(order_spreads(modes)) if rich else None,
+        harmonics=(MachineHarmonic(frequency_hz=50.0, reason="kurtosis 1.5"),) if draw(st.booleans()) else (),
+        fit=draw(modal_fits(len(responses), inputs, modes=modes)) if fitted else None,
+        stabilisation=draw(stabilisation_diagrams(modes)) if rich else None,
+        provenance=draw(provenances()),
+    )
+
+
+@st.composite
+def mode_validations(draw: st.DrawFn) -> ModeValidation:
+    """Checks of up to four modes."""
+    modes = draw(st.integers(0, 4))
+    return ModeValidation(
+        auto_mac=draw(reals((modes, modes), st.floats(0.0, 1.0))),
+        mpc=draw(reals((modes,), st.floats(0.0, 1.0))),
+        mpd_deg=draw(reals((modes,), st.floats(0.0, 90.0))),
+        mean_phase_deg=draw(reals((modes,), st.floats(-90.0, 90.0))),
+        alike=((0, 1),) if modes > 1 else (),
+        findings=("something",),
+    )

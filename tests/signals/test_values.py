@@ -35,6 +35,12 @@ values = st.one_of(
     ours.frequency_responses(),
     ours.coherences(),
     ours.waterfalls(),
+    ours.mode_sets(),
+    ours.mode_validations(),
+    ours.modal_scales(2),
+    ours.order_spreads(2),
+    ours.modal_fits(2, 1, modes=2),
+    ours.stabilisation_diagrams(2),
     st.just(fit_time_base(np.arange(0, 10**9, 10**7))),
 )
 
