@@ -8,6 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value
 
+# Below the smallest normal number a quotient overflows; no motion is that small.
+_LEAST = np.finfo(np.float64).tiny
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MeanPhase(Value):
@@ -131,6 +134,6 @@ def _scaled(shapes: ArrayLike) -> NDArray[np.complex128]:
     if phi.ndim != 2 or phi.shape[1] == 0:
         raise EstimateError(f"shapes have shape {phi.shape}; they are [mode, channel] with at least one channel")
     largest = np.max(np.abs(phi), axis=1, keepdims=True)
-    if not np.all(np.isfinite(largest)) or np.any(largest == 0):
+    if not np.all(np.isfinite(largest)) or np.any(largest < _LEAST):
         raise EstimateError("a shape is zero at all channels, or holds NaN or infinity; leave it out")
     return np.asarray(phi / largest, dtype=np.complex128)

@@ -10,8 +10,10 @@ from chladni.signals.channel import Channel, Vector
 from chladni.signals.errors import EstimateError
 from chladni.signals.mode_set import ModeSet
 
-# Directions from a setup file are unit vectors rounded in the last digits.
-_PARALLEL = 1e-9
+# Cosine of a few hundredths of a degree: setup files hold directions with three or four digits.
+_PARALLEL = 1e-6
+# Below the smallest normal number a quotient overflows; no motion is that small.
+_LEAST = np.finfo(np.float64).tiny
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,7 +159,7 @@ def _unit_length(shapes: ArrayLike, name: str) -> NDArray[np.complex128]:
         raise EstimateError(f"{name} holds NaN or infinity; leave such shapes out before they are compared")
     # By the largest component first, so that squares neither overflow nor vanish.
     largest = np.max(np.abs(array), axis=1, keepdims=True)
-    if np.any(largest == 0):
+    if np.any(largest < _LEAST):
         raise EstimateError(f"shape {int(np.argmin(largest))} of {name} is zero at all channels compared")
     array = array / largest
     return np.asarray(array / np.linalg.norm(array, axis=1, keepdims=True), dtype=np.complex128)
