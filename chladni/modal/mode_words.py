@@ -1,0 +1,72 @@
+"""Modes and numbers with error bars, as sentences name them."""
+
+from collections.abc import Sequence
+from math import floor, isfinite, log10
+
+from chladni.signals.mode_set import ModeSet
+
+_MOST_DECIMALS = 12
+
+
+def mode_name(modes: ModeSet, row: int) -> str:
+    """Name one mode by number, counted from 1, and frequency: ``mode 2 (3.962 Hz)``."""
+    return f"mode {row + 1} ({modes.frequency_hz[row]:.4g} Hz)"
+
+
+def mode_names(modes: ModeSet, rows: Sequence[int]) -> str:
+    """Name several modes: ``modes 1, 2 and 4 (3.47, 3.962 and 6.61 Hz)``."""
+    if len(rows) == 1:
+        return mode_name(modes, rows[0])
+    numbers = joined([str(row + 1) for row in rows])
+    return f"modes {numbers} ({joined([f'{modes.frequency_hz[row]:.4g}' for row in rows])} Hz)"
+
+
+def capital(text: str) -> str:
+    """Begin a sentence; the rest keeps its case, which units need.
+
+    Examples
+    --------
+    >>> capital("mode 1 (3 Hz)")
+    'Mode 1 (3 Hz)'
+    """
+    return text[:1].upper() + text[1:]
+
+
+def joined(words: Sequence[str], *, most: int = 6) -> str:
+    """Join words with commas and an ``and``; beyond `most` the rest is counted.
+
+    Examples
+    --------
+    >>> joined(["a", "b", "c"]), joined(["a", "b", "c", "d"], most=2)
+    ('a, b and c', 'a, b and 2 more')
+    """
+    if len(words) > most:
+        words = [*words[:most], f"{len(words) - most} more"]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def with_std(number: float, std: float) -> str:
+    """Give a number as far as its error bar lets it be known, two digits of which are shown.
+
+    Examples
+    --------
+    >>> with_std(3.96214, 0.00372), with_std(1407.31, 12.0), with_std(2.5, float("nan"))
+    ('3.9621 ± 0.0037', '1407 ± 12', '2.5 (no error bar)')
+    """
+    if not (isfinite(std) and isfinite(number)):
+        return f"{number:.4g} (no error bar)"
+    if std <= 0:
+        return f"{number:.6g} ± 0"
+    decimals = min(max(1 - floor(log10(std)), 0), _MOST_DECIMALS)
+    return f"{number:.{decimals}f} ± {std:.{decimals}f}"
+
+
+def percent_with_std(ratio: float, std: float) -> str:
+    """Give a ratio in percent with its error bar.
+
+    Examples
+    --------
+    >>> percent_with_std(0.0123, 0.0004)
+    '1.230 ± 0.040 %'
+    """
+    return f"{with_std(100 * ratio, 100 * std)} %"
