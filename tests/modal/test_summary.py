@@ -1,0 +1,80 @@
+"""The summary says what was found, how good it is and what to distrust."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from chladni.modal.relative_motion import relative_motion
+from chladni.modal.summary import summarise
+from chladni.modal.validation import validate
+from chladni.signals.geometry import Geometry
+from chladni.signals.machine_harmonic import MachineHarmonic
+from chladni.signals.mode_set import ModeSet
+from chladni.signals.provenance import Provenance
+from tests.modal.mode_makers import mode_set
+from tests.modal.test_joint_treatment import GEOMETRY, scaled_modes
+from tests.modal.test_validation import REFERENCE, SOUND, fit_of
+
+
+def summary_of(modes: ModeSet, geometry: Geometry | None = None) -> tuple[str, ...]:
+    return summarise(modes, validate(modes), relative_motion(modes, geometry or Geometry()))
+
+
+def test_sound_modes() -> None:
+    text = summary_of(mode_set(SOUND, provenance=Provenance(notes=("Measured at night.",))))
+    assert text[0] == (
+        "2 modes between 10 and 20 Hz, from responses alone at 3 channels; at 10.0000 ± 0.0010 Hz with "
+        "1.000 ± 0.010 % damping and 20.0000 ± 0.0010 Hz with 1.000 ± 0.010 % damping (± one sigma)."
+    )
+    assert "The checks found nothing to distrust." in text
+    assert text[-1] == "Measured at night."
+
+
+def test_findings_take_the_place_of_praise() -> None:
+    text = summary_of(mode_set([[1.0, 0.5], [1.0, 0.55]]))
+    assert "The checks found nothing to distrust." not in text
+    assert any("don't tell the shapes" in sentence for sentence in text)
+    assert any("check before building" in sentence for sentence in text)
+
+
+def test_the_fit_is_stated_with_its_worst_function() -> None:
+    modes = mode_set(SOUND, references=REFERENCE, participation=np.ones((2, 1), complex))
+    good = summary_of(replace(modes, fit=fit_of([0.01, 0.02, 0.03], [0.01, 0.02])))
+    assert any(sentence.startswith("The modes reproduce the measured functions to 3 % (RMS") for sentence in good)
+    poor = summary_of(replace(modes, fit=fit_of([0.01, 0.15, 0.03], [0.01, 0.02])))
+    assert any("worst in c1 over hammer (15 %)" in sentence for sentence in poor)
+    assert "from frequency responses" in good[0]
+
+
+def test_only_the_main_modes_are_listed() -> None:
+    shapes = np.eye(9)
+    many = mode_set(shapes, references=REFERENCE, participation=np.array([[1.0 + 0j]] * 6 + [[50.0]] * 3))
+    text = summary_of(many)[0]
+    assert text.startswith("9 modes between 10 and 90 Hz")
+    assert "the main ones at 40.0000" in text, "the three strongest are the last, the others rank by frequency"
+    alone = summary_of(mode_set(shapes))[0]
+    assert "the main ones at 10.0000" in alone
+    assert "70.0000" not in alone
+
+
+def test_no_mode_and_machines() -> None:
+    line = MachineHarmonic(frequency_hz=49.98, reason="kurtosis 1.5, that of a sine")
+    none = mode_set(np.zeros((0, 2)), harmonics=(line,), provenance=Provenance(notes=("Too short.",)))
+    assert summary_of(none) == (
+        "No mode was found.",
+        "49.98 Hz is a line of a machine, no mode (kurtosis 1.5, that of a sine).",
+        "Too short.",
+    )
+
+
+def test_one_mode_is_written_in_the_singular() -> None:
+    assert summary_of(mode_set([[1.0, 0.2]]))[0].startswith("1 mode, from responses alone at 2 channels; at 10.0000")
+
+
+def test_the_joints_of_the_sharpest_modes_are_named_with_a_number() -> None:
+    text = summary_of(scaled_modes(), GEOMETRY)
+    named = [sentence for sentence in text if "move most against each other" in sentence]
+    assert len(named) == 3
+    assert all("N s/m between the two would double the damping" in sentence for sentence in named)
+    damping = scaled_modes().damping_ratio
+    assert named[0].startswith(f"Mode {int(np.argmin(damping)) + 1} (")
