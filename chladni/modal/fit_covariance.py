@@ -6,6 +6,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.modal.fit_inflation import Misfit
 from chladni.modal.fitted_modes import FittedModes
 from chladni.modal.lsfd import ShapeSolution
 from chladni.modal.modal_model import ModalModel
@@ -22,24 +23,23 @@ def fitted_modes(
     poles: Complex,
     solution: ShapeSolution,
     *,
-    inflation: Floats,
-    chi_square: float,
+    found: Misfit,
     kept: NDArray[np.intp],
     notes: tuple[str, ...],
 ) -> FittedModes:
-    """Attach error bars to poles and their best shapes, whose variance is multiplied by `inflation` of each mode."""
+    """Attach error bars to poles and their best shapes, with what was found of the misfit."""
     spread = _spread(lines, solution)
     model, largest = _normalised(solution.model(poles))
-    modes = np.arange(poles.size)
-    scale = solution.shapes[modes, largest]
+    modes, inflation = range(poles.size), found.inflation
+    scale = solution.shapes[np.arange(poles.size), largest]
     change = np.stack([_frequency_slopes(poles), _damping_slopes(poles)], axis=1)
     inflated = np.sqrt(inflation[:, np.newaxis] * inflation)
     covariance = np.einsum("rax,rxsy,sby->rasb", change, spread.poles(), change) * inflated[:, None, :, None]
     std = np.sqrt(np.einsum("rara->ra", covariance))
     gains = np.sqrt(inflation)[:, np.newaxis]
-    shape_std = np.stack([spread.shape_std(mode, largest[mode], scale[mode]) for mode in modes])
-    participation_std = np.stack([spread.participation_std(mode, largest[mode], scale[mode]) for mode in modes])
-    masses = np.stack([spread.mass_std(mode, largest[mode], scale[mode], poles[mode]) for mode in modes])
+    shape_std = np.stack([spread.shape_std(mode, int(largest[mode]), scale[mode]) for mode in modes])
+    participation_std = np.stack([spread.participation_std(mode, int(largest[mode]), scale[mode]) for mode in modes])
+    masses = np.stack([spread.mass_std(mode, int(largest[mode]), scale[mode], poles[mode]) for mode in modes])
     order = np.argsort(np.abs(poles), kind="stable")
     return FittedModes(
         model=model.select(order),
@@ -50,8 +50,34 @@ def fitted_modes(
         shape_std=(gains * shape_std)[order],
         participation_std=(gains * participation_std)[order],
         modal_mass_std=(gains[..., np.newaxis] * masses)[order],
-        chi_square=chi_square,
+        chi_square=found.chi_square if lines.weighted else float("nan"),
         inflation=inflation[order],
+        notes=notes,
+    )
+
+
+def no_modes(lines: ModelLines, notes: tuple[str, ...]) -> FittedModes:
+    """Give the answer that no mode is left."""
+    responses, references, _ = lines.values.shape
+    none = np.zeros((responses, references), dtype=np.complex128)
+    model = ModalModel(
+        poles=np.empty(0, dtype=np.complex128),
+        shapes=np.empty((0, responses), dtype=np.complex128),
+        participation=np.empty((0, references), dtype=np.complex128),
+        lower=none,
+        upper=none,
+    )
+    return FittedModes(
+        model=model,
+        kept=np.empty(0, dtype=np.intp),
+        frequency_std_hz=np.empty(0),
+        damping_std=np.empty(0),
+        covariance=np.empty((0, 2, 0, 2)),
+        shape_std=model.shapes,
+        participation_std=model.participation,
+        modal_mass_std=np.empty((0, responses, references)),
+        chi_square=float("nan"),
+        inflation=np.empty(0),
         notes=notes,
     )
 
@@ -178,14 +204,14 @@ def _real(factors: Complex) -> Floats:
 
 
 def _sandwich(through: Floats, covariance: Floats) -> Floats:
-    return through @ covariance @ np.swapaxes(through, -1, -2)
+    return np.asarray(through @ covariance @ np.swapaxes(through, -1, -2), dtype=np.float64)
 
 
 def _packed(covariance: Floats, factors: Complex) -> Complex:
     """One sigma of Re + j one sigma of Im, after multiplication by complex factors."""
     turned = _real(factors) @ covariance @ np.swapaxes(_real(factors), -1, -2)
     variances = np.maximum(np.einsum("...aa->...a", turned), 0.0)
-    return np.ascontiguousarray(np.sqrt(variances)).view(np.complex128)[..., 0]
+    return np.asarray(np.ascontiguousarray(np.sqrt(variances)).view(np.complex128)[..., 0], dtype=np.complex128)
 
 
 def _frequency_slopes(poles: Complex) -> Floats:

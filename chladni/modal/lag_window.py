@@ -122,7 +122,6 @@ def _moments(z: Complex, kind: int) -> tuple[Complex, Complex]:
         value, slope = (grown - 1 - safe) / safe**2, (grown * (safe - 2) + safe + 2) / safe**3
     if small.any():
         near = z[small]
-        terms = [1 / factorial(k + kind) for k in range(SERIES_TERMS)]
-        value[small] = np.polyval(terms[::-1], near)
-        slope[small] = np.polyval(np.polyder(np.array(terms[::-1])), near)
-    return value, slope
+        series = np.polynomial.Polynomial([1 / factorial(k + kind) for k in range(SERIES_TERMS)])
+        value[small], slope[small] = series(near), series.deriv()(near)
+    return np.asarray(value, dtype=np.complex128), np.asarray(slope, dtype=np.complex128)

@@ -1,7 +1,7 @@
 """Least-squares frequency domain: shapes and residuals for given poles and participation."""
 
 from dataclasses import dataclass
-from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,8 @@ RESIDUAL_COLUMNS = 4
 
 def least_squares_frequency_domain(
     response: FrequencyResponse,
-    poles: NDArray[np.complexfloating],
-    participation: NDArray[np.complexfloating] | None = None,
+    poles: NDArray[np.complexfloating[Any, Any]],
+    participation: NDArray[np.complexfloating[Any, Any]] | None = None,
     *,
     band_hz: tuple[float, float] | None = None,
 ) -> ModalModel:
@@ -67,31 +67,29 @@ def least_squares_frequency_domain(
     (see `LagWindow`), so that shapes and residuals are those of the structure.
     """
     lines = model_lines(response, band_hz)
-    poles, vectors = checked_modes(response, poles, participation)
-    basis = modal_basis(lines, poles)
-    return solve_shapes(lines, basis, vectors).model(poles)
+    checked, vectors = checked_modes(response, poles, participation)
+    return solve_shapes(lines, modal_basis(lines, checked), vectors).model(checked)
 
 
 def checked_modes(
     response: FrequencyResponse,
-    poles: NDArray[np.complexfloating],
-    participation: NDArray[np.complexfloating] | None,
+    poles: NDArray[np.complexfloating[Any, Any]],
+    participation: NDArray[np.complexfloating[Any, Any]] | None,
 ) -> tuple[Complex, Complex]:
     """Check and convert poles and participation; see `least_squares_frequency_domain`."""
-    poles = np.asarray(poles, dtype=np.complex128)
+    checked = np.asarray(poles, dtype=np.complex128)
     references = len(response.references)
-    if participation is None:
-        if references != 1:
-            raise EstimateError(f"{references} references need participation vectors; give [mode, reference]")
-        participation = np.ones((poles.size, 1))
-    vectors = np.asarray(participation, dtype=np.complex128)
-    require_shape("participation", vectors, (poles.size, references), "modes x references")
-    for pole in poles:
+    if participation is None and references != 1:
+        raise EstimateError(f"{references} references need participation vectors; give [mode, reference]")
+    given = np.ones((checked.size, 1)) if participation is None else participation
+    vectors = np.asarray(given, dtype=np.complex128)
+    require_shape("participation", vectors, (checked.size, references), "modes x references")
+    for pole in checked:
         if not (np.isfinite(pole) and pole.real < 0 < pole.imag):
             raise EstimateError(f"pole {pole:.6g} rad/s is no decaying oscillation; Re < 0 < Im is asked for")
     if not np.all(np.isfinite(vectors)) or not np.all(np.any(vectors != 0, axis=1)):
         raise EstimateError("participation vectors must be finite, none of them zero")
-    return poles, vectors
+    return checked, vectors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -123,6 +121,12 @@ class ShapeSolution:
         """``[mode, response]``."""
         modes = len(self.participation)
         return np.ascontiguousarray(self.coefficients[:, : 2 * modes]).view(np.complex128).T
+
+    @property
+    def strength(self) -> Floats:
+        """``[mode]`` root of the sum of squared residues."""
+        participation = np.linalg.norm(self.participation, axis=1)
+        return np.asarray(np.linalg.norm(self.shapes, axis=1) * participation, dtype=np.float64)
 
     def model(self, poles: Complex) -> ModalModel:
         """Give the model in terms of lower and upper residual."""
@@ -203,8 +207,3 @@ def shape_gradient(projected: Floats, participation: Complex) -> Floats:
     head = 2 * len(participation)
     shapes = sum(rotated(projected[:, j, :head], vector) for j, vector in enumerate(participation.T))
     return np.concatenate([np.asarray(shapes), projected[:, :, head:].reshape(len(projected), -1)], axis=1)
-
-
-def band_of(lines: ModelLines) -> tuple[float, float]:
-    """Lowest and highest |s| of the lines, as frequencies in Hz."""
-    return float(lines.s.imag[0] / (2 * pi)), float(lines.s.imag[-1] / (2 * pi))

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.modal.fit_covariance import fitted_modes
+from chladni.modal.fit_covariance import fitted_modes, no_modes
 from chladni.modal.fit_inflation import misfit
 from chladni.modal.fitted_modes import FittedModes
 from chladni.modal.lsfd import ShapeSolution, checked_modes, solve_shapes
 from chladni.modal.modal_basis import modal_basis
 from chladni.modal.modal_model import ModalModel
-from chladni.modal.model_lines import ModelLines, model_lines
+from chladni.modal.mode_guard import lost_mode
+from chladni.modal.model_lines import ModelLines, model_lines, reweighted
 from chladni.modal.reduced_equations import ReducedEquations, reduced_equations
 from chladni.signals.frequency_response import FrequencyResponse
 
@@ -35,7 +36,8 @@ def refine(
     Parameters
     ----------
     response
-        As for `least_squares_frequency_domain`.
+        As for `least_squares_frequency_domain`. Where no `std` is known, each function is weighted by what the fit
+        leaves of it, and a note says so.
     model
         Where to begin: poles and participation; shapes and residuals are solved for.
     band_hz
@@ -46,7 +48,7 @@ def refine(
     Returns
     -------
     FittedModes
-        Modes that leave the band, lose their decay or run into another mode are left out, and a note says so.
+        Modes that leave the lines, run away or run into another mode are left out, and a note says so.
 
     Raises
     ------
@@ -61,21 +63,22 @@ def refine(
     """
     lines = model_lines(response, band_hz)
     poles, vectors = checked_modes(response, model.poles, model.participation)
-    state = _minimise(lines, _State.at(lines, poles, _unit_largest(vectors)), max_iterations)
-    found = misfit(lines, state.solution, response.provenance)
-    return fitted_modes(
-        lines,
-        state.poles,
-        state.solution,
-        inflation=found.inflation,
-        chi_square=found.chi_square if lines.weighted else float("nan"),
-        kept=np.arange(poles.size),
-        notes=(),
-    )
+    kept, notes = np.arange(poles.size), list(lines.notes)
+    while kept.size:
+        lines, state = _fitted(lines, poles[kept], _unit_largest(vectors[kept]), max_iterations)
+        lost = lost_mode(lines, poles[kept], state.poles, state.solution.strength)
+        if lost is None:
+            found = misfit(lines, state.solution, response.provenance)
+            return fitted_modes(lines, state.poles, state.solution, found=found, kept=kept, notes=tuple(notes))
+        notes.append(f"{lost[1]} in the refinement and is left out")
+        kept = np.delete(kept, lost[0])
+    return no_modes(lines, tuple(notes))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _State:
+    """A point of the iteration: nonlinear parameters, the best coefficients for them, and the cost."""
+
     poles: Complex
     participation: Complex
     solution: ShapeSolution
@@ -88,11 +91,20 @@ class _State:
         return cls(poles=poles, participation=participation, solution=solution, cost=cost)
 
 
+def _fitted(
+    lines: ModelLines, poles: Complex, participation: Complex, max_iterations: int
+) -> tuple[ModelLines, _State]:
+    state = _minimise(lines, _State.at(lines, poles, participation), max_iterations)
+    if lines.weighted:
+        return lines, state
+    lines = reweighted(lines, state.solution.residual, parameters=state.solution.coefficients.shape[1])
+    return lines, _minimise(lines, _State.at(lines, state.poles, state.participation), max_iterations)
+
+
 def _minimise(lines: ModelLines, state: _State, max_iterations: int) -> _State:
     damping = FIRST_DAMPING
     for _ in range(max_iterations):
-        equations = reduced_equations(lines, state.solution)
-        found = _step(lines, state, equations, damping)
+        found = _step(lines, state, reduced_equations(lines, state.solution), damping)
         if found is None:
             break
         trial, damping = found
@@ -106,16 +118,17 @@ def _minimise(lines: ModelLines, state: _State, max_iterations: int) -> _State:
 def _step(
     lines: ModelLines, state: _State, equations: ReducedEquations, damping: float
 ) -> tuple[_State, float] | None:
+    """Take a step that lowers the cost, shorter and shorter until one does; None when none does."""
     while damping < LARGEST_DAMPING:
         poles, participation = equations.moved(state.poles, state.participation, damping)
         if np.all(poles.real < 0) and np.all(poles.imag > 0):
             trial = _State.at(lines, poles, participation)
             if trial.cost <= state.cost:
-                return trial, max(damping / 10, 1e-12)
+                return trial, max(damping / 10, FIRST_DAMPING**2)
         damping *= 10
     return None
 
 
 def _unit_largest(vectors: Complex) -> Complex:
     largest = np.argmax(np.abs(vectors), axis=1)[:, np.newaxis]
-    return vectors / np.take_along_axis(vectors, largest, axis=1)
+    return np.asarray(vectors / np.take_along_axis(vectors, largest, axis=1), dtype=np.complex128)

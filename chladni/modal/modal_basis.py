@@ -18,8 +18,8 @@ class ModalBasis(Value):
     """Functions over lines whose combinations with *real* weights are modal models.
 
     A shape enters with its conjugate, so that the model is linear in Re psi and Im psi, not in psi. For each mode
-    there are two columns, phi + phi~ for the real part and j(phi - phi~) for the imaginary. phi is s^p/(s - lambda) as
-    the window of the segments shows it, and phi~ the same of conj(lambda).
+    there are two columns, phi + phi~ for the real part and j(phi - phi~) for the imaginary. phi is s^p/(s - lambda)
+    as the window of the segments shows it, and phi~ the same of conj(lambda).
 
     Attributes
     ----------

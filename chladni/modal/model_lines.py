@@ -1,6 +1,6 @@
 """The lines that a modal model is fitted to, with their weights."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import Any
 
@@ -15,6 +15,8 @@ from chladni.spectral.forms import ORDER, form
 
 # Below this share of a function's largest magnitude a standard deviation is rounding, not noise.
 ROUNDING = 1e-8
+EXACT = 1e-13
+UNKNOWN_STD = "the functions carry no standard deviation: error bars rest on what the fit leaves of each function"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,7 +37,9 @@ class ModelLines(Value):
     window
         How averaging over segments shortens impulse responses; None where it doesn't.
     weighted
-        Whether `weights` come from `std`; else they are equal over each function, its mean square being 1.
+        Whether `weights` come from `std`; else they are the same over each function.
+    notes
+        Where the weights come from, when not from `std`.
     """
 
     frequency_hz: NDArray[np.float64]
@@ -44,6 +48,7 @@ class ModelLines(Value):
     order: int
     window: LagWindow | None
     weighted: bool
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -84,7 +89,20 @@ def model_lines(response: FrequencyResponse, band_hz: tuple[float, float] | None
         # H2 and Hv see the window in another way, which is not modelled.
         window=lag_window(response.provenance) if response.provenance.estimator == "H1" else None,
         weighted=weighted,
+        notes=() if weighted else (UNKNOWN_STD,),
     )
+
+
+def reweighted(lines: ModelLines, residual: NDArray[np.complex128], *, parameters: int) -> ModelLines:
+    """Weigh each function by what a fit with `parameters` real coefficients a response leaves of it."""
+    used = lines.weights > 0
+    share = parameters / lines.values.shape[1]
+    freedom = np.maximum(2 * used.sum(axis=-1) - share, 1.0)
+    variance = np.sum(np.where(used, np.abs(residual) ** 2, 0.0), axis=-1) / freedom
+    # A function that is fitted to the last digit must not drive all others out.
+    floor = (EXACT * np.abs(lines.values).max(axis=(-1))) ** 2
+    variance = np.maximum(variance, np.where(floor > 0, floor, floor.max()))
+    return replace(lines, weights=np.where(used, 1 / variance[..., np.newaxis], 0.0))
 
 
 def _weights(

@@ -38,7 +38,7 @@ class ProductTable:
     @property
     def columns(self) -> int:
         """Number of basis functions."""
-        return self.products.shape[-1]
+        return int(self.products.shape[-1])
 
     def batches(self, responses: int, references: int) -> list[slice]:
         """Cut the responses so that their Gram matrices fit in memory."""
