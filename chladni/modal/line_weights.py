@@ -60,7 +60,8 @@ def weighted_lines(
         Lowest and highest line, inclusive; None for all. The line at 0 Hz is never used: few sensors measure it.
     weighting
         ``std``: inverse of one sigma, root mean square over the references, times the root of the magnitude that the
-        responses have together on a line; where no response knows its sigma, as ``uniform``: each response by the inverse of its rms;
+        responses have together on a line; where no response knows its sigma, as ``uniform``: each response by the
+        inverse of its rms;
         ``relative``: inverse of the magnitude.
 
     Raises
@@ -153,7 +154,7 @@ def _typical(std: NDArray[np.float64]) -> float:
 
 
 def _rms(values: NDArray[Any], axis: tuple[int, ...]) -> NDArray[np.float64]:
-    return np.asarray(np.sqrt(np.mean(np.abs(values) ** 2, axis=axis)), dtype=np.float64)
+    return np.asarray(np.sqrt(np.mean(values.real**2 + values.imag**2, axis=axis)), dtype=np.float64)
 
 
 def _or_one(numbers: NDArray[np.float64]) -> NDArray[np.float64]:

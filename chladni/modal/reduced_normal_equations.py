@@ -52,12 +52,9 @@ def reduced_normal_matrix(lines: WeightedLines, circle: UnitCircle, order: int) 
     matrix = np.array(blocks.transpose(2, 0, 3, 1), order="C").reshape((order + 1) * references, -1)
     diagonal = np.diag_indices_from(matrix)
     ridge = DENOMINATOR_RIDGE * matrix[diagonal].real
-    chunk = max(1, CHUNK // (references * max((order + 1) ** 2, circle.length)))
-    for start in range(0, lines.weight.shape[0], chunk):
-        part = slice(start, start + chunk)
-        numerators = _toeplitz(circle.moments(power[part], order), order)
-        cross = _toeplitz(circle.moments(power[part, None] * lines.values[part], order), order)
-        matrix -= _eliminated(numerators, cross)
+    for part in _chunks(lines.weight.shape[0], references * max((order + 1) ** 2, circle.length)):
+        cross = circle.moments(power[part, None] * lines.values[part], order)
+        matrix -= _eliminated(circle, power[part], _toeplitz(cross, order))
     matrix = without_noise((matrix + matrix.conj().T) / 2, lines, circle, order)
     matrix[diagonal] += ridge
     return matrix
@@ -68,18 +65,59 @@ def _toeplitz(moments: NDArray[np.complex128], order: int) -> NDArray[np.complex
     return sliding_window_view(moments, order + 1, axis=-1)[..., ::-1]
 
 
-def _eliminated(numerators: NDArray[np.complex128], cross: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _chunks(responses: int, numbers: int) -> list[slice]:
+    """Cut the responses so that no more than a chunk's numbers are held at once, so many for each."""
+    size = max(1, CHUNK // numbers)
+    return [slice(start, start + size) for start in range(0, responses, size)]
+
+
+def _eliminated(
+    circle: UnitCircle, power: NDArray[np.float64], cross: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
     """Sum over the responses of S^H R^-1 S, by the Cholesky factors of R."""
-    responses, size = numerators.shape[:2]
+    responses, _, order_1 = cross.shape[:3]
+    share, common = _common_power(power)
+    if common is None:
+        factor = _factors(_toeplitz(circle.moments(power, order_1 - 1), order_1 - 1))
+        stacked = np.array(cross.transpose(0, 2, 3, 1), order="C").reshape(responses, order_1, -1)
+        for response in range(responses):
+            _solve_in_place(factor[response], stacked[response])
+        return _gram(stacked.reshape(responses * order_1, -1))
+    # Responses weighted alike share R, up to a factor that goes into S.
+    factor = _factors(_toeplitz(circle.moments(common[None], order_1 - 1), order_1 - 1))
+    wide = np.array((cross / np.sqrt(share)[:, None, None, None]).transpose(2, 0, 3, 1), order="C")
+    _solve_in_place(factor[0], wide.reshape(order_1, -1))
+    return _gram(wide.reshape(order_1 * responses, -1))
+
+
+def _common_power(power: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Factor of each response and the lines' weights they share, None when they differ by more than rounding."""
+    total = power.sum(axis=1)
+    share = np.where(total > 0, total, 1.0)
+    common = power[np.argmax(total)] / share[np.argmax(total)]
+    alike = bool(np.all(total > 0)) and np.allclose(power / share[:, None], common, rtol=1e-12, atol=0)
+    return share, common if alike else None
+
+
+def _factors(numerators: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Lower Cholesky factors of matrices ``[response, row, row]``, kept positive definite."""
     matrix = numerators.copy()
     diagonal = np.einsum("orr->or", matrix)
     # A response without a usable line has R = 0 and S = 0: any positive diagonal makes it vanish.
     diagonal += np.where(diagonal.real > 0, NUMERATOR_RIDGE * diagonal.real, 1.0)
-    stacked = np.array(cross.transpose(0, 2, 3, 1), order="C").reshape(responses, size, -1)
-    from scipy.linalg import solve_triangular
+    return np.asarray(np.linalg.cholesky(matrix), dtype=np.complex128)
 
-    factor = np.linalg.cholesky(matrix)
-    for response in range(responses):
-        stacked[response] = solve_triangular(factor[response], stacked[response], lower=True, check_finite=False)
-    tall = stacked.reshape(responses * size, -1)
-    return np.asarray(tall.conj().T @ tall)
+
+def _solve_in_place(factor: NDArray[np.complex128], right: NDArray[np.complex128]) -> None:
+    """Replace `right` by factor^-1 right; both are rows in memory, which BLAS sees as their transposes."""
+    from scipy.linalg.blas import ztrsm
+
+    ztrsm(1.0, factor.T, right.T, side=1, lower=0, overwrite_b=1)
+
+
+def _gram(tall: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """``tall^H tall``, half of which BLAS computes."""
+    from scipy.linalg.blas import zherk
+
+    upper = zherk(1.0, tall.T)
+    return np.asarray(upper.T + np.triu(upper, 1).conj())

@@ -1,0 +1,96 @@
+"""Poles of all orders, their stability and shapes from 60 frequency responses, against sdypy-EMA."""
+
+import time
+import warnings
+from statistics import median
+
+import numpy as np
+from random_modes import RandomModes, accelerances, random_modes
+
+from chladni.modal.lsfd import least_squares_frequency_domain
+from chladni.modal.plscf import polyreference_poles
+from chladni.modal.pole_selection import select_poles
+from chladni.modal.stabilisation import pole_status
+from chladni.signals.frequency_response import FrequencyResponse
+
+RESPONSES, LINES, ORDERS, MODES, TOP_HZ, NOISE = 60, 2048, 60, 10, 1024.0, 0.01
+ROUNDS = 9
+# Order k of ours has k complex coefficients at positive frequencies, order k of theirs 2 k real ones: as many poles.
+Times = dict[str, float]
+
+
+def ours(response: FrequencyResponse) -> tuple[np.ndarray, Times]:
+    """Poles ``[mode]`` and the time of each step; the choice among the poles is made by clustering."""
+    begun = time.perf_counter()
+    table = polyreference_poles(response, max_order=ORDERS)
+    poles = time.perf_counter()
+    pole_status(table)
+    selection = select_poles(table)
+    stable = time.perf_counter()
+    least_squares_frequency_domain(response, selection.pole)
+    shapes = time.perf_counter()
+    return selection.pole, {"poles": poles - begun, "stability": stable - poles, "shapes": shapes - stable}
+
+
+def theirs(response: FrequencyResponse, modes: RandomModes) -> tuple[np.ndarray, Times]:
+    """The same by sdypy-EMA, which is told the frequencies to choose poles at."""
+    from sdypy.EMA import Model
+
+    begun = time.perf_counter()
+    model = Model(
+        response.values[:, 0],
+        response.frequency_hz,
+        lower=float(response.frequency_hz[1]),
+        upper=TOP_HZ,
+        pol_order_high=ORDERS,
+        frf_form="accelerance",
+    )
+    model.get_poles(show_progress=False)
+    poles = time.perf_counter()
+    model.select_closest_poles(list(modes.frequency_hz))
+    stable = time.perf_counter()
+    model.get_constants()
+    shapes = time.perf_counter()
+    chosen = np.array([model.all_poles[order][row] for order, row in model.pole_ind])
+    return chosen, {"poles": poles - begun, "stability": stable - poles, "shapes": shapes - stable}
+
+
+def worst(found: np.ndarray, truth: np.ndarray) -> float:
+    """Largest relative error of a natural frequency, each mode having its own pole."""
+    nearest = np.argmin(np.abs(found - truth[:, None]), axis=1)
+    assert len(set(nearest)) == len(truth), "two modes share a pole"
+    return float(np.max(np.abs(np.abs(found[nearest]) / np.abs(truth) - 1)))
+
+
+def main() -> None:
+    modes = random_modes(MODES, responses=RESPONSES, references=1, top_hz=TOP_HZ)
+    response = accelerances(modes, lines=LINES, top_hz=TOP_HZ, noise=NOISE)
+    runs: dict[str, list[Times]] = {"chladni": [], "sdypy-EMA": []}
+    errors = {}
+    with warnings.catch_warnings():
+        # sdypy-EMA warns that the last line lies above the last of the response.
+        warnings.simplefilter("ignore")
+        for _ in range(ROUNDS):
+            for name, work in (("chladni", lambda: ours(response)), ("sdypy-EMA", lambda: theirs(response, modes))):
+                found, times = work()
+                runs[name].append(times)
+                errors[name] = worst(found, modes.poles)
+    assert errors["chladni"] < 3e-4, "the frequencies aren't those of the modes"
+    assert errors["sdypy-EMA"] < 3e-4, "the frequencies aren't those of the modes"
+    print(f"{RESPONSES} responses x {LINES} lines, {MODES} modes, {100 * NOISE:.0f} % noise, orders to {ORDERS}\n")
+    print("| work | chladni | sdypy-EMA | ratio, median of pairs | lowest to highest |")
+    print("| --- | ---: | ---: | ---: | ---: |")
+    for steps in (("poles",), ("stability",), ("shapes",), ("poles", "stability", "shapes")):
+        mine, peer = ([sum(times[step] for step in steps) for times in runs[name]] for name in runs)
+        ratios = [b / a for a, b in zip(mine, peer, strict=True)]
+        print(
+            f"| {', '.join(steps)} | {1e3 * median(mine):.1f} ms | {1e3 * median(peer):.1f} ms | {median(ratios):.1f} | "
+            f"{min(ratios):.1f} to {max(ratios):.1f} |"
+        )
+    print(
+        f"\nworst natural frequency: chladni {errors['chladni']:.1e}, sdypy-EMA {errors['sdypy-EMA']:.1e} (relative)"
+    )
+
+
+if __name__ == "__main__":
+    main()
