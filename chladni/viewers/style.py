@@ -2,7 +2,10 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from chladni.signals.channel import Channel
 from chladni.signals.study import Study
@@ -32,6 +35,25 @@ ON_DARK: tuple[Colour, ...] = (
     (205, 170, 140),
     (190, 190, 190),
 )
+# Of poles, in the order of POLE_STATUSES: grey for those that nothing confirms, then from warm to green.
+STATUS_ON_LIGHT: tuple[Colour, ...] = ((160, 160, 160), (213, 94, 0), (0, 114, 178), (0, 145, 106))
+STATUS_ON_DARK: tuple[Colour, ...] = ((105, 105, 105), (240, 125, 50), (86, 180, 233), (40, 195, 150))
+# Amplitude, low to high: blue, teal, yellow, red-orange; also told apart in grey, and on both grounds.
+AMPLITUDES = np.array([(40, 70, 160), (40, 160, 160), (235, 190, 60), (250, 90, 40)], dtype=np.float64)
+
+
+def amplitude_colours(share: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+    """Give ``[..., rgb]`` of amplitudes from 0 to 1; what lies outside has the colour of the end."""
+    return _colours(AMPLITUDES, share)
+
+
+# Modal assurance: from the ground of a dark picture over blue to yellow, so that likeness shines.
+LIKENESS = np.array([(18, 22, 40), (30, 75, 130), (20, 135, 140), (120, 175, 70), (235, 190, 60)], dtype=np.float64)
+
+
+def mac_colours(mac: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+    """Give ``[..., rgb]`` of modal assurance criteria from 0 to 1."""
+    return _colours(LIKENESS, mac)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,6 +105,13 @@ class Style:
         return ON_LIGHT[self.numbers[channel.name]]
 
 
+def _colours(scale: NDArray[np.float64], share: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+    # What isn't known has the lowest colour.
+    place = np.nan_to_num(np.clip(share, 0, 1)) * (len(scale) - 1)
+    parts = [np.interp(place, np.arange(len(scale)), scale[:, part]) for part in range(3)]
+    return np.stack(parts, axis=-1).astype(np.uint8)
+
+
 def _channels(study: Study) -> Iterator[Channel]:
     for series in study.series:
         yield from series.channels
@@ -92,6 +121,8 @@ def _channels(study: Study) -> Iterator[Channel]:
         yield from waterfall.channels
     if study.response is not None:
         yield from (*study.response.references, *study.response.responses)
+    if study.modes is not None:
+        yield from (*study.modes.references, *study.modes.channels)
 
 
 def _starts(study: Study) -> Iterator[int]:
