@@ -5,21 +5,34 @@ Importing this package costs half a second, so it's imported where a figure is w
 
 from chladni.viewers.figures.album import Album
 from chladni.viewers.figures.comparison import comparison_figures
+from chladni.viewers.figures.complexity import complexity_figures
 from chladni.viewers.figures.density import density_figures
 from chladni.viewers.figures.frequency_response import response_figures
+from chladni.viewers.figures.mac import cross_mac_figure, mac_figures
+from chladni.viewers.figures.mode_shapes import mode_shape_figures
 from chladni.viewers.figures.nyquist import nyquist_figures
+from chladni.viewers.figures.relative_motion import relative_motion_figures
 from chladni.viewers.figures.saving import save_album, save_figures
+from chladni.viewers.figures.stabilisation import stabilisation_figures
+from chladni.viewers.figures.synthesis import synthesis_figures
 from chladni.viewers.figures.waterfall import waterfall_figures
 from chladni.viewers.figures.waveforms import waveform_figures
 
 __all__ = [
     "Album",
     "comparison_figures",
+    "complexity_figures",
+    "cross_mac_figure",
     "density_figures",
+    "mac_figures",
+    "mode_shape_figures",
     "nyquist_figures",
+    "relative_motion_figures",
     "response_figures",
     "save_album",
     "save_figures",
+    "stabilisation_figures",
+    "synthesis_figures",
     "waterfall_figures",
     "waveform_figures",
 ]

@@ -6,10 +6,16 @@ from typing import Self
 from matplotlib.figure import Figure
 
 from chladni.signals.study import Study
+from chladni.viewers.figures.complexity import complexity_figures
 from chladni.viewers.figures.density import density_figures
 from chladni.viewers.figures.frequency_response import response_figures
+from chladni.viewers.figures.mac import mac_figures
+from chladni.viewers.figures.mode_shapes import mode_shape_figures
 from chladni.viewers.figures.nyquist import nyquist_figures
+from chladni.viewers.figures.relative_motion import relative_motion_figures
 from chladni.viewers.figures.rendering import rendered
+from chladni.viewers.figures.stabilisation import stabilisation_figures
+from chladni.viewers.figures.synthesis import synthesis_figures
 from chladni.viewers.figures.waterfall import waterfall_figures
 from chladni.viewers.figures.waveforms import waveform_figures
 
@@ -29,7 +35,7 @@ class Album:
 
     @classmethod
     def of(cls, study: Study) -> Self:
-        """Draw every figure that the study has data for: waveforms, densities, responses, nyquist, waterfalls."""
+        """Draw every figure that the study has data for: waveforms, spectra, transfer functions, modes."""
         return cls(
             {
                 "waveforms": waveform_figures(study),
@@ -37,6 +43,12 @@ class Album:
                 "responses": response_figures(study),
                 "nyquist": nyquist_figures(study),
                 "waterfalls": waterfall_figures(study),
+                "mode shapes": mode_shape_figures(study),
+                "relative motion": relative_motion_figures(study),
+                "stabilisation": stabilisation_figures(study),
+                "synthesis": synthesis_figures(study),
+                "mac": mac_figures(study),
+                "complexity": complexity_figures(study),
             }
         )
 

@@ -28,6 +28,7 @@ th { color: var(--soft); font-weight: 600; white-space: nowrap; }
 tbody tr:nth-child(even) { background: var(--band); }
 td.number { text-align: right; white-space: nowrap; }
 th.number { text-align: right; }
+.note { margin: .5rem 0 .8rem; color: var(--soft); font-size: .85rem; }
 td { overflow-wrap: anywhere; }
 .figures { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(26rem, 100%), 1fr)); gap: 1rem;
   align-items: start; }

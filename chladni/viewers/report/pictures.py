@@ -10,21 +10,37 @@ _SIGMA = "Shaded: one sigma of the random error."
 
 def pictures(album: Album) -> dict[str, str]:
     """Give the figures as HTML, by the heading of their section; sections without figures are left out."""
+    return {
+        heading: element(
+            "div", "".join(_picture(album, name, caption) for name, caption in captioned), class_="figures"
+        )
+        for heading, captioned in _sections(album).items()
+        if captioned
+    }
+
+
+def _sections(album: Album) -> dict[str, list[tuple[str, str]]]:
+    """Names of figures with their captions, by heading."""
+
+    def captioned(section: str, caption: str) -> list[tuple[str, str]]:
+        return [(name, caption) for name in album.sections[section]]
+
     # Each magnitude beside its Nyquist plot.
     pairs = zip(album.sections["responses"], album.sections["nyquist"], strict=True)
-    sections = {
-        "Frequency responses": (
-            [name for pair in pairs for name in pair],
-            f"{_SIGMA} Lines that nothing excites are left out.",
-        ),
-        "Power spectral densities": (album.sections["densities"], f"One-sided. {_SIGMA}"),
-        "Waterfalls": (album.sections["waterfalls"], "Grey: samples are missing."),
-        "Waveforms": (album.sections["waveforms"], "Long records are drawn by the extremes of each stretch."),
-    }
+    masked = f"{_SIGMA} Lines that nothing excites are left out."
     return {
-        heading: element("div", "".join(_picture(album, name, caption) for name in names), class_="figures")
-        for heading, (names, caption) in sections.items()
-        if names
+        "Mode shapes": captioned("mode shapes", "Each mode at its furthest.")
+        + captioned("complexity", "Components in the complex plane: a mode that moves in one phase is a line."),
+        "Joints that move": captioned("relative motion", "Red: the neighbours that move most against each other."),
+        "Poles and fit": captioned("stabilisation", "Poles of all model orders over the indicator function.")
+        + captioned("mac", "Modal assurance criterion: 1 for shapes that these sensors can't tell apart.")
+        + captioned(
+            "synthesis", "Error: root of the squares that the modes leave over those of the measured function."
+        ),
+        "Frequency responses": [(name, masked) for pair in pairs for name in pair],
+        "Power spectral densities": captioned("densities", f"One-sided. {_SIGMA}"),
+        "Waterfalls": captioned("waterfalls", "Grey: samples are missing."),
+        "Waveforms": captioned("waveforms", "Long records are drawn by the extremes of each stretch."),
     }
 
 

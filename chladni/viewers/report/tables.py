@@ -38,8 +38,9 @@ def _channel_rows(study: Study, style: Style) -> Iterator[tuple[str, ...]]:
             seen.add(channel.name)
             yield (*_place(channel, style), f"{series.sample_rate_hz:.6g}", f"{series.duration_s:.6g}")
     others = [channel for density in study.densities for channel in density.channels]
+    others += [] if study.modes is None else [*study.modes.references, *study.modes.channels]
     for channel in others:
-        # Spectra may be shown without their waveforms; their channels are listed all the same.
+        # Spectra and modes may be shown without their waveforms; their channels are listed all the same.
         if channel.name not in seen:
             seen.add(channel.name)
             yield (*_place(channel, style), "", "")

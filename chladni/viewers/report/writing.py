@@ -8,6 +8,7 @@ from chladni.io.atomic import atomic_write
 from chladni.signals.study import Study
 from chladni.viewers.figures import Album
 from chladni.viewers.report.markup import PAGE, element, escaped
+from chladni.viewers.report.modes import modes_section, relative_motion_section
 from chladni.viewers.report.pictures import pictures
 from chladni.viewers.report.tables import channel_table, method_table, peak_table
 from chladni.viewers.style import Style
@@ -54,6 +55,7 @@ def _body(study: Study, album: Album) -> Iterator[str]:
     yield element("h1", escaped(study.title))
     if study.findings:
         yield _section("Findings", element("ul", "".join(element("li", escaped(text)) for text in study.findings)))
+    yield from _modes(study, style)
     yield _section(
         "Peaks of the frequency responses", peak_table(study.response_peaks, style, channels="Response, reference")
     )
@@ -62,6 +64,13 @@ def _body(study: Study, album: Album) -> Iterator[str]:
         yield _section(heading, shown)
     yield _section("Channels", channel_table(study, style))
     yield _section("Method", method_table(study))
+
+
+def _modes(study: Study, style: Style) -> Iterator[str]:
+    if study.modes is None:
+        return
+    yield _section("Modes", modes_section(study.modes, study.validation))
+    yield _section("Relative motion between neighbours", relative_motion_section(study, study.modes, style))
 
 
 def _section(heading: str, content: str) -> str:

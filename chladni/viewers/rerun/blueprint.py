@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 import rerun.blueprint as rrb
 
-from chladni.viewers.rerun.timelines import TIME
+from chladni.viewers.rerun.timelines import PHASE, PHASE_STEPS_PER_S, TIME
 
+# More tabs than this in one row don't fit into a window.
+TABS_IN_A_ROW = 6
 # More plots than this above one another are too flat to read; the rest goes behind tabs.
 STACKED = 3
 
@@ -34,6 +36,27 @@ class ChannelViews:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ModeViews:
+    """Plots of one mode."""
+
+    label: str
+    frequency: str
+    shape: rrb.View
+    complexity: rrb.View
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModesViews:
+    """Everything about modes; parts without data are empty."""
+
+    text: rrb.View
+    shapes: Sequence[ModeViews] = ()
+    mac: rrb.View | None = None
+    stabilisation: rrb.View | None = None
+    synthesis: Sequence[rrb.View] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Views:
     """Everything that was drawn of a study; parts without data are empty."""
 
@@ -42,22 +65,31 @@ class Views:
     densities: Sequence[rrb.View] = ()
     channels: Sequence[ChannelViews] = ()
     responses: Sequence[ResponseViews] = ()
+    modes: ModesViews | None = None
 
 
 def arrange(views: Views) -> rrb.Blueprint:
-    """Put the views on pages: overview, spectra over time, frequency responses."""
+    """Put the views on pages: overview, spectra over time, frequency responses, modes."""
     pages = [_overview(views)]
     if views.channels:
         pages.append(_over_time(views))
     if views.responses:
         pages.append(_responses(views))
+    if views.modes is not None:
+        pages.append(_modes(views.modes))
     # Nothing is left to heuristics: they would add a view for every entity.
     return rrb.Blueprint(
         rrb.Tabs(*pages, active_tab=0),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         # Paused: a file that starts to play runs away from whoever wants to read it.
-        rrb.TimePanel(state="collapsed", timeline=TIME, play_state="paused"),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=_first_timeline(views),
+            play_state="paused",
+            loop_mode="all",
+            fps=PHASE_STEPS_PER_S,
+        ),
         auto_layout=False,
         auto_views=False,
     )
@@ -91,6 +123,52 @@ def _response(response: ResponseViews, name: str) -> rrb.Container:
     curves = rrb.Vertical(response.magnitude, response.phase, response.coherence, row_shares=[2, 1, 1])
     side = [response.nyquist] if response.deflection is None else [response.deflection, response.nyquist]
     return rrb.Horizontal(curves, rrb.Vertical(*side), column_shares=[1.9, 1], name=name)
+
+
+def _first_timeline(views: Views) -> str:
+    """Seconds, unless only shapes move: everything else is drawn over seconds too, and nothing over the phase."""
+    others = (views.waveforms, views.densities, views.channels, views.responses)
+    only_shapes = views.modes is not None and views.modes.shapes and not views.modes.synthesis and not any(others)
+    return PHASE if only_shapes else TIME
+
+
+def _modes(modes: ModesViews) -> rrb.Container:
+    """Shapes with what is known of them; on a second page what they were taken from and how well they fit."""
+    fit: list[rrb.View | rrb.Container] = [modes.stabilisation] if modes.stabilisation is not None else []
+    fit += [rrb.Tabs(*modes.synthesis)] if modes.synthesis else []
+    if not fit:
+        return _shapes(modes, "Modes")
+    shares = [1.3, 1][: len(fit)]
+    poles = rrb.Vertical(*fit, row_shares=shares, name="Poles and fit")
+    return rrb.Tabs(_shapes(modes, "Shapes"), poles, active_tab=0, name="Modes")
+
+
+def _shapes(modes: ModesViews, name: str) -> rrb.Container:
+    beside = modes.text if modes.mac is None else rrb.Vertical(modes.text, modes.mac, row_shares=[1.3, 1])
+    if not modes.shapes:
+        return rrb.Horizontal(beside, name=name)
+    return rrb.Horizontal(_tabs(modes.shapes), beside, column_shares=[1.7, 1], name=name)
+
+
+def _tabs(modes: Sequence[ModeViews]) -> rrb.Container:
+    """All modes behind one row of tabs, or behind two rows when one is too short."""
+    rows = -(-len(modes) // TABS_IN_A_ROW)
+    # Rows of equal length, each named by the first and the last of its modes.
+    length = -(-len(modes) // rows)
+    parts = [modes[start : start + length] for start in range(0, len(modes), length)]
+    firsts = range(1, len(modes) + 1, length)
+    tabs = [
+        rrb.Tabs(
+            *(_mode(mode) for mode in part),
+            name=f"{first}–{first + len(part) - 1}: {part[0].frequency}–{part[-1].frequency} Hz",
+        )
+        for first, part in zip(firsts, parts, strict=True)
+    ]
+    return tabs[0] if len(tabs) == 1 else rrb.Tabs(*tabs)
+
+
+def _mode(mode: ModeViews) -> rrb.Container:
+    return rrb.Horizontal(mode.shape, mode.complexity, column_shares=[1.7, 1], name=mode.label)
 
 
 def _stack(plots: Sequence[rrb.View]) -> rrb.Container:

@@ -3,14 +3,21 @@
 import rerun as rr
 
 from chladni.signals.study import Study
+from chladni.viewers.mode_tables import hertz, mode_title
 from chladni.viewers.panels import panels
-from chladni.viewers.rerun.blueprint import ChannelViews, ResponseViews, Views, arrange
+from chladni.viewers.rerun.blueprint import ChannelViews, ModesViews, ModeViews, ResponseViews, Views, arrange
+from chladni.viewers.rerun.complexity import draw_complexity
 from chladni.viewers.rerun.deflection import draw_deflections
 from chladni.viewers.rerun.density import draw_densities
 from chladni.viewers.rerun.findings import draw_findings
 from chladni.viewers.rerun.frequency_response import draw_coherence, draw_magnitude, draw_phase
+from chladni.viewers.rerun.mac import draw_mac
+from chladni.viewers.rerun.mode_text import draw_mode_text
 from chladni.viewers.rerun.nyquist import draw_nyquist
+from chladni.viewers.rerun.shapes import draw_shapes
 from chladni.viewers.rerun.spectrum import draw_spectra
+from chladni.viewers.rerun.stabilisation import draw_stabilisation
+from chladni.viewers.rerun.synthesis import draw_synthesis
 from chladni.viewers.rerun.waterfall import draw_waterfalls
 from chladni.viewers.rerun.waveforms import draw_waveforms, waveform_view
 from chladni.viewers.style import Style
@@ -46,6 +53,7 @@ def draw(recording: rr.RecordingStream, study: Study) -> None:
         densities=draw_densities(recording, study, style),
         channels=_draw_over_time(recording, study, style),
         responses=_draw_responses(recording, study, style),
+        modes=_draw_modes(recording, study, style),
     )
     # The blueprint goes last: rerun 0.41 has lost rows that followed one in a file (rerun issue 12769).
     recording.flush()
@@ -85,3 +93,27 @@ def _draw_responses(recording: rr.RecordingStream, study: Study, style: Style) -
         )
         for panel in panels(response)
     ]
+
+
+def _draw_modes(recording: rr.RecordingStream, study: Study, style: Style) -> ModesViews | None:
+    modes, validation = study.modes, study.validation
+    if modes is None:
+        return None
+    shapes = draw_shapes(recording, study, modes, style)
+    planes = draw_complexity(recording, modes, validation, style)
+    return ModesViews(
+        text=draw_mode_text(recording, study, modes, style),
+        shapes=[
+            ModeViews(
+                label=mode_title(modes, row),
+                frequency=hertz(float(modes.frequency_hz[row])),
+                shape=shape,
+                complexity=plane,
+            )
+            for row, (shape, plane) in enumerate(zip(shapes, planes, strict=True))
+        ],
+        # One mode is like itself and nothing else.
+        mac=draw_mac(recording, modes, validation) if validation is not None and len(shapes) > 1 else None,
+        stabilisation=draw_stabilisation(recording, modes),
+        synthesis=draw_synthesis(recording, study, modes, style),
+    )

@@ -1,4 +1,4 @@
-"""The two timelines: seconds of the log, and frequency written as a duration, 1 Hz as 1 ms.
+"""The timelines: seconds of the log, frequency written as a duration (1 Hz as 1 ms), and the phase of a mode.
 
 Frequency plots are written on both. A view shows only what the active timeline holds, so with the second timeline
 alone they would stay empty until the reader switches to it; ``docs/decisions/0002-frequency-in-rerun.md`` tells more.
@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 
 TIME = "time"
 FREQUENCY = "frequency"
+# Of a motion, in degrees, a step of the timeline each: it holds one period and nothing else, so that it can loop.
+PHASE = "phase"
+PHASE_STEPS_PER_S = 180.0
+PERIOD_S = 360 / PHASE_STEPS_PER_S
 NS_PER_HZ = 1_000_000
 # Measured: twice as fast as 4096 rows, no slower than more rows at once, and a thousand times faster than row by row.
 ROWS_IN_A_BATCH = 16384
@@ -25,6 +29,17 @@ def frequency_index(frequency_hz: NDArray[np.float64]) -> dict[str, NDArray[np.i
     # Whole nanoseconds: a millionth of a hertz, finer than any line spacing.
     ticks = np.rint(frequency_hz * NS_PER_HZ).astype(np.int64)
     return {FREQUENCY: ticks, TIME: ticks}
+
+
+def phase_index(phase_deg: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
+    """Give the index of rows at phases of a motion, 0 to 360 degrees."""
+    return {PHASE: phase_deg}
+
+
+def motion_index(period: NDArray[np.int64], phase_deg: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
+    """Give the index of rows of a motion that is repeated from second 0 on, in the period and at the phase given."""
+    ns_per_degree = PERIOD_S * 1e9 / 360
+    return {TIME: np.rint((360 * period + phase_deg) * ns_per_degree).astype(np.int64)}
 
 
 def send_columns(
@@ -64,5 +79,11 @@ def frequency_axis(low_hz: float, high_hz: float) -> rr.blueprint.TimeAxis:
 
 
 def _time_columns(index: dict[str, NDArray[np.int64]], rows: slice) -> list[rr.TimeColumn]:
+    return [_time_column(name, places[rows]) for name, places in index.items()]
+
+
+def _time_column(name: str, places: NDArray[np.int64]) -> rr.TimeColumn:
+    if name == PHASE:
+        return rr.TimeColumn(name, sequence=places)
     # As timedelta64, which is taken as it is; numbers would go through floating point seconds.
-    return [rr.TimeColumn(name, duration=ns[rows].astype("timedelta64[ns]")) for name, ns in index.items()]
+    return rr.TimeColumn(name, duration=places.astype("timedelta64[ns]"))

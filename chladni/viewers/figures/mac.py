@@ -1,0 +1,89 @@
+"""Matrices of the modal assurance criterion, with numbers."""
+
+from collections.abc import Sequence
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from chladni.signals.study import Study
+from chladni.viewers.drawing import Floats
+from chladni.viewers.figures.sheet import WIDTH_IN, look, plain
+from chladni.viewers.mode_tables import mode_ticks
+
+# Up to so many columns every cell has its number; up to a few more, those that aren't small.
+ALL_NUMBERED, ANY_NUMBERED = 10, 24
+SMALL = 0.2
+# A number is white on the dark half of the scale.
+DARK_BELOW = 0.55
+TICKS = 24
+
+
+def mac_figures(study: Study) -> dict[str, Figure]:
+    """Draw the AutoMAC, by name; none without a validation of at least two modes."""
+    modes, validation = study.modes, study.validation
+    # One mode is like itself and nothing else.
+    if modes is None or validation is None or modes.frequency_hz.size < 2:
+        return {}
+    names = mode_ticks(modes)
+    figure = cross_mac_figure(
+        validation.auto_mac, rows=names, columns=names, row_name="Mode: Hz", column_name="Mode: Hz"
+    )
+    return {"mac": figure}
+
+
+def cross_mac_figure(
+    mac: Floats, *, rows: Sequence[str], columns: Sequence[str], row_name: str = "", column_name: str = ""
+) -> Figure:
+    """Draw the modal assurance criterion between two sets of modes.
+
+    Parameters
+    ----------
+    mac
+        ``[row, column]``, 0 to 1.
+    rows, columns
+        Names of the modes, such as ``1: 24.67``.
+    row_name, column_name
+        What the sets are, with the unit of their names.
+    """
+    with look():
+        share = min(1.0, 0.45 + 0.08 * len(columns))
+        width = WIDTH_IN * share
+        cell = (width - 1.4) / max(len(columns), 1)
+        figure = Figure(figsize=(width, min(cell * len(rows) + 0.9, 2 * WIDTH_IN)), layout="constrained")
+        axes = figure.subplots()
+        axes.grid(visible=False)
+        image = axes.imshow(mac, vmin=0, vmax=1, cmap=mpl.colormaps["viridis"], interpolation="nearest")
+        _draw_numbers(axes, mac)
+        _name(axes, rows, columns)
+        axes.set_xlabel(plain(column_name))
+        axes.set_ylabel(plain(row_name))
+        bar = figure.colorbar(image, ax=axes, aspect=25, pad=0.02)
+        bar.set_label("MAC [1]")
+        bar.outline.set_linewidth(0.0)
+    return figure
+
+
+def _draw_numbers(axes: Axes, mac: Floats) -> None:
+    columns = mac.shape[1]
+    if columns > ANY_NUMBERED:
+        return
+    least = 0.0 if columns <= ALL_NUMBERED else SMALL
+    for (row, column), value in [(place, float(mac[place])) for place in zip(*(mac >= least).nonzero(), strict=True)]:
+        axes.text(
+            column,
+            row,
+            f"{value:.2f}" if columns <= ALL_NUMBERED else f"{value:.1f}",
+            ha="center",
+            va="center",
+            fontsize=6.5 if columns <= ALL_NUMBERED else 4.5,
+            color="white" if value < DARK_BELOW else "black",
+        )
+
+
+def _name(axes: Axes, rows: Sequence[str], columns: Sequence[str]) -> None:
+    for axis, names, turned in ((axes.xaxis, columns, 90), (axes.yaxis, rows, 0)):
+        every = -(-len(names) // TICKS)
+        axis.set_ticks(
+            range(0, len(names), max(every, 1)), [plain(name) for name in names[:: max(every, 1)]], rotation=turned
+        )

@@ -1,0 +1,89 @@
+"""The stabilisation diagram over its indicator."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from chladni.signals.mode_set import ModeSet
+from chladni.signals.stabilisation_diagram import StabilisationDiagram
+from chladni.signals.study import Study
+from chladni.viewers.drawing import decibels_of_amplitude, level_limits
+from chladni.viewers.figures.log_axis import logarithmic
+from chladni.viewers.figures.sheet import legend, look, paint, sheet
+from chladni.viewers.figures.upright import STRIP_POINTS, name_above
+from chladni.viewers.labels import printed_unit
+from chladni.viewers.stabilisation import STATUS_NAMES, frequency_range, order_range
+from chladni.viewers.style import STATUS_ON_LIGHT
+
+HEIGHT_IN = 3.4
+INDICATOR = "#8a8a8a"
+MACHINE = "#c03030"
+MARKS = (".", "^", "s", "o")
+
+
+def stabilisation_figures(study: Study) -> dict[str, Figure]:
+    """Draw the poles of all model orders over the indicator, by name; none for methods without model orders."""
+    if study.modes is None or study.modes.stabilisation is None:
+        return {}
+    with look():
+        return {"stabilisation": _figure(study.modes, study.modes.stabilisation)}
+
+
+def _figure(modes: ModeSet, diagram: StabilisationDiagram) -> Figure:
+    named = modes.frequency_hz.size + len(modes.harmonics) > 0
+    figure, (poles,) = sheet([HEIGHT_IN], above_points=STRIP_POINTS if named else 0.0)
+    _draw_indicator(poles, modes, diagram)
+    poles.set_xlim(*frequency_range(modes, diagram))
+    poles.set_ylim(*order_range(diagram))
+    for status, (name, mark) in enumerate(zip(STATUS_NAMES, MARKS, strict=True)):
+        chosen = diagram.status == status
+        poles.plot(
+            diagram.frequency_hz[chosen],
+            diagram.order[chosen],
+            linestyle="none",
+            marker=mark,
+            markersize=2.2 if status else 3.0,
+            color=paint(STATUS_ON_LIGHT[status]),
+            markeredgewidth=0.0,
+            label=name,
+            zorder=3 + status,
+        )
+    taken = diagram.mode >= 0
+    poles.plot(
+        diagram.frequency_hz[taken],
+        diagram.order[taken],
+        linestyle="none",
+        marker="o",
+        markersize=3.8,
+        markerfacecolor="none",
+        markeredgecolor="black",
+        markeredgewidth=0.4,
+        label="taken for a mode",
+        zorder=8,
+    )
+    poles.set_xlabel("Frequency [Hz]")
+    poles.set_ylabel("Model order")
+    names = [(float(hz), "black") for hz in modes.frequency_hz]
+    names += [(line.frequency_hz, MACHINE) for line in modes.harmonics]
+    for hertz, colour in names:
+        poles.axvline(hertz, color=colour, linewidth=0.4, alpha=0.5, zorder=2)
+    legend(poles, above_points=name_above(poles, names))
+    return figure
+
+
+def _draw_indicator(poles: Axes, modes: ModeSet, diagram: StabilisationDiagram) -> None:
+    """Curves on a logarithmic axis of their own on the right, behind the poles."""
+    behind = poles.twinx()
+    poles.set_zorder(behind.get_zorder() + 1)
+    poles.patch.set_visible(False)
+    low_hz, high_hz = frequency_range(modes, diagram)
+    inside = (diagram.indicator_hz >= low_hz) & (diagram.indicator_hz <= high_hz)
+    low, high = level_limits(decibels_of_amplitude(diagram.indicator[:, inside]))
+    logarithmic(behind, 10 ** (low / 20), 10 ** (high / 20))
+    for place, curve in enumerate(diagram.indicator):
+        positive = np.where(curve > 0, curve, np.nan)
+        # The first curve leads; those behind it tell of close modes.
+        behind.plot(diagram.indicator_hz, positive, color=INDICATOR, linewidth=0.9 if place == 0 else 0.5)
+    behind.set_ylabel(f"{diagram.indicator_name} [{printed_unit(diagram.indicator_unit)}]")
+    behind.spines.right.set_visible(True)
+    behind.grid(visible=False)

@@ -1,0 +1,43 @@
+"""Frequencies written upright above the frame, crossed by no line."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.transforms import ScaledTranslation
+
+from chladni.viewers.figures.peak_labels import GAP_POINTS, LETTERS_POINTS, ROOM, STRIP_POINTS
+from chladni.viewers.mode_tables import hertz
+from chladni.viewers.spread import spread
+
+__all__ = ["STRIP_POINTS", "name_above"]
+
+
+def name_above(axes: Axes, names: Sequence[tuple[float, str]]) -> float:
+    """Write frequencies, each in its colour, above the frame; one without room is left out, its line stays.
+
+    Returns
+    -------
+    float
+        Points that the names take above the frame; 0 when there are none.
+    """
+    low, high = axes.get_xlim()
+    shown = [(at, colour) for at, colour in names if low <= at <= high]
+    if not shown:
+        return 0.0
+    places = np.array([((at - low) / (high - low), 0.0) for at, _ in shown])
+    above = ScaledTranslation(0, GAP_POINTS / 72, axes.figure.dpi_scale_trans)
+    for row in spread(places, apart=(ROOM, 1.0)):
+        at, colour = shown[row]
+        axes.text(
+            at,
+            1.0,
+            f"{hertz(at)} Hz",
+            transform=axes.get_xaxis_transform() + above,
+            rotation=90,
+            ha="center",
+            va="bottom",
+            fontsize=LETTERS_POINTS,
+            color=colour,
+        )
+    return STRIP_POINTS

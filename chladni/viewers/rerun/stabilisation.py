@@ -1,0 +1,135 @@
+"""The stabilisation diagram: poles of all model orders over the indicator, those taken for modes ringed."""
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from chladni.signals.mode_set import ModeSet
+from chladni.signals.stabilisation_diagram import StabilisationDiagram
+from chladni.viewers.drawing import Floats, decibels_of_amplitude, level_limits, ticks
+from chladni.viewers.labels import decibel_unit
+from chladni.viewers.mode_tables import hertz
+from chladni.viewers.rerun.canvas import BEHIND, BELOW, LETTERS, Canvas, draw_labels
+from chladni.viewers.spread import spread
+from chladni.viewers.stabilisation import STATUS_NAMES, frequency_range, order_range
+from chladni.viewers.style import STATUS_ON_DARK
+
+PATH = "/stabilisation"
+WIDTH, HEIGHT = 1440.0, 330.0
+INDICATOR_COLOUR = (120, 120, 120)
+MODE_COLOUR = (245, 245, 245)
+HARMONIC_COLOUR = (235, 80, 80)
+ABOVE_RIGHT = np.array([1.2, -0.5]) * LETTERS
+
+
+def draw_stabilisation(recording: rr.RecordingStream, modes: ModeSet) -> rrb.View | None:
+    """Write the diagram and give its view; None for methods without model orders."""
+    diagram = modes.stabilisation
+    if diagram is None:
+        return None
+    canvas = Canvas(width=WIDTH, height=HEIGHT, x_range=frequency_range(modes, diagram), y_range=order_range(diagram))
+    canvas.draw_axes(recording, f"{PATH}/axes", x_name="Frequency [Hz]", y_name="Model order")
+    _draw_indicator(recording, canvas, diagram)
+    _draw_modes(recording, canvas, modes)
+    for status, name in enumerate(STATUS_NAMES):
+        _draw_poles(recording, canvas, diagram, status, name)
+    _draw_legend(recording)
+    return canvas.view(
+        PATH, f"Stabilisation over {diagram.indicator_name} · point at a pole to read it", right=80.0, above=95.0
+    )
+
+
+def _draw_indicator(recording: rr.RecordingStream, canvas: Canvas, diagram: StabilisationDiagram) -> None:
+    """Curves in decibels, over the whole height, with an axis of their own on the right."""
+    level = decibels_of_amplitude(diagram.indicator)
+    low, high = level_limits(level)
+    over = Canvas(width=WIDTH, height=HEIGHT, x_range=canvas.x_range, y_range=(low, high))
+    inside = (diagram.indicator_hz >= canvas.x_range[0]) & (diagram.indicator_hz <= canvas.x_range[1])
+    strips = []
+    for curve in level:
+        known = inside & np.isfinite(curve)
+        strips.append(over.places(diagram.indicator_hz[known], np.maximum(curve[known], low)))
+    lines = rr.LineStrips2D(
+        [strip for strip in strips if len(strip) > 1],
+        colors=[INDICATOR_COLOUR],
+        radii=rr.Radius.ui_points(0.75),
+        draw_order=BEHIND / 2,
+    )
+    recording.log(f"{PATH}/indicator", lines, static=True)
+    numbers = ticks(low, high, count=8)
+    right = over.places(np.full(numbers.size, canvas.x_range[1]), numbers) + ABOVE_RIGHT
+    name = f"{diagram.indicator_name} [{decibel_unit(diagram.indicator_unit)}]"
+    places = np.vstack([right, [(WIDTH - 60.0, -1.6 * LETTERS)]])
+    draw_labels(recording, f"{PATH}/indicator/numbers", places, [*(f"{number:g}" for number in numbers), name])
+
+
+def _draw_modes(recording: rr.RecordingStream, canvas: Canvas, modes: ModeSet) -> None:
+    """An upright line at each mode and at each line of a machine, named above the frame where there is room."""
+    low, high = canvas.y_range
+    marks = [
+        ("modes", modes.frequency_hz, MODE_COLOUR, ""),
+        ("harmonics", np.array([line.frequency_hz for line in modes.harmonics]), HARMONIC_COLOUR, " (machine)"),
+    ]
+    for kind, frequencies_hz, colour, word in marks:
+        strips = [canvas.places([at, at], [low, high]) for at in frequencies_hz]
+        lines = rr.LineStrips2D(
+            strips, colors=[(*colour, 90)] * len(strips), radii=rr.Radius.ui_points(0.5), draw_order=-2.0
+        )
+        recording.log(f"{PATH}/{kind}", lines, static=True)
+        tops = canvas.places(frequencies_hz, np.full(frequencies_hz.size, high)) - [0.0, LETTERS]
+        named = spread(tops, apart=(52.0 + 8 * len(word), 1.0))
+        texts = [hertz(float(frequencies_hz[row])) + word for row in named]
+        draw_labels(recording, f"{PATH}/{kind}/names", tops[named], texts, colours=[colour] * len(texts))
+
+
+def _draw_poles(
+    recording: rr.RecordingStream, canvas: Canvas, diagram: StabilisationDiagram, status: int, name: str
+) -> None:
+    chosen = (
+        (diagram.status == status)
+        & (diagram.frequency_hz >= canvas.x_range[0])
+        & (diagram.frequency_hz <= canvas.x_range[1])
+    )
+    if not chosen.any():
+        return
+    places = canvas.places(diagram.frequency_hz[chosen], diagram.order[chosen])
+    texts = [
+        f"{hertz(f)} Hz, {zeta * 100:.2f} %, order {order}"
+        for f, zeta, order in zip(
+            diagram.frequency_hz[chosen], diagram.damping_ratio[chosen], diagram.order[chosen], strict=True
+        )
+    ]
+    # Poles of noise are the most and matter the least.
+    radius = 1.75 if status == 0 else 2.75
+    dots = rr.Points2D(
+        places,
+        colors=[STATUS_ON_DARK[status]] * len(texts),
+        radii=rr.Radius.ui_points(radius),
+        # Told under the pointer.
+        labels=texts,
+        show_labels=False,
+        draw_order=1.0 + status,
+    )
+    recording.log(f"{PATH}/poles/{name.replace(' ', '_')}", dots, static=True)
+    taken = places[diagram.mode[chosen] >= 0]
+    rings = [_ring(place) for place in taken]
+    if rings:
+        circles = rr.LineStrips2D(rings, colors=[(*MODE_COLOUR, 150)], radii=rr.Radius.ui_points(0.4), draw_order=9.0)
+        recording.log(f"{PATH}/taken/{name.replace(' ', '_')}", circles, static=True)
+
+
+def _ring(place: Floats) -> Floats:
+    angle = np.linspace(0, 2 * np.pi, 13)
+    return np.asarray(place + 5.0 * np.column_stack([np.cos(angle), np.sin(angle)]))
+
+
+def _draw_legend(recording: rr.RecordingStream) -> None:
+    """A row above the frame: a dot of each colour, and its meaning below it."""
+    count = len(STATUS_NAMES) + 1
+    across = WIDTH * (0.22 + 0.56 * np.arange(count) / (count - 1))
+    places = np.column_stack([across, np.full(count, -3.6 * LETTERS)])
+    dots = rr.Points2D(places[:-1], colors=list(STATUS_ON_DARK), radii=rr.Radius.ui_points(4.0), show_labels=False)
+    recording.log(f"{PATH}/legend/dots", dots, static=True)
+    ring = rr.LineStrips2D([_ring(places[-1])], colors=[MODE_COLOUR], radii=rr.Radius.ui_points(0.5))
+    recording.log(f"{PATH}/legend/ring", ring, static=True)
+    draw_labels(recording, f"{PATH}/legend/names", places + BELOW, [*STATUS_NAMES, "taken for a mode"])
