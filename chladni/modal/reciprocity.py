@@ -244,7 +244,7 @@ def _not_measured() -> ReciprocityCheck:
         significant_share=np.zeros(0),
         verdict="not measured",
         finding=(
-            "reciprocity can't be checked: it takes excited lines and two references with points and directions, with a "
-            "response at each"
+            "reciprocity can't be checked: it takes excited lines and two references with points and directions, "
+            "with a response at each"
         ),
     )
