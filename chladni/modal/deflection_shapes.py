@@ -85,8 +85,8 @@ def phase_referenced_shape(spectra: CrossSpectra, frequency_hz: float, *, refere
     -----
     A_i = G_ri sqrt(B)/sqrt(G_rr) with the effective noise bandwidth B; |A_i|^2 is the coherent output power of
     channel i (Bendat & Piersol 2010, section 6.2). With the coherence gamma^2 and n effective averages one sigma of
-    the real and of the imaginary part is |A_i| sqrt((1 - gamma^2)/(2 n gamma^2)) (table 9.6), without the scatter of the
-    reference's own size, which all channels share.
+    the real and of the imaginary part is |A_i| sqrt((1 - gamma^2)/(2 n gamma^2)) (table 9.6), without the scatter of
+    the reference's own size, which all channels share.
     """
     row = find_channel(spectra.channels, reference, role="reference")
     line, note = _nearest(spectra.frequency_hz, np.ones(spectra.frequency_hz.size, dtype=np.bool_), frequency_hz)
