@@ -83,10 +83,8 @@ def main() -> None:
     for steps in (("poles",), ("stability",), ("shapes",), ("poles", "stability", "shapes")):
         mine, peer = ([sum(times[step] for step in steps) for times in runs[name]] for name in runs)
         ratios = [b / a for a, b in zip(mine, peer, strict=True)]
-        print(
-            f"| {', '.join(steps)} | {1e3 * median(mine):.1f} ms | {1e3 * median(peer):.1f} ms | {median(ratios):.1f} | "
-            f"{min(ratios):.1f} to {max(ratios):.1f} |"
-        )
+        row = [f"{1e3 * median(mine):.1f} ms", f"{1e3 * median(peer):.1f} ms", f"{median(ratios):.1f}"]
+        print(f"| {', '.join(steps)} | {' | '.join(row)} | {min(ratios):.1f} to {max(ratios):.1f} |")
     print(
         f"\nworst natural frequency: chladni {errors['chladni']:.1e}, sdypy-EMA {errors['sdypy-EMA']:.1e} (relative)"
     )

@@ -11,7 +11,10 @@ from chladni.signals.provenance import Provenance
 
 @dataclass(frozen=True, kw_only=True)
 class RandomModes:
-    """``frequency_hz[mode]``, ``damping_ratio[mode]``; real ``shapes[mode, response]`` and ``drives[mode, reference]``."""
+    """Real modes.
+
+    ``frequency_hz[mode]``, ``damping_ratio[mode]``, ``shapes[mode, response]``, ``drives[mode, reference]``.
+    """
 
     frequency_hz: np.ndarray
     damping_ratio: np.ndarray

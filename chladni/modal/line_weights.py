@@ -108,7 +108,7 @@ def _lines(response: FrequencyResponse, band_hz: tuple[float, float] | None) -> 
 def _by_magnitude(
     frequency_hz: NDArray[np.float64], values: NDArray[np.complex128], usable: NDArray[np.bool_], *, relative: bool
 ) -> WeightedLines:
-    scale = _or_one(_rms(values, (0, 2)))
+    scale = _typical(_rms(values, (2,)), axis=0)
     scaled = values / scale[:, None]
     level = _rms(scaled, (1,))
     typical = _or_one(_rms(level, (1,)))[:, None]
@@ -127,16 +127,18 @@ def _by_std(
     values: NDArray[np.complex128],
     std: NDArray[np.float64],
 ) -> WeightedLines:
-    scale = np.array([_typical(std[:, reference]) for reference in range(std.shape[1])])
+    scale = _typical(std, axis=(0, 2))
     scaled, sigma = values / scale[:, None], std / scale[:, None]
-    usable = np.isfinite(sigma).all(axis=1)
+    usable: NDArray[np.bool_] = np.all(np.isfinite(sigma), axis=1)
     level = np.where(usable, _rms(sigma, (1,)), 1.0)
-    floor = np.array([_typical(np.where(good, row, np.nan)) for row, good in zip(level, usable, strict=True)])
+    floor = _typical(np.where(usable, level, np.nan), axis=1)
     steady = usable / np.hypot(level, FLOOR * floor[:, None])
     magnitude = _rms(scaled, (1,))
     weight = steady * np.sqrt(_rms(magnitude / _or_one(_rms(magnitude, (1,)))[:, None], (0,)))
     without = [channel.name for channel, lines in zip(response.responses, usable, strict=True) if not lines.any()]
-    notes = (f"not used for the poles, as no line has a finite std: {', '.join(without)}",) if without else ()
+    notes = (
+        (f"not used for the poles, as no line has a finite value and std: {', '.join(without)}",) if without else ()
+    )
     return WeightedLines(
         frequency_hz=frequency_hz,
         values=scaled,
@@ -147,10 +149,14 @@ def _by_std(
     )
 
 
-def _typical(std: NDArray[np.float64]) -> float:
-    """Median of the positive numbers, 1 where there are none; NaN counts for nothing."""
-    positive = std[std > 0]
-    return float(np.median(positive)) if positive.size else 1.0
+def _typical(numbers: NDArray[np.float64], axis: int | tuple[int, ...]) -> NDArray[np.float64]:
+    """Geometric mean of the positive numbers, 1 where there are none; NaN counts for nothing.
+
+    Unlike other means it only takes over the factor when a channel's unit changes.
+    """
+    positive = numbers > 0
+    logs = np.log(numbers, where=positive, out=np.zeros_like(numbers))
+    return np.asarray(np.exp(logs.sum(axis=axis) / np.maximum(positive.sum(axis=axis), 1)))
 
 
 def _rms(values: NDArray[Any], axis: tuple[int, ...]) -> NDArray[np.float64]:
