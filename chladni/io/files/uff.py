@@ -1,6 +1,5 @@
 """Universal files: time records of dataset 58, text and binary, with the units of dataset 164."""
 
-import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.atomic import atomic_path
 from chladni.io.files.contents import (
     FileContents,
     placed_rows,
@@ -28,19 +26,22 @@ from chladni.io.files.uff_header import (
     start_of_header,
     unit_of_header,
 )
+from chladni.io.files.uff_sets import (
+    FUNCTION_AT_NODE,
+    UNITS,
+    Dataset,
+    cut_off_note,
+    open_uff,
+    read_dataset,
+    read_headers,
+    si_units,
+    write_datasets,
+)
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
 
-Dataset = dict[str, Any]
-
-_FUNCTION_AT_NODE = 58
-_UNITS = 164
-# Fewest characters or bytes that a value of each ordinate type takes in a file: single, double, complex.
-_LEAST_BYTES = {2: 4, 4: 8, 5: 8, 6: 16}
 _SINGLE = 2
-# Enough for a last line and the blanks or zeros behind it.
-_TAIL_BYTES = 4096
 
 
 def read_uff(path: Path | str, *, units: Mapping[str, str] | None = None) -> FileContents:
@@ -69,20 +70,20 @@ def read_uff(path: Path | str, *, units: Mapping[str, str] | None = None) -> Fil
         When a unit is unknown.
     """
     path = Path(path)
-    file = _uff(path)
-    headers = _headers(path, file)
-    functions = [number for number, header in enumerate(headers) if header.get("type") == _FUNCTION_AT_NODE]
+    file = open_uff(path)
+    headers = read_headers(path, file)
+    functions = [number for number, header in enumerate(headers) if header.get("type") == FUNCTION_AT_NODE]
     records = [number for number in functions if headers[number].get("func_type") == TIME_RESPONSE]
     if not records:
         raise LogError(f"{path}: holds no time record (function type 1), but {_listed(headers, functions)}")
     names = _names([headers[number] for number in records])
     _require_known(path, names, units)
-    system = next((header for header in headers if header.get("type") == _UNITS), None)
-    notes = _cut_off(path) + _left_out(path, headers, [number for number in functions if number not in records])
+    system = next((header for header in headers if header.get("type") == UNITS), None)
+    notes = cut_off_note(path) + _left_out(path, headers, [number for number in functions if number not in records])
     # Records of one measurement share their time axis; others in the same file may not.
     groups: dict[tuple[Any, ...], list[tuple[Dataset, Channel]]] = {}
     for number, name in zip(records, names, strict=True):
-        dataset = _dataset(path, file, number)
+        dataset = _time_record(path, file, number)
         unit, factor = unit_of_header(dataset, system)
         if name in (units or {}):
             unit, factor = unit_of(name, unit, units), 1.0
@@ -117,7 +118,7 @@ def write_uff(
         For gaps, fewer than two samples, or when the file can't be written.
     """
     parts = (series,) if isinstance(series, TimeSeries) else tuple(series)
-    datasets: list[Dataset] = [_si_units()]
+    datasets: list[Dataset] = [si_units()]
     losses: list[str] = []
     for part in parts:
         require_no_gaps(part, "a universal file")
@@ -129,79 +130,14 @@ def write_uff(
             datasets.append(_record(header, part, row, binary=binary))
     if not binary:
         losses.append("A text universal file rounds values to twelve digits.")
-    _write(path, datasets, overwrite=overwrite)
+    write_datasets(path, datasets, overwrite=overwrite)
     return tuple(losses)
 
 
-def _uff(path: Path) -> Any:
-    import pyuff
-
-    if not path.is_file():
-        raise LogError(f"{path}: no such file")
-    try:
-        return pyuff.UFF(str(path))
-    except Exception as error:  # pyuff raises nothing more specific
-        raise LogError(f"{path}: this universal file can't be read: {error}") from error
-
-
-def _cut_off(path: Path) -> tuple[str, ...]:
-    """Say so when the file ends anywhere but behind a dataset; pyuff passes over what isn't closed."""
-    with path.open("rb") as file:
-        file.seek(max(0, path.stat().st_size - _TAIL_BYTES))
-        tail = file.read().rstrip(b" \t\r\n\0\x1a")
-    # Behind binary values the closing line begins without a line break.
-    if tail.endswith(b"    -1") or tail.rpartition(b"\n")[2].strip() == b"-1":
-        return ()
-    note = (
-        f"{path}: doesn't end with the line -1 that closes a dataset; it was cut off, and what stands after the last "
-        "whole dataset is lost."
-    )
-    return (note,)
-
-
-def _headers(path: Path, file: Any) -> list[Dataset]:
-    """Read what is in front of the data, and check that the data it announces are there."""
-    count = int(file.get_n_sets())
-    if count == 0:
-        raise LogError(
-            f"{path}: holds no whole dataset between lines of -1; is it a universal file, or was it cut off?"
-        )
-    headers = []
-    for number, kind in enumerate(file.get_set_types()):
-        if kind not in (_FUNCTION_AT_NODE, _UNITS):
-            headers.append({"type": int(kind)})
-            continue
-        try:
-            headers.append(dict(file.read_sets(number, header_only=True)))
-        except Exception as error:  # pyuff raises nothing more specific
-            raise LogError(f"{path}: dataset {number + 1} (type {kind}) can't be read: {error}") from error
-    # Pyuff builds the abscissa from the announced count, so it must be believable before the values are read.
-    size = path.stat().st_size
-    for number, header in enumerate(headers):
-        least = _LEAST_BYTES.get(header.get("ord_data_type", 0), 0) * header.get("num_pts", 0)
-        if header["type"] == _FUNCTION_AT_NODE and not 0 < least <= size:
-            raise LogError(
-                f"{path}: dataset {number + 1} announces {header.get('num_pts')} values of type "
-                f"{header.get('ord_data_type')}, which a file of {size} bytes doesn't hold"
-            )
-    return headers
-
-
-def _dataset(path: Path, file: Any, number: int) -> Dataset:
-    try:
-        dataset = dict(file.read_sets(number))
-    except Exception as error:  # pyuff raises nothing more specific
-        raise LogError(
-            f"{path}: the values of dataset {number + 1} can't be read: {error}; binary files of some exporters hold "
-            "line breaks inside the data: export as text (58) or convert with pyuff.fix_58b"
-        ) from error
-    found, announced = len(dataset["data"]), dataset["num_pts"]
-    if found < announced:
-        raise LogError(f"{path}: dataset {number + 1} announces {announced} values and holds {found}; it's cut short")
+def _time_record(path: Path, file: Any, number: int) -> Dataset:
+    dataset = read_dataset(path, file, number)
     if np.iscomplexobj(dataset["data"]):
         raise LogError(f"{path}: dataset {number + 1} is a time record of complex values, which isn't a measurement")
-    # Padding behind the last binary value would otherwise count as samples.
-    dataset["data"], dataset["x"] = dataset["data"][:announced], dataset["x"][:announced]
     return dataset
 
 
@@ -280,35 +216,13 @@ def _rate_notes(path: Path, headers: list[Dataset], records: list[int]) -> tuple
     )
 
 
-def _si_units() -> Dataset:
-    return {
-        "type": _UNITS,
-        "units_code": 1,
-        "units_description": "SI",
-        "temp_mode": 1,
-        "length": 1.0,
-        "force": 1.0,
-        "temp": 1.0,
-        "temp_offset": 0.0,
-    }
-
-
 def _record(header: Dataset, series: TimeSeries, row: int, *, binary: bool) -> Dataset:
     return {
         **header,
-        "type": _FUNCTION_AT_NODE,
+        "type": FUNCTION_AT_NODE,
         "binary": int(binary),
         "func_type": TIME_RESPONSE,
         "abscissa_spacing": 1,
         "x": np.array([0.0, 1.0 / series.sample_rate_hz]),
         "data": np.asarray(series.values[row], dtype=np.float64),
     }
-
-
-def _write(path: Path | str, datasets: list[Dataset], *, overwrite: bool) -> None:
-    import pyuff
-
-    with atomic_path(path, overwrite=overwrite) as temporary, warnings.catch_warnings():
-        # Pyuff leaves closing its second handle to the interpreter, which does it before the call returns.
-        warnings.simplefilter("ignore", ResourceWarning)
-        pyuff.UFF(str(temporary)).write_sets(datasets, mode="overwrite")

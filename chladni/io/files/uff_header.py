@@ -28,13 +28,13 @@ FUNCTION_TYPES = {
 """Names of the function types, for messages."""
 
 # Codes 1 to 3 are translations along x, y, z, and 4 to 6 rotations about them.
-_DIRECTIONS: dict[int, Vector] = {
+DIRECTIONS: dict[int, Vector] = {
     code + turn: AXES[axis]
     for code, axis in ((1, "+x"), (-1, "-x"), (2, "+y"), (-2, "-y"), (3, "+z"), (-3, "-z"))
     for turn in (0, 3 if code > 0 else -3)
 }
 # Ordinate type: SI unit, and the powers of length and force in it.
-_QUANTITIES = {
+QUANTITIES = {
     8: ("m", 1, 0),
     9: ("N", 0, 1),
     11: ("m/s", 1, 0),
@@ -42,7 +42,7 @@ _QUANTITIES = {
     13: ("N", 0, 1),
     15: ("Pa", -2, 1),
 }
-_TYPE_OF_UNIT = {"m": 8, "m/s": 11, "m/s^2": 12, "Pa": 15}
+TYPE_OF_UNIT = {"m": 8, "m/s": 11, "m/s^2": 12, "Pa": 15}
 # Our own fifth line: the fields of the record round rate and start to six digits.
 _EXACT = re.compile(r"^start_time_ns=(?P<start>-?\d{1,19}) sample_rate_hz=(?P<rate>\d+(\.\d+)?(e[+-]\d+)?)$")
 _EXCITATION_FORCE = 13
@@ -61,7 +61,7 @@ def channel_of_header(header: dict[str, Any], name: str, unit: str) -> Channel:
         name=name,
         unit=unit,
         point=point or None,
-        direction=_DIRECTIONS.get(int(header["rsp_dir"])),
+        direction=DIRECTIONS.get(int(header["rsp_dir"])),
         role="reference" if int(header["ordinate_spec_data_type"]) == _EXCITATION_FORCE else "response",
     )
 
@@ -83,7 +83,7 @@ def unit_of_header(header: dict[str, Any], system: dict[str, Any] | None) -> tup
     label = str(header["ordinate_axis_units_lab"]).strip()
     if label not in ("", "NONE"):
         return label, 1.0
-    unit, lengths, forces = _QUANTITIES.get(int(header["ordinate_spec_data_type"]), ("1", 0, 0))
+    unit, lengths, forces = QUANTITIES.get(int(header["ordinate_spec_data_type"]), ("1", 0, 0))
     if system is None or unit == "1":
         return unit, 1.0
     length, force = float(system["length"]), float(system["force"])
@@ -141,7 +141,7 @@ def header_of_channel(channel: Channel, series: TimeSeries) -> tuple[dict[str, A
     losses = []
     name = channel.name.encode("ascii", "replace").decode()[:_ID_LENGTH]
     entity, node = _place(channel.point)
-    direction = _direction_code(channel)
+    direction = direction_code(channel)
     if name != channel.name:
         losses.append(f"{channel.name}: the name became {name!r}; a universal file holds 80 ASCII characters.")
     if channel.point and entity not in (channel.point, "NONE"):
@@ -164,7 +164,7 @@ def header_of_channel(channel: Channel, series: TimeSeries) -> tuple[dict[str, A
         "abscissa_spec_data_type": 17,
         "abscissa_axis_lab": "Time",
         "abscissa_axis_units_lab": "s",
-        "ordinate_spec_data_type": _quantity_code(channel),
+        "ordinate_spec_data_type": quantity_code(channel),
         "ordinate_axis_lab": "NONE",
         "ordinate_axis_units_lab": channel.unit if len(channel.unit) <= _LABEL_LENGTH else "NONE",
         "orddenom_spec_data_type": 0,
@@ -193,19 +193,21 @@ def _place(point: str | None) -> tuple[str, int]:
     return entity, 0
 
 
-def _direction_code(channel: Channel) -> int:
+def direction_code(channel: Channel) -> int:
+    """Give the code of a direction, negative for the opposite one; 0 when it's unknown or along no axis."""
     # The same axis has another code for a rotation; only the unit tells which it is.
     turn = channel.unit.startswith("rad") or channel.unit == "N m"
     for code in (1, -1, 2, -2, 3, -3):
-        if channel.direction == _DIRECTIONS[code]:
+        if channel.direction == DIRECTIONS[code]:
             return code + ((3 if code > 0 else -3) if turn else 0)
     return 0
 
 
-def _quantity_code(channel: Channel) -> int:
+def quantity_code(channel: Channel) -> int:
+    """Give the code of what a channel measures; 0 when it has none."""
     if channel.unit == "N":
         return _EXCITATION_FORCE if channel.role == "reference" else 9
-    return _TYPE_OF_UNIT.get(channel.unit, 0)
+    return TYPE_OF_UNIT.get(channel.unit, 0)
 
 
 def _date(start_time_ns: int) -> str:
