@@ -1,0 +1,159 @@
+"""Which poles of subspace models are modes of the structure, and which are noise or machines."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.modal.certain_poles import certain_pole, least_std, pole_std
+from chladni.modal.correlation import CorrelationFunctions
+from chladni.modal.pole_selection import PoleSelection, SelectionRules, select_poles
+from chladni.modal.pole_table import PoleTable
+from chladni.modal.replication import replication
+from chladni.signals.machine_harmonic import MachineHarmonic
+
+Rows = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResponseRules:
+    """What a candidate must show to be taken for a mode.
+
+    Attributes
+    ----------
+    replication
+        Least share of it that comes back in data that it was not found in (`replication`).
+    damping_std
+        Largest standard deviation of the damping ratio over the ratio, and of the frequency over the half-power
+        half-width.
+    over_least_std
+        Largest standard deviation over the least that a record of this length allows (`least_std`).
+    harmonic_distance, harmonic_damping
+        A pole within this share of the frequency of a machine's line and with no more than this damping ratio is
+        that line.
+    """
+
+    replication: float = 0.55
+    damping_std: float = 0.7
+    over_least_std: float = 12.0
+    harmonic_distance: float = 0.01
+    harmonic_damping: float = 0.005
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChosenPoles:
+    """Rows of a table of poles that stand for modes.
+
+    Attributes
+    ----------
+    selection
+        Clusters that were looked at.
+    clusters
+        ``[mode]`` number of each mode's cluster in `selection`.
+    rows
+        ``[mode]`` row of the pole that stands for it.
+    notes
+        What was left out, and why.
+    """
+
+    selection: PoleSelection
+    clusters: Rows
+    rows: Rows
+    notes: tuple[str, ...]
+
+
+def choose_poles(
+    correlations: CorrelationFunctions,
+    table: PoleTable,
+    *,
+    block_rows: int,
+    band_hz: tuple[float, float],
+    harmonics: Sequence[MachineHarmonic],
+    count: int | None = None,
+    frequencies_hz: Sequence[float] | None = None,
+    selection: SelectionRules,
+    rules: ResponseRules,
+) -> ChosenPoles:
+    """Choose the poles that are modes.
+
+    Parameters
+    ----------
+    correlations, block_rows
+        What the table was made from.
+    table
+        With standard deviations.
+    band_hz
+        Where modes may be.
+    harmonics
+        Lines of machines.
+    count
+        Largest number of modes: those that most orders hold.
+    frequencies_hz
+        Frequencies to take a mode at, whatever the rules say of it; that is told in a note.
+    selection, rules
+        What makes poles a candidate, and a candidate a mode.
+    """
+    found = select_poles(table, band_hz=band_hz, frequencies_hz=frequencies_hz, rules=selection)
+    rows = np.array(
+        [certain_pole(table, np.flatnonzero(found.member == mode)) for mode in range(found.row.size)], dtype=np.int64
+    )
+    shares = replication(correlations, table, found, block_rows=block_rows)
+    unsure = (shares < rules.replication) | _too_wide(table, rows, correlations.duration_s, rules)
+    machine = np.array([_is_harmonic(table, row, harmonics, rules) for row in rows], dtype=np.bool_)
+    if frequencies_hz is not None:
+        kept, notes = np.arange(rows.size), _doubts(table, rows, unsure, machine)
+    else:
+        kept, notes = _kept(table, rows, found, unsure, machine, count)
+    kept = kept[np.argsort(table.frequency_hz[rows[kept]], kind="stable")]
+    return ChosenPoles(selection=found, clusters=kept, rows=rows[kept], notes=found.notes + notes)
+
+
+def _too_wide(table: PoleTable, rows: Rows, duration_s: float, rules: ResponseRules) -> Bools:
+    frequency_hz, damping = table.frequency_hz[rows], table.damping_ratio[rows]
+    frequency_std, damping_std = pole_std(table, rows)
+    spread = np.hypot(frequency_std / frequency_hz, damping_std) / np.sqrt(2)
+    least = least_std(frequency_hz, damping, duration_s)[1]
+    return np.asarray((spread > rules.damping_std * damping) | (spread > rules.over_least_std * least))
+
+
+def _is_harmonic(table: PoleTable, row: int, harmonics: Sequence[MachineHarmonic], rules: ResponseRules) -> bool:
+    frequency_hz = table.frequency_hz[row]
+    near = any(abs(line.frequency_hz / frequency_hz - 1) <= rules.harmonic_distance for line in harmonics)
+    return near and bool(table.damping_ratio[row] <= rules.harmonic_damping)
+
+
+def _kept(
+    table: PoleTable, rows: Rows, found: PoleSelection, unsure: Bools, machine: Bools, count: int | None
+) -> tuple[Rows, tuple[str, ...]]:
+    kept, notes = np.flatnonzero(~unsure & ~machine), []
+    if np.any(machine):
+        notes.append(f"{_at(table, rows[machine])}: lines of machines, not modes")
+    noise = unsure & ~machine
+    if np.any(noise):
+        notes.append(
+            f"{_at(table, rows[noise])}: many orders hold a pole there, but it doesn't come back in the other half "
+            "of the record, or its error bar is as wide as what it says: noise, unless a longer record shows it again"
+        )
+    if count is not None:
+        if kept.size < count:
+            notes.append(f"{count} modes were asked for, but the record holds no more than {kept.size} that are sure")
+        strongest = np.argsort(-found.spread.orders[kept], kind="stable")
+        kept = kept[strongest[:count]]
+    return kept, tuple(notes)
+
+
+def _doubts(table: PoleTable, rows: Rows, unsure: Bools, machine: Bools) -> tuple[str, ...]:
+    notes = []
+    if np.any(machine):
+        notes.append(
+            f"{_at(table, rows[machine])}: taken as asked, but it's the line of a machine rather than a mode"
+        )
+    if np.any(unsure & ~machine):
+        notes.append(f"{_at(table, rows[unsure & ~machine])}: taken as asked, but it can't be told from noise")
+    return tuple(notes)
+
+
+def _at(table: PoleTable, rows: Rows) -> str:
+    return ", ".join(f"{frequency_hz:.4g}" for frequency_hz in sorted(table.frequency_hz[rows])) + " Hz"
