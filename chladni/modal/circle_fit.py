@@ -101,7 +101,7 @@ class CircleFit:
             reach_hz = circle.damping_ratio * circle.frequency_hz
         if circle is None:
             return None, [f"the lines around {centre_hz:.5g} Hz draw no circle; no mode is taken there"]
-        return _single_mode(lines, circle), _words(lines, span, resonance, circle)
+        return _single_mode(circle), _words(lines, span, resonance, circle)
 
 
 UNSCALED = "one mode at a time: close modes pull at each other, and shapes are unscaled; a look, not the final word"
@@ -119,8 +119,9 @@ def closeness(modes: Sequence[SingleMode]) -> list[str]:
     ]
 
 
-def _single_mode(lines: MobilityLines, circle: NyquistCircle) -> SingleMode:
-    inflation = lines.correlation + circle.excess * circle.lines / 2
+def _single_mode(circle: NyquistCircle) -> SingleMode:
+    # What doesn't fit is no scatter: it doesn't average out over lines.
+    inflation = 1 + circle.excess * circle.lines / 2
     std = np.sqrt(inflation * np.diag(circle.covariance))
     return SingleMode(
         frequency_hz=circle.frequency_hz,

@@ -16,6 +16,7 @@ from chladni.signals.mode_set import ModeSet
 Floats = NDArray[np.float64]
 
 STEPS = 30
+ROUNDS = 3
 FEWEST_LINES = 5
 # A frequency is never better known than this share of a line, nor a bandwidth than twice that.
 SURELY_LINES = 0.02
@@ -82,23 +83,51 @@ class HalfPower:
 
 def _mode(lines: MobilityLines, resonance: Resonance) -> SingleMode | None:
     centre_hz = float(lines.frequency_hz[resonance.line])
-    span = lines.around(centre_hz, resonance.half_width_hz, at_least=FEWEST_LINES)
-    span = resonance.within(lines, span, at_least=FEWEST_LINES)
-    f_hz = lines.frequency_hz[span]
-    magnitude, std = np.abs(lines.values[resonance.function][span]), lines.std[resonance.function][span]
+    half_width_hz = max(resonance.half_width_hz, 0.3 * lines.spacing_hz)
+    peak, span = None, slice(0)
+    # Noise cuts the first width short; later rounds have that of the curve, or twice as much when none fitted.
+    for _ in range(ROUNDS):
+        span = lines.around(centre_hz, half_width_hz, at_least=FEWEST_LINES)
+        span = resonance.within(lines, span, at_least=FEWEST_LINES)
+        peak = _peak(lines, span, resonance.function, centre_hz, half_width_hz)
+        centre_hz, half_width_hz = (centre_hz, 2 * half_width_hz) if peak is None else peak.place()
+    return None if peak is None else _single_mode(lines, span, resonance, peak)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Peak:
+    """Frequency and half-power half-width of a peak, and one sigma of each."""
+
+    frequency_hz: float
+    half_width_hz: float
+    std_hz: Floats
+
+    def place(self) -> tuple[float, float]:
+        return self.frequency_hz, self.half_width_hz
+
+
+def _peak(
+    lines: MobilityLines, span: slice, function: tuple[int, int], centre_hz: float, half_width_hz: float
+) -> _Peak | None:
+    values, std = lines.values[function][span], lines.std[function][span]
+    magnitude = np.abs(values)
     # Noise adds its own power to every line, 2 sigma^2.
     power, power_std = magnitude**2 - 2 * std**2, 2 * std * np.hypot(magnitude, std)
-    peak = _lorentzian(f_hz, power, power_std, centre_hz, max(resonance.half_width_hz, 0.3 * lines.spacing_hz))
-    if peak is None:
-        return None
-    place, covariance = peak
-    frequency_hz, half_width_hz = float(place[1]), float(place[2])
+    # Of the power only the part of the noise in phase with the mobility is seen.
+    phase = np.exp(1j * np.angle(values))
+    correlation = (phase.conj()[:, None] * lines.correlation(span) * phase).real
+    first = np.array([power.max(), centre_hz, half_width_hz])
+    return _lorentzian(lines.frequency_hz[span], power, power_std, correlation, first)
+
+
+def _single_mode(lines: MobilityLines, span: slice, resonance: Resonance, peak: _Peak) -> SingleMode:
+    frequency_hz, half_width_hz = peak.place()
     values, at_std = _at_peak(lines, span, frequency_hz, half_width_hz)
     others = _others(lines, resonance, values, frequency_hz, half_width_hz)
     # A background of b on a peak of height h moves it, and its half-power points, by up to b/h of the half-width.
     share = float(others[resonance.function] / np.abs(values[resonance.function]))
     least_hz = np.hypot(SURELY_LINES * lines.spacing_hz, half_width_hz * share)
-    frequency_std_hz, width_std_hz = np.hypot(np.sqrt(lines.correlation * np.diag(covariance)[1:]), least_hz)
+    frequency_std_hz, width_std_hz = np.hypot(peak.std_hz, least_hz)
     return SingleMode(
         frequency_hz=frequency_hz,
         frequency_std_hz=float(frequency_std_hz),
@@ -109,11 +138,8 @@ def _mode(lines: MobilityLines, resonance: Resonance) -> SingleMode | None:
     )
 
 
-def _lorentzian(
-    f_hz: Floats, power: Floats, std: Floats, centre_hz: float, half_width_hz: float
-) -> tuple[Floats, Floats] | None:
-    """Height, frequency and half-power half-width of |Y|^2 = h/(1 + x^2), and their covariance; None without peak."""
-    place = np.array([power.max(), centre_hz, half_width_hz])
+def _lorentzian(f_hz: Floats, power: Floats, std: Floats, correlation: Floats, place: Floats) -> _Peak | None:
+    """Fit |Y|^2 = h/(1 + x^2) from a first (height, frequency, half-width); None when there's no such peak."""
     for _ in range(STEPS):
         model, jacobian = _curve(f_hz, place)
         step, *_ = np.linalg.lstsq(jacobian / std[:, None], (power - model) / std, rcond=None)
@@ -125,11 +151,12 @@ def _lorentzian(
             break
     model, jacobian = _curve(f_hz, place)
     residual = (power - model) / std
-    normal = (jacobian / std[:, None]).T @ (jacobian / std[:, None])
+    weighted = jacobian / std[:, None]
+    inverse = np.linalg.pinv(weighted)
     misfit = float(residual @ residual) / (f_hz.size - 3)
     # The curve is the mode's own only; what others add makes lines miss it by more than their scatter.
-    covariance = np.linalg.pinv(normal, hermitian=True) * max(misfit, 1.0)
-    return place, np.asarray(covariance, dtype=np.float64)
+    covariance = inverse @ correlation @ inverse.T * max(misfit, 1.0)
+    return _Peak(frequency_hz=float(place[1]), half_width_hz=float(place[2]), std_hz=np.sqrt(np.diag(covariance)[1:]))
 
 
 def _curve(f_hz: Floats, place: Floats) -> tuple[Floats, Floats]:
@@ -148,9 +175,10 @@ def _at_peak(
     """Mobility of all functions at the peak: lines above half the power, each raised to what it is there."""
     raised = 1 + 1j * sweep(lines.frequency_hz[span], frequency_hz, half_width_hz / frequency_hz)
     weights = 1 / (np.abs(raised) * lines.std[:, :, span]) ** 2
-    total = weights.sum(axis=2)
-    values = (weights * raised * lines.values[:, :, span]).sum(axis=2) / total
-    return values, np.sqrt(lines.correlation / total)
+    gains = weights * raised / weights.sum(axis=2, keepdims=True)
+    scatter = gains * lines.std[:, :, span]
+    variance = np.einsum("rck,kl,rcl->rc", scatter, lines.correlation(span), scatter.conj(), optimize=True).real
+    return (gains * lines.values[:, :, span]).sum(axis=2), np.sqrt(variance)
 
 
 def _others(

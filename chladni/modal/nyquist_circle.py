@@ -27,7 +27,7 @@ class NyquistCircle:
     frequency_hz, damping_ratio
         Of the mode.
     covariance
-        ``[2, 2]`` of frequency_hz and damping_ratio, from the std of the lines.
+        ``[2, 2]`` of frequency_hz and damping_ratio, from the std of the lines and their correlation.
     origin, diameter
         ``[response, reference]`` complex: each circle is origin + diameter/(1 + j x), swept by frequency.
     diameter_std
@@ -64,16 +64,20 @@ def fit_circle(lines: MobilityLines, span: slice, frequency_hz: float, damping_r
     The mobility of one viscously damped mode is D/(1 + j x), x = (f/f_r - f_r/f)/(2 zeta): a circle through the
     origin with diameter D, swept fastest at f_r (Ewins 2000, section 4.3.3). What other modes add is taken as
     constant, which moves the circle's origin. Least squares over lines weighted by their std; diameters and origins
-    are linear and solved for within each Gauss-Newton step on frequency and damping (Golub & Pereyra 1973).
+    are linear and solved for within each Gauss-Newton step on frequency and damping (Golub & Pereyra 1973). The
+    covariance is that of this estimator for lines whose noise the window has smeared over their neighbours.
     """
     f_hz = lines.frequency_hz[span]
     weights = 1 / lines.std[:, :, span].reshape(-1, f_hz.size)
     values = lines.values[:, :, span].reshape(-1, f_hz.size)
     place = np.array([frequency_hz, damping_ratio])
     for _ in range(STEPS):
-        origin, diameter, inverse = _linear(f_hz, place, values, weights)
-        jacobian, residual = _projected(f_hz, place, origin, diameter, values, weights)
-        step = np.linalg.lstsq(jacobian, residual, rcond=None)[0]
+        origin, diameter, _ = _linear(f_hz, place, values, weights)
+        columns, residual = (
+            part.reshape(values.size, -1) for part in _projected(f_hz, place, origin, diameter, values, weights)
+        )
+        jacobian, missing = (np.concatenate([part.real, part.imag]) for part in (columns, residual))
+        step = np.linalg.lstsq(jacobian, missing[:, 0], rcond=None)[0]
         # The damping ratio may not fall through zero on the way.
         share = 1.0 if step[1] > -0.7 * place[1] else -0.7 * place[1] / step[1]
         place = place + share * step
@@ -81,19 +85,29 @@ def fit_circle(lines: MobilityLines, span: slice, frequency_hz: float, damping_r
             return None
         if abs(step[0]) / (place[0] * place[1]) + abs(step[1]) / place[1] < CONVERGED:
             break
+    return _circle(lines, span, place, values, weights)
+
+
+def _circle(lines: MobilityLines, span: slice, place: Floats, values: Complex, weights: Floats) -> NyquistCircle:
+    """The circles at the pole that was found, and how sure they are when noise hangs together over lines."""
+    f_hz, functions = lines.frequency_hz[span], lines.values.shape[:2]
     origin, diameter, inverse = _linear(f_hz, place, values, weights)
-    jacobian, residual = _projected(f_hz, place, origin, diameter, values, weights)
-    functions = lines.values.shape[:2]
+    columns, residual = _projected(f_hz, place, origin, diameter, values, weights)
+    correlation = lines.correlation(span)
+    bread = np.linalg.inv(np.einsum("fla,flb->ab", columns.conj(), columns).real)
+    meat = np.einsum("fka,kl,flb->ab", columns.conj(), correlation, columns, optimize=True).real
     # Five lines give every function ten numbers for its four and the two that all share.
     freedom = 2 * values.size - 4 * values.shape[0] - 2
-    misfit = float(residual @ residual) / freedom
+    misfit = float(np.sum(np.abs(residual) ** 2)) / freedom
+    spread = np.einsum("fab,bl,fl->fal", inverse, _basis(f_hz, place).conj(), weights)
+    diameter_variance = np.einsum("fk,kl,fl->f", spread[:, 1], correlation, spread[:, 1].conj(), optimize=True).real
     return NyquistCircle(
         frequency_hz=float(place[0]),
         damping_ratio=float(place[1]),
-        covariance=np.asarray(np.linalg.inv(jacobian.T @ jacobian), dtype=np.float64),
+        covariance=np.asarray(bread @ meat @ bread, dtype=np.float64),
         origin=origin.reshape(functions),
         diameter=diameter.reshape(functions),
-        diameter_std=np.sqrt(inverse[:, 1, 1].real).reshape(functions),
+        diameter_std=np.sqrt(diameter_variance).reshape(functions),
         misfit=misfit,
         excess=max(misfit - 1 - CHANCE_SIGMAS * np.sqrt(2 / freedom), 0.0),
         lines=f_hz.size,
@@ -111,9 +125,13 @@ def sweep(frequency_hz: Floats, natural_hz: float, damping_ratio: float) -> Floa
     return np.asarray((frequency_hz / natural_hz - natural_hz / frequency_hz) / (2 * damping_ratio))
 
 
+def _basis(f_hz: Floats, place: Floats) -> Complex:
+    return np.stack([np.ones(f_hz.size), 1 / (1 + 1j * sweep(f_hz, *place))])
+
+
 def _linear(f_hz: Floats, place: Floats, values: Complex, weights: Floats) -> tuple[Complex, Complex, Complex]:
     """Origins and diameters at a given pole, and the inverse normal matrix of each function."""
-    basis = np.stack([np.ones(f_hz.size), 1 / (1 + 1j * sweep(f_hz, *place))])
+    basis = _basis(f_hz, place)
     normal = np.einsum("al,fl,bl->fab", basis.conj(), weights**2, basis)
     inverse = np.linalg.inv(normal)
     right = np.einsum("al,fl->fa", basis.conj(), weights**2 * values)
@@ -123,8 +141,8 @@ def _linear(f_hz: Floats, place: Floats, values: Complex, weights: Floats) -> tu
 
 def _projected(
     f_hz: Floats, place: Floats, origin: Complex, diameter: Complex, values: Complex, weights: Floats
-) -> tuple[Floats, Floats]:
-    """Jacobian of frequency and damping, freed of what origins and diameters take up, and the residual; weighted."""
+) -> tuple[Complex, Complex]:
+    """Derivatives by frequency and damping, freed of what origins and diameters take up, and residual; weighted."""
     natural, zeta = place
     x = sweep(f_hz, natural, zeta)
     lorentzian = 1 / (1 + 1j * x)
@@ -137,8 +155,4 @@ def _projected(
     orthogonal = np.linalg.qr(basis.transpose(0, 2, 1))[0]
     columns = columns.transpose(0, 2, 1)
     columns = columns - orthogonal @ (orthogonal.conj().transpose(0, 2, 1) @ columns)
-    residual = weights * (values - origin[:, None] - diameter[:, None] * lorentzian)
-    stacked = columns.reshape(-1, 2)
-    return np.concatenate([stacked.real, stacked.imag]), np.concatenate(
-        [residual.real.ravel(), residual.imag.ravel()]
-    )
+    return columns, weights * (values - origin[:, None] - diameter[:, None] * lorentzian)

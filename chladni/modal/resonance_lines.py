@@ -12,7 +12,7 @@ from chladni.signals.peak import Peak
 from chladni.signals.provenance import Provenance
 from chladni.signals.wording import counted
 from chladni.spectral.forms import convert_form
-from chladni.spectral.leakage import line_correlation, named_window
+from chladni.spectral.leakage import named_window
 from chladni.spectral.peaks import find_response_peaks
 from chladni.spectral.response_advice import half_power_lines
 
@@ -40,8 +40,8 @@ class MobilityLines:
         ``[response, reference, line]`` mobility and one sigma of its real and of its imaginary part.
     spacing_hz
         Between lines that have none left out between them.
-    correlation
-        By how much more the sum over neighbouring lines scatters than if they were independent, as variance.
+    provenance
+        Tells how the noise of neighbouring lines hangs together.
     std_known
         False when no line has a finite std above zero.
     """
@@ -50,8 +50,12 @@ class MobilityLines:
     values: Complex
     std: Floats
     spacing_hz: float
-    correlation: float
+    provenance: Provenance
     std_known: bool
+
+    def correlation(self, span: slice) -> Complex:
+        """``[line, line]`` of the noise, which a window smears over neighbouring lines."""
+        return _line_correlation(self.frequency_hz[span], self.spacing_hz, self.provenance)
 
     def around(self, centre_hz: float, reach_hz: float, *, at_least: int) -> slice:
         """Lines within `reach_hz` of a frequency, and the nearest `at_least` in any case."""
@@ -110,18 +114,23 @@ def mobility_lines(response: FrequencyResponse, band_hz: tuple[float, float] | N
         values=values,
         std=np.where(std > 0, std, 1.0),
         spacing_hz=float(np.median(np.diff(frequency_hz))),
-        correlation=_correlation(response.provenance),
+        provenance=response.provenance,
         std_known=std_known,
     )
 
 
-def _correlation(provenance: Provenance) -> float:
-    """By how much more sums over lines scatter: N sum w^4 / (sum w^2)^2 of the window w on the noise."""
-    if provenance.averaging == "periodic":
-        return 1.0
+def _line_correlation(frequency_hz: Floats, spacing_hz: float, provenance: Provenance) -> Complex:
+    """``[line, line]`` of the noise: sum w^2 exp(-2 pi j m n/N)/sum w^2 for lines m apart, by the window w."""
+    numbers = np.rint(frequency_hz / spacing_hz).astype(np.int64)
+    apart = numbers[:, np.newaxis] - numbers
     decay = provenance.window_decay_per_s * provenance.segment_s
-    # For exp(-sigma t) over T the sums have the closed form a / tanh(a), a = sigma T.
-    return decay / np.tanh(decay) if decay > 0 else line_correlation(named_window(provenance.window))
+    if decay > 0:
+        return np.asarray(decay / (decay + 1j * np.pi * apart), dtype=np.complex128)
+    if provenance.averaging == "periodic":
+        return np.asarray(apart == 0, dtype=np.complex128)
+    power = named_window(provenance.window) ** 2
+    lags = np.fft.fft(power) / power.sum()
+    return np.where(np.abs(apart) < power.size // 2, lags[apart % power.size], 0.0)
 
 
 def resonances(
