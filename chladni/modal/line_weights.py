@@ -60,9 +60,8 @@ def weighted_lines(
         Lowest and highest line, inclusive; None for all. The line at 0 Hz is never used: few sensors measure it.
     weighting
         ``std``: inverse of one sigma, root mean square over the references, times the root of the magnitude that the
-        responses have together on a line; where no response knows its sigma, as ``uniform``: each response by the
-        inverse of its rms;
-        ``relative``: inverse of the magnitude.
+        responses have together on a line; where no response knows its sigma, as ``uniform``. ``uniform``: inverse of
+        the rms of each response. ``relative``: inverse of the magnitude.
 
     Raises
     ------

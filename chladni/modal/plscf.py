@@ -85,11 +85,11 @@ def polyreference_poles(
 
 
 def _highest_order(lines: WeightedLines) -> int:
-    """Numerators take at most half of the lines, and twice as many equations as unknowns are left for A."""
+    """Numerators take at most a quarter of the lines, and twice as many equations as unknowns are left for A."""
     responses, references = lines.values.shape[:2]
     count: int = lines.frequency_hz.size
     by_equations: int = responses * (count - 1) // (responses + 2 * references)
-    return min(count // 2 - 1, by_equations)
+    return min(count // 4, by_equations)
 
 
 def _pole_table(lines: WeightedLines, circle: UnitCircle, orders: range, notes: tuple[str, ...]) -> PoleTable:

@@ -236,8 +236,8 @@ def test_orders_are_counted_down_from_the_highest():
 def test_orders_beyond_what_the_lines_determine_are_left_out_with_a_note():
     response = functions(chain(), np.arange(1, 61, 1.0), noise=1e-3)
     table = polyreference_poles(response, max_order=60)
-    assert table.orders[-1] == 29
-    assert "orders above 29 left out: 60 lines" in table.notes[0]
+    assert table.orders[-1] == 15
+    assert "orders above 15 left out: 60 lines" in table.notes[0]
 
 
 def test_one_function_of_few_lines_is_enough():
@@ -256,7 +256,7 @@ def test_impossible_requests_are_named():
         polyreference_poles(response, band_hz=(10, 10.15))
     with pytest.raises(EstimateError, match="zero or not finite"):
         polyreference_poles(replace(response, values=np.zeros_like(response.values)))
-    with pytest.raises(EstimateError, match="21 lines carry polynomials up to order 9, min_order is 30"):
+    with pytest.raises(EstimateError, match="21 lines carry polynomials up to order 5, min_order is 30"):
         polyreference_poles(response, band_hz=(10, 12), min_order=30)
     with pytest.raises(EstimateError, match="'magic' is none of std, uniform, relative"):
         polyreference_poles(response, weighting="magic")
