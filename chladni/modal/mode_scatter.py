@@ -1,0 +1,30 @@
+"""How a mode scatters: apart for each response by noise, and for all of them together by leakage."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModeScatter:
+    """Factors that turn the scatter computed for independent lines of known variance into that of one mode.
+
+    Attributes
+    ----------
+    pole
+        ``[2, 2]`` covariance of Re and Im of the pole, in (rad/s)^2.
+    shared
+        On what poles and participation add to ratios of components, which no common error moves.
+    shares
+        ``[response]`` on the own scatter of each response's shape.
+    amplitude
+        On the variance of the scale: participation and modal mass.
+    """
+
+    pole: Floats
+    shared: float
+    shares: Floats
+    amplitude: float
