@@ -1,0 +1,156 @@
+"""Which channels of a log modes are identified from."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+from chladni.apps.analyse import FORCE_UNITS, excitations
+from chladni.apps.sources import Progress, Span, Watched, no_progress, watched_grids
+from chladni.io.log import Log
+from chladni.io.log_info import some_of
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError
+from chladni.signals.time_series import TimeSeries
+from chladni.signals.unit_text import in_unit
+from chladni.spectral.forms import MOTION_ORDER
+
+Chosen = tuple[tuple[str, ...], tuple[str, ...]]
+
+
+def excitation_names(source: Log | TimeSeries, span: Span) -> tuple[str, ...]:
+    """Name the excitations that the channels tell: those marked as reference, else the first force that changes.
+
+    Raises
+    ------
+    EstimateError
+        When there is none.
+    """
+    candidates = [one for one in source.channels if one.role == "reference" or one.unit in FORCE_UNITS]
+    found: tuple[str, ...] = ()
+    if candidates:
+        names = [channel.name for channel in candidates]
+        still = _constant(source, names, span)
+        found = excitations([channel for channel in candidates if channel.name not in still])
+    if not found:
+        raise EstimateError(
+            "no channel that changes is an excitation; name it as reference, or ask for modes from responses alone "
+            "(operational)"
+        )
+    return found
+
+
+def motions_of_one_unit(channels: Sequence[Channel], *, named: bool) -> Chosen:
+    """Choose the responses whose unit is the most common, motions first; say which are left out.
+
+    Modal vectors are ratios of displacements: a rotation or a strain beside them would have no place in the vector.
+
+    Parameters
+    ----------
+    named
+        Whether the user named the channels: then none may be left out.
+
+    Returns
+    -------
+    Names in their own order, and notes.
+
+    Raises
+    ------
+    EstimateError
+        When named channels have several units.
+    """
+    counts = Counter(channel.unit for channel in channels)
+    if len(counts) <= 1:
+        return tuple(channel.name for channel in channels), ()
+    if named:
+        told = ", ".join(f"{channel.name} {in_unit(channel.unit)}" for channel in channels)
+        raise EstimateError(f"modal vectors need responses of one unit, got {told}; name those of one unit")
+    unit = max(counts, key=lambda one: (one in MOTION_ORDER, counts[one]))
+    names = tuple(channel.name for channel in channels if channel.unit == unit)
+    others = [channel.name for channel in channels if channel.unit != unit]
+    return names, (f"modal vectors are of the channels {in_unit(unit)}; left out: {some_of(others)}",)
+
+
+def responses_alone(
+    source: Log | TimeSeries, channels: Sequence[str] | None, span: Span, *, progress: Progress
+) -> tuple[TimeSeries | Watched, tuple[str, ...]]:
+    """Choose the responses that modes are identified from when no excitation was measured.
+
+    Parameters
+    ----------
+    channels
+        Names; None takes the motions of one unit that change, on the sampling grid that holds most of them.
+
+    Returns
+    -------
+    Their samples, and notes on what was left out.
+
+    Raises
+    ------
+    LogError, EstimateError
+        When a channel is missing, several units or grids are mixed by name, or there is no response.
+    """
+    if isinstance(source, TimeSeries):
+        return _of_series(source, channels, span)
+    if channels is not None:
+        return _of_named(source, source.names(channels), span, progress), ()
+    return _of_log(source, span, progress)
+
+
+def _of_series(series: TimeSeries, channels: Sequence[str] | None, span: Span) -> tuple[TimeSeries, tuple[str, ...]]:
+    part = series if span == Span() else series.window(start_s=span.start_s, end_s=span.end_s)
+    if channels is not None:
+        names, notes = motions_of_one_unit(part.select(list(channels)).channels, named=True)
+    else:
+        still = _constant(part, [channel.name for channel in part.channels], Span())
+        names, notes = motions_of_one_unit(_responses(part.channels, still), named=False)
+    if not names:
+        raise EstimateError("the series holds no response that changes; nothing to identify modes from")
+    return part.select(list(names)), notes
+
+
+def _of_named(log: Log, names: tuple[str, ...], span: Span, progress: Progress) -> Watched:
+    motions_of_one_unit([channel for channel in log.channels if channel.name in names], named=True)
+    for grid in watched_grids(log, names, span, progress=progress):
+        if set(names) <= set(grid.names):
+            return grid
+    # Not on one grid: the log's own error names the grids and the remedies.
+    log.read(list(names), start_s=span.start_s, end_s=span.end_s)
+    raise EstimateError(f"{log.path.name}: no sampling grid holds all of {', '.join(names)}")
+
+
+def _of_log(log: Log, span: Span, progress: Progress) -> tuple[Watched, tuple[str, ...]]:
+    known = {channel.name: channel for channel in log.channels}
+    offers: list[Chosen] = []
+    for grid in log.grids(start_s=span.start_s, end_s=span.end_s):
+        moving = _responses([known[name] for name in grid.names], _constant(log, grid.names, span))
+        offers.append(motions_of_one_unit(moving, named=False))
+    names, notes = max(offers, key=lambda offer: len(offer[0]), default=((), ()))
+    if not names:
+        raise EstimateError(f"{log.path.name}: no response changes; nothing to identify modes from")
+    elsewhere = [name for chosen, _ in offers for name in chosen if name not in names]
+    if elsewhere:
+        notes = (*notes, f"on other sampling grids, left out: {some_of(elsewhere)}")
+    return _of_named(log, names, span, progress), notes
+
+
+def _responses(channels: Sequence[Channel], constant: Sequence[str]) -> list[Channel]:
+    return [
+        channel
+        for channel in channels
+        if channel.role != "reference" and channel.unit not in FORCE_UNITS and channel.name not in constant
+    ]
+
+
+def _constant(source: Log | TimeSeries, names: Sequence[str], span: Span) -> tuple[str, ...]:
+    """Name the channels among `names` that show one value only."""
+    if isinstance(source, TimeSeries):
+        chosen = source.select(list(names))
+        grids = [Watched(tuple(names), (chosen,), duration_s=chosen.duration_s, progress=no_progress)]
+    else:
+        grids = list(watched_grids(source, list(names), span))
+    found: list[str] = []
+    for grid in grids:
+        for _ in grid:
+            # Watching is all that is wanted.
+            pass
+        found += grid.constant()
+    return tuple(found)
