@@ -23,6 +23,7 @@ Complex = NDArray[np.complex128]
 # is fitted to them then says how sure it is.
 SMALLEST_STD_SHARE = 1e-9
 PEAKS_A_FUNCTION = 50
+MOST_FUNCTIONS = 32
 # A frequency given by hand is moved to the highest line this near.
 REACH_SHARE = 0.01
 REACH_LINES = 2
@@ -162,17 +163,38 @@ def resonances(
 
 
 def _peaks(response: FrequencyResponse) -> list[tuple[Peak, int, int]]:
-    """Peaks of each function, the surest first."""
+    """Peaks of the functions that show them best, the surest first."""
     functions = len(response.responses) * len(response.references)
     # Where the number of averages isn't known (a file without it) the coherence can't be judged, and isn't.
     provenance = response.provenance
     if not provenance.effective_averages:
         provenance = replace(provenance, effective_averages=np.inf)
-    peaks = find_response_peaks(
-        replace(response, provenance=provenance), count=PEAKS_A_FUNCTION, false_alarm=0.01 / functions
-    )
-    named = [(peak, *response.function(*peak.channels)) for peak in peaks]
+    named = []
+    for row, column in _telling(response):
+        one = replace(
+            response,
+            values=response.values[row : row + 1, column : column + 1],
+            std=response.std[row : row + 1, column : column + 1],
+            coherence=response.coherence[row : row + 1],
+            responses=response.responses[row : row + 1],
+            references=response.references[column : column + 1],
+            provenance=provenance,
+        )
+        peaks = find_response_peaks(one, count=PEAKS_A_FUNCTION, false_alarm=0.01 / functions)
+        named += [(peak, row, column) for peak in peaks]
     return sorted(named, key=lambda entry: -entry[0].height / entry[0].height_std)
+
+
+def _telling(response: FrequencyResponse) -> list[tuple[int, int]]:
+    """Functions that are the surest of all on most lines: hundreds of others tell the same, more slowly."""
+    values, std = np.abs(response.values), response.std
+    surely = np.divide(values, std, out=np.zeros(values.shape), where=np.isfinite(values) & (std > 0))
+    # Without a std to go by all are as sure, and the highest tell most.
+    surely = np.where(surely.any(), surely, np.nan_to_num(values))
+    surest = np.argmax(surely.reshape(-1, values.shape[2])[:, response.excited], axis=0)
+    lines = np.bincount(surest, minlength=values.shape[0] * values.shape[1])
+    chosen = np.argsort(-lines, kind="stable")[:MOST_FUNCTIONS]
+    return [(int(row), int(column)) for row, column in zip(*np.unravel_index(chosen, values.shape[:2]), strict=True)]
 
 
 def _merged(lines: MobilityLines, peaks: list[tuple[Peak, int, int]]) -> list[Resonance]:

@@ -15,16 +15,18 @@ from tests.spectral.aircraft import ACCELEROMETERS, PAYLOAD, SHAKER, aircraft
 F_HZ = np.arange(2.0, 60.0, 0.1)
 
 
-def levels(count=3, *, seed=0, noise=0.02):
-    return [functions(chain(), F_HZ, noise=noise / (k + 1), seed=10 * seed + k) for k in range(count)]
+def levels(count=3, *, seed=0, noise=0.02, responses=None):
+    return [
+        functions(chain(), F_HZ, noise=noise / (k + 1), seed=10 * seed + k, responses=responses) for k in range(count)
+    ]
 
 
 def test_a_linear_chain_is_linear_at_the_stated_false_alarm_rate():
-    checks = [check_linearity(levels(seed=seed), false_alarm=0.05) for seed in range(60)]
-    # One in twenty: more than 9 of 60 happen once in 1000 times.
-    assert sum(check.verdict != "linear" for check in checks) <= 9
+    checks = [check_linearity(levels(seed=seed, responses=("m2", "m5")), false_alarm=0.05) for seed in range(30)]
+    # One in twenty: more than 6 of 30 happen once in 1000 times.
+    assert sum(check.verdict != "linear" for check in checks) <= 6
     check = next(check for check in checks if check.verdict == "linear")
-    assert check.difference.shape == (2, 5, 1)
+    assert check.difference.shape == (2, 2, 1)
     # 580 lines know the RMS of a difference to 3 %.
     np.testing.assert_allclose(check.difference / check.expected, 1.0, atol=0.15)
     assert check.finding.startswith("linear: between 3 levels no line changes")
