@@ -171,7 +171,7 @@ def validation(modes: ModeSet) -> ModeValidation:
         mpd_deg=np.linspace(0.4, 4.0, count),
         mean_phase_deg=np.linspace(-1.0, 1.0, count),
         alike=(),
-        findings=(f"{count} modes, all shapes are told apart.", "Mode 5 rests on few orders."),
+        findings=(f"{count} modes, all shapes are told apart.", "Mode 5 rests on few orders.") if count else (),
     )
 
 
@@ -264,15 +264,14 @@ def ring_study() -> Study:
 
 def without_modes() -> Study:
     """Modes were looked for and none was found."""
-    nothing = made_modes(np.zeros((0, 5), dtype=np.complex128), arm_study().response.responses)  # type: ignore[union-attr]
+    nothing = made_modes(np.zeros((0, 5), dtype=np.complex128), modes_of(arm_study()).channels)
     noted = replace(nothing, provenance=Provenance(estimator="made up", notes=("No pole repeats over the orders.",)))
     return Study(title="noise.mcap", modes=noted, validation=validation(noted))
 
 
 def one_mode() -> Study:
     """The arm's first mode alone, from responses alone."""
-    modes = arm_study().modes
-    assert modes is not None
+    modes = modes_of(arm_study())
     alone = made_modes(modes.shapes[:1], modes.channels)
     return replace(Study(title="one.mcap", modes=alone, validation=validation(alone)), geometry=arm_study().geometry)
 
@@ -280,3 +279,8 @@ def one_mode() -> Study:
 def without_geometry() -> Study:
     """The arm without the places of its sensors."""
     return replace(arm_study(), geometry=Geometry())
+
+
+def modes_of(study: Study) -> ModeSet:
+    assert study.modes is not None
+    return study.modes

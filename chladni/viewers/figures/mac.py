@@ -6,6 +6,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chladni.signals.errors import EstimateError
 from chladni.signals.study import Study
 from chladni.viewers.drawing import Floats
 from chladni.viewers.figures.sheet import WIDTH_IN, look, plain
@@ -45,7 +46,17 @@ def cross_mac_figure(
         Names of the modes, such as ``1: 24.67``.
     row_name, column_name
         What the sets are, with the unit of their names.
+
+    Raises
+    ------
+    EstimateError
+        When a set is empty, or the names aren't as many as the rows and columns.
     """
+    if mac.shape != (len(rows), len(columns)) or not mac.size:
+        raise EstimateError(
+            f"a MAC of shape {mac.shape} can't be drawn with {len(rows)} and {len(columns)} names;"
+            " give one or more modes on both sides, each with its name"
+        )
     with look():
         share = min(1.0, 0.45 + 0.08 * len(columns))
         width = WIDTH_IN * share

@@ -7,6 +7,8 @@ import rerun.blueprint as rrb
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.study import Study
 from chladni.viewers.drawing import Floats
+from chladni.viewers.mode_tables import mode_title
+from chladni.viewers.rerun.blueprint import ShapeViews
 from chladni.viewers.rerun.canvas import BEHIND, BELOW, LETTERS, Canvas, draw_labels
 from chladni.viewers.rerun.movement import Movement
 from chladni.viewers.style import Style, amplitude_colours
@@ -18,8 +20,8 @@ NAMES_SHOWN = 24
 NAME_ROOM = 150.0
 
 
-def draw_bars(recording: rr.RecordingStream, study: Study, modes: ModeSet, style: Style) -> list[rrb.View]:
-    """Write each mode at all phases and give a view of each; the names say why there is no wireframe."""
+def draw_bars(recording: rr.RecordingStream, study: Study, modes: ModeSet, style: Style) -> list[ShapeViews]:
+    """Write each mode at all phases and give the views of each; the names say why there is no wireframe."""
     count = len(modes.channels)
     canvas = Canvas(width=WIDTH, height=HEIGHT, x_range=(-1.1, 1.1), y_range=(0.0, float(count)))
     _draw_axes(recording, canvas, modes, style)
@@ -46,7 +48,7 @@ def _draw_axes(recording: rr.RecordingStream, canvas: Canvas, modes: ModeSet, st
 
 def _draw_mode(
     recording: rr.RecordingStream, canvas: Canvas, movement: Movement, modes: ModeSet, row: int
-) -> rrb.View:
+) -> ShapeViews:
     parent, shape = f"{PATH}/mode_{row + 1}", modes.shapes[row]
     far, heights = np.abs(shape), _rows(shape.size)
     thick = min(5.0, 0.3 * HEIGHT / shape.size)
@@ -59,11 +61,19 @@ def _draw_mode(
     ends = np.stack([np.zeros_like(tips), tips], axis=-1)
     across = canvas.places(ends, np.broadcast_to(heights[:, None], ends.shape))
     movement.send(recording, f"{parent}/bars", across, _strips)
+    name = "Re(ψ e^jφ) a channel · the setup gives no places · press play"
+    return ShapeViews(
+        large=_view(name, f"{PATH}/axes/**", f"{parent}/**", left=NAME_ROOM),
+        small=_view(mode_title(modes, row), f"{PATH}/axes", f"{parent}/**", left=20.0),
+    )
+
+
+def _view(name: str, *contents: str, left: float) -> rrb.View:
     return rrb.Spatial2DView(
         origin=PATH,
-        contents=[f"{PATH}/axes/**", f"{parent}/**"],
-        name="Re(ψ e^jφ) a channel · the setup gives no places · press play",
-        visual_bounds=rrb.VisualBounds2D(x_range=(-NAME_ROOM, WIDTH + 20), y_range=(-20, HEIGHT + 2 * LETTERS)),
+        contents=list(contents),
+        name=name,
+        visual_bounds=rrb.VisualBounds2D(x_range=(-left, WIDTH + 20), y_range=(-20, HEIGHT + 2 * LETTERS)),
     )
 
 

@@ -9,6 +9,8 @@ from chladni.viewers.rerun.timelines import PHASE, PHASE_STEPS_PER_S, TIME
 
 # More tabs than this in one row don't fit into a window.
 TABS_IN_A_ROW = 6
+# More shapes than this are too small to tell anything.
+SEEN_TOGETHER = 24
 # More plots than this above one another are too flat to read; the rest goes behind tabs.
 STACKED = 3
 
@@ -36,12 +38,21 @@ class ChannelViews:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ShapeViews:
+    """A mode that moves: with its names, and small among all others."""
+
+    large: rrb.View
+    small: rrb.View
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ModeViews:
     """Plots of one mode."""
 
+    number: int
     label: str
     frequency: str
-    shape: rrb.View
+    shape: ShapeViews
     complexity: rrb.View
 
 
@@ -156,19 +167,20 @@ def _tabs(modes: Sequence[ModeViews]) -> rrb.Container:
     # Rows of equal length, each named by the first and the last of its modes.
     length = -(-len(modes) // rows)
     parts = [modes[start : start + length] for start in range(0, len(modes), length)]
-    firsts = range(1, len(modes) + 1, length)
-    tabs = [
-        rrb.Tabs(
-            *(_mode(mode) for mode in part),
-            name=f"{first}–{first + len(part) - 1}: {part[0].frequency}–{part[-1].frequency} Hz",
-        )
-        for first, part in zip(firsts, parts, strict=True)
-    ]
-    return tabs[0] if len(tabs) == 1 else rrb.Tabs(*tabs)
+    tabs = [_mode(mode) for mode in modes] if rows == 1 else [_row(part) for part in parts]
+    if 1 < len(modes) <= SEEN_TOGETHER:
+        tabs.append(rrb.Grid(*(mode.shape.small for mode in modes), name="All"))
+    return rrb.Tabs(*tabs, active_tab=0)
+
+
+def _row(part: Sequence[ModeViews]) -> rrb.Container:
+    first, last = part[0], part[-1]
+    name = f"{first.number}–{last.number}: {first.frequency}–{last.frequency} Hz"
+    return rrb.Tabs(*(_mode(mode) for mode in part), name=name)
 
 
 def _mode(mode: ModeViews) -> rrb.Container:
-    return rrb.Horizontal(mode.shape, mode.complexity, column_shares=[1.7, 1], name=mode.label)
+    return rrb.Horizontal(mode.shape.large, mode.complexity, column_shares=[1.7, 1], name=mode.label)
 
 
 def _stack(plots: Sequence[rrb.View]) -> rrb.Container:

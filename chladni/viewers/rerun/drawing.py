@@ -99,12 +99,14 @@ def _draw_modes(recording: rr.RecordingStream, study: Study, style: Style) -> Mo
     modes, validation = study.modes, study.validation
     if modes is None:
         return None
-    shapes = draw_shapes(recording, study, modes, style)
-    planes = draw_complexity(recording, modes, validation, style)
+    found = modes.frequency_hz.size > 0
+    shapes = draw_shapes(recording, study, modes, style) if found else []
+    planes = draw_complexity(recording, modes, validation, style) if found else []
     return ModesViews(
         text=draw_mode_text(recording, study, modes, style),
         shapes=[
             ModeViews(
+                number=row + 1,
                 label=mode_title(modes, row),
                 frequency=hertz(float(modes.frequency_hz[row])),
                 shape=shape,

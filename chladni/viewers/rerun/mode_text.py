@@ -37,7 +37,7 @@ def _page(study: Study, modes: ModeSet, style: Style) -> Iterator[str]:
         yield "No mode was found."
     told = advice(modes, study.validation)
     if told:
-        yield "\n### Before you rely on them\n"
+        yield "\n### What to know\n"
         yield from (f"- {escaped(sentence)}" for sentence in told)
     yield from _motions(study, modes, style)
     if found:

@@ -4,26 +4,28 @@ from functools import partial
 
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.study import Study
+from chladni.signals.wording import counted
 from chladni.viewers.drawing import Floats
+from chladni.viewers.mode_tables import mode_title
 from chladni.viewers.rerun.bars import draw_bars
+from chladni.viewers.rerun.blueprint import ShapeViews
 from chladni.viewers.rerun.movement import Movement
 from chladni.viewers.rerun.structure import draw_rest, shape_view
 from chladni.viewers.style import Style, amplitude_colours
 from chladni.viewers.wireframe import DRAWN_SHARE, Motion, Wireframe, along, amplitude
 
 PATH = "/shapes"
-# The view is upright, and what moves must stay inside.
-DISTANCE = 1.3
+# The large view is upright, the small one lies; what moves must stay inside.
+DISTANCE, SMALL_DISTANCE = 1.3, 0.85
 # Pieces that each line is cut into, so that colour runs along it, as far as this many segments allow.
 PIECES, SEGMENTS = 6, 600
 
 
-def draw_shapes(recording: rr.RecordingStream, study: Study, modes: ModeSet, style: Style) -> list[rrb.View]:
-    """Write each mode at all phases and give a view of each."""
+def draw_shapes(recording: rr.RecordingStream, study: Study, modes: ModeSet, style: Style) -> list[ShapeViews]:
+    """Write each mode at all phases and give the views of each."""
     wireframe = Wireframe.of(study.geometry, modes.channels)
     if wireframe is None:
         return draw_bars(recording, study, modes, style)
@@ -34,7 +36,7 @@ def draw_shapes(recording: rr.RecordingStream, study: Study, modes: ModeSet, sty
     movement = Movement.of(study, vertices=count * (len(wireframe.names) + 2 * parts * pieces))
     left_out = len(modes.channels) - len(wireframe.rows)
     draw = partial(_draw_mode, recording, wireframe, movement, pieces, left_out)
-    return [draw(row, motion) for row, motion in enumerate(wireframe.motion(modes.shapes))]
+    return [draw(row, motion, mode_title(modes, row)) for row, motion in enumerate(wireframe.motion(modes.shapes))]
 
 
 def _draw_mode(
@@ -45,7 +47,8 @@ def _draw_mode(
     left_out: int,
     row: int,
     motion: Motion,
-) -> rrb.View:
+    title: str,
+) -> ShapeViews:
     parent, size = f"{PATH}/mode_{row + 1}", wireframe.size
     far = amplitude(motion)
     greatest = float(far.max()) or 1.0
@@ -63,13 +66,13 @@ def _draw_mode(
         wires = rr.LineStrips3D.from_fields(colors=amplitude_colours(shade), radii=(0.006 if few else 0.003) * size)
         recording.log(f"{parent}/lines", wires, static=True)
         movement.send(recording, f"{parent}/lines", along(places, ends, shares), _strips)
-    note = f" · {left_out} channels have no place" if left_out else ""
-    return shape_view(
-        PATH,
-        f"Re(ψ e^jφ), colour |ψ| · press play{note}",
-        wireframe,
-        contents=(f"{PATH}/rest/**", f"{parent}/**"),
-        distance=DISTANCE,
+    note = f" · {counted(left_out, 'channel')} without a place" if left_out else ""
+    moved, view = f"{parent}/**", partial(shape_view, PATH, wireframe=wireframe)
+    return ShapeViews(
+        large=view(
+            f"Re(ψ e^jφ), colour |ψ| · press play{note}", contents=(f"{PATH}/rest/**", moved), distance=DISTANCE
+        ),
+        small=view(title, contents=(f"{PATH}/rest/points", f"{PATH}/rest/lines", moved), distance=SMALL_DISTANCE),
     )
 
 

@@ -13,14 +13,15 @@ NAMES_SHOWN = 24
 def draw_rest(recording: rr.RecordingStream, parent: str, wireframe: Wireframe) -> None:
     """Write points with their names, and lines, under ``parent``/rest."""
     size, names = wireframe.size, wireframe.names
+    few = len(names) <= NAMES_SHOWN
+    grey = [REST_COLOUR] * len(names)
     dots = rr.Points3D(
-        wireframe.rest,
-        labels=names,
-        show_labels=len(names) <= NAMES_SHOWN,
-        colors=[REST_COLOUR] * len(names),
-        radii=0.008 * size if len(names) <= NAMES_SHOWN else 0.003 * size,
+        wireframe.rest, labels=names, show_labels=False, colors=grey, radii=(0.008 if few else 0.003) * size
     )
     recording.log(f"{parent}/rest/points", dots, static=True)
+    # Apart from the points, so that a view too small for names can leave them out.
+    shown = rr.Points3D(wireframe.rest, labels=names, show_labels=few, colors=grey, radii=0.0)
+    recording.log(f"{parent}/rest/names", shown, static=True)
     strips = [wireframe.rest[list(line)] for line in wireframe.lines]
     wires = rr.LineStrips3D(strips, colors=[REST_COLOUR] * len(strips), radii=0.002 * size)
     recording.log(f"{parent}/rest/lines", wires, static=True)
