@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.modal.exponential_window import without_window_damping
 from chladni.modal.nyquist_circle import NyquistCircle, fit_circle, sweep
 from chladni.modal.resonance_lines import MobilityLines, Resonance, mobility_lines, resonances
 from chladni.modal.single_modes import SingleMode, mode_set
@@ -72,7 +73,8 @@ class CircleFit:
         -------
         ModeSet
             Frequency at the greatest rate of sweep, damping and shape with their sigma, from the std of the lines and
-            the distance of the lines from the circles, whichever is more. Unscaled.
+            the distance of the lines from the circles, whichever is more. Unscaled. The damping of an exponential
+            window is taken off, and a note says so.
 
         Raises
         ------
@@ -86,7 +88,8 @@ class CircleFit:
             mode, words = self._mode(lines, resonance)
             modes += [mode] if mode else []
             notes += words
-        return mode_set(modes, response, estimator="circle fit", notes=[*notes, *closeness(modes), UNSCALED])
+        found_modes = mode_set(modes, response, estimator="circle fit", notes=[*notes, *closeness(modes), UNSCALED])
+        return without_window_damping(found_modes, response.provenance.window_decay_per_s)
 
     def _mode(self, lines: MobilityLines, resonance: Resonance) -> tuple[SingleMode | None, list[str]]:
         centre_hz = float(lines.frequency_hz[resonance.line])

@@ -326,7 +326,7 @@ def _sentence(point: DrivingPoint) -> str:
         )
     if point.verdict == "undecided":
         return f"{who}: no resonance stands out of the noise, so its sign can't be told; take more averages"
-    gaps = f", though {len(point.missing_hz)} without antiresonance" if point.missing_hz else ""
+    gaps = "".join(f"; none is seen between {low:.4g} and {high:.4g} Hz" for low, high in point.missing_hz[:1])
     return (
         f"{who}: sound; {counted(point.peaks, 'resonance')} and all {counted(point.lines, 'line')} take power in, "
         f"{point.pairs - len(point.missing_hz)} of {counted(point.pairs, 'pair')} of resonances have their "

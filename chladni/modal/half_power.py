@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.modal.circle_fit import UNSCALED, closeness
+from chladni.modal.exponential_window import without_window_damping
 from chladni.modal.nyquist_circle import sweep
 from chladni.modal.resonance_lines import MobilityLines, Resonance, mobility_lines, resonances
 from chladni.modal.single_modes import SingleMode, mode_set
@@ -61,7 +62,8 @@ class HalfPower:
         Returns
         -------
         ModeSet
-            Sigma from the std of the lines and from the spacing between them. Unscaled.
+            Sigma from the std of the lines and from the spacing between them. Unscaled. The damping of an
+            exponential window is taken off, and a note says so.
 
         Raises
         ------
@@ -78,7 +80,8 @@ class HalfPower:
                 notes.append(f"the peak at {centre_hz:.5g} Hz has no half-power points; no mode is taken there")
             else:
                 modes.append(mode)
-        return mode_set(modes, response, estimator="half-power", notes=[*notes, *closeness(modes), UNSCALED])
+        found_modes = mode_set(modes, response, estimator="half-power", notes=[*notes, *closeness(modes), UNSCALED])
+        return without_window_damping(found_modes, response.provenance.window_decay_per_s)
 
 
 def _mode(lines: MobilityLines, resonance: Resonance) -> SingleMode | None:

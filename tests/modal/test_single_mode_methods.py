@@ -12,9 +12,11 @@ from chladni.modal.resonance_lines import mobility_lines
 from chladni.signals.errors import EstimateError
 from chladni.signals.provenance import Provenance
 from chladni.spectral.frequency_response import frequency_response
+from chladni.spectral.impact import find_impacts, impact_cross_spectra
 from chladni.spectral.periodic import find_period, periodic_cross_spectra
 from tests.modal.made_responses import chain, functions, one_mass
 from tests.spectral.aircraft import ACCELEROMETERS, SHAKER, aircraft
+from tests.spectral.measured_logs import hammer
 
 METHODS = [CircleFit(), HalfPower()]
 F_HZ = np.arange(2.0, 60.0, 0.05)
@@ -187,6 +189,7 @@ def test_noise_that_a_window_has_smeared_over_lines_is_reckoned_with(method, kin
     made = functions(one_mass(20.0, 0.01), np.arange(300, 501) / 20.0, order=1)
     provenance = replace(made.provenance, window="hann" if kind == "hann" else "boxcar", segment_s=20.0)
     if kind == "exponential":
+        # Of the pole's 1.26/s the window is said to have given 0.3, which are taken off: the scatter stays.
         provenance = replace(provenance, averaging="impact", window_decay_per_s=decay)
     made = replace(made, provenance=provenance)
     level = 0.05 * np.abs(made.values).max()
@@ -221,6 +224,17 @@ def test_the_aircraft_has_its_modes(method, shared_data):
     series = aircraft(shared_data, 1)
     spectra = periodic_cross_spectra(series, find_period(series, channel=SHAKER))
     modes = method.identify(frequency_response(spectra, references=SHAKER, responses=ACCELEROMETERS))
-    for published in (5.19, 7.32):
-        assert np.min(np.abs(modes.frequency_hz - published)) < 0.05
-    assert np.all((modes.frequency_hz > 2.0) & (modes.frequency_hz < 15.0))
+    published = np.array([3.47, 3.96, 5.19, 6.61, 7.32, 9.17])
+    # To 0.02 Hz by circles; a first look is allowed what it says of itself, and what the published digits leave.
+    tolerance = 0.02 if isinstance(method, CircleFit) else 3 * modes.frequency_std_hz
+    assert np.all(np.abs(modes.frequency_hz - published) < tolerance)
+
+
+def test_the_measured_impact_test_has_its_published_peaks(method, shared_data):
+    series = hammer(shared_data)
+    spectra = impact_cross_spectra(series, find_impacts(series, force="/daq.hammer"))
+    modes = method.identify(frequency_response(spectra, references="/daq.hammer"), band_hz=(100.0, 4000.0))
+    for published in (242, 447, 558, 731, 872, 1362, 1407, 2085, 2249, 2607, 2959, 3295):
+        nearest = np.min(np.abs(modes.frequency_hz - published))
+        assert nearest < 0.005 * published, published
+    assert np.all(modes.damping_std < modes.damping_ratio)
