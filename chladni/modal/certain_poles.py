@@ -9,7 +9,7 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 
-def certain_pole(table: PoleTable, cluster: Rows) -> int:
+def certain_pole(table: PoleTable, cluster: Rows, *, least_order: int = 0) -> int:
     """Give the row of the pole with the least sigma among those that the cluster doesn't contradict.
 
     The least order that describes a mode estimates it best, since every state more adds scatter; an order too low
@@ -22,13 +22,17 @@ def certain_pole(table: PoleTable, cluster: Rows) -> int:
         With standard deviations.
     cluster
         Rows of the poles of one mode, at least one.
+    least_order
+        Poles of lower orders are taken only when the cluster has no other. A model that lacks one of the modes puts
+        that mode's motion into the shapes of the others.
     """
+    high = cluster[table.order[cluster] >= least_order]
+    cluster = high if high.size else cluster
     frequency_std, damping_std = pole_std(table, cluster)
     frequency, damping = table.frequency_hz[cluster], table.damping_ratio[cluster]
     off = np.maximum(
         np.abs(frequency - np.median(frequency)) / frequency_std, np.abs(damping - np.median(damping)) / damping_std
     )
-    # A wide error bar reaches everything: only poles about as sure as the others are asked.
     total = np.hypot(frequency_std / frequency, damping_std)
     agreeing = np.flatnonzero(off <= 1)
     if not agreeing.size:

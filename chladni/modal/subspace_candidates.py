@@ -33,6 +33,9 @@ class ResponseRules:
     harmonic_distance, harmonic_damping
         A pole within this share of the frequency of a machine's line and with no more than this damping ratio is
         that line.
+    same_shape
+        Two poles whose shapes have this MAC or more, and whose frequencies lie within half a half-power width, are
+        one mode that the models told twice: these sensors couldn't tell two such modes apart.
     """
 
     replication: float = 0.55
@@ -40,6 +43,7 @@ class ResponseRules:
     over_least_std: float = 12.0
     harmonic_distance: float = 0.01
     harmonic_damping: float = 0.005
+    same_shape: float = 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,9 +109,17 @@ def choose_poles(
     if frequencies_hz is not None:
         kept, notes = np.arange(rows.size), _doubts(table, rows, unsure, machine)
     else:
-        kept, notes = _kept(table, rows, found, unsure, machine, count)
-    kept = kept[np.argsort(table.frequency_hz[rows[kept]], kind="stable")]
-    return ChosenPoles(selection=found, clusters=kept, rows=rows[kept], notes=found.notes + notes)
+        kept, notes = _kept(table, rows, found, unsure, machine, count, rules)
+    final = _of_full_models(table, found, kept)
+    rising = np.argsort(table.frequency_hz[final], kind="stable")
+    return ChosenPoles(selection=found, clusters=kept[rising], rows=final[rising], notes=found.notes + notes)
+
+
+def _of_full_models(table: PoleTable, found: PoleSelection, kept: Rows) -> Rows:
+    """Poles of models that are rich enough to hold all modes."""
+    clusters = [np.flatnonzero(found.member == mode) for mode in kept]
+    least = max((int(table.order[cluster].min()) for cluster in clusters), default=0)
+    return np.array([certain_pole(table, cluster, least_order=least) for cluster in clusters], dtype=np.int64)
 
 
 def _too_wide(table: PoleTable, rows: Rows, duration_s: float, rules: ResponseRules) -> Bools:
@@ -125,7 +137,13 @@ def _is_harmonic(table: PoleTable, row: int, harmonics: Sequence[MachineHarmonic
 
 
 def _kept(
-    table: PoleTable, rows: Rows, found: PoleSelection, unsure: Bools, machine: Bools, count: int | None
+    table: PoleTable,
+    rows: Rows,
+    found: PoleSelection,
+    unsure: Bools,
+    machine: Bools,
+    count: int | None,
+    rules: ResponseRules,
 ) -> tuple[Rows, tuple[str, ...]]:
     kept, notes = np.flatnonzero(~unsure & ~machine), []
     if np.any(machine):
@@ -136,12 +154,32 @@ def _kept(
             f"{_at(table, rows[noise])}: many orders hold a pole there, but it doesn't come back in the other half "
             "of the record, or its error bar is as wide as what it says: noise, unless a longer record shows it again"
         )
+    twice = _repeated(table, rows[kept], found.spread.orders[kept], rules)
+    if np.any(twice):
+        notes.append(
+            f"{_at(table, rows[kept[twice]])}: a second pole of a mode with the same shape beside it, left out"
+        )
+        kept = kept[~twice]
     if count is not None:
         if kept.size < count:
             notes.append(f"{count} modes were asked for, but the record holds no more than {kept.size} that are sure")
         strongest = np.argsort(-found.spread.orders[kept], kind="stable")
         kept = kept[strongest[:count]]
     return kept, tuple(notes)
+
+
+def _repeated(table: PoleTable, rows: Rows, orders: Rows, rules: ResponseRules) -> Bools:
+    """Poles within the half-power half-width of one that more orders hold, with its shape."""
+    repeated = np.zeros(rows.size, dtype=np.bool_)
+    strongest = np.argsort(-orders, kind="stable")
+    frequency_hz, width_hz = table.frequency_hz[rows], (table.frequency_hz * table.damping_ratio)[rows]
+    # Vectors have length 1, so that the MAC is their product squared.
+    alike = np.abs(table.vector[rows].conj() @ table.vector[rows].T) ** 2 >= rules.same_shape
+    for place, row in enumerate(strongest):
+        stronger = strongest[:place][~repeated[strongest[:place]]]
+        near = np.abs(frequency_hz[stronger] - frequency_hz[row]) <= np.maximum(width_hz[stronger], width_hz[row])
+        repeated[row] = bool(np.any(near & alike[row, stronger]))
+    return repeated
 
 
 def _doubts(table: PoleTable, rows: Rows, unsure: Bools, machine: Bools) -> tuple[str, ...]:
