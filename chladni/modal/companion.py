@@ -5,8 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.errors import EstimateError
-
 
 def denominators(matrix: NDArray[np.complex128], references: int, orders: range) -> Iterator[NDArray[np.complex128]]:
     """Solve for the coefficients alpha_1 to alpha_k of each order k, alpha_0 being the identity.
@@ -24,6 +22,11 @@ def denominators(matrix: NDArray[np.complex128], references: int, orders: range)
     ------
     ``[k, reference, reference]``.
 
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When the matrix isn't positive definite.
+
     Notes
     -----
     With the Cholesky factor L of M without its first block row and column, and y = -L^-1 M_10, the coefficients of
@@ -34,12 +37,7 @@ def denominators(matrix: NDArray[np.complex128], references: int, orders: range)
     """
     from scipy.linalg import solve_triangular
 
-    try:
-        factor = np.linalg.cholesky(matrix[references:, references:])
-    except np.linalg.LinAlgError:
-        raise EstimateError(
-            f"the lines don't determine polynomials of order {orders[-1]}: lower max_order or widen the band"
-        ) from None
+    factor = np.linalg.cholesky(matrix[references:, references:])
     inverse = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
     right = -inverse @ matrix[references:, :references]
     for order in orders:

@@ -81,7 +81,12 @@ def polyreference_poles(
     references = lines.reference_scale.size
     step = order_step or (1 if highest * references <= EVERY_ORDER else 2)
     orders = range(min_order + (highest - min_order) % step, highest + 1, step)
-    return _pole_table(lines, unit_circle(lines.frequency_hz), orders, notes)
+    try:
+        return _pole_table(lines, unit_circle(lines.frequency_hz), orders, notes)
+    except np.linalg.LinAlgError:
+        raise EstimateError(
+            f"the lines don't determine polynomials of order {highest}: lower max_order or widen the band"
+        ) from None
 
 
 def _highest_order(lines: WeightedLines) -> int:

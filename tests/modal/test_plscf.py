@@ -262,6 +262,13 @@ def test_impossible_requests_are_named():
         polyreference_poles(response, weighting="magic")
 
 
+def test_lines_that_do_not_determine_the_polynomials_are_an_error(monkeypatch):
+    # The matrix of powers up to 60 on lines with a hole is singular to rounding, which a ridge below zero brings out.
+    monkeypatch.setattr("chladni.modal.reduced_normal_equations.NUMERATOR_RIDGE", -1e-9)
+    with pytest.raises(EstimateError, match="don't determine polynomials of order 60: lower max_order"):
+        polyreference_poles(_a_hole(functions(chain(), FREQUENCY_HZ)))
+
+
 @settings(max_examples=25, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
