@@ -223,20 +223,21 @@ def _middle(table: PoleTable, cluster: Rows) -> int:
 
 def _different(table: PoleTable, clusters: list[Rows], rules: SelectionRules) -> list[Rows]:
     """Keep of clusters that are the same pole twice the one that most orders hold."""
-    kept: list[Rows] = []
-    for cluster in _strongest(table, clusters, len(clusters)):
-        if not any(_same(table, cluster, other, rules) for other in kept):
-            kept.append(cluster)
-    return kept
-
-
-def _same(table: PoleTable, one: Rows, other: Rows, rules: SelectionRules) -> bool:
+    ranked = _strongest(table, clusters, len(clusters))
+    if not ranked:
+        return []
+    same = np.ones((len(ranked), len(ranked)), bool)
     for column in (table.frequency_hz, table.damping_ratio):
-        scatter = np.hypot(_scatter(column[one]), _scatter(column[other]))
-        if abs(np.median(column[one]) - np.median(column[other])) > 2 * scatter:
-            return False
-    product = np.vdot(table.vector[_middle(table, one)], table.vector[_middle(table, other)])
-    return bool(abs(product) ** 2 >= 1 - rules.tolerance.vector)
+        middle = np.array([np.median(column[cluster]) for cluster in ranked])
+        scatter = np.array([_scatter(column[cluster]) for cluster in ranked])
+        same &= np.abs(middle[:, None] - middle) <= 2 * np.hypot(scatter[:, None], scatter)
+    vectors = table.vector[[_middle(table, cluster) for cluster in ranked]]
+    same &= np.abs(vectors.conj() @ vectors.T) ** 2 >= 1 - rules.tolerance.vector
+    kept: list[int] = []
+    for place in range(len(ranked)):
+        if not same[place, kept].any():
+            kept.append(place)
+    return [ranked[place] for place in kept]
 
 
 def _scatter(values: Floats) -> float:
