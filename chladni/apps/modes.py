@@ -1,0 +1,244 @@
+"""Natural modes of a log, a series or frequency responses, in one call."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from chladni.apps.modal_channels import excitation_names, motions_of_one_unit, responses_alone
+from chladni.apps.sources import Progress, Span, Watched, no_progress
+from chladni.apps.spectra import Averaging, transfer
+from chladni.io.log import Log
+from chladni.modal.bands import join_bands
+from chladni.modal.circle_fit import CircleFit
+from chladni.modal.efdd import EnhancedFrequencyDomainDecomposition
+from chladni.modal.fdd import FrequencyDomainDecomposition
+from chladni.modal.half_power import HalfPower
+from chladni.modal.polyreference import PolyReferenceLeastSquares
+from chladni.modal.subspace import CovarianceDrivenSubspace
+from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.errors import EstimateError
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.mode_set import ModeSet
+from chladni.signals.time_series import TimeSeries
+from chladni.spectral.adaptive import adaptive_cross_spectra
+
+Band = tuple[float, float]
+FromResponses = CovarianceDrivenSubspace | FrequencyDomainDecomposition | EnhancedFrequencyDomainDecomposition
+FromFunctions = PolyReferenceLeastSquares | CircleFit | HalfPower
+Method = FromFunctions | FromResponses
+
+# Segments of a record, end to end, that modes are identified from: half as many as a spectrum for the eye has, twice
+# the lines in each peak. Each further reference takes some of the averages for itself.
+SEGMENTS, SEGMENTS_A_REFERENCE = 8, 4
+LONGEST_SEGMENT = 1 << 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """Which modes to look for: in these bands (all lines if none), so many at most, or near these frequencies."""
+
+    bands_hz: tuple[Band, ...] = ()
+    count: int | None = None
+    frequencies_hz: tuple[float, ...] | None = None
+
+    @classmethod
+    def of(
+        cls, *, bands_hz: Sequence[Band] | None, count: int | None, frequencies_hz: Sequence[float] | None
+    ) -> Self:
+        """Give the request for options that may be missing or empty."""
+        return cls(
+            bands_hz=tuple(bands_hz or ()),
+            count=count,
+            frequencies_hz=tuple(frequencies_hz) if frequencies_hz else None,
+        )
+
+
+def identify_modes(
+    source: Log | TimeSeries | FrequencyResponse | CrossSpectra,
+    *,
+    reference: str | Sequence[str] | None = None,
+    operational: bool = False,
+    channels: Sequence[str] | None = None,
+    method: Method | None = None,
+    band_hz: Band | Sequence[Band] | None = None,
+    count: int | None = None,
+    frequencies_hz: Sequence[float] | None = None,
+    resolution_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> ModeSet:
+    """Identify natural frequencies, damping ratios and modal vectors, each with its uncertainty.
+
+    Parameters
+    ----------
+    source
+        A log or a series, whose frequency responses are estimated first (or, with `operational`, whose responses
+        alone are used), frequency responses, or averaged cross-spectra of responses.
+    reference
+        Channel of the excitation, or several; None takes those whose role is reference, else the first force.
+    operational
+        Whether to use responses alone, excited by wind, traffic, the machine's own work.
+    channels
+        Responses; None takes all motions of the most common unit on one sampling grid.
+    method
+        `PolyReferenceLeastSquares` (the default for frequency responses), `CircleFit`, `HalfPower`;
+        `CovarianceDrivenSubspace` (the default for responses alone), `FrequencyDomainDecomposition`,
+        `EnhancedFrequencyDomainDecomposition` (the default for cross-spectra).
+    band_hz
+        Only modes between these frequencies; several bands are fitted one by one and joined.
+    count
+        At most so many modes, the most certain ones. When the data hold fewer, a note says why.
+    frequencies_hz
+        The modes nearest to these frequencies, instead of an automatic choice.
+    resolution_hz
+        Distance of the lines of the frequency responses (of the cross-spectra for frequency domain decomposition).
+    start_s, end_s
+        Only samples with ``start_s <= t < end_s``, seconds from the start.
+
+    Returns
+    -------
+    ModeSet
+        Empty when there is no mode; its notes say why.
+
+    Raises
+    ------
+    LogError
+        When there is no such channel, or the channels named have different sampling grids.
+    EstimateError
+        When the source, the method and the options don't go together, or there is too little to identify from.
+
+    Examples
+    --------
+    >>> with open_log("arm.mcap") as log:  # doctest: +SKIP
+    ...     modes = identify_modes(log, reference="/shaker.wrench.force.x", band_hz=(10, 400))
+    """
+    wanted = Wanted.of(bands_hz=_bands(band_hz), count=count, frequencies_hz=frequencies_hz)
+    span, averaging = Span(start_s=start_s, end_s=end_s), Averaging(resolution_hz=resolution_hz)
+    if isinstance(source, FrequencyResponse):
+        return modes_of_response(source, method=method, wanted=wanted)
+    if isinstance(source, CrossSpectra):
+        return modes_of_spectra(source, method=method, wanted=wanted)
+    if operational or isinstance(method, FromResponses):
+        return modes_of_responses(
+            source, channels=channels, method=method, wanted=wanted, averaging=averaging, span=span
+        )
+    response = modal_response(source, reference, channels, averaging=averaging, span=span)
+    return modes_of_response(response, method=method, wanted=wanted)
+
+
+def modes_of_response(response: FrequencyResponse, *, method: Method | None, wanted: Wanted) -> ModeSet:
+    """Identify modes from frequency responses, band by band when several bands are wanted."""
+    chosen = PolyReferenceLeastSquares() if method is None else method
+    if not isinstance(chosen, FromFunctions):
+        raise EstimateError(f"{type(chosen).__name__} works on responses alone, not on frequency responses")
+    if len(wanted.bands_hz) > 1:
+        return join_bands([modes_of_response(response, method=chosen, wanted=one) for one in _band_by_band(wanted)])
+    band = wanted.bands_hz[0] if wanted.bands_hz else None
+    return chosen.identify(response, band_hz=band, count=wanted.count, frequencies_hz=wanted.frequencies_hz)
+
+
+def modes_of_spectra(spectra: CrossSpectra, *, method: Method | None, wanted: Wanted) -> ModeSet:
+    """Identify modes from averaged cross-spectra of responses, band by band when several bands are wanted."""
+    chosen = EnhancedFrequencyDomainDecomposition() if method is None else method
+    if not isinstance(chosen, FrequencyDomainDecomposition | EnhancedFrequencyDomainDecomposition):
+        raise EstimateError(f"{type(chosen).__name__} doesn't work on cross-spectra; give it the series or the log")
+    if len(wanted.bands_hz) > 1:
+        return join_bands([modes_of_spectra(spectra, method=chosen, wanted=one) for one in _band_by_band(wanted)])
+    band = wanted.bands_hz[0] if wanted.bands_hz else None
+    return chosen.identify(spectra, band_hz=band, count=wanted.count, frequencies_hz=wanted.frequencies_hz)
+
+
+def modes_of_responses(
+    source: Log | TimeSeries,
+    *,
+    channels: Sequence[str] | None,
+    method: Method | None,
+    wanted: Wanted,
+    averaging: Averaging,
+    span: Span,
+    progress: Progress = no_progress,
+) -> ModeSet:
+    """Identify modes from responses alone."""
+    chosen = CovarianceDrivenSubspace() if method is None else method
+    if not isinstance(chosen, FromResponses):
+        raise EstimateError(f"{type(chosen).__name__} needs frequency responses; name the channel of the excitation")
+    samples, notes = responses_alone(source, channels, span, progress=progress)
+    found = _from_samples(samples, chosen, wanted, averaging)
+    return replace(found, provenance=found.provenance.with_notes(*notes))
+
+
+def modal_response(
+    source: Log | TimeSeries,
+    reference: str | Sequence[str] | None,
+    channels: Sequence[str] | None,
+    *,
+    averaging: Averaging,
+    span: Span,
+    progress: Progress = no_progress,
+) -> FrequencyResponse:
+    """Estimate the frequency responses that modes are identified from: those of motions in one unit.
+
+    Raises
+    ------
+    EstimateError
+        When no excitation is named and none can be told.
+    """
+    if reference is None:
+        references = excitation_names(source, span)
+    else:
+        references = (reference,) if isinstance(reference, str) else tuple(reference)
+    response = transfer(
+        source, references, channels, estimator="H1", averaging=averaging, span=span, progress=progress
+    )
+    finer = _modal_averaging(response, averaging)
+    if finer != averaging:
+        response = transfer(source, references, channels, estimator="H1", averaging=finer, span=span)
+    names, notes = motions_of_one_unit(response.responses, named=channels is not None)
+    chosen = response.select(names)
+    return replace(chosen, provenance=chosen.provenance.with_notes(*notes))
+
+
+def _modal_averaging(response: FrequencyResponse, averaging: Averaging) -> Averaging:
+    """Trade averages for lines, unless the user or the excitation has chosen.
+
+    A fit averages over lines itself, but can't part modes that the window has smeared into one.
+    """
+    account = response.provenance
+    if averaging != Averaging() or account.averaging != "linear":
+        return averaging
+    hop_s = account.segment_s * (1 - account.overlap)
+    duration_s = account.segment_s + (account.averages - 1) * hop_s
+    segments = SEGMENTS + SEGMENTS_A_REFERENCE * (len(response.references) - 1)
+    rate_hz = 2 * float(response.frequency_hz[-1])
+    longest_s = min(duration_s / segments, LONGEST_SEGMENT / rate_hz)
+    return averaging if longest_s <= account.segment_s else replace(averaging, resolution_hz=1 / longest_s)
+
+
+def _from_samples(
+    samples: TimeSeries | Watched, method: FromResponses, wanted: Wanted, averaging: Averaging
+) -> ModeSet:
+    if isinstance(method, CovarianceDrivenSubspace):
+        if len(wanted.bands_hz) > 1:
+            raise EstimateError("responses alone are identified in one band; give the band that holds them all")
+        band = wanted.bands_hz[0] if wanted.bands_hz else None
+        return method.identify(samples, band_hz=band, count=wanted.count, frequencies_hz=wanted.frequencies_hz)
+    spectra = adaptive_cross_spectra(
+        samples, resolution_hz=averaging.resolution_hz, window=averaging.window, overlap=averaging.overlap
+    )
+    return modes_of_spectra(spectra, method=method, wanted=wanted)
+
+
+def _bands(band_hz: Band | Sequence[Band] | None) -> tuple[Band, ...]:
+    """Give one band or several as several."""
+    if band_hz is None:
+        return ()
+    edges = np.asarray(band_hz, dtype=np.float64)
+    if edges.ndim not in (1, 2) or edges.shape[-1] != 2:
+        raise EstimateError(f"band_hz {band_hz} must be (low, high) or several such pairs")
+    return tuple((float(low), float(high)) for low, high in np.atleast_2d(edges))
+
+
+def _band_by_band(wanted: Wanted) -> list[Wanted]:
+    return [replace(wanted, bands_hz=(band,)) for band in wanted.bands_hz]

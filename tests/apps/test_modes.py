@@ -1,0 +1,154 @@
+"""Modes of logs, series, functions and spectra in one call, against the closed form."""
+
+import numpy as np
+import pytest
+
+from chladni.apps.modes import identify_modes
+from chladni.apps.spectra import frf
+from chladni.io.log import open_log
+from chladni.modal.circle_fit import CircleFit
+from chladni.modal.efdd import EnhancedFrequencyDomainDecomposition
+from chladni.modal.polyreference import PolyReferenceLeastSquares
+from chladni.modal.subspace import CovarianceDrivenSubspace
+from chladni.signals.errors import EstimateError
+from chladni.signals.time_series import TimeSeries
+from chladni.spectral.cross_spectra import cross_spectra
+from tests.arm import FORCE, TOOL, WRIST, short_arm, write_arm
+
+# Twenty-five seconds give half a percent of the lowest mode's frequency at the default resolution.
+SIGMAS = 4.0
+# The force ends at 300 Hz: to responses alone its edge looks like a property of the structure.
+FORCED_HZ = (5.0, 280.0)
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    path = write_arm(tmp_path_factory.mktemp("arm"))
+    with open_log(path, setup=path.with_name("setup.toml")) as log:
+        yield log
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return short_arm().modes
+
+
+def series_of_arm():
+    made = short_arm()
+    rows = np.concatenate([one.values[:, :19_000] for one in made.series])
+    channels = tuple(one.channels[0] for one in made.series)
+    return TimeSeries(values=rows, channels=channels, sample_rate_hz=1000.0)
+
+
+def assert_near_truth(modes, truth, *, floor=0.0):
+    """Every found mode is a true one within its own error bar (or a floor), and none is found twice."""
+    nearest = np.abs(modes.frequency_hz[:, None] - truth.frequency_hz).argmin(axis=1)
+    assert len(set(nearest.tolist())) == nearest.size
+    allowed = np.maximum(SIGMAS * modes.frequency_std_hz, floor * modes.frequency_hz)
+    assert np.all(np.abs(modes.frequency_hz - truth.frequency_hz[nearest]) < allowed)
+
+
+def test_a_log_needs_no_argument_when_its_channels_tell_the_excitation(arm, truth):
+    modes = identify_modes(arm)
+    assert modes.frequency_hz.size == truth.frequency_hz.size
+    assert_near_truth(modes, truth)
+    assert [channel.name for channel in modes.references] == [FORCE]
+    assert modes.scale is not None  # the tool is a driving point
+
+
+def test_functions_give_what_their_log_gives(arm):
+    # The lines that are asked for are the lines that modes are identified from.
+    response = frf(arm, reference=FORCE, resolution_hz=0.5)
+    np.testing.assert_allclose(
+        identify_modes(response).frequency_hz,
+        identify_modes(arm, reference=FORCE, resolution_hz=0.5).frequency_hz,
+        rtol=1e-12,
+    )
+
+
+def test_modes_are_given_finer_lines_than_a_spectrum_for_the_eye(arm):
+    modes = identify_modes(arm, reference=FORCE)
+    assert modes.provenance.segment_s > 1.9 * frf(arm, reference=FORCE).provenance.segment_s
+
+
+def test_a_series_gives_modes_from_functions_and_from_responses_alone(truth):
+    series = series_of_arm()
+    assert_near_truth(identify_modes(series, reference=FORCE), truth)
+    # The arm is shaken by noise of one band, at one body: nearly what responses alone ask for.
+    operational = identify_modes(series, operational=True, band_hz=FORCED_HZ)
+    assert operational.references == ()
+    assert operational.frequency_hz.size >= 3
+    assert_near_truth(operational, truth, floor=0.01)
+
+
+def test_bands_are_fitted_one_by_one_and_joined(arm, truth):
+    modes = identify_modes(arm, reference=FORCE, band_hz=[(15, 57), (57, 130)])
+    assert modes.frequency_hz.size == 4
+    # The border runs between two heavily damped modes: what crosses it is a residual only to first order.
+    assert_near_truth(modes, truth, floor=0.01)
+
+
+def test_one_band_and_a_count_and_given_frequencies_limit_what_is_found(arm, truth):
+    within = identify_modes(arm, reference=FORCE, band_hz=(15, 57))
+    assert within.frequency_hz.size == 2
+    assert identify_modes(arm, reference=FORCE, count=2).frequency_hz.size == 2
+    (near,) = identify_modes(arm, reference=FORCE, frequencies_hz=[48.2]).frequency_hz
+    assert near == pytest.approx(truth.frequency_hz[1], rel=0.005)
+
+
+def test_named_responses_only(arm):
+    modes = identify_modes(arm, reference=FORCE, channels=[TOOL, WRIST])
+    assert [channel.name for channel in modes.channels] == [TOOL, WRIST]
+
+
+@pytest.mark.parametrize("method", [CircleFit(), PolyReferenceLeastSquares(max_order=30)])
+def test_methods_for_functions(arm, truth, method):
+    modes = identify_modes(arm, reference=FORCE, method=method)
+    assert modes.frequency_hz.size >= 3
+    assert_near_truth(modes, truth, floor=0.005)
+
+
+@pytest.mark.parametrize("method", [CovarianceDrivenSubspace(), EnhancedFrequencyDomainDecomposition()])
+def test_methods_for_responses_alone_need_no_word_operational(truth, method):
+    modes = identify_modes(series_of_arm(), method=method, band_hz=FORCED_HZ)
+    assert modes.frequency_hz.size >= 2
+    assert_near_truth(modes, truth, floor=0.02)
+
+
+def test_cross_spectra_give_modes(truth):
+    series = series_of_arm()
+    responses = series.select([channel.name for channel in series.channels if channel.name != FORCE])
+    modes = identify_modes(cross_spectra(responses, resolution_hz=0.5), band_hz=FORCED_HZ)
+    assert modes.frequency_hz.size >= 2
+    assert_near_truth(modes, truth, floor=0.02)
+
+
+@pytest.mark.parametrize(
+    ("source", "method", "words"),
+    [
+        ("response", CovarianceDrivenSubspace(), "works on responses alone"),
+        ("spectra", CovarianceDrivenSubspace(), "doesn't work on cross-spectra"),
+        ("spectra", CircleFit(), "doesn't work on cross-spectra"),
+    ],
+)
+def test_a_method_that_does_not_fit_the_source_is_refused(source, method, words):
+    series = series_of_arm()
+    found = frf(series, reference=FORCE) if source == "response" else cross_spectra(series)
+    with pytest.raises(EstimateError, match=words):
+        identify_modes(found, method=method)
+
+
+def test_a_method_for_functions_does_not_work_on_responses_alone():
+    with pytest.raises(EstimateError, match="needs frequency responses"):
+        identify_modes(series_of_arm(), operational=True, method=CircleFit())
+
+
+@pytest.mark.parametrize("band", [(1, 2, 3), [[[1, 2]]], 5.0])
+def test_a_band_is_two_numbers(band):
+    with pytest.raises(EstimateError, match="must be"):
+        identify_modes(series_of_arm(), reference=FORCE, band_hz=band)
+
+
+def test_responses_alone_are_identified_in_one_band():
+    with pytest.raises(EstimateError, match="in one band"):
+        identify_modes(series_of_arm(), operational=True, band_hz=[(10, 40), (40, 80)])
