@@ -1,10 +1,11 @@
-"""A virtual Fourier analyser: acceleration logs to spectra, transfer functions and coherence, in rerun.
+"""A virtual Fourier analyser: acceleration logs to spectra, transfer functions and modes, in rerun.
 
 ::
 
     log = chladni.open_log("arm.mcap")                          # lazy: nothing decoded yet
     frf = chladni.frf(log, reference="/hammer.wrench.force.x", resolution_hz=0.5)
-    chladni.show(log, frf)                                      # rerun
+    modes = chladni.identify_modes(frf, band_hz=(10, 400))
+    chladni.show(log, frf, modes)                               # rerun
 
 The names below are the public surface; each is imported when it is first used, so that ``import chladni`` is cheap.
 """
@@ -17,6 +18,7 @@ __version__ = "0.1.0"
 _HOME = {
     "analyse": "chladni.apps.analyse",
     "frf": "chladni.apps.spectra",
+    "identify_modes": "chladni.apps.modes",
     "psd": "chladni.apps.spectra",
     "show": "chladni.apps.show",
     "find_peaks": "chladni.spectral.peaks",
@@ -24,6 +26,15 @@ _HOME = {
     "cross_spectra": "chladni.spectral.cross_spectra",
     "coherence": "chladni.spectral.coherence",
     "waterfall": "chladni.spectral.waterfall",
+    "mac": "chladni.modal.mac",
+    "relative_motion": "chladni.modal.relative_motion",
+    "validate": "chladni.modal.validation",
+    "CircleFit": "chladni.modal.circle_fit",
+    "CovarianceDrivenSubspace": "chladni.modal.subspace",
+    "EnhancedFrequencyDomainDecomposition": "chladni.modal.efdd",
+    "FrequencyDomainDecomposition": "chladni.modal.fdd",
+    "HalfPower": "chladni.modal.half_power",
+    "PolyReferenceLeastSquares": "chladni.modal.polyreference",
     "load_setup": "chladni.io.setup",
     "open_log": "chladni.io.log",
     "write_mcap": "chladni.io.mcap.writer",
@@ -31,6 +42,7 @@ _HOME = {
     "Coherence": "chladni.signals.coherence",
     "CrossSpectra": "chladni.signals.cross_spectra",
     "FrequencyResponse": "chladni.signals.frequency_response",
+    "ModeSet": "chladni.signals.mode_set",
     "PowerSpectralDensity": "chladni.signals.power_spectral_density",
     "Study": "chladni.signals.study",
     "TimeSeries": "chladni.signals.time_series",
@@ -44,12 +56,19 @@ _HOME = {
 __all__ = [
     "Channel",
     "ChladniError",
+    "CircleFit",
     "Coherence",
+    "CovarianceDrivenSubspace",
     "CrossSpectra",
+    "EnhancedFrequencyDomainDecomposition",
     "EstimateError",
+    "FrequencyDomainDecomposition",
     "FrequencyResponse",
+    "HalfPower",
     "LogError",
+    "ModeSet",
     "ModelError",
+    "PolyReferenceLeastSquares",
     "PowerSpectralDensity",
     "SetupError",
     "Study",
@@ -60,26 +79,41 @@ __all__ = [
     "find_peaks",
     "find_response_peaks",
     "frf",
+    "identify_modes",
     "load_setup",
+    "mac",
     "open_log",
     "psd",
+    "relative_motion",
     "show",
+    "validate",
     "waterfall",
     "write_mcap",
 ]
 
 if TYPE_CHECKING:
     from chladni.apps.analyse import analyse
+    from chladni.apps.modes import identify_modes
     from chladni.apps.show import show
     from chladni.apps.spectra import frf, psd
     from chladni.io.log import open_log
     from chladni.io.mcap.writer import write_mcap
     from chladni.io.setup import load_setup
+    from chladni.modal.circle_fit import CircleFit
+    from chladni.modal.efdd import EnhancedFrequencyDomainDecomposition
+    from chladni.modal.fdd import FrequencyDomainDecomposition
+    from chladni.modal.half_power import HalfPower
+    from chladni.modal.mac import mac
+    from chladni.modal.polyreference import PolyReferenceLeastSquares
+    from chladni.modal.relative_motion import relative_motion
+    from chladni.modal.subspace import CovarianceDrivenSubspace
+    from chladni.modal.validation import validate
     from chladni.signals.channel import Channel
     from chladni.signals.coherence import Coherence
     from chladni.signals.cross_spectra import CrossSpectra
     from chladni.signals.errors import ChladniError, EstimateError, LogError, ModelError, SetupError
     from chladni.signals.frequency_response import FrequencyResponse
+    from chladni.signals.mode_set import ModeSet
     from chladni.signals.power_spectral_density import PowerSpectralDensity
     from chladni.signals.study import Study
     from chladni.signals.time_series import TimeSeries

@@ -7,10 +7,12 @@ import pytest
 import chladni
 
 SURFACE = {
-    "Channel", "ChladniError", "Coherence", "CrossSpectra", "EstimateError", "FrequencyResponse", "LogError",
-    "ModelError", "PowerSpectralDensity", "SetupError", "Study", "TimeSeries", "analyse", "coherence",
-    "cross_spectra", "find_peaks", "find_response_peaks", "frf", "load_setup", "open_log", "psd", "show",
-    "waterfall", "write_mcap",
+    "Channel", "ChladniError", "CircleFit", "Coherence", "CovarianceDrivenSubspace", "CrossSpectra",
+    "EnhancedFrequencyDomainDecomposition", "EstimateError", "FrequencyDomainDecomposition",
+    "FrequencyResponse", "HalfPower", "LogError", "ModeSet", "ModelError", "PolyReferenceLeastSquares",
+    "PowerSpectralDensity", "SetupError", "Study", "TimeSeries", "analyse", "coherence", "cross_spectra",
+    "find_peaks", "find_response_peaks", "frf", "identify_modes", "load_setup", "mac", "open_log", "psd",
+    "relative_motion", "show", "validate", "waterfall", "write_mcap",
 }  # fmt: skip
 HEAVY = {"numpy", "scipy", "rerun", "matplotlib", "pint", "pydantic", "mcap", "zstandard"}
 

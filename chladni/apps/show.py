@@ -5,15 +5,19 @@ from dataclasses import replace
 from chladni.apps.analyse import analyse
 from chladni.apps.unit_peaks import unit_peaks
 from chladni.io.log import Log
+from chladni.modal.relative_motion import relative_motion
+from chladni.modal.summary import summarise
+from chladni.modal.validation import validate
 from chladni.signals.errors import SetupError
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.mode_set import ModeSet
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.study import Study
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.waterfall import Waterfall
 from chladni.spectral.peaks import find_response_peaks
 
-Analysed = Study | TimeSeries | PowerSpectralDensity | FrequencyResponse | Waterfall
+Analysed = Study | TimeSeries | PowerSpectralDensity | FrequencyResponse | Waterfall | ModeSet
 Shown = Log | Analysed
 
 # Title of a study that no log has given its name yet.
@@ -21,7 +25,7 @@ NAMELESS = "chladni"
 
 
 def show(*items: Shown) -> None:
-    """Open the rerun viewer with logs, series, spectra and transfer functions side by side.
+    """Open the rerun viewer with logs, series, spectra, transfer functions and modes side by side.
 
     Parameters
     ----------
@@ -39,15 +43,16 @@ def show(*items: Shown) -> None:
 
 
 def gather(*items: Shown) -> Study:
-    """Put items into one study; a later transfer function replaces an earlier one, with a finding that says so."""
+    """Put items into one study; later functions or modes replace earlier ones, with a finding that says so."""
     if not items:
-        raise SetupError("nothing to show; give a log, a series, a spectrum or a transfer function")
+        raise SetupError("nothing to show; give a log, a series, a spectrum, a transfer function or modes")
     studies = [analyse(item) if isinstance(item, Log) else item for item in items]
     several = sum(isinstance(item, Study) for item in studies) > 1
     study = Study(title=NAMELESS)
     for item in studies:
         study = _with(study, _labelled(item) if several and isinstance(item, Study) else item)
-    return study
+    # Last: the geometry that relative motion needs may come after the modes.
+    return study if study.modes is None or study.validation is not None else _with_checks(study, study.modes)
 
 
 def _labelled(study: Study) -> Study:
@@ -68,14 +73,30 @@ def _with(study: Study, item: Analysed) -> Study:
             return replace(study, waterfalls=(*study.waterfalls, item))
         case FrequencyResponse():
             return replace(study, response=item, response_peaks=find_response_peaks(item))
+        case ModeSet():
+            return replace(study, modes=item, validation=None)
+
+
+def _with_checks(study: Study, modes: ModeSet) -> Study:
+    validation, motions = validate(modes), relative_motion(modes, study.geometry)
+    return replace(
+        study,
+        validation=validation,
+        relative_motion=motions,
+        findings=(*study.findings, *summarise(modes, validation, motions)),
+    )
 
 
 def _joined(first: Study, second: Study) -> Study:
-    replaced: tuple[str, ...] = ()
-    if first.response is not None and second.response is not None:
-        replaced = (
-            f"The transfer functions shown are those of {second.title}; view the other log alone for its own.",
+    replaced = [
+        f"The {what} shown are those of {second.title}; view the other log alone for its own."
+        for what, one, other in (
+            ("transfer functions", first.response, second.response),
+            ("modes", first.modes, second.modes),
         )
+        if one is not None and other is not None
+    ]
+    modal = second if second.modes is not None else first
     return Study(
         title=second.title if first.title == NAMELESS else f"{first.title}, {second.title}",
         series=first.series + second.series,
@@ -84,6 +105,9 @@ def _joined(first: Study, second: Study) -> Study:
         response=second.response or first.response,
         peaks=first.peaks + second.peaks,
         response_peaks=second.response_peaks if second.response is not None else first.response_peaks,
+        modes=modal.modes,
+        validation=modal.validation,
+        relative_motion=modal.relative_motion,
         geometry=second.geometry if second.geometry.points else first.geometry,
         findings=(*first.findings, *second.findings, *replaced),
     )

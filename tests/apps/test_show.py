@@ -47,3 +47,24 @@ def test_transfer_functions_that_are_not_shown_are_told(tmp_path):
     assert alone.findings == ("sound",)
     assert both.findings[0] == "first.mcap: sound"
     assert "those of second.mcap" in both.findings[-1]
+
+
+@pytest.mark.parametrize("last", ["modes", "log"])
+def test_modes_are_checked_with_the_geometry_whichever_comes_first(tmp_path, last):
+    with chladni.open_log(write_arm(tmp_path), setup=tmp_path / "setup.toml") as log:
+        modes = chladni.identify_modes(log, reference=FORCE)
+        study = gather(log, modes) if last == "modes" else gather(modes, log)
+    assert study.modes is modes
+    assert study.validation is not None
+    assert study.validation.mpc.size == modes.frequency_hz.size
+    assert ("base", "column") in {tuple(sorted(one.between)) for one in study.relative_motion}
+    assert any("mode" in finding for finding in study.findings)
+
+
+def test_modes_that_are_not_shown_are_told(tmp_path):
+    with chladni.open_log(write_arm(tmp_path)) as log:
+        modes = chladni.identify_modes(log, reference=FORCE)
+    first, second = (gather(Study(title=name), modes) for name in ("first.mcap", "second.mcap"))
+    both = gather(first, second)
+    assert both.modes is modes
+    assert "The modes shown are those of second.mcap" in both.findings[-1]
