@@ -33,10 +33,11 @@ def denominators(matrix: NDArray[np.complex128], references: int, orders: range)
     order k are the leading part of L^-H times that of y: one factorisation serves every order.
 
     With alpha_0 fixed, the roots z that only model noise lie outside the unit circle, that is among unstable poles,
-    while fixing alpha_k would draw them inside (Cauberghe, Guillaume, Verboven, Vanlanduyt and Parloo 2005).
+    while fixing alpha_k would draw them inside (Cauberghe, Guillaume, Verboven, Vanlanduit and Parloo 2005).
     """
     from scipy.linalg import solve_triangular
 
+    # The inverse of a triangle starts with the inverses of all its leading blocks.
     factor = np.linalg.cholesky(matrix[references:, references:])
     inverse = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
     right = -inverse @ matrix[references:, :references]
@@ -64,6 +65,7 @@ def stable_roots(coefficients: NDArray[np.complex128]) -> NDArray[np.complex128]
     companion[:references] = -coefficients.transpose(2, 0, 1).reshape(references, -1)
     below = np.arange((order - 1) * references)
     companion[below + references, below] = 1
+    # Only eigenvalues: few of the roots are physical, and their vectors follow from A itself at less cost.
     inverse = np.linalg.eigvals(companion)
     return np.asarray(1 / inverse[np.abs(inverse) > 1])
 

@@ -77,6 +77,7 @@ def weighted_lines(
         raise EstimateError(f"weighting {weighting!r} is none of {', '.join(get_args(Weighting))}")
     chosen = _lines(response, band_hz)
     usable = np.isfinite(response.values).all(axis=1)[:, chosen]
+    # A weight is one for all references of a response, so that a line counts with all of them or not at all.
     values = np.asarray(np.where(usable[:, None], response.values[..., chosen], 0), dtype=np.complex128)
     if not np.any(values):
         raise EstimateError("the frequency responses are zero or not finite on every line used: nothing to fit")
@@ -109,6 +110,7 @@ def _by_magnitude(
 ) -> WeightedLines:
     scale = _typical(_rms(values, (2,)), axis=0)
     scaled = values / scale[:, None]
+    # A function that is zero has no scale of its own.
     level = _rms(scaled, (1,))
     typical = _or_one(_rms(level, (1,)))[:, None]
     return WeightedLines(
@@ -126,12 +128,14 @@ def _by_std(
     values: NDArray[np.complex128],
     std: NDArray[np.float64],
 ) -> WeightedLines:
+    # Any units of the references give the same numbers from here on.
     scale = _typical(std, axis=(0, 2))
     scaled, sigma = values / scale[:, None], std / scale[:, None]
     usable: NDArray[np.bool_] = np.all(np.isfinite(sigma), axis=1)
     level = np.where(usable, _rms(sigma, (1,)), 1.0)
     floor = _typical(np.where(usable, level, np.nan), axis=1)
     steady = usable / np.hypot(level, FLOOR * floor[:, None])
+    # Responses count alike in the magnitude, or the unit of the largest would choose the lines.
     magnitude = _rms(scaled, (1,))
     weight = steady * np.sqrt(_rms(magnitude / _or_one(_rms(magnitude, (1,)))[:, None], (0,)))
     without = [channel.name for channel, lines in zip(response.responses, usable, strict=True) if not lines.any()]

@@ -21,7 +21,7 @@ def without_noise(
     Noise of H enters the quadratic form of A as if each line carried A itself, so that a small A, with roots off the
     circle and too much damping or none, looks best. With N its expectation, M - 0.8 lambda N is used, where lambda is
     the smallest generalised eigenvalue of (M, N), about 1 for the right std, whose scale hence doesn't matter
-    (between the least-squares and the generalised total least-squares estimates of Verboven 2002, section 5.3.4).
+    (between the least-squares and the generalised total least-squares estimates of Verboven 2002).
     """
     if not np.any(lines.noise_power):
         return matrix

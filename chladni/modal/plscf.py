@@ -93,6 +93,7 @@ def _highest_order(lines: WeightedLines) -> int:
     """Numerators take at most a quarter of the lines, and twice as many equations as unknowns are left for A."""
     responses, references = lines.values.shape[:2]
     count: int = lines.frequency_hz.size
+    # More of either would let them follow single lines, and leakage of windows with them.
     by_equations: int = responses * (count - 1) // (responses + 2 * references)
     return min(count // 4, by_equations)
 
@@ -105,6 +106,7 @@ def _pole_table(lines: WeightedLines, circle: UnitCircle, orders: range, notes: 
         roots = stable_roots(coefficients)
         pole = circle.pole(roots)
         kept = _in_band(pole, lines.frequency_hz, circle.step_hz)
+        # Roots outside the band belong to the gap of the circle and to modes that the lines don't show.
         kept = kept[np.argsort(pole[kept].imag)]
         poles.append(pole[kept])
         vectors.append(_unit(participation(coefficients, roots[kept]) * lines.reference_scale))
@@ -118,6 +120,7 @@ def _pole_table(lines: WeightedLines, circle: UnitCircle, orders: range, notes: 
 
 
 def _in_band(pole: NDArray[np.complex128], frequency_hz: NDArray[np.float64], step_hz: float) -> NDArray[np.intp]:
+    # A pole nearer to 0 Hz than half a line decays within the record or doesn't oscillate: no line could tell.
     damped_hz = pole.imag / (2 * np.pi)
     low_hz = max(frequency_hz[0] - step_hz, step_hz / 2)
     return np.flatnonzero((pole.real < 0) & (damped_hz >= low_hz) & (damped_hz <= frequency_hz[-1] + step_hz))

@@ -39,11 +39,13 @@ def reduced_normal_matrix(lines: WeightedLines, circle: UnitCircle, order: int) 
     -----
     The right matrix fraction H(z) A(z) = B(z) with A = sum alpha_r z^r, B_o = sum beta_or z^r, is linear in the
     coefficients; for each output o the normal equations have the blocks R_o, S_o, T_o, and eliminating the
-    numerators leaves M = sum_o T_o - S_o^H R_o^-1 S_o (Guillaume et al. 2003, equations 9 to 14). On lines at
+    numerators leaves M = sum_o T_o - S_o^H R_o^-1 S_o (Guillaume et al. 2003). On lines at
     z = exp(j angle) every block depends on the difference of its row and column only and is read off one FFT
-    (Cauberghe 2004, section 3.3). Most of what noise of the known std contributes is taken off, see
+    (Cauberghe 2004). Most of what noise of the known std contributes is taken off, see
     `chladni.modal.noise_compensation`.
     """
+    # Numerators keep the full order at every order of the denominator: they only take lags at the end of the circle,
+    # where little is left of any mode, and one matrix then serves all orders.
     power = lines.weight**2
     references = lines.values.shape[1]
     # Sum over the responses before the FFT: there are references^2 of these, however many responses.

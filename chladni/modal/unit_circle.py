@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from chladni.signals.value import Value
 
 # A band that filled the circle would force the polynomials to be periodic in it, and a jump from its end to its start
-# would cost orders; much less than the circle makes the powers of z nearly dependent (Verboven 2002, section 5.3.3).
+# would cost orders; much less than the circle makes the powers of z nearly dependent (Verboven 2002).
 ARC = 0.9
 # Lines count as equidistant when they lie this close to a grid, in steps.
 ON_GRID = 1e-3
