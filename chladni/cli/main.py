@@ -14,6 +14,7 @@ from chladni.cli.convert import convert
 from chladni.cli.demo import demo
 from chladni.cli.frf import frf
 from chladni.cli.info import info
+from chladni.cli.modes import modes
 from chladni.cli.psd import psd
 from chladni.cli.view import view
 from chladni.signals.errors import ChladniError
@@ -28,7 +29,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (info, psd, frf, view, compare, convert, demo):
+for command in (info, psd, frf, modes, view, compare, convert, demo):
     app.command()(command)
 
 

@@ -1,0 +1,101 @@
+"""``chladni modes`` on a log whose modes are known, and on measured ones."""
+
+import numpy as np
+import pytest
+
+from tests.arm import FORCE, TOOL, short_arm
+
+KEYS = {"frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std", "mpc", "shape", "relative_motion"}
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return short_arm().modes
+
+
+def test_the_document_holds_the_true_modes_within_their_error_bars(run, arm_log, truth):
+    setup = arm_log.with_name("setup.toml")
+    document = run("modes", arm_log, "--setup", setup, "--json", "-").document
+    assert document["format"] == "chladni.modes/1"
+    assert 0 < document["fit_error"] < 0.2
+    found = document["modes"]
+    assert all(set(mode) >= KEYS for mode in found)
+    for key, std, true in (
+        ("frequency_hz", "frequency_std_hz", truth.frequency_hz),
+        ("damping_ratio", "damping_std", truth.damping_ratio),
+    ):
+        off = [(mode[key] - one) / mode[std] for mode, one in zip(found, true, strict=True)]
+        assert np.abs(off).max() < 4
+    for mode, shape in zip(found, truth.shapes, strict=True):
+        vector = np.array([entry["real"] + 1j * entry["imag"] for entry in mode["shape"]])
+        mac = abs(np.vdot(vector, shape)) ** 2 / (np.vdot(vector, vector) * np.vdot(shape, shape)).real
+        # The mode at 98 Hz hardly moves the tool that is shaken: its own error bars allow no more.
+        assert mac > 0.99
+        assert {tuple(pair["between"]) for pair in mode["relative_motion"]} >= {("base", "column")}
+
+
+def test_people_get_a_table_with_error_bars_and_advice(run, arm_log):
+    outcome = run("modes", arm_log, "--setup", arm_log.with_name("setup.toml"), "--reference", FORCE)
+    assert outcome.code == 0, outcome.err
+    assert "5 modes" in outcome.out
+    assert "±" in outcome.out
+    assert "modal mass" in outcome.out
+    assert "base - column" in outcome.out or "column - arm" in outcome.out
+    assert "driving point" in outcome.out
+
+
+def test_band_count_and_frequency_choose(run, arm_log, truth):
+    def frequencies(*options):
+        document = run("modes", arm_log, "--reference", FORCE, *options, "--json", "-").document
+        return [mode["frequency_hz"] for mode in document["modes"]]
+
+    assert frequencies("--band", 15, 57) == pytest.approx(truth.frequency_hz[:2], rel=0.01)
+    assert len(frequencies("--count", 2)) == 2
+    assert frequencies("--frequency", 170) == pytest.approx(truth.frequency_hz[-1:], rel=0.01)
+
+
+@pytest.mark.parametrize("method", ["circle-fit", "half-power", "fdd", "efdd", "ssi-cov"])
+def test_other_methods(run, arm_log, truth, method):
+    document = run("modes", arm_log, "--method", method, "--band", 5, 280, "--json", "-").document
+    found = np.array([mode["frequency_hz"] for mode in document["modes"]])
+    assert found.size >= 2
+    assert np.all(np.abs(found[:, None] / truth.frequency_hz - 1).min(axis=1) < 0.03)
+
+
+def test_files_are_written(run, arm_log, tmp_path):
+    paths = {name: tmp_path / f"modes.{name}" for name in ("uff", "csv", "rrd", "html")}
+    outcome = run(
+        "modes", arm_log, "--setup", arm_log.with_name("setup.toml"), "--uff", paths["uff"], "--csv", paths["csv"],
+        "--save", paths["rrd"], "--report", paths["html"], "--figures", tmp_path / "figures",
+    )  # fmt: skip
+    assert outcome.code == 0, outcome.err
+    for path in paths.values():
+        assert path.stat().st_size > 500
+        assert str(path) in outcome.out.replace("\n", "")
+    assert (tmp_path / "figures" / "stabilisation.png").exists()
+
+
+def test_no_mode_is_an_answer_with_its_reason(run, arm_log):
+    outcome = run("modes", arm_log, "--reference", FORCE, "--channel", TOOL, "--band", 200, 290)
+    assert outcome.code == 0, outcome.err
+    assert "No mode was found." in outcome.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--reference", FORCE, "--operational"], "drop one of them"),
+        (["--reference", FORCE, "--method", "fdd"], "method fdd uses responses alone"),
+        (["--operational", "--method", "plscf"], "method plscf needs an excitation"),
+        (["--reference", "/nowhere"], "/nowhere"),
+        (["--band", 400, 450], "band"),
+        (["--count", 0], "count"),
+        (["--method", "magic"], "'magic'"),
+        (["--channel", "/base.accel.linear.q", "--operational"], "/base.accel.linear.q"),
+    ],
+)
+def test_bad_options_are_told_in_one_line(run, arm_log, arguments, words):
+    outcome = run("modes", arm_log, *arguments)
+    assert outcome.code == 2
+    assert words in outcome.err
+    assert outcome.err.count("\n") == 1
