@@ -24,12 +24,15 @@ class Misfit:
     ----------
     chi_square
         Weighted sum of squares over degrees of freedom, 1 for noise of the stated variance.
-    inflation
-        ``[mode]`` factor on variances, at least 1.
+    correlation
+        Factor on variances for the correlation of neighbouring lines, where errors are noise.
+    excess
+        ``[mode]`` factor on variances for misfit and for weights that are estimates themselves, at least 1.
     """
 
     chi_square: float
-    inflation: NDArray[np.float64]
+    correlation: float
+    excess: NDArray[np.float64]
 
 
 def misfit(lines: ModelLines, solution: ShapeSolution, provenance: Provenance) -> Misfit:
@@ -43,8 +46,8 @@ def misfit(lines: ModelLines, solution: ShapeSolution, provenance: Provenance) -
     chi_square = float(normalised.sum() / free)
     local = [_excess(normalised, share, correlation) for share in _shares(lines, solution)]
     overall = _excess(normalised, used.astype(float), correlation)
-    inflation = correlation * efficiency * np.maximum(np.array(local), overall)
-    return Misfit(chi_square=chi_square, inflation=inflation)
+    excess = efficiency * np.maximum(np.array(local), overall)
+    return Misfit(chi_square=chi_square, correlation=correlation, excess=excess)
 
 
 def _estimated_weights(lines: ModelLines, provenance: Provenance) -> tuple[float, float]:

@@ -14,6 +14,8 @@ Complex = NDArray[np.complex128]
 
 # Cosines that the lag window of any cosine window up to flattop is made of.
 HARMONICS = 4
+# Coefficients below this are rounding of the fit to 512 samples.
+NEGLIGIBLE = 1e-6
 # Below this the closed forms lose more digits to cancellation than the series leaves out.
 SERIES_BELOW = 0.5
 SERIES_TERMS = 16
@@ -64,18 +66,18 @@ class LagWindow:
         """
         z = (poles[:, np.newaxis] - s) * self.segment_s
         value, slope = np.zeros_like(z), np.zeros_like(z)
-        for order, weight in enumerate(self.tapered):
-            for shift in {order, -order}:
-                share = weight if order == 0 else weight / 2
-                ramp, ramp_slope = _moments(z + 2j * pi * shift, 2)
-                value += share * ramp
-                slope += share * ramp_slope
-        for order, weight in enumerate(self.sines, start=1):
-            for sign in (1, -1):
-                flat, flat_slope = _moments(z + sign * 2j * pi * order, 1)
-                value += sign * weight / 2j * flat
-                slope += sign * weight / 2j * flat_slope
+        for weight, shift, kind in self._terms():
+            part, part_slope = _moments(z + shift, kind)
+            value += weight * part
+            slope += weight * part_slope
         return value * self.segment_s, slope * self.segment_s**2
+
+    def _terms(self) -> list[tuple[complex, complex, int]]:
+        """Weight, shift of z and kind of integral of each exponential that r is made of."""
+        angles = 2j * pi * np.arange(HARMONICS + 1)
+        tapers = [(weight / 2, sign * angles[m], 2) for m, weight in enumerate(self.tapered) for sign in (1, -1)]
+        waves = [(sign * b / 2j, sign * angles[m], 1) for m, b in enumerate(self.sines, 1) for sign in (1, -1)]
+        return [term for term in tapers + waves if term[0] != 0]
 
 
 def lag_window(provenance: Provenance) -> LagWindow | None:
@@ -108,6 +110,8 @@ def _coefficients(window: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     waves = np.sin(2 * pi * u[:, np.newaxis] * orders[1:])
     # Exact for cosine windows; for others the nearest, which is close because lag windows are smooth.
     answer = np.linalg.lstsq(np.hstack([tapers, waves]), lags / lags[0], rcond=None)[0]
+    # What is nothing but rounding of the fit needn't be evaluated at every line.
+    answer = np.where(np.abs(answer) > NEGLIGIBLE, answer, 0.0)
     return tuple(map(float, answer[: HARMONICS + 1])), tuple(map(float, answer[HARMONICS + 1 :]))
 
 

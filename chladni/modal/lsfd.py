@@ -25,7 +25,8 @@ Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 
 # Rounds that bring the solution from the precision of normal equations to that of the data.
-REFINEMENTS = 6
+REFINEMENTS = 12
+SETTLED = 1e-12
 RESIDUAL_COLUMNS = 4
 
 
@@ -146,7 +147,7 @@ class ShapeSolution:
 def solve_shapes(lines: ModelLines, basis: ModalBasis, participation: Complex) -> ShapeSolution:
     """Solve the normal equations of every response, then again for what is left of the data."""
     functions = np.concatenate([basis.modes, basis.residuals])
-    table = product_table(functions)
+    table = product_table(functions, lines.weights)
     responses, references, _ = lines.values.shape
     size = 2 * len(participation) + RESIDUAL_COLUMNS * references
     inverse, deficient = np.empty((responses, size, size)), np.empty(responses, dtype=np.int64)
@@ -161,7 +162,7 @@ def solve_shapes(lines: ModelLines, basis: ModalBasis, participation: Complex) -
         step = np.einsum("iab,ib->ia", inverse, gradient)
         coefficients += step
         residual = lines.values - synthesis(basis, coefficients, participation)
-        if np.all(np.abs(step) <= 1e-14 * np.abs(coefficients).max(axis=-1, keepdims=True)):
+        if np.all(np.abs(step) <= SETTLED * np.abs(coefficients).max(axis=-1, keepdims=True)):
             break
     return ShapeSolution(
         coefficients=coefficients,

@@ -19,8 +19,9 @@ from chladni.signals.frequency_response import FrequencyResponse
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 
-# A step that moves no pole by more than this share of its decay rate ends the iteration.
-CONVERGED = 1e-7
+# A step that moves no pole by more than this share of its decay rate ends the iteration, and so does one that improves
+# a fit with known variances by less than this: it is a small part of a sigma.
+CONVERGED, ENOUGH = 1e-7, 1e-4
 FIRST_DAMPING, LARGEST_DAMPING = 1e-6, 1e6
 
 
@@ -69,7 +70,15 @@ def refine(
         lost = lost_mode(lines, poles[kept], state.poles, state.solution.strength)
         if lost is None:
             found = misfit(lines, state.solution, response.provenance)
-            return fitted_modes(lines, state.poles, state.solution, found=found, kept=kept, notes=tuple(notes))
+            return fitted_modes(
+                lines,
+                state.poles,
+                state.solution,
+                found=found,
+                provenance=response.provenance,
+                kept=kept,
+                notes=tuple(notes),
+            )
         notes.append(f"{lost[1]} in the refinement and is left out")
         kept = np.delete(kept, lost[0])
     return no_modes(lines, tuple(notes))
@@ -109,8 +118,9 @@ def _minimise(lines: ModelLines, state: _State, max_iterations: int) -> _State:
             break
         trial, damping = found
         moved = np.abs(trial.poles - state.poles) / -state.poles.real
+        done = moved.max() < CONVERGED or (lines.weighted and state.cost - trial.cost < ENOUGH)
         state = trial
-        if moved.max() < CONVERGED:
+        if done:
             break
     return state
 

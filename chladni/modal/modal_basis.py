@@ -1,6 +1,7 @@
 """What one mode, and what lies outside the band, adds to the lines of a function."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,12 @@ class ModalBasis(Value):
 
     def __post_init__(self) -> None:
         self._freeze()
+
+    def at(self, near: slice) -> Self:
+        """Give the basis on some of the lines."""
+        return replace(
+            self, modes=self.modes[:, near], slopes=self.slopes[:, near], residuals=self.residuals[:, near]
+        )
 
 
 def modal_basis(lines: ModelLines, poles: Complex) -> ModalBasis:

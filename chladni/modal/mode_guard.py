@@ -11,6 +11,8 @@ Complex = NDArray[np.complex128]
 # two modes nearer to each other are one that the data don't split.
 LONGEST_WAY = 10.0
 NEAREST = 0.02
+# A mode whose decay rate is below this share of the distance of lines hides between them.
+NARROWEST = 0.02
 
 
 def lost_mode(
@@ -31,6 +33,9 @@ def lost_mode(
     frequency_hz = np.abs(poles) / (2 * np.pi)
     for mode in np.flatnonzero((frequency_hz < low) | (frequency_hz > high)):
         return int(mode), f"{_named(began[mode])} left the band from {low:.6g} to {high:.6g} Hz"
+    spacing = 2 * np.pi * float(np.median(np.diff(lines.frequency_hz))) if lines.frequency_hz.size > 1 else 0.0
+    for mode in np.flatnonzero(-poles.real < NARROWEST * spacing):
+        return int(mode), f"{_named(began[mode])} ran into a peak that is narrower than the lines can tell"
     way = np.abs(poles - began) / np.maximum(-poles.real, -began.real)
     for mode in np.flatnonzero(way > LONGEST_WAY):
         return int(mode), f"{_named(began[mode])} ran away to {frequency_hz[mode]:.6g} Hz"

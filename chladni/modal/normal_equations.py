@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 
-# Largest table of products of basis functions, in numbers (128 MB); beyond it weights are averaged over neighbours.
-LARGEST_TABLE = 2**24
+# Largest table of products of basis functions, in numbers (32 MB); beyond it weights are averaged over neighbours.
+LARGEST_TABLE = 2**22
 # Largest set of Gram matrices held at once, in numbers.
 LARGEST_BATCH = 2**23
 # Directions weaker than this, relative to the strongest, can't be told from rounding.
@@ -21,18 +21,22 @@ class ProductTable:
     """Products of all pairs of basis functions, summed over blocks of neighbouring lines.
 
     Weights differ from function to function, products don't: with the table, the Gram matrices of all functions are
-    one matrix product. Blocks are single lines unless the table would be too large; then weights are averaged within
-    a block, which alters the curvature that steps and error bars come from a little and the solution not at all.
+    one matrix product. Blocks are single lines unless the table would be too large; then a function's weights, over
+    the profile that all functions have in common, are averaged within a block. That alters the curvature that steps
+    and error bars come from a little, and the solution not at all.
 
     Attributes
     ----------
     products
-        ``[block, column, column]`` Re(conj(P_a) P_b).
+        ``[block, column, column]`` Re(conj(P_a) P_b) times the profile.
+    profile
+        ``[line]`` common course of the weights.
     block
         Lines in a block.
     """
 
     products: Floats
+    profile: Floats
     block: int
 
     @property
@@ -48,23 +52,31 @@ class ProductTable:
     def gram(self, weights: Floats) -> Floats:
         """Give ``[..., column, column]`` from weights ``[..., line]``."""
         blocks = len(self.products)
-        padded = np.zeros((*weights.shape[:-1], blocks * self.block))
-        padded[..., : weights.shape[-1]] = weights
-        means = padded.reshape(*weights.shape[:-1], blocks, self.block).mean(axis=-1)
+        ratios = np.divide(weights, self.profile, out=np.zeros_like(weights), where=self.profile > 0)
+        if self.block == 1:
+            means = ratios
+        else:
+            padded = np.zeros((*weights.shape[:-1], blocks * self.block))
+            padded[..., : weights.shape[-1]] = ratios
+            # The last block may be short; its missing lines count for nothing.
+            sizes = np.minimum(self.block, weights.shape[-1] - self.block * np.arange(blocks))
+            means = padded.reshape(*weights.shape[:-1], blocks, self.block).sum(axis=-1) / sizes
         table = self.products.reshape(blocks, -1)
         return np.asarray((means @ table).reshape(*weights.shape[:-1], self.columns, self.columns), dtype=np.float64)
 
 
-def product_table(functions: Complex) -> ProductTable:
-    """Tabulate the products of basis functions ``[column, line]``."""
+def product_table(functions: Complex, weights: Floats) -> ProductTable:
+    """Tabulate the products of basis functions ``[column, line]`` for weights ``[response, reference, line]``."""
     columns, lines = functions.shape
+    strongest = weights.max(axis=-1, keepdims=True)
+    profile = np.mean(np.divide(weights, strongest, out=np.zeros_like(weights), where=strongest > 0), axis=(0, 1))
     block = max(1, -(-lines * columns**2 // LARGEST_TABLE))
     blocks = -(-lines // block)
     padded = np.zeros((columns, blocks * block), dtype=np.complex128)
-    padded[:, :lines] = functions
+    padded[:, :lines] = functions * np.sqrt(profile)
     parts = padded.reshape(columns, blocks, block).transpose(1, 2, 0)
     stacked = np.concatenate([parts.real, parts.imag], axis=1)
-    return ProductTable(products=stacked.transpose(0, 2, 1) @ stacked, block=block)
+    return ProductTable(products=stacked.transpose(0, 2, 1) @ stacked, profile=profile, block=block)
 
 
 def projections(functions: Complex, weighted: Complex) -> Floats:

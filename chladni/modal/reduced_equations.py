@@ -48,7 +48,7 @@ def reduced_equations(lines: ModelLines, solution: ShapeSolution) -> ReducedEqua
     """Set up the equations at the best coefficients for given poles and participation."""
     basis, vectors = solution.basis, solution.participation
     functions = np.concatenate([basis.modes, basis.slopes, basis.residuals])
-    table = product_table(functions)
+    table = product_table(functions, lines.weights)
     responses, references, _ = lines.values.shape
     free = _free(vectors)
     curvature = np.zeros((free.size, free.size))

@@ -97,8 +97,10 @@ def unit_modal_mass_shapes(
 
     A mode whose modal mass isn't positive has none, and its row is NaN.
     """
-    mass = np.where(scale.modal_mass > 0, scale.modal_mass, np.nan)
-    return np.asarray(shapes / np.sqrt(mass)[:, np.newaxis], dtype=np.complex128)
+    unit = np.full(shapes.shape, np.nan, dtype=np.complex128)
+    positive = scale.modal_mass > 0
+    unit[positive] = shapes[positive] / np.sqrt(scale.modal_mass[positive])[:, np.newaxis]
+    return unit
 
 
 def driving_points(
