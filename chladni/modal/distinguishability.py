@@ -51,20 +51,29 @@ def alike_sentence(
     modes: ModeSet, pairs: Sequence[tuple[int, int]], likeness: NDArray[np.float64], *, limit: float = ALIKE_MAC
 ) -> str:
     """Say which modes are alike, why, and what to do; `pairs` must not be empty, `likeness` is their AutoMAC."""
-    named = [
+    count = modes.frequency_hz.size
+    values = [float(likeness[pair]) for pair in pairs]
+    if count > 2 and len(pairs) == count * (count - 1) // 2:
+        which = f"any two of the {count} modes apart (MAC {min(values):.2f} to {max(values):.2f})"
+    else:
+        which = f"modes {joined(_named(modes, pairs, likeness), most=_MOST_PAIRS)} apart"
+    sensors = counted(len(modes.channels), "channel")
+    verb = "doesn't" if len(modes.channels) == 1 else "don't"
+    blurred = min(values) < limit
+    reason = "; where the MAC is lower, the error bars of the shapes hide the difference" if blurred else ""
+    return (
+        f"{sensors} {verb} tell the shapes of {which}{reason}. Their "
+        "frequencies and damping stand; don't rely on their shapes, on a MAC or on relative motion until sensors at "
+        "further points or directions tell them apart."
+    )
+
+
+def _named(modes: ModeSet, pairs: Sequence[tuple[int, int]], likeness: NDArray[np.float64]) -> list[str]:
+    return [
         f"{first + 1} and {second + 1} ({modes.frequency_hz[first]:.4g} and {modes.frequency_hz[second]:.4g} Hz, MAC "
         f"{likeness[first, second]:.2f})"
         for first, second in pairs
     ]
-    sensors = counted(len(modes.channels), "channel")
-    verb = "doesn't" if len(modes.channels) == 1 else "don't"
-    blurred = any(likeness[pair] < limit for pair in pairs)
-    reason = "; where the MAC is lower, the error bars of the shapes hide the difference" if blurred else ""
-    return (
-        f"{sensors} {verb} tell the shapes of modes {joined(named, most=_MOST_PAIRS)} apart{reason}. Their "
-        "frequencies and damping stand; don't rely on their shapes, on a MAC or on relative motion until sensors at "
-        "further points or directions tell them apart."
-    )
 
 
 def _sine_squared_of_noise(modes: ModeSet) -> NDArray[np.float64]:

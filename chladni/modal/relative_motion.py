@@ -78,9 +78,10 @@ def relative_motion(modes: ModeSet, geometry: Geometry) -> tuple[RelativeMotion,
     [(('arm', 'wrist'), 1.3), (('base', 'arm'), 0.2)]
     """
     pairs = neighbours(modes.channels, geometry)
+    mass = kilogram_scale(modes)
     found = []
     for mode in range(modes.frequency_hz.size):
-        joints = [_joint(modes, mode, pair) for pair in pairs]
+        joints = [_joint(modes, mode, pair, float(mass[mode])) for pair in pairs]
         # A ratio that isn't there ranks below zero.
         found += sorted(joints, key=lambda joint: -1.0 if joint.ratio is None else joint.ratio, reverse=True)
     return tuple(found)
@@ -121,7 +122,7 @@ def kilogram_scale(modes: ModeSet) -> NDArray[np.float64]:
     return np.where(np.isfinite(mass) & (mass > 0), mass, nan)
 
 
-def _joint(modes: ModeSet, mode: int, pair: Neighbours) -> RelativeMotion:
+def _joint(modes: ModeSet, mode: int, pair: Neighbours, mass: float) -> RelativeMotion:
     shape = modes.shapes[mode].astype(np.complex128)
     motion = joint_motion(shape, pair)
     if motion is None:
@@ -130,7 +131,7 @@ def _joint(modes: ModeSet, mode: int, pair: Neighbours) -> RelativeMotion:
     std_real = float(np.linalg.norm(motion.weights * modes.shape_std[mode].real))
     std_imag = float(np.linalg.norm(motion.weights * modes.shape_std[mode].imag))
     std = magnitude_std(motion.relative, std_real, std_imag) / largest
-    gain = _gain(modes, mode, motion)
+    gain = _gain(modes, mode, motion, mass)
     return RelativeMotion(
         mode=mode,
         between=pair.between,
@@ -141,9 +142,8 @@ def _joint(modes: ModeSet, mode: int, pair: Neighbours) -> RelativeMotion:
     )
 
 
-def _gain(modes: ModeSet, mode: int, motion: JointMotion) -> float | None:
+def _gain(modes: ModeSet, mode: int, motion: JointMotion, mass: float) -> float | None:
     """(delta phi)^2/(2 omega) with a shape of unit modal mass, in s/kg."""
-    mass = float(kilogram_scale(modes)[mode])
     used = np.flatnonzero(motion.weights)
     translations = all(modes.channels[row].unit in ("m", "m/s", "m/s^2") for row in used)
     if not (isfinite(mass) and translations):

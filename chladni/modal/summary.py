@@ -5,8 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.modal.joint_treatment import treatments
-from chladni.modal.mode_words import capital, joined, percent_with_std, with_std
+from chladni.modal.joint_treatment import JointTreatment, treatments
+from chladni.modal.mode_words import capital, joined, mode_names, percent_with_std, with_std
+from chladni.modal.neighbours import neighbour_note
+from chladni.signals.geometry import Geometry
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.relative_motion import RelativeMotion
@@ -15,10 +17,15 @@ from chladni.signals.wording import counted
 _MAIN_MODES = 6
 _GOOD_FIT = 0.05
 _MOST_JOINTS = 3
+_DOUBT = "The shapes aren't all told apart: check before building."
 
 
 def summarise(
-    modes: ModeSet, validation: ModeValidation, relative_motion: Sequence[RelativeMotion] = ()
+    modes: ModeSet,
+    validation: ModeValidation,
+    relative_motion: Sequence[RelativeMotion] = (),
+    *,
+    geometry: Geometry | None = None,
 ) -> tuple[str, ...]:
     """Say how many modes there are, the main ones, how good the fit is, what to distrust and which joint to treat.
 
@@ -26,6 +33,8 @@ def summarise(
     ----------
     validation, relative_motion
         Of the same modes.
+    geometry
+        That said who is whose neighbour; what stood in for its lines is said, too.
 
     Returns
     -------
@@ -41,6 +50,7 @@ def summarise(
         *validation.findings,
         *(() if validation.findings else ("The checks found nothing to distrust.",)),
         *_joints(modes, validation, relative_motion),
+        *_neighbours(modes, relative_motion, geometry),
         *notes,
     )
 
@@ -95,15 +105,43 @@ def _harmonics(modes: ModeSet) -> list[str]:
     ]
 
 
+def _neighbours(modes: ModeSet, motions: Sequence[RelativeMotion], geometry: Geometry | None) -> list[str]:
+    names = {channel.name for channel in modes.channels}
+    # Without a geometry at hand the motions tell whether there were points: else they are between channels.
+    if not motions or (geometry is None and not names.issuperset(motions[0].between)):
+        return []
+    note = neighbour_note(modes.channels, geometry or Geometry())
+    return [] if note is None else [note]
+
+
 def _joints(modes: ModeSet, validation: ModeValidation, motions: Sequence[RelativeMotion]) -> list[str]:
     found = treatments(modes, motions)
-    # The sharpest resonances first: they are what a damper is for.
-    by_damping = sorted(found, key=lambda one: float(modes.damping_ratio[one.mode]))[:_MOST_JOINTS]
     doubtful = {row for pair in validation.alike for row in pair}
+    scaled = [one for one in found if one.damper is not None]
+    if not scaled:
+        return _unscaled_joints(modes, found, doubtful)
+    # The sharpest resonances first: they are what a damper is for.
+    by_damping = sorted(scaled, key=lambda one: float(modes.damping_ratio[one.mode]))[:_MOST_JOINTS]
+    return [one.sentence + (f" {_DOUBT}" if one.mode in doubtful else "") for one in by_damping]
+
+
+def _unscaled_joints(modes: ModeSet, found: Sequence[JointTreatment], doubtful: set[int]) -> list[str]:
+    """One sentence for each joint that moves most in some mode, the one of most modes first."""
+    by_joint: dict[tuple[str, str], list[JointTreatment]] = {}
+    for one in found:
+        by_joint.setdefault(one.between, []).append(one)
     sentences = []
-    for one in by_damping:
-        warning = (
-            " Its shape isn't told apart from another mode's: check before building." if one.mode in doubtful else ""
+    for between, of_modes in sorted(by_joint.items(), key=lambda item: -len(item[1]))[:_MOST_JOINTS]:
+        ratios = joined([f"{one.ratio:.2f}" for one in of_modes])
+        sentence = (
+            f"{between[0]} and {between[1]} move most against each other in "
+            f"{mode_names(modes, [one.mode for one in of_modes])}, by {ratios} of the largest motion: treat that "
+            "joint first."
         )
-        sentences.append(one.sentence + warning)
+        sentences.append(sentence + (f" {_DOUBT}" if doubtful.intersection(one.mode for one in of_modes) else ""))
+    if sentences:
+        sentences.append(
+            "By how much a damper or a spring helps takes scaled modes: measure a driving point, force in N and "
+            "motion at the same point and direction."
+        )
     return sentences

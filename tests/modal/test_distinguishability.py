@@ -62,8 +62,15 @@ def test_one_channel_tells_nothing_apart() -> None:
 
 
 def test_many_pairs_are_counted() -> None:
-    modes = mode_set(np.ones((5, 2)))
-    assert "and 6 more apart" in alike_sentence(modes, alike_modes(modes), auto_mac(modes))
+    modes = mode_set([[1.0, 1.0, 0.0]] * 4 + [[0.0, 0.0, 1.0]])
+    assert len(alike_modes(modes)) == 6
+    assert "and 2 more apart" in alike_sentence(modes, alike_modes(modes), auto_mac(modes))
+
+
+def test_when_no_two_modes_are_told_apart_they_arent_listed() -> None:
+    modes = mode_set([[1.0, 0.9], [1.0, 0.8], [1.0, 1.0]])
+    sentence = alike_sentence(modes, alike_modes(modes), auto_mac(modes))
+    assert sentence.startswith("2 channels don't tell the shapes of any two of the 3 modes apart (MAC 0.99 to 1.00).")
 
 
 @given(ours.mode_sets())

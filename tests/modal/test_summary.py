@@ -78,3 +78,25 @@ def test_the_joints_of_the_sharpest_modes_are_named_with_a_number() -> None:
     assert all("N s/m between the two would double the damping" in sentence for sentence in named)
     damping = scaled_modes().damping_ratio
     assert named[0].startswith(f"Mode {int(np.argmin(damping)) + 1} (")
+
+
+def test_unscaled_modes_name_each_joint_once() -> None:
+    text = summary_of(mode_set([[1.0, 0.5, 0.4], [1.0, -0.5, -0.4], [0.1, 1.0, -0.2]]))
+    assert (
+        "c0 and c1 move most against each other in modes 1 and 2 (10 and 20 Hz), by 0.50 and 1.50 of the largest "
+        in (" ".join(text))
+    )
+    assert "c1 and c2 move most against each other in mode 3 (30 Hz), by 1.20 of" in " ".join(text)
+    assert sum("measure a driving point" in sentence for sentence in text) == 1
+
+
+def test_what_stood_in_for_the_lines_is_said() -> None:
+    bare = mode_set([[1.0, 0.5]])
+    assert any("The channels have no points" in sentence for sentence in summary_of(bare))
+    modes = scaled_modes()
+    motions = relative_motion(modes, Geometry(points=GEOMETRY.points))
+    loose = summarise(modes, validate(modes), motions, geometry=Geometry(points=GEOMETRY.points))
+    assert any("No line joins the points" in sentence for sentence in loose)
+    joined = summarise(modes, validate(modes), motions, geometry=GEOMETRY)
+    assert not any("joins the points" in sentence or "no points" in sentence for sentence in joined)
+    assert not any("no points" in sentence for sentence in summarise(modes, validate(modes), motions))
