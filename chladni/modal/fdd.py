@@ -31,6 +31,7 @@ class FrequencyDomainDecomposition:
 
     Frequencies lie between the lines by interpolation; the shape is the first singular vector over the top of the
     peak; the damping ratio is half the half-power width over the frequency, corrected for what the window widens.
+    Modes closer than their half-power widths make one peak and are found as one, or left out for their mixed shape.
 
     Attributes
     ----------
@@ -41,9 +42,21 @@ class FrequencyDomainDecomposition:
 
     Examples
     --------
-    >>> method = FrequencyDomainDecomposition()
-    >>> method.identify(spectra).frequency_hz  # doctest: +SKIP
-    array([1.88, 2.42, 2.69])
+    >>> from scipy.signal import lfilter
+    >>> from chladni.signals.channel import Channel
+    >>> from chladni.signals.time_series import TimeSeries
+    >>> from chladni.spectral.cross_spectra import cross_spectra
+    >>> pole = np.exp(2 * np.pi * 4.0 * (-0.02 + 1j) / 50)  # 4 Hz with 2 % damping, 50 samples a second
+    >>> noise = np.random.default_rng(0).standard_normal((3, 60_000))
+    >>> mode = lfilter([1.0], [1.0, -2 * pole.real, abs(pole) ** 2], noise[0])
+    >>> series = TimeSeries(
+    ...     values=np.stack([mode, -0.5 * mode]) + noise[1:],
+    ...     sample_rate_hz=50.0,
+    ...     channels=(Channel(name="a", unit="m/s^2"), Channel(name="b", unit="m/s^2")),
+    ... )
+    >>> modes = FrequencyDomainDecomposition().identify(cross_spectra(series, resolution_hz=0.05))
+    >>> modes.frequency_hz.round(1), modes.shapes.real.round(1)
+    (array([4.]), array([[ 1. , -0.5]]))
     """
 
     false_alarm: float = 0.01
@@ -115,6 +128,7 @@ def nothing_found(picked: PickedPeaks) -> tuple[str, ...]:
 def half_power_half_width(decomposition: SpectralDecomposition, peak: ResponsePeak) -> float:
     """Half of the half-power width of a mode in Hz, without what the window adds to it."""
     window = required_lag_window(decomposition)
+    # The window widens every bell in the same way, so that what it adds can be taken back.
     shown = _shown_half_width(decomposition.values[:, 0], peak.line)
     return own_half_width(shown, window) * decomposition.spacing_hz
 
@@ -148,6 +162,7 @@ def _mode(decomposition: SpectralDecomposition, peak: ResponsePeak) -> ResponseM
 
 def _shown_half_width(power: Floats, line: int) -> float:
     """Half of the distance, in lines, of the half-power points beside a peak, each between two lines."""
+    # From the peak outwards the first line below half: farther ones belong to other modes.
     below = np.flatnonzero(power[: line + 1] <= power[line] / 2)
     above = np.flatnonzero(power[line:] <= power[line] / 2)
     sides = []

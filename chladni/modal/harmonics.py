@@ -90,11 +90,14 @@ def machine_harmonics(
     [12.5]
     """
     _require_arguments(series, band_hz, false_alarm, least_damping)
+    # Narrow bands need long segments: they follow from the longest run of valid samples, not from the record.
     longest = _longest_run(series) // LONGEST_SEGMENT_SHARE
     lengths = [2 * (longest // widening // 2) for widening in WIDENINGS]
     found: list[Tone] = []
+    # From narrow to wide, so that a sine has the frequency that the narrowest band gives it.
     scales = [narrow_bands(series, length) for length in lengths if length >= SHORTEST_SEGMENT]
     looked_at = [_lines(bands.frequency_hz, candidates_hz, band_hz) for bands in scales]
+    # The chance of any false alarm is at most the sum of the chances of all, however they hang together.
     tests = max(sum(int(lines.sum()) for lines in looked_at), 1) * len(series.channels)
     for bands, lines in zip(scales, looked_at, strict=True):
         even = even_tones(series, bands, lines, chance=false_alarm / 2 / tests, least_damping=least_damping)
@@ -159,6 +162,7 @@ def _lines(
         chosen &= (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
     if candidates_hz is not None:
         near = np.zeros(frequency_hz.size, dtype=np.bool_)
+        # One at a time: all differences at once would be as large as the spectra of many channels.
         for candidate_hz in candidates_hz:
             near |= np.abs(frequency_hz - candidate_hz) <= 1.5 * frequency_hz[1]
         chosen &= near
@@ -167,6 +171,7 @@ def _lines(
 
 def _named(tones: list[Tone]) -> tuple[MachineHarmonic, ...]:
     """Add to each reason of which other tone it is a multiple."""
+    # By rising frequency, so that the base of a family is named before its multiples.
     tones = sorted(tones, key=lambda tone: tone.frequency_hz)
     named = []
     for row, tone in enumerate(tones):

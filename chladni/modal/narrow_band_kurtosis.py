@@ -66,6 +66,7 @@ def narrow_bands(series: TimeSeries, samples: int) -> NarrowBands:
     window = window_samples("hann", samples)
     runs = valid_runs(series)
     require_finite(series, runs)
+    # Sums only: the segments of a long record would take as much memory as the record.
     second = np.zeros((samples // 2 + 1, len(series.channels)))
     fourth, count = np.zeros_like(second), 0
     together = max(1, SAMPLES_TOGETHER // (len(series.channels) * samples))
@@ -104,6 +105,7 @@ def independent_samples(bands: NarrowBands, least_damping: float) -> Floats:
     ndarray
         ``[line]``, at most the number of segments.
     """
+    # Every line has another decay, but the inflation is smooth in its logarithm.
     decay = 2 * np.pi * least_damping * bands.frequency_hz * bands.segment_s
     grid = np.geomspace(1e-6, 1e3, 400)
     inflation = np.interp(np.log(np.maximum(decay, grid[0])), np.log(grid), _inflation(grid))
@@ -129,6 +131,7 @@ def chance_of_kurtosis(kurtosis: Floats, samples: Floats) -> Floats:
     >>> bool(chance[0] < 1e-12), bool(chance[1] > 0.1)
     (True, True)
     """
+    # Beyond either end of the table the chance stays what it is there, which is on the safe side.
     ratio, rate = _rate_function()
     found = np.interp(kurtosis / SINE_KURTOSIS, ratio, rate)
     chance = scipy.special.ndtr(-np.sqrt(2 * samples * found))

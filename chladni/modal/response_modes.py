@@ -38,10 +38,12 @@ def response_mode_set(
     """Gather modes by rising frequency, and say what limits them."""
     ordered = sorted(modes, key=lambda mode: mode.frequency_hz)
     shapes = [largest_one(mode.shape, decomposition.scale) for mode in ordered]
+    # An array of no rows has no columns either, and these are known.
     empty = np.zeros((0, len(decomposition.channels)), dtype=np.complex128)
     remarks = [*notes, UNSCALED]
     if len(decomposition.channels) == 1:
         remarks.append(ONE_CHANNEL)
+    # The first singular value stands all the same: only what lies below it is lost.
     if decomposition.averages < len(decomposition.channels):
         remarks.append(
             f"{decomposition.averages:.3g} effective averages of {len(decomposition.channels)} channels leave the "

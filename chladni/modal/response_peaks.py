@@ -68,6 +68,7 @@ def pick_peaks(
         Mean MAC with the lines beside the peak, at least.
     """
     _require_request(decomposition, band_hz, count, frequencies_hz)
+    # A person sees what statistics don't: what is asked for is taken as it is.
     if frequencies_hz is not None:
         return PickedPeaks(peaks=_by_hand(decomposition, frequencies_hz), notes=())
     peaks: list[ResponsePeak] = []
@@ -97,6 +98,7 @@ def pick_peaks(
 def modal_coherence(decomposition: SpectralDecomposition, line: int) -> float:
     """Mean MAC of the first vector of a line with those of the lines beside it; 1 for a single channel."""
     first = decomposition.vectors[:, :, 0]
+    # Through the window the nearest lines share part of the segment's noise; the next ones hardly any.
     beside = [row for step in range(1, NEIGHBOURS + 1) for row in (line - step, line + step)]
     inside = [row for row in beside if 0 <= row < len(first)]
     return float(np.mean(np.abs(first[inside].conj() @ first[line]) ** 2))
@@ -106,6 +108,7 @@ def _significant(
     decomposition: SpectralDecomposition, band_hz: tuple[float, float] | None, false_alarm: float
 ) -> list[Peak]:
     """Peaks in the band, the strongest first."""
+    # The largest eigenvalue scatters a little less than a channel's density does: the test is on the safe side.
     first = decomposition.values[:, 0][np.newaxis]
     density = PowerSpectralDensity(
         frequency_hz=decomposition.frequency_hz,

@@ -38,6 +38,7 @@ def shape_at(decomposition: SpectralDecomposition, line: int, half_width_hz: flo
     sum_k S_1k S_jk / (T df), with T the length of the record, df the spacing and S_jk = v_j^H G_k v_j (Brillinger
     1981, section 9.4).
     """
+    # Where the mode is strong; with more lines the scatter of the shape falls, with too many that of others comes in.
     reach = max(1, int(half_width_hz / decomposition.spacing_hz))
     matrices = decomposition.matrix[max(line - reach, 0) : line + reach + 1]
     values, vectors = np.linalg.eigh(matrices.sum(axis=0))
@@ -80,5 +81,6 @@ def modal_filters(shapes: list[Complex]) -> list[Complex]:
 
 def modal_spectrum(decomposition: SpectralDecomposition, weights: Complex) -> Floats:
     """``[line]`` spectrum of the modal coordinate w^H x."""
-    spectrum = np.einsum("c,kcd,d->k", weights.conj(), decomposition.matrix, weights)
+    # As a product of matrices, which calls BLAS; hundreds of channels take minutes otherwise.
+    spectrum = (decomposition.matrix @ weights) @ weights.conj()
     return np.asarray(np.maximum(spectrum.real, 0.0), dtype=np.float64)

@@ -76,6 +76,7 @@ def joined(
     scaled[:, from_a] += np.outer(other, by_first)
     scaled[:, old + np.array(from_b)] += np.outer(other, by_other)
     known = _variances(so_far)[rows_a]
+    # Inverse variances: the better of two looks counts more.
     share = known / (known + abs(factor) ** 2 * _variances(shape)[rows_b])
     slopes[rows_a] = (1 - share)[:, None] * slopes[rows_a] + share[:, None] * scaled[rows_b]
     slopes[old:] = scaled[new]

@@ -81,6 +81,7 @@ def merge_setups(sets: Sequence[ModeSet], *, references: Sequence[str] | None = 
         modes, alone = _paired(modes, sets, one, shared, scaling)
         notes += alone
         notes.append(f"set-up {number} is scaled by {', '.join(one.channels[pair.row_b].name for pair in scaling)}")
+        # In the order in which `joined` adds them to the shapes.
         known = {pair.row_b for pair in shared}
         channels += [channel for row, channel in enumerate(one.channels) if row not in known]
     return _mode_set(sets, channels, modes, notes)
@@ -135,6 +136,7 @@ def _shared(
         shared = shared_channels(channels, one.channels)
     except EstimateError as error:
         raise EstimateError(f"set-up {number} can't be merged with those before it: {error}") from error
+    # A shape in m/s^2 can't be scaled by one in g, and nothing in the numbers would show it.
     for pair in shared:
         mine, theirs = channels[pair.row_a], one.channels[pair.row_b]
         if mine.unit != theirs.unit:
@@ -163,6 +165,7 @@ def _paired(
 ) -> tuple[list[_GrowingMode], list[str]]:
     """Give each mode its partner in another set-up, and tell those that have none."""
     number = len(modes[0].rows) + 1
+    # Against the shapes as they have grown: set-ups in a row need not share anything with the first.
     partners = _partners(modes, sets, one, scaling)
     grown = []
     for row, mode in enumerate(modes):
@@ -215,6 +218,7 @@ def _mac_or_zero(mine: Complex, theirs: Complex) -> Floats:
     """MAC of shapes that may not move at all at these channels, and then are like no other."""
     agreement = np.zeros((len(mine), len(theirs)))
     moving, moving_too = np.any(mine != 0, axis=1), np.any(theirs != 0, axis=1)
+    # MAC refuses shapes of zeros, which a sensor in a node gives.
     if np.any(moving) and np.any(moving_too):
         agreement[np.ix_(moving, moving_too)] = mac(mine[moving], theirs[moving_too])
     return agreement
@@ -301,6 +305,7 @@ def _with_common_references(sets: Sequence[ModeSet]) -> tuple[ModeSet, tuple[str
     names = [tuple(channel.name for channel in one.references) for one in sets]
     if len(set(names)) == 1:
         return sets[0], ()
+    # Each set-up's participation belongs to its own excitation, and one residue needs both sides from one.
     bare = replace(sets[0], references=(), participation=None, scale=None, fit=None)
     return bare, ("set-ups have different references: participation and modal scale are left out",)
 

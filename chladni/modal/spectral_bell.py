@@ -15,7 +15,10 @@ Floats = NDArray[np.float64]
 
 # Scoring converges in a handful of steps; one that hasn't after so many never will.
 MOST_STEPS = 60
+LEAST_LINES = 6
 SMALL_STEP = 1e-9
+# The power of a window's transform is taken this far, in lines, and in so many steps a line.
+KERNEL_LINES, GRID_STEPS = 12, 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -107,13 +110,15 @@ def fit_bell(data: BellData, *, frequency_hz: float, half_width_hz: float) -> Be
     with the spectrum S as it was before the window W (Brillinger 1981, section 5.10): a mode narrower than a line
     makes lines and segments alike, and then more lines are no more information.
     """
-    if data.power.size < 6:
+    # Four unknowns, and something left over to tell a bell from a slope.
+    if data.power.size < LEAST_LINES:
         raise EstimateError(f"{data.power.size} lines are too few for a mode; ask for a finer resolution")
     theta, expected = _scored(data, _start(data, frequency_hz, half_width_hz))
     outside = not data.frequency_hz[0] <= theta[1] * data.spacing_hz <= data.frequency_hz[-1]
     weighted = expected.slopes / expected.power[:, np.newaxis]
     if outside or np.linalg.matrix_rank(weighted) < theta.size:
         raise _no_mode(data)
+    # The likelihood takes lines as independent; what they really share goes between two of its own covariances.
     information = np.linalg.inv(weighted.T @ weighted)
     score = _score_covariance(data, theta, weighted / expected.power[:, np.newaxis])
     covariance = information @ score @ information
@@ -161,6 +166,7 @@ class _Expected:
 
 def _start(data: BellData, frequency_hz: float, half_width_hz: float) -> Floats:
     top = float(data.power.max())
+    # Half of the lowest line: with no floor at all, steps would begin at the edge of what is allowed.
     floor = 0.5 * float(data.power.min())
     width = max(half_width_hz / data.spacing_hz, 0.05)
     return np.array([np.log(top), frequency_hz / data.spacing_hz, np.log(width), floor / top])
@@ -196,6 +202,7 @@ def _no_mode(data: BellData) -> EstimateError:
 def _deviance(data: BellData, expected: _Expected) -> float:
     if not np.all(expected.power > 0):
         return float(np.inf)
+    # Against lines that fit exactly, so that rounding stays small beside what is left.
     ratio = data.power / expected.power
     return float(np.sum(ratio - np.log(np.maximum(ratio, np.finfo(float).tiny)) - 1))
 
@@ -255,11 +262,25 @@ def _score_covariance(data: BellData, theta: Floats, coefficients: Floats) -> Fl
     before = lorentz / (2 * np.pi * width) / _bell(data.lag_window, 0.0, width, np.zeros(1))[0].real
     smooth = _smooth_part(line, damped, width, data.derivatives)[0]
     spectrum = np.exp(theta[0]) * (before * smooth + theta[3])
-    window = named_window(data.window)
-    kernel = leakage(window, line[:, np.newaxis] - np.round(data.frequency_hz / data.spacing_hz))
-    sums = kernel @ coefficients / noise_bandwidth_bins(window)
+    sums = _seen_by(data, coefficients, line)
     weights = step * spectrum**2 / (data.record_s * data.spacing_hz)
     return np.asarray(sums.T @ (weights[:, np.newaxis] * sums), dtype=np.float64)
+
+
+def _seen_by(data: BellData, coefficients: Floats, line: Floats) -> Floats:
+    """``[place, 4]`` sums over the data's lines of coefficients times the power of the window at that place.
+
+    On a fine grid it's a convolution: a matrix of places and lines would take gigabytes for a wide bell.
+    """
+    window = named_window(data.window)
+    offsets = np.arange(-KERNEL_LINES * GRID_STEPS, KERNEL_LINES * GRID_STEPS + 1) / GRID_STEPS
+    kernel = leakage(window, offsets) / noise_bandwidth_bins(window)
+    combed = np.zeros((GRID_STEPS * (data.power.size - 1) + 1, coefficients.shape[1]))
+    combed[::GRID_STEPS] = coefficients
+    first = round(data.frequency_hz[0] / data.spacing_hz) - KERNEL_LINES
+    grid = first + np.arange(len(combed) + kernel.size - 1) / GRID_STEPS
+    columns = [np.interp(line, grid, np.convolve(column, kernel), left=0.0, right=0.0) for column in combed.T]
+    return np.stack(columns, axis=1)
 
 
 def _integration_lines(data: BellData, theta: Floats) -> tuple[Floats, Floats]:

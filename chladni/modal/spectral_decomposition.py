@@ -87,6 +87,7 @@ def decompose(spectra: CrossSpectra) -> SpectralDecomposition:
     """
     _require_random_average(spectra)
     _require_numbers(spectra)
+    # Rotations in rad/s^2 beside accelerations in m/s^2 would count by their numbers, which mean nothing together.
     units = {channel.unit for channel in spectra.channels}
     power = np.einsum("iif->i", spectra.density).real
     scale = np.sqrt(np.where(power > 0, power, 1.0)) if len(units) > 1 else np.ones(power.size)
@@ -96,6 +97,7 @@ def decompose(spectra: CrossSpectra) -> SpectralDecomposition:
     return SpectralDecomposition(
         frequency_hz=np.asarray(spectra.frequency_hz, dtype=np.float64),
         matrix=matrix,
+        # Rounding leaves eigenvalues of -1e-17 where there are none.
         values=np.maximum(values[:, ::-1], 0.0),
         vectors=vectors[:, :, ::-1],
         scale=scale,
@@ -144,6 +146,7 @@ def _require_numbers(spectra: CrossSpectra) -> None:
                 f"spectra of channel {channel.name!r} aren't finite on {counted(int(bad.sum()), 'line')}, from "
                 f"{spectra.frequency_hz[np.argmax(bad)]:g} Hz on; leave the channel out or mark its samples invalid"
             )
+    # A single dead channel is no reason to refuse the others.
     power = np.einsum("iif->i", spectra.density).real
     if not np.any(power > 0):
         raise EstimateError("no channel has any power; check that the sensors were connected")

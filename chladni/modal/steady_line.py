@@ -55,6 +55,7 @@ def steady_lines(series: TimeSeries, least_damping: float) -> SteadyLines:
     of two powers follows Fisher's F, with 2 M degrees of freedom over 2 M times the neighbours that count as
     independent, M the number of segments.
     """
+    # Across a gap the phase of a sine is kept, but no line is: only one run can be taken whole.
     first, last = max(valid_runs(series), key=lambda run: run[1] - run[0])
     samples = min(last - first, LONGEST_PIECE) // 2 * 2
     plan = Segmentation(samples=samples, hop=samples, window="hann", detrend="linear")
@@ -84,6 +85,7 @@ def _over_neighbours(power: Floats) -> Floats:
     """Each line over the mean of its neighbours, `NEAREST` to `FARTHEST` lines away on both sides."""
     over = np.zeros_like(power)
     total = np.cumsum(np.pad(power, ((0, 0), (1, 0))), axis=1)
+    # Lines nearer to an end have no neighbours on one side: a slope would look like a peak there.
     lines = np.arange(FARTHEST, power.shape[1] - FARTHEST)
     below = total[:, lines - NEAREST + 1] - total[:, lines - FARTHEST]
     above = total[:, lines + FARTHEST + 1] - total[:, lines + NEAREST]

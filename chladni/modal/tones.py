@@ -53,6 +53,7 @@ def even_tones(
     """
     independent = independent_samples(bands, least_damping)
     chances = chance_of_kurtosis(bands.kurtosis, independent[np.newaxis])
+    # Sure that it's no noise, and so much of it that the band is the sine's.
     sure = (chances <= chance) & (bands.kurtosis <= MOST_KURTOSIS) & lines
     tones: list[Tone] = []
     for channel in np.argsort(chances.min(axis=1), kind="stable"):
@@ -73,6 +74,7 @@ def steady_tones(
 
     Parameters as those of `even_tones`.
     """
+    # One line a sine, the surest channel first: it names the sine, and gives the frequency.
     sure = (record.chance <= chance) & lines
     tones: list[Tone] = []
     for channel in np.argsort(-np.where(sure, record.over_neighbours, 0.0).max(axis=1), kind="stable"):

@@ -34,13 +34,13 @@ def test_a_long_record_of_a_chain_gives_what_responses_alone_can():
 def test_error_bars_cover_the_truth_with_automatic_picking():
     rng, truth = np.random.default_rng(1), chain()
     inside = []
-    for _ in range(12):
+    for _ in range(8):
         modes = METHOD.identify(cross_spectra(ambient_record(truth, cycles=1000, rng=rng, noise=0.05)))
         assert modes.frequency_hz.size == 5
         inside += list(np.abs(modes.frequency_hz - truth.frequency_hz) <= 1.96 * modes.frequency_std_hz)
         inside += list(np.abs(modes.damping_ratio - 0.01) <= 1.96 * modes.damping_std)
-    # 114 of 120 expected; four sigma of a binomial count are 10. Larger campaigns of 40 to 60 runs gave 94 to 97 %.
-    assert sum(inside) >= 104
+    # 76 of 80 expected; four sigma of a binomial count are 8. A campaign of 150 runs gave 94.5 and 96.3 %.
+    assert sum(inside) >= 68
 
 
 def test_neither_conjugate_nor_neighbours_disturb_closed_form_modes():
@@ -70,7 +70,7 @@ def test_the_kind_of_sensor_is_taken_into_account(unit, derivatives):
 
 def test_five_modes_under_as_much_noise_and_none_in_noise_alone():
     rng = np.random.default_rng(2)
-    for _ in range(6):
+    for _ in range(3):
         loud = cross_spectra(ambient_record(chain(), cycles=2000, rng=rng, noise=1.0))
         assert METHOD.identify(loud).frequency_hz.size == 5
         series = noise_record(20_000, rng=rng).select([f"/mass{row}.z" for row in range(4)])
