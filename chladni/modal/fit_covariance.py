@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from chladni.modal.fit_inflation import Misfit
 from chladni.modal.fitted_modes import FittedModes
 from chladni.modal.lsfd import ShapeSolution
-from chladni.modal.mode_scatter import ModeScatter
 from chladni.modal.modal_model import ModalModel
+from chladni.modal.mode_scatter import ModeScatter
 from chladni.modal.model_lines import ModelLines
 from chladni.modal.parameter_spread import ParameterSpread, parameter_spread
 from chladni.modal.scatter_estimate import mode_scatter
@@ -122,4 +122,5 @@ def _frequency_slopes(poles: Complex) -> Floats:
 def _damping_slopes(poles: Complex) -> Floats:
     """``[mode, 2]`` derivative of -Re/abs to Re and Im."""
     size = np.abs(poles)
-    return np.stack([-(poles.imag**2), poles.real * poles.imag], axis=1) / size[:, np.newaxis] ** 3
+    slopes = np.stack([-(poles.imag**2), poles.real * poles.imag], axis=1) / size[:, np.newaxis] ** 3
+    return np.asarray(slopes, dtype=np.float64)

@@ -44,9 +44,9 @@ def misfit(lines: ModelLines, solution: ShapeSolution, provenance: Provenance) -
     parameters = solution.coefficients.size + 2 * solution.participation.size
     free = max(used.sum() - parameters / 2, 1.0)
     chi_square = float(normalised.sum() / free)
-    local = [_excess(normalised, share, correlation) for share in _shares(lines, solution)]
-    overall = _excess(normalised, used.astype(float), correlation)
-    excess = efficiency * np.maximum(np.array(local), overall)
+    overall = _excess(normalised.sum(), used.sum(), used.sum(), correlation)
+    local = _excess(*_near_modes(lines, solution, normalised), correlation)
+    excess = efficiency * np.maximum(local, overall)
     return Misfit(chi_square=chi_square, correlation=correlation, excess=excess)
 
 
@@ -62,22 +62,27 @@ def _estimated_weights(lines: ModelLines, provenance: Provenance) -> tuple[float
     return freedom / (freedom - 2), freedom / (freedom - 4)
 
 
-def _shares(lines: ModelLines, solution: ShapeSolution) -> list[Floats]:
-    """``[response, reference, line]`` for each mode: how much a line says about its pole."""
+def _near_modes(lines: ModelLines, solution: ShapeSolution, normalised: Floats) -> tuple[Floats, Floats, Floats]:
+    """For each mode the sums of share x square, share and share^2 over all lines of all functions.
+
+    A line's share is what it says about the pole: its weight times the square of the model's slope.
+    """
     slopes = np.abs(solution.basis.slopes) ** 2
-    density = slopes[0::2] + slopes[1::2]
-    residues = solution.shapes[:, :, np.newaxis] * solution.participation[:, np.newaxis]
-    return [
-        lines.weights * np.abs(residue)[..., np.newaxis] ** 2 * line
-        for residue, line in zip(residues, density, strict=True)
-    ]
+    density = (slopes[0::2] + slopes[1::2]).T
+    modal = np.abs(solution.shapes[:, :, np.newaxis] * solution.participation[:, np.newaxis]) ** 2
+    squares = np.moveaxis(modal, 0, -1)
+    weights = lines.weights
+    return (
+        np.sum(squares * ((weights * normalised) @ density), axis=(0, 1)),
+        np.sum(squares * (weights @ density), axis=(0, 1)),
+        np.sum(squares**2 * (weights**2 @ density**2), axis=(0, 1)),
+    )
 
 
-def _excess(normalised: Floats, share: Floats, correlation: float) -> float:
-    total = share.sum()
-    if total <= 0:
-        return 1.0
-    mean = float((share * normalised).sum() / total)
+def _excess(weighted: Floats, total: Floats, squared: Floats, correlation: float) -> Floats:
+    """Mean square where it is more than chance makes of it, else 1."""
+    safe = np.where(total > 0, total, 1.0)
+    mean = weighted / safe
     # Mean of independent squares with unequal shares: its own sigma tells chance from misfit.
-    scatter = float(np.sqrt(correlation * (share**2).sum()) / total)
-    return mean if mean > 1 + SIGNIFICANT * scatter else 1.0
+    scatter = np.sqrt(correlation * squared) / safe
+    return np.asarray(np.where(mean > 1 + SIGNIFICANT * scatter, mean, 1.0), dtype=np.float64)

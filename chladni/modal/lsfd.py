@@ -144,8 +144,13 @@ class ShapeSolution:
         )
 
 
-def solve_shapes(lines: ModelLines, basis: ModalBasis, participation: Complex) -> ShapeSolution:
-    """Solve the normal equations of every response, then again for what is left of the data."""
+def solve_shapes(
+    lines: ModelLines, basis: ModalBasis, participation: Complex, *, enough: float = 0.0
+) -> ShapeSolution:
+    """Solve the normal equations of every response, then again for what is left of the data.
+
+    Ends when the last digits stand still, or when a round improves the weighted sum of squares by less than `enough`.
+    """
     functions = np.concatenate([basis.modes, basis.residuals])
     table = product_table(functions, lines.weights)
     responses, references, _ = lines.values.shape
@@ -162,7 +167,8 @@ def solve_shapes(lines: ModelLines, basis: ModalBasis, participation: Complex) -
         step = np.einsum("iab,ib->ia", inverse, gradient)
         coefficients += step
         residual = lines.values - synthesis(basis, coefficients, participation)
-        if np.all(np.abs(step) <= SETTLED * np.abs(coefficients).max(axis=-1, keepdims=True)):
+        gained = float(np.sum(gradient * step))
+        if gained < enough or np.all(np.abs(step) <= SETTLED * np.abs(coefficients).max(axis=-1, keepdims=True)):
             break
     return ShapeSolution(
         coefficients=coefficients,

@@ -19,8 +19,8 @@ from chladni.signals.frequency_response import FrequencyResponse
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 
-# A step that moves no pole by more than this share of its decay rate ends the iteration, and so does one that improves
-# a fit with known variances by less than this: it is a small part of a sigma.
+# A step that moves no pole by more than this share of its decay rate ends the iteration, and so does one that
+# improves a fit with known variances by less than this: it is a small part of a sigma.
 CONVERGED, ENOUGH = 1e-7, 1e-4
 FIRST_DAMPING, LARGEST_DAMPING = 1e-6, 1e6
 
@@ -95,7 +95,8 @@ class _State:
 
     @classmethod
     def at(cls, lines: ModelLines, poles: Complex, participation: Complex) -> "_State":
-        solution = solve_shapes(lines, modal_basis(lines, poles), participation)
+        enough = ENOUGH / 100 if lines.weighted else 0.0
+        solution = solve_shapes(lines, modal_basis(lines, poles), participation, enough=enough)
         cost = float(np.sum(lines.weights * np.abs(solution.residual) ** 2))
         return cls(poles=poles, participation=participation, solution=solution, cost=cost)
 
