@@ -42,6 +42,7 @@ def alike_modes(modes: ModeSet, *, limit: float = ALIKE_MAC) -> tuple[tuple[int,
     """
     likeness = auto_mac(modes)
     explained = 1.0 - likeness <= _sine_squared_of_noise(modes)
+    # The upper triangle: a pair is named once, and no mode is like itself.
     first, second = np.nonzero(np.triu((likeness >= limit) | explained, k=1))
     by_likeness = np.argsort(-likeness[first, second], kind="stable")
     return tuple((int(first[pair]), int(second[pair])) for pair in by_likeness)
@@ -80,8 +81,10 @@ def _sine_squared_of_noise(modes: ModeSet) -> NDArray[np.float64]:
     """``[mode, mode]`` the 95 % point of 1 - MAC for shapes that differ by their errors only."""
     variance = np.nansum(np.abs(modes.shape_std) ** 2, axis=1) / np.sum(np.abs(modes.shapes) ** 2, axis=1)
     freedom = 2 * (len(modes.channels) - 1)
+    # One component is 1 in every shape: the MAC is 1 whatever the errors.
     if freedom == 0:
         return np.zeros((variance.size, variance.size))
+    # Imported here: it takes longer than all the rest of a validation.
     from scipy.special import chdtri
 
     quantile = float(chdtri(freedom, _SIGNIFICANCE)) / freedom

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.modal.mode_words import capital, mode_name
+from chladni.modal.mode_words import capital, mode_name, prefixed
 from chladni.modal.relative_motion import kilogram_scale
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.relative_motion import RelativeMotion
 
 # A joint that hardly moves can't be treated: its relative motion is lost in its own error bar.
 _SIGNIFICANT = 2.0
+# A change that a designer would notice, small enough for the linear law.
 _FREQUENCY_STEP = 0.1
 
 
@@ -104,6 +105,7 @@ def _treatment(modes: ModeSet, motion: RelativeMotion) -> JointTreatment:
     ratio = 0.0 if motion.ratio is None else motion.ratio
     gain, stiffness_gain = motion.damping_gain, motion.stiffness_gain_hz
     damper = spring = None
+    # A gain of zero belongs to a joint that doesn't move: no damper is large enough.
     if gain and stiffness_gain:
         damper = max(float(modes.damping_ratio[motion.mode]), 0.0) / gain
         spring = _FREQUENCY_STEP * float(modes.frequency_hz[motion.mode]) / stiffness_gain
@@ -145,7 +147,7 @@ def _sentence(
         )
     frequency_hz, damping = float(modes.frequency_hz[motion.mode]), float(modes.damping_ratio[motion.mode])
     return (
-        f"{start}; a damper of {damper:.3g} N s/m between the two would double the damping of {100 * damping:.2g} % "
-        f"and a spring of {spring:.3g} N/m raise the frequency by {_FREQUENCY_STEP * frequency_hz:.2g} Hz, "
+        f"{start}; a damper of {prefixed(damper, 'N s/m')} between the two would double the damping of "
+        f"{100 * damping:.2g} % and a spring of {prefixed(spring, 'N/m')} raise the frequency by {_FREQUENCY_STEP * frequency_hz:.2g} Hz, "
         "to first order."
     )

@@ -40,6 +40,7 @@ def joined(words: Sequence[str], *, most: int = 6) -> str:
     >>> joined(["a", "b", "c"]), joined(["a", "b", "c", "d"], most=2)
     ('a, b and c', 'a, b and 2 more')
     """
+    # A list that nobody reads to its end hides what stands first.
     if len(words) > most:
         words = [*words[:most], f"{len(words) - most} more"]
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
@@ -57,8 +58,25 @@ def with_std(number: float, std: float) -> str:
         return f"{number:.4g} (no error bar)"
     if std <= 0:
         return f"{number:.6g} ± 0"
+    # The second digit of the error bar is the last that says anything about the number.
     decimals = min(max(1 - floor(log10(std)), 0), _MOST_DECIMALS)
     return f"{number:.{decimals}f} ± {std:.{decimals}f}"
+
+
+def prefixed(number: float, unit: str) -> str:
+    """Give a number of three digits with the prefix that keeps it short.
+
+    Examples
+    --------
+    >>> prefixed(8342.0, "N s/m"), prefixed(275.3, "N s/m"), prefixed(5e6, "N/m"), prefixed(0.0021, "N/m")
+    ('8.34 kN s/m', '275 N s/m', '5 MN/m', '0.0021 N/m')
+    """
+    # Rounded first: 999.6 is 1 k, not 1e+03.
+    rounded = float(f"{number:.3g}")
+    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if abs(rounded) >= factor:
+            return f"{rounded / factor:.3g} {prefix}{unit}"
+    return f"{rounded:.3g} {unit}"
 
 
 def percent_with_std(ratio: float, std: float) -> str:

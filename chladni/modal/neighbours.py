@@ -56,6 +56,7 @@ def neighbours(channels: Sequence[Channel], geometry: Geometry) -> tuple[Neighbo
         return tuple(_compare(channels, pair, at_points) for pair in named)
     if len(at_points) > 1:
         return tuple(_compare(channels, pair, at_points) for pair in pairwise(at_points))
+    # A motion along z relative to one along x says nothing, and the names are all there is to go by.
     groups: dict[tuple[str, str], list[int]] = {}
     for row, channel in enumerate(channels):
         groups.setdefault((_kind(channel), _label(channel)), []).append(row)
@@ -90,6 +91,7 @@ def _along_lines(geometry: Geometry, at_points: dict[str, list[int]]) -> Iterato
     seen = set()
     for line in geometry.lines:
         for pair in pairwise(name for name in line if name in at_points):
+            # Lines cross and run both ways: a pair counts once.
             if pair[0] != pair[1] and frozenset(pair) not in seen:
                 seen.add(frozenset(pair))
                 yield pair
@@ -137,6 +139,7 @@ def _intersection(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.
     They belong to the principal angles of zero between the two spans (Golub & Van Loan 2013, section 6.4.3).
     """
     basis_a, basis_b = _span(a), _span(b)
+    # Singular values of the product of two orthonormal bases are the cosines of the principal angles.
     left, cosines, _ = np.linalg.svd(basis_a.T @ basis_b)
     return np.asarray(basis_a @ left[:, : int(np.sum(cosines > 1 - _PARALLEL))], dtype=np.float64)
 

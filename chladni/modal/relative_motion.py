@@ -92,6 +92,7 @@ def joint_motion(shape: NDArray[np.complex128], pair: Neighbours) -> JointMotion
     if pair.first.shape[0] == 0:
         return None
     difference = (pair.first - pair.second) @ shape
+    # Real and imaginary part are the motion at two moments a quarter of a period apart: one direction serves both.
     left, _, _ = np.linalg.svd(np.stack([difference.real, difference.imag], axis=1))
     along = left[:, 0]
     first, second = along @ pair.first, along @ pair.second
@@ -145,6 +146,7 @@ def _joint(modes: ModeSet, mode: int, pair: Neighbours, mass: float) -> Relative
 def _gain(modes: ModeSet, mode: int, motion: JointMotion, mass: float) -> float | None:
     """(delta phi)^2/(2 omega) with a shape of unit modal mass, in s/kg."""
     used = np.flatnonzero(motion.weights)
+    # In radians delta phi would make the gain one for a rotary damper.
     translations = all(modes.channels[row].unit in ("m", "m/s", "m/s^2") for row in used)
     if not (isfinite(mass) and translations):
         return None

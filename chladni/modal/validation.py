@@ -24,6 +24,7 @@ _WIDE_SHAPE = 0.1
 _FIT_ERROR = 0.2
 _FEWEST_ORDERS = 4
 _FEW_ORDERS = 0.25
+# Two estimates of one frequency differ by more than this in 3 of 1000 cases.
 _SAME_MODE_SIGMA = 3.0
 _SCATTER = 3.0
 
@@ -94,6 +95,7 @@ def _found_twice(modes: ModeSet, alike: Sequence[tuple[int, int]]) -> list[str]:
 
 def _few_sensors(modes: ModeSet) -> list[str]:
     sensors, found = len(modes.channels), modes.frequency_hz.size
+    # More shapes than components are linearly dependent, whatever the structure.
     if sensors >= found:
         return []
     sentence = (
@@ -140,6 +142,7 @@ def _poor_support(modes: ModeSet) -> list[str]:
     if spread is None or spread.orders.size == 0:
         return []
     sentences = []
+    # A few orders in a row agree by chance; how many there could be depends on the orders that were tried.
     least = max(_FEWEST_ORDERS, _FEW_ORDERS * spread.orders.max())
     few = np.flatnonzero(spread.orders < least)
     if few.size:
@@ -176,6 +179,7 @@ def _high_damping(modes: ModeSet) -> list[str]:
 
 def _wide_error_bars(modes: ModeSet) -> list[str]:
     sentences = []
+    # A missing error bar is told once, not as one that is too wide.
     known = _has_error_bar(modes)
     if not known.all():
         unknown = np.flatnonzero(~known).tolist()

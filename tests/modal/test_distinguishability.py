@@ -1,11 +1,16 @@
 """Modes whose shapes the sensors can't tell apart."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 
+from chladni.apps.modes import identify_modes
+from chladni.io.log import open_log
 from chladni.modal.distinguishability import alike_modes, alike_sentence
 from chladni.modal.mac import auto_mac
+from chladni.modal.validation import validate
 from tests import strategies as ours
 from tests.modal.mode_makers import mode_set
 
@@ -73,6 +78,20 @@ def test_when_no_two_modes_are_told_apart_they_arent_listed() -> None:
     assert sentence.startswith("2 channels don't tell the shapes of any two of the 3 modes apart (MAC 0.99 to 1.00).")
 
 
+def test_three_accelerometers_on_an_aircraft(shared_data: Path) -> None:
+    with open_log(shared_data / "f16_level1.mcap") as log:
+        modes = identify_modes(log, reference="/shaker.wrench.force.z")
+    checks = validate(modes)
+    count = modes.frequency_hz.size
+    off_diagonal = checks.auto_mac[np.triu_indices(count, k=1)]
+    assert count >= 6
+    # Known of this set-up: modes that are far apart in frequency have a MAC of 0.98 and more.
+    assert np.sum(off_diagonal > 0.98) >= 5
+    assert len(checks.alike) >= 5
+    assert "3 channels don't tell the shapes of" in checks.findings[0]
+
+
+@settings(max_examples=40)
 @given(ours.mode_sets())
 def test_pairs_are_ordered_and_the_most_alike_come_first(modes) -> None:  # type: ignore[no-untyped-def]
     likeness = auto_mac(modes)

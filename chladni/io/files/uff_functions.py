@@ -55,6 +55,7 @@ def function_datasets(
     places
         Where each channel stands, by name.
     """
+    # Text files can't hold NaN, and noise on lines without excitation would be fitted by whoever reads them.
     keep = response.excited & np.isfinite(response.values).all(axis=(0, 1))
     axis, losses = _axis_fields(response.frequency_hz[keep], binary=binary)
     left_out = int(keep.size - keep.sum())
@@ -128,6 +129,7 @@ def read_functions(
             beside[header["func_type"]][pair] = dataset
     if not by_axis:
         return None, ()
+    # One response has one axis: the one that most functions share.
     found = max(by_axis.values(), key=len)
     notes = _left_out_notes(path, headers, len(found))
     references = tuple(dict.fromkeys(pair[1] for pair in found))
@@ -155,6 +157,7 @@ def _assembled(
     axis: NDArray[np.float64] = found[responses[0], references[0]]["x"]
     shape = (len(responses), len(references), axis.size)
     values = np.empty(shape, dtype=np.complex128)
+    # Infinite and NaN say that nothing is known, which zero and one would deny.
     std = np.full(shape, np.inf)
     coherence = np.full((shape[0], axis.size), np.nan)
     for row, measured in enumerate(responses):

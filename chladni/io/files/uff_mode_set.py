@@ -42,11 +42,13 @@ def mode_set_of(
     channels = _channels(degrees, nodes, response, units.pop() if len(units) == 1 else "1")
     sign = np.array([-1.0 if direction_code(channel) < 0 else 1.0 for channel in channels])
     motion = sign * np.array([[mode.motion.get(degree, 0j) for degree in degrees] for mode in ordered])
+    # Other tools scale shapes as they like; ours have the largest component 1.
     rows = np.arange(len(ordered))
     pivot = np.argmax(np.abs(motion), axis=1)
     largest = motion[rows, pivot]
     shapes = motion / largest[:, np.newaxis]
     shapes[rows, pivot] = 1.0
+    # The file has no place for them, and zero would claim that they're exact.
     std = np.full(shapes.shape, complex(nan, nan))
     std[rows, pivot] = 0.0
     scale = _scale(ordered, largest, degrees, channels, nodes, response, kilogram)
@@ -97,6 +99,7 @@ def _scale(
 ) -> ModalScale | None:
     """Modal A over the square of what the shapes were divided by; None when no mode has one."""
     modal_a = np.array([mode.modal_a for mode in ordered]) / largest**2 / kilogram
+    # Zero is what tools write for modes that they didn't scale.
     if not np.any(modal_a):
         return None
     modal_a[modal_a == 0] = complex(nan, nan)
@@ -142,6 +145,7 @@ def _participation(
         column = columns.get((point, abs(axis)))
         if column is None or not axis:
             return None
+        # A force against x does what the opposite force along x would: the sign goes with the participation.
         turned = np.sign(axis) * (-1.0 if direction_code(channels[column]) < 0 else 1.0)
         factors.append(turned * np.divide(shapes[:, column], scale.modal_a, out=unknown.copy(), where=scaled))
     return np.stack(factors, axis=1) if factors else None

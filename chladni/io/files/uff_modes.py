@@ -90,6 +90,7 @@ def write_uff_modes(
     functions, lost = ([], ()) if response is None else function_datasets(response, places, binary=binary)
     with atomic_path(path, overwrite=overwrite) as temporary:
         temporary.write_text(_header_text(), encoding="ascii", newline="\n")
+        # Units go first: what follows is read by them.
         append_datasets(temporary, [si_units()])
         with temporary.open("a", encoding="ascii", newline="\n") as file:
             file.write(node_text + shapes)
@@ -133,6 +134,7 @@ def read_uff_modes(path: Path | str) -> UffModes:
 
 def _channels_of(modes: ModeSet, response: FrequencyResponse | None) -> tuple[Channel, ...]:
     others = () if response is None else (*response.responses, *response.references)
+    # The channels of the modes go last, so that they stand for their name.
     by_name = {channel.name: channel for channel in (*others, *modes.references, *modes.channels)}
     return tuple(by_name.values())
 

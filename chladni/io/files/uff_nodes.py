@@ -88,6 +88,7 @@ def node_blocks(geometry: Geometry, nodes: Mapping[str, int], unplaced: Sequence
             names = _NAMES_APART.join(part)
             told = len(names) <= _ID_LENGTH and names.isascii() and names.isprintable()
             said.update(part if told else ())
+            # Names that don't fit the line are left out as a whole: half a list would name the wrong nodes.
             numbers = [nodes[name] for name in part]
             rows = [integer_line(*numbers[start : start + _A_LINE]) for start in range(0, len(numbers), _A_LINE)]
             text += block_text(
