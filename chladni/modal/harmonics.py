@@ -70,10 +70,13 @@ def machine_harmonics(
     that shapes it (Jacobsen, Andersen & Brincker 2007); the speed may wander within the band. And if its frequency
     stays, its line in the spectrum of the whole record is narrower than that of any mode: damping near zero.
 
-    A steady sine is found when its mean square is above about 70 G/T, with G the one-sided density of the random
-    response around it and T the length of the record: on top of a mode that has all of the power, when
-    (RMS of the sine / RMS of the response)^2 is above 70/(pi zeta f T), -4 dB at 1 % and 6000 cycles. One that
-    wanders needs more than half of the power in a band of 24/T or wider, and less the shorter the record.
+    With G the one-sided density of the random response around it and T the length of the record, a steady sine is
+    found in half of all records when its mean square is 70 G/T, in nearly all from 150 G/T on; times what the ratio
+    of the narrowest mode is allowed (3 when least_damping f T is 6, 1.3 at 16, hardly more than 1 from 30 on). On top
+    of a mode with 1 % damping that has all of the power, 6000 cycles long, that is a sine as strong as the response;
+    two of its half-power widths away, -10 dB, four widths, -20 dB. One that wanders needs more than half of the power
+    in a band of 24/T or wider. False alarms were 0 in 600 records of modes with 0.1 to 1 % damping.
+
     Responses to periodic excitation (multisine, sweep that repeats) are harmonics throughout.
 
     Examples
