@@ -8,7 +8,7 @@ from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.relative_motion import RelativeMotion
 from chladni.viewers.drawing import Floats
-from chladni.viewers.labels import value_with_deviation
+from chladni.viewers.labels import LONGEST_NAME, value_with_deviation
 from chladni.viewers.style import Style
 
 Row = tuple[str, ...]
@@ -31,6 +31,11 @@ def hertz(frequency_hz: float) -> str:
 def mode_title(modes: ModeSet, row: int) -> str:
     """Name a mode by number, natural frequency and damping ratio, such as ``1: 24.67 Hz, 1.02 %``."""
     return f"{row + 1}: {hertz(float(modes.frequency_hz[row]))} Hz, {modes.damping_ratio[row] * 100:.2f} %"
+
+
+def has_mac(modes: ModeSet) -> bool:
+    """Whether likeness of shapes tells anything: one mode is like itself, and one channel has one shape."""
+    return modes.frequency_hz.size > 1 and len(modes.channels) > 1
 
 
 def mode_ticks(modes: ModeSet) -> tuple[str, ...]:
@@ -94,10 +99,10 @@ def first_of_each(rows: Sequence[Row], count: int) -> list[Row]:
     return kept
 
 
-def between(motion: RelativeMotion, style: Style) -> str:
-    """Name the two that move against each other."""
+def between(motion: RelativeMotion, style: Style, *, longest: int = LONGEST_NAME) -> str:
+    """Name the two that move against each other, each with at most so many characters."""
     # A channel that stands for a point goes by its label.
-    return " – ".join(style.labels.get(name, name) for name in motion.between)
+    return " – ".join(_shortened(style.labels.get(name, name), longest) for name in motion.between)
 
 
 def advice(modes: ModeSet, validation: ModeValidation | None) -> list[str]:
@@ -105,6 +110,11 @@ def advice(modes: ModeSet, validation: ModeValidation | None) -> list[str]:
     findings = [] if validation is None else list(validation.findings)
     harmonics = [f"{hertz(line.frequency_hz)} Hz is no mode: {line.reason}" for line in modes.harmonics]
     return list(dict.fromkeys([*findings, *harmonics, *modes.provenance.notes]))
+
+
+def _shortened(name: str, longest: int) -> str:
+    # The ends tell names apart more often than the middle does.
+    return name if len(name) <= longest else f"{name[: longest // 2 - 1]}…{name[-(longest // 2) :]}"
 
 
 def _mode_then_ratio(motion: RelativeMotion) -> tuple[int, float]:

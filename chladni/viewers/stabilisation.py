@@ -4,18 +4,36 @@ import numpy as np
 
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
+from chladni.viewers.drawing import Floats
 
+# Share of the poles' span that is left free on both sides, and the share of the whole below which it's zoomed.
+ROOM, WORTH_ZOOMING = 0.1, 0.6
 # In the order of POLE_STATUSES: each includes those before it.
 STATUS_NAMES = ("new", "frequency stable", "and damping", "and vector")
 
 
 def frequency_range(modes: ModeSet, diagram: StabilisationDiagram) -> tuple[float, float]:
-    """Give the frequencies that are shown: those of the indicator, else of modes and poles."""
-    shown = diagram.indicator_hz if diagram.indicator_hz.size > 1 else diagram.frequency_hz
-    everything = np.concatenate([shown, modes.frequency_hz])
-    if everything.size == 0:
+    """Give the frequencies that are shown: those of the indicator, or the part of them that has poles."""
+    poles = np.concatenate([diagram.frequency_hz, modes.frequency_hz])
+    low, high = _ends(diagram.indicator_hz if diagram.indicator_hz.size > 1 else poles)
+    if not poles.size:
+        return low, high
+    first, last = _ends(poles)
+    room = ROOM * (last - first)
+    first, last = max(low, first - room), min(high, last + room)
+    # The ends of the indicator are worth seeing, but not at the price of poles that can't be told apart.
+    return (first, last) if last - first < WORTH_ZOOMING * (high - low) else (low, high)
+
+
+def title(diagram: StabilisationDiagram) -> str:
+    """Name the indicator as a label begins."""
+    return diagram.indicator_name[:1].upper() + diagram.indicator_name[1:]
+
+
+def _ends(values: Floats) -> tuple[float, float]:
+    if not values.size:
         return 0.0, 1.0
-    low, high = float(everything.min()), float(everything.max())
+    low, high = float(values.min()), float(values.max())
     return (low, high) if high > low else (0.9 * low, 1.1 * low + 1e-3)
 
 

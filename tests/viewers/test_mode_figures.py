@@ -72,14 +72,43 @@ def drawn(figure: Figure) -> RendererAgg:
 def various() -> dict[str, Figure]:
     """Every kind of figure, with few modes and with many."""
     plate = made.plate_study(5, 4, 20)
-    few = made.plate_study(20, 15, 7)
+    few = made.plate_study(8, 6, 7)
     crowded = {f"plate {name}": figure for name, figure in (mac_figures(plate) | complexity_figures(few)).items()}
     large = {
         f"large {name}": figure for name, figure in (mode_shape_figures(few) | relative_motion_figures(few)).items()
     }
     bars = {f"bars {name}": figure for name, figure in mode_shape_figures(made.without_geometry()).items()}
     alone = {f"alone {name}": figure for name, figure in Album.of(made.one_mode()).figures.items()}
-    return Album.of(ALONE).figures | synthesis_figures(ARM) | crowded | large | bars | alone
+    odd = {f"odd {name}": figure for name, figure in awkward().items()}
+    return Album.of(ALONE).figures | synthesis_figures(ARM) | crowded | large | bars | alone | odd
+
+
+def awkward() -> dict[str, Figure]:
+    """Long names of neighbours, and one function of one channel alone on its page."""
+    names = ("payload_rail_of_the_right_wing", "wing_rail")
+    motions = tuple(RelativeMotion(mode=mode, between=names, ratio=0.5, ratio_std=0.1) for mode in range(3))
+    return relative_motion_figures(replace(ALONE, relative_motion=motions)) | synthesis_figures(single_channel())
+
+
+def single_channel() -> Study:
+    fit = MODES.fit
+    assert fit is not None
+    return replace(
+        ARM,
+        modes=replace(
+            MODES,
+            shapes=np.ones((5, 1), dtype=complex),
+            shape_std=np.zeros((5, 1), dtype=complex),
+            channels=MODES.channels[4:],
+            fit=replace(
+                fit,
+                synthesised=fit.synthesised[4:],
+                lower_residual=fit.lower_residual[4:],
+                upper_residual=fit.upper_residual[4:],
+                function_error=fit.function_error[4:],
+            ),
+        ),
+    )
 
 
 def test_no_picture_is_blank_or_cut_off_and_no_text_lies_on_another() -> None:
@@ -206,6 +235,22 @@ def test_stabilisation_of_nothing_is_drawn_all_the_same() -> None:
     drawn(figure)
 
 
+def test_a_single_channel_has_no_shape_to_draw() -> None:
+    study = single_channel()
+    assert mode_shape_figures(study) | complexity_figures(study) | mac_figures(study) == {}
+
+
+def test_stabilisation_is_zoomed_to_the_poles_where_they_fill_little_of_the_indicator() -> None:
+    diagram = MODES.stabilisation
+    assert diagram is not None
+    wide = replace(diagram, indicator_hz=np.linspace(0, 2000, diagram.indicator_hz.size))
+    (figure,) = stabilisation_figures(replace(ALONE, modes=replace(MODES, stabilisation=wide))).values()
+    low, high = figure.axes[0].get_xlim()
+    assert 0 <= low < diagram.frequency_hz.min()
+    assert diagram.frequency_hz.max() < high < 300
+    drawn(figure)
+
+
 def test_mac_has_a_number_in_every_cell(figures: dict[str, Figure]) -> None:
     assert ARM.validation is not None
     axes = figures["mac"].axes[0]
@@ -249,7 +294,7 @@ def test_synthesis_lies_over_the_measured_function_with_its_error(figures: dict[
     lines = {line.get_label(): line for line in axes.lines}
     np.testing.assert_array_equal(lines["synthesised"].get_ydata(), np.abs(MODES.fit.synthesised[4, 0]))
     np.testing.assert_array_equal(lines["measured"].get_ydata(), np.abs(ARM.response.values[4, 0]))
-    assert "Accelerance |H| [(m/s²)/N] to shaker.x" in texts(figures["synthesis 1 Acceleration 2/2"])
+    assert "Accelerance |H| [(m/s²)/N]\nto shaker.x" in texts(figures["synthesis 1 Acceleration 2/2"])
 
 
 def test_complexity_is_the_components_in_the_plane(figures: dict[str, Figure]) -> None:

@@ -174,6 +174,27 @@ def test_twenty_modes_are_in_rows_of_tabs_that_fit(tmp_path: Path) -> None:
     assert {"1–5: 10.00–38.12 Hz", "16–20: 115.5–143.6 Hz", "20: 143.6 Hz, 1.23 %", "All"} <= names
 
 
+def test_sixty_modes_are_in_rows_of_rows(tmp_path: Path) -> None:
+    study = made.plate_study(2, 2, 62)
+    assert study.validation is not None
+    alike = replace(study.validation, auto_mac=np.ones((62, 62)))
+    found = contents(replace(study, validation=alike), tmp_path)
+    names = container_names(found)
+    assert {"1–11: 10.00–80.30 Hz", "1–6: 10.00–45.15 Hz", "62: 438.8 Hz, 1.23 %"} <= names
+    # Too many to be seen together, and too many numbers to leave the cells in sight.
+    assert "All" not in names
+    assert "/mac/numbers" not in found.entities()
+
+
+def test_stabilisation_alone_fills_its_page(tmp_path: Path) -> None:
+    alone = contents(replace(ARM, modes=replace(MODES, fit=None)), tmp_path)
+    frames = [
+        np.array(found.static("/stabilisation/axes")["LineStrips2D:strips"][-1])
+        for found in (alone, contents(ARM, tmp_path))
+    ]
+    assert np.ptp(frames[0][:, 1]) > 2 * np.ptp(frames[1][:, 1])
+
+
 def container_names(found: Contents) -> set[str]:
     key = "ContainerBlueprint:display_name"
     return {row[key][0] for row in found.blueprint if row.get(key)}

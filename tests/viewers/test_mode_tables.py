@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.signals.relative_motion import RelativeMotion
-from chladni.viewers.mode_tables import advice, hertz, mode_table, mode_ticks, mode_title, motion_table
+from chladni.viewers.mode_tables import advice, between, hertz, mode_table, mode_ticks, mode_title, motion_table
 from chladni.viewers.style import Style
 from tests.viewers import synthetic_modes as made
 
@@ -78,6 +78,12 @@ def test_neighbours_without_a_common_direction_are_named_and_come_last() -> None
     headings, rows = motion_table((crossed, plain), MODES, STYLE)
     assert headings == ("Mode", "Frequency [Hz]", "Between", "Ratio")
     assert [row[2:] for row in rows] == [("base – arm", "0"), ("base.x – tool", "no common direction")]
+
+
+def test_long_names_of_neighbours_are_shortened_in_the_middle() -> None:
+    motion = RelativeMotion(mode=0, between=("payload_rail_right", "base"), ratio=0.1, ratio_std=None)
+    assert between(motion, STYLE, longest=10) == "payl…right – base"
+    assert between(motion, STYLE) == "payload_rail_right – base"
 
 
 def test_gains_that_one_pair_lacks_are_left_empty() -> None:

@@ -22,9 +22,12 @@ CHANNELS_NAMED = 8
 
 
 def complexity_figures(study: Study) -> dict[str, Figure]:
-    """Draw every mode in a circle of its own, several to a figure, by name; none without modes."""
+    """Draw every mode in a circle of its own, several to a figure, by name; none without modes.
+
+    A single channel has nothing to draw: its only component is 1.
+    """
     modes = study.modes
-    if modes is None or not modes.frequency_hz.size:
+    if modes is None or not modes.frequency_hz.size or len(modes.channels) == 1:
         return {}
     style = Style.of(study)
     with look():

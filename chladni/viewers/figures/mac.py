@@ -10,7 +10,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.study import Study
 from chladni.viewers.drawing import Floats
 from chladni.viewers.figures.sheet import WIDTH_IN, look, plain
-from chladni.viewers.mode_tables import mode_ticks
+from chladni.viewers.mode_tables import has_mac, mode_ticks
 
 # Up to so many columns every cell has its number; up to a few more, those that aren't small.
 ALL_NUMBERED, ANY_NUMBERED = 10, 24
@@ -21,10 +21,9 @@ TICKS = 24
 
 
 def mac_figures(study: Study) -> dict[str, Figure]:
-    """Draw the AutoMAC, by name; none without a validation of at least two modes."""
+    """Draw the AutoMAC, by name; none without a validation of several modes and channels."""
     modes, validation = study.modes, study.validation
-    # One mode is like itself and nothing else.
-    if modes is None or validation is None or modes.frequency_hz.size < 2:
+    if modes is None or validation is None or not has_mac(modes):
         return {}
     names = mode_ticks(modes)
     figure = cross_mac_figure(

@@ -27,9 +27,12 @@ BAR_HEIGHT_IN = 0.16
 
 
 def mode_shape_figures(study: Study) -> dict[str, Figure]:
-    """Draw every mode in a pane of its own, several to a figure, by name; none without modes."""
+    """Draw every mode in a pane of its own, several to a figure, by name; none without modes.
+
+    A single channel has no shape to draw: its only component is 1.
+    """
     modes = study.modes
-    if modes is None or not modes.frequency_hz.size:
+    if modes is None or not modes.frequency_hz.size or len(modes.channels) == 1:
         return {}
     wireframe = Wireframe.of(study.geometry, modes.channels)
     style = Style.of(study)

@@ -17,8 +17,6 @@ def pages(count: int, size: int) -> Iterator[tuple[str, range]]:
     >>> list(pages(3, 6)), list(pages(7, 4))
     ([('', range(0, 3))], [(' 1–4', range(0, 4)), (' 5–7', range(4, 7))])
     """
-    if not count:
-        return
     number = -(-count // size)
     length = -(-count // number)
     for start in range(0, count, length):

@@ -16,6 +16,8 @@ from chladni.viewers.style import AMPLITUDES, Style
 MODES_IN_A_FIGURE = 8
 # The least of very many pairs tell nothing.
 PAIRS = 6
+# Longer names of pairs leave no room for bars in half a figure, those of longer points in none.
+SHORT_NAMES, LONGEST_POINT = 18, 24
 BAR_HEIGHT_IN = 0.19
 GREATEST, OTHERS = tuple(AMPLITUDES[-1] / 255), "#9fb4c7"
 
@@ -38,7 +40,11 @@ def relative_motion_figures(study: Study) -> dict[str, Figure]:
 
 def _figure(study: Study, found: Sequence[tuple[int, list[RelativeMotion]]], style: Style) -> Figure:
     bars = min(PAIRS, max(len(motions) for _, motions in found))
-    figure, stack = panes(len(found), columns=2, height_in=0.35 + BAR_HEIGHT_IN * max(bars, 2), sharex=True)
+    longest = max(
+        len(between(motion, style, longest=LONGEST_POINT)) for _, motions in found for motion in motions[:PAIRS]
+    )
+    columns = 2 if longest <= SHORT_NAMES else 1
+    figure, stack = panes(len(found), columns=columns, height_in=0.35 + BAR_HEIGHT_IN * max(bars, 2), sharex=True)
     greatest = max(motion.ratio or 0.0 for _, motions in found for motion in motions) or 1.0
     for axes, (row, motions) in zip(stack, found, strict=True):
         _draw(axes, sorted(motions, key=lambda motion: -(motion.ratio or 0.0)), style)
@@ -62,5 +68,5 @@ def _draw(axes: Axes, motions: Sequence[RelativeMotion], style: Style) -> None:
     ]
     colours = [GREATEST] + [OTHERS] * (len(shown) - 1)
     axes.barh(places, ratios, height=0.7, color=colours, xerr=sigma, error_kw={"linewidth": 0.7})
-    axes.set_yticks(places, [plain(between(motion, style)) for motion in shown], fontsize=6.5)
+    axes.set_yticks(places, [plain(between(motion, style, longest=LONGEST_POINT)) for motion in shown], fontsize=6.5)
     axes.grid(visible=False, axis="y")

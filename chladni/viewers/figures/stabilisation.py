@@ -12,7 +12,7 @@ from chladni.viewers.figures.log_axis import logarithmic
 from chladni.viewers.figures.sheet import legend, look, paint, sheet
 from chladni.viewers.figures.upright import STRIP_POINTS, name_above
 from chladni.viewers.labels import printed_unit
-from chladni.viewers.stabilisation import STATUS_NAMES, frequency_range, order_range
+from chladni.viewers.stabilisation import STATUS_NAMES, frequency_range, order_range, title
 from chladni.viewers.style import STATUS_ON_LIGHT
 
 HEIGHT_IN = 3.4
@@ -65,6 +65,8 @@ def _figure(modes: ModeSet, diagram: StabilisationDiagram) -> Figure:
     poles.set_ylabel("Model order")
     names = [(float(hz), "black") for hz in modes.frequency_hz]
     names += [(line.frequency_hz, MACHINE) for line in modes.harmonics]
+    low_hz, high_hz = poles.get_xlim()
+    names = [(hertz, colour) for hertz, colour in names if low_hz <= hertz <= high_hz]
     for hertz, colour in names:
         poles.axvline(hertz, color=colour, linewidth=0.4, alpha=0.5, zorder=2)
     legend(poles, above_points=name_above(poles, names))
@@ -84,6 +86,6 @@ def _draw_indicator(poles: Axes, modes: ModeSet, diagram: StabilisationDiagram) 
         positive = np.where(curve > 0, curve, np.nan)
         # The first curve leads; those behind it tell of close modes.
         behind.plot(diagram.indicator_hz, positive, color=INDICATOR, linewidth=0.9 if place == 0 else 0.5)
-    behind.set_ylabel(f"{diagram.indicator_name} [{printed_unit(diagram.indicator_unit)}]")
+    behind.set_ylabel(f"{title(diagram)} [{printed_unit(diagram.indicator_unit)}]")
     behind.spines.right.set_visible(True)
     behind.grid(visible=False)

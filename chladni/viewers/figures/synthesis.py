@@ -12,7 +12,7 @@ from chladni.viewers.labels import printed_unit
 from chladni.viewers.overlays import Overlay, OverlayPage, left_out, overlay_pages
 from chladni.viewers.style import Style
 
-HEIGHT_IN = 1.5
+HEIGHT_IN, ALONE_IN = 1.5, 2.6
 MODES = "#cccccc"
 SYNTHESISED = "black"
 
@@ -31,7 +31,9 @@ def synthesis_figures(study: Study) -> dict[str, Figure]:
 
 
 def _figure(page: OverlayPage, natural_hz: Floats, style: Style, rest: str) -> Figure:
-    figure, stack = sheet([HEIGHT_IN] * len(page.overlays), above_points=30.0, sharex=True)
+    figure, stack = sheet(
+        [HEIGHT_IN if len(page.overlays) > 1 else ALONE_IN] * len(page.overlays), above_points=30.0, sharex=True
+    )
     for axes, overlay in zip(stack, page.overlays, strict=True):
         for hertz in natural_hz:
             axes.axvline(hertz, color=MODES, linewidth=0.6, zorder=1)
@@ -40,7 +42,7 @@ def _figure(page: OverlayPage, natural_hz: Floats, style: Style, rest: str) -> F
     stack[0].set_xlim(first.frequency_hz[0], first.frequency_hz[-1])
     stack[-1].set_xlabel("Frequency [Hz]")
     reference = plain(style.labels[first.reference.name])
-    figure.supylabel(f"{page.quantity} |H| [{printed_unit(page.unit)}] to {reference}", fontsize=8.5)
+    figure.supylabel(f"{page.quantity} |H| [{printed_unit(page.unit)}]\nto {reference}", fontsize=8.5)
     if rest:
         figure.suptitle(rest.removeprefix(" · "), fontsize=7.5, x=0.99, ha="right")
     # The name of the first function stands between the frame and the legend.

@@ -8,7 +8,7 @@ from chladni.viewers.report.markup import element, escaped, table
 from chladni.viewers.style import Style
 
 # Of each mode: those that matter, where a large structure has hundreds of neighbours.
-MOTIONS_OF_A_MODE = 5
+MOTIONS_OF_A_MODE = 3
 
 
 def modes_section(modes: ModeSet, validation: ModeValidation | None) -> str:

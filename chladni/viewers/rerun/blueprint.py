@@ -162,21 +162,27 @@ def _shapes(modes: ModesViews, name: str) -> rrb.Container:
 
 
 def _tabs(modes: Sequence[ModeViews]) -> rrb.Container:
-    """All modes behind one row of tabs, or behind two rows when one is too short."""
-    rows = -(-len(modes) // TABS_IN_A_ROW)
-    # Rows of equal length, each named by the first and the last of its modes.
-    length = -(-len(modes) // rows)
-    parts = [modes[start : start + length] for start in range(0, len(modes), length)]
-    tabs = [_mode(mode) for mode in modes] if rows == 1 else [_row(part) for part in parts]
+    """All modes behind rows of tabs that fit into a window, and all together where they can be seen together."""
+    tabs = _rows(modes)
     if 1 < len(modes) <= SEEN_TOGETHER:
         tabs.append(rrb.Grid(*(mode.shape.small for mode in modes), name="All"))
     return rrb.Tabs(*tabs, active_tab=0)
 
 
-def _row(part: Sequence[ModeViews]) -> rrb.Container:
-    first, last = part[0], part[-1]
-    name = f"{first.number}–{last.number}: {first.frequency}–{last.frequency} Hz"
-    return rrb.Tabs(*(_mode(mode) for mode in part), name=name)
+def _rows(modes: Sequence[ModeViews]) -> list[rrb.Container]:
+    """A tab a mode, or a tab a group of modes, each named by its first and its last, that has tabs again."""
+    if len(modes) <= TABS_IN_A_ROW:
+        return [_mode(mode) for mode in modes]
+    groups = min(TABS_IN_A_ROW, -(-len(modes) // TABS_IN_A_ROW))
+    length = -(-len(modes) // groups)
+    parts = [modes[start : start + length] for start in range(0, len(modes), length)]
+    return [
+        rrb.Tabs(
+            *_rows(part),
+            name=f"{part[0].number}–{part[-1].number}: {part[0].frequency}–{part[-1].frequency} Hz",
+        )
+        for part in parts
+    ]
 
 
 def _mode(mode: ModeViews) -> rrb.Container:

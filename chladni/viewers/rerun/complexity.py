@@ -11,7 +11,7 @@ from chladni.viewers.spread import spread
 from chladni.viewers.style import Style
 
 PATH = "/complexity"
-REACH = 1.25
+REACH = 1.4
 PHASE_COLOUR = (235, 235, 235)
 # Of a label in a view of a few hundred pixels, in units of the greatest component.
 LABEL_SIZE = (0.45, 0.2)

@@ -3,7 +3,7 @@
 import rerun as rr
 
 from chladni.signals.study import Study
-from chladni.viewers.mode_tables import hertz, mode_title
+from chladni.viewers.mode_tables import has_mac, hertz, mode_title
 from chladni.viewers.panels import panels
 from chladni.viewers.rerun.blueprint import ChannelViews, ModesViews, ModeViews, ResponseViews, Views, arrange
 from chladni.viewers.rerun.complexity import draw_complexity
@@ -114,8 +114,7 @@ def _draw_modes(recording: rr.RecordingStream, study: Study, style: Style) -> Mo
             )
             for row, (shape, plane) in enumerate(zip(shapes, planes, strict=True))
         ],
-        # One mode is like itself and nothing else.
-        mac=draw_mac(recording, modes, validation) if validation is not None and len(shapes) > 1 else None,
+        mac=draw_mac(recording, modes, validation) if validation is not None and has_mac(modes) else None,
         stabilisation=draw_stabilisation(recording, modes),
         synthesis=draw_synthesis(recording, study, modes, style),
     )

@@ -12,8 +12,9 @@ from chladni.viewers.style import mac_colours
 
 PATH = "/mac"
 # Up to so many modes every cell has its number; beyond, only those of different modes that look alike.
-ALL_NUMBERED = 8
+ALL_NUMBERED = 10
 ALIKE = 0.2
+NUMBERS = 100
 INK = (235, 235, 235)
 # Labels hang below their place by about this share of a picture that half the window shows.
 DROP = 0.035
@@ -48,6 +49,9 @@ def _draw_numbers(recording: rr.RecordingStream, mac: np.ndarray) -> None:
     if count > ALL_NUMBERED:
         wanted = (mac >= ALIKE) & ~np.eye(count, dtype=np.bool_)
     rows, columns = np.nonzero(wanted)
+    # Too many would hide the cells, whose colour says the same.
+    if rows.size > NUMBERS:
+        return
     places = np.column_stack([columns + 0.5, rows + 0.5 - DROP * count])
     texts = [f"{mac[row, column]:.2f}" for row, column in zip(rows, columns, strict=True)]
     draw_labels(recording, f"{PATH}/numbers", places, texts, colours=[INK] * len(texts))

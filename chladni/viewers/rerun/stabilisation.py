@@ -1,5 +1,7 @@
 """The stabilisation diagram: poles of all model orders over the indicator, those taken for modes ringed."""
 
+from dataclasses import replace
+
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
@@ -11,11 +13,14 @@ from chladni.viewers.labels import decibel_unit
 from chladni.viewers.mode_tables import hertz
 from chladni.viewers.rerun.canvas import BEHIND, BELOW, LETTERS, Canvas, draw_labels
 from chladni.viewers.spread import spread
-from chladni.viewers.stabilisation import STATUS_NAMES, frequency_range, order_range
+from chladni.viewers.stabilisation import STATUS_NAMES, frequency_range, order_range, title
 from chladni.viewers.style import STATUS_ON_DARK
 
 PATH = "/stabilisation"
-WIDTH, HEIGHT = 1440.0, 330.0
+# With the synthesis below it, and alone on its page.
+WIDTH, HEIGHT, ALONE = 1440.0, 320.0, 690.0
+# Half of a letter, to set a text right.
+HALF_LETTER = 3.7
 INDICATOR_COLOUR = (120, 120, 120)
 MODE_COLOUR = (245, 245, 245)
 HARMONIC_COLOUR = (235, 80, 80)
@@ -27,7 +32,8 @@ def draw_stabilisation(recording: rr.RecordingStream, modes: ModeSet) -> rrb.Vie
     diagram = modes.stabilisation
     if diagram is None:
         return None
-    canvas = Canvas(width=WIDTH, height=HEIGHT, x_range=frequency_range(modes, diagram), y_range=order_range(diagram))
+    height = ALONE if modes.fit is None else HEIGHT
+    canvas = Canvas(width=WIDTH, height=height, x_range=frequency_range(modes, diagram), y_range=order_range(diagram))
     canvas.draw_axes(recording, f"{PATH}/axes", x_name="Frequency [Hz]", y_name="Model order")
     _draw_indicator(recording, canvas, diagram)
     _draw_modes(recording, canvas, modes)
@@ -35,7 +41,7 @@ def draw_stabilisation(recording: rr.RecordingStream, modes: ModeSet) -> rrb.Vie
         _draw_poles(recording, canvas, diagram, status, name)
     _draw_legend(recording)
     return canvas.view(
-        PATH, f"Stabilisation over {diagram.indicator_name} · point at a pole to read it", right=80.0, above=95.0
+        PATH, f"Stabilisation over {diagram.indicator_name} · point at a pole to read it", right=80.0, above=115.0
     )
 
 
@@ -43,7 +49,7 @@ def _draw_indicator(recording: rr.RecordingStream, canvas: Canvas, diagram: Stab
     """Curves in decibels, over the whole height, with an axis of their own on the right."""
     level = decibels_of_amplitude(diagram.indicator)
     low, high = level_limits(level)
-    over = Canvas(width=WIDTH, height=HEIGHT, x_range=canvas.x_range, y_range=(low, high))
+    over = replace(canvas, y_range=(low, high))
     inside = (diagram.indicator_hz >= canvas.x_range[0]) & (diagram.indicator_hz <= canvas.x_range[1])
     strips = []
     for curve in level:
@@ -58,8 +64,8 @@ def _draw_indicator(recording: rr.RecordingStream, canvas: Canvas, diagram: Stab
     recording.log(f"{PATH}/indicator", lines, static=True)
     numbers = ticks(low, high, count=8)
     right = over.places(np.full(numbers.size, canvas.x_range[1]), numbers) + ABOVE_RIGHT
-    name = f"{diagram.indicator_name} [{decibel_unit(diagram.indicator_unit)}]"
-    places = np.vstack([right, [(WIDTH - 60.0, -1.6 * LETTERS)]])
+    name = f"{title(diagram)} [{decibel_unit(diagram.indicator_unit)}]"
+    places = np.vstack([right, [(WIDTH + 2 * LETTERS - HALF_LETTER * len(name), -2.2 * LETTERS)]])
     draw_labels(recording, f"{PATH}/indicator/numbers", places, [*(f"{number:g}" for number in numbers), name])
 
 
@@ -70,7 +76,9 @@ def _draw_modes(recording: rr.RecordingStream, canvas: Canvas, modes: ModeSet) -
         ("modes", modes.frequency_hz, MODE_COLOUR, ""),
         ("harmonics", np.array([line.frequency_hz for line in modes.harmonics]), HARMONIC_COLOUR, " (machine)"),
     ]
-    for kind, frequencies_hz, colour, word in marks:
+    for kind, everywhere_hz, colour, word in marks:
+        inside = (everywhere_hz >= canvas.x_range[0]) & (everywhere_hz <= canvas.x_range[1])
+        frequencies_hz = everywhere_hz[inside]
         strips = [canvas.places([at, at], [low, high]) for at in frequencies_hz]
         lines = rr.LineStrips2D(
             strips, colors=[(*colour, 90)] * len(strips), radii=rr.Radius.ui_points(0.5), draw_order=-2.0
@@ -114,20 +122,20 @@ def _draw_poles(
     taken = places[diagram.mode[chosen] >= 0]
     rings = [_ring(place) for place in taken]
     if rings:
-        circles = rr.LineStrips2D(rings, colors=[(*MODE_COLOUR, 150)], radii=rr.Radius.ui_points(0.4), draw_order=9.0)
+        circles = rr.LineStrips2D(rings, colors=[(*MODE_COLOUR, 130)], radii=rr.Radius.ui_points(0.4), draw_order=9.0)
         recording.log(f"{PATH}/taken/{name.replace(' ', '_')}", circles, static=True)
 
 
 def _ring(place: Floats) -> Floats:
     angle = np.linspace(0, 2 * np.pi, 13)
-    return np.asarray(place + 5.0 * np.column_stack([np.cos(angle), np.sin(angle)]))
+    return np.asarray(place + 4.2 * np.column_stack([np.cos(angle), np.sin(angle)]))
 
 
 def _draw_legend(recording: rr.RecordingStream) -> None:
     """A row above the frame: a dot of each colour, and its meaning below it."""
     count = len(STATUS_NAMES) + 1
     across = WIDTH * (0.22 + 0.56 * np.arange(count) / (count - 1))
-    places = np.column_stack([across, np.full(count, -3.6 * LETTERS)])
+    places = np.column_stack([across, np.full(count, -4.4 * LETTERS)])
     dots = rr.Points2D(places[:-1], colors=list(STATUS_ON_DARK), radii=rr.Radius.ui_points(4.0), show_labels=False)
     recording.log(f"{PATH}/legend/dots", dots, static=True)
     ring = rr.LineStrips2D([_ring(places[-1])], colors=[MODE_COLOUR], radii=rr.Radius.ui_points(0.5))

@@ -43,15 +43,19 @@ def _draw_overlay(recording: rr.RecordingStream, overlay: Overlay, path: str, st
     colour, label = style.on_dark(overlay.response), style.labels[overlay.response.name]
     if overlay.measured_hz.size:
         # Not dots: the viewer draws those over all lines.
-        wide = rr.SeriesLines(
-            names=f"{label} measured", colors=[(*colour, 130)], widths=4.0, aggregation_policy="Max"
-        )
+        wide = rr.SeriesLines(names=f"{label} measured", colors=[_dim(colour)], widths=4.0, aggregation_policy="Max")
         recording.log(f"{path}/measured", wide, static=True)
         x, y = _broken(overlay.measured_hz, decibels_of_amplitude(np.abs(overlay.measured)))
         send_scalars(recording, f"{path}/measured", frequency_index(x), y)
     name = f"{label}, error {overlay.error:.1%}"
     x, y = _broken(overlay.frequency_hz, decibels_of_amplitude(np.abs(overlay.synthesised)))
     draw_line(recording, f"{path}/synthesised", x, y, name=name, colour=_bright(colour))
+
+
+def _dim(colour: Colour) -> Colour:
+    """Darken a line; an opacity would show its joints as dots."""
+    red, green, blue = (part // 2 for part in colour)
+    return red, green, blue
 
 
 def _bright(colour: Colour) -> Colour:
