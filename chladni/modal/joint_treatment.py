@@ -148,6 +148,6 @@ def _sentence(
     frequency_hz, damping = float(modes.frequency_hz[motion.mode]), float(modes.damping_ratio[motion.mode])
     return (
         f"{start}; a damper of {prefixed(damper, 'N s/m')} between the two would double the damping of "
-        f"{100 * damping:.2g} % and a spring of {prefixed(spring, 'N/m')} raise the frequency by {_FREQUENCY_STEP * frequency_hz:.2g} Hz, "
-        "to first order."
+        f"{100 * damping:.2g} % and a spring of {prefixed(spring, 'N/m')} raise the frequency by "
+        f"{_FREQUENCY_STEP * frequency_hz:.2g} Hz, to first order."
     )
