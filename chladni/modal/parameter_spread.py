@@ -21,11 +21,15 @@ class ParameterSpread:
 
     ``own[response, coefficient, coefficient]`` and ``theta[parameter, parameter]`` are covariances,
     ``coupling[response, coefficient, parameter]``; parameters are Re, Im of poles, then of participation.
+    ``root[parameter, direction]`` times its transpose is theta, and ``rooted`` the coupling of shapes times root: a
+    variance then is a sum of squares, which keeps many responses cheap.
     """
 
     own: Floats
     coupling: Floats
     theta: Floats
+    root: Floats
+    rooted: Floats
     solution: ShapeSolution
 
     @property
@@ -52,7 +56,7 @@ class ParameterSpread:
         # d(psi_i/psi_c) = (d psi_i - (psi_i/psi_c) d psi_c) / psi_c
         through = coupling - _real(ratios) @ coupling[largest]
         total = own + _real(ratios) @ own[largest] @ _real(ratios.conj())
-        total = total + scatter.shared * _sandwich(through, self.theta)
+        total = total + scatter.shared * _squared(through)
         total[largest] = 0
         return _packed(total, np.full(ratios.shape, 1 / scale))
 
@@ -63,7 +67,7 @@ class ParameterSpread:
         vector = self.participation[mode]
         # d(L_j psi_c) = psi_c d L_j + L_j d psi_c
         through = _real(np.full(vector.shape, scale)) @ self._components(mode) + _real(vector) @ coupling[largest]
-        total = _real(vector) @ own[largest] @ _real(vector.conj()) + _sandwich(through, self.theta)
+        total = _real(vector) @ own[largest] @ _real(vector.conj()) + _squared(through)
         return _packed(total, np.ones_like(vector))
 
     def amplitude(self, mode: int, largest: int) -> tuple[Floats, Floats]:
@@ -74,9 +78,9 @@ class ParameterSpread:
         reference = int(np.argmax(np.abs(self.participation[mode])))
         factor = _real(self.participation[mode, reference])
         rows = slice(2 * mode, 2 * mode + 2)
-        through = factor @ self.coupling[largest, rows]
+        through = factor @ self.rooted[largest, rows]
         through += _real(self.shapes[mode, largest]) @ self._components(mode)[reference]
-        return through @ self.theta, factor @ self.own[largest, rows]
+        return through @ self.root.T, factor @ self.own[largest, rows]
 
     def field(self, near: slice, theta: Floats, own: tuple[int, Floats] | None = None) -> Complex:
         """Change of the model ``[response, reference, line]`` with theta and with one response's own scatter."""
@@ -108,8 +112,8 @@ class ParameterSpread:
         own, coupling = self._shape(mode)
         here, there = 1 / (self.participation[mode, reference] * scale**2 * 2j * pole.imag), -2 * mass / scale
         beside = -mass / self.participation[mode, reference]
-        tuned = np.zeros((2, self.theta.shape[0]))
-        tuned[0, 2 * mode + 1] = 1 / pole.imag
+        tuned = np.zeros((2, self.root.shape[1]))
+        tuned[0] = self.root[2 * mode + 1] / pole.imag
         direct = _real(np.full(mass.shape, here))
         through = direct @ coupling + _real(there) @ coupling[largest]
         through += _real(beside) @ self._components(mode)[reference] - _real(mass) @ tuned
@@ -119,20 +123,16 @@ class ParameterSpread:
         # The largest component is one scatter, seen twice.
         both = direct[largest] + shared[largest]
         total[largest] = both @ own[largest] @ both.T
-        return np.asarray(np.sqrt((total + _sandwich(through, self.theta))[:, 0, 0]), dtype=np.float64)
+        return np.asarray(np.sqrt((total + _squared(through))[:, 0, 0]), dtype=np.float64)
 
     def _shape(self, mode: int) -> tuple[Floats, Floats]:
         rows = slice(2 * mode, 2 * mode + 2)
-        return self.own[:, rows, rows], self.coupling[:, rows]
+        return self.own[:, rows, rows], self.rooted[:, rows]
 
     def _components(self, mode: int) -> Floats:
-        """``[reference, 2, parameter]`` that picks Re, Im of a participation vector."""
+        """``[reference, 2, direction]`` root of Re, Im of a participation vector."""
         modes, references = self.participation.shape
-        picks = np.zeros((references, 2, self.theta.shape[0]))
-        for j in range(references):
-            first = 2 * modes * (1 + j) + 2 * mode
-            picks[j, [0, 1], [first, first + 1]] = 1
-        return picks
+        return self.root[2 * modes :].reshape(references, modes, 2, -1)[:, mode]
 
 
 def parameter_spread(lines: ModelLines, solution: ShapeSolution) -> ParameterSpread:
@@ -145,10 +145,17 @@ def parameter_spread(lines: ModelLines, solution: ShapeSolution) -> ParameterSpr
     coupling = np.zeros((*equations.coupling.shape[:2], size))
     # Shapes and residuals follow the parameters so that the misfit stays least.
     coupling[..., equations.free] = -equations.coupling
+    # Poles in rad/s and participation factors are of different size; a common one keeps the digits of both.
+    sizes = np.sqrt(np.diag(theta))
+    safe = np.where(sizes > 0, sizes, 1.0)
+    strengths, directions = np.linalg.eigh(theta / safe[:, np.newaxis] / safe)
+    root = sizes[:, np.newaxis] * directions * np.sqrt(np.maximum(strengths, 0.0))
     return ParameterSpread(
         own=solution.equations.inverse,
         coupling=coupling,
         theta=theta,
+        root=root,
+        rooted=(coupling[:, : 2 * modes].reshape(-1, size) @ root).reshape(-1, 2 * modes, size),
         solution=solution,
     )
 
@@ -161,8 +168,8 @@ def _real(factors: Complex | complex) -> Floats:
     )
 
 
-def _sandwich(through: Floats, covariance: Floats) -> Floats:
-    return np.asarray(through @ covariance @ np.swapaxes(through, -1, -2), dtype=np.float64)
+def _squared(through: Floats) -> Floats:
+    return np.asarray(through @ np.swapaxes(through, -1, -2), dtype=np.float64)
 
 
 def _packed(covariance: Floats, factors: Complex) -> Complex:
