@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from chladni.modal.fdd import half_power_half_width, nothing_found, require_shares, required_lag_window
 from chladni.modal.response_modes import ResponseMode, response_mode_set
-from chladni.modal.response_peaks import ResponsePeak, pick_peaks
+from chladni.modal.response_peaks import ResponsePeak, close_mode_notes, pick_peaks
 from chladni.modal.response_shapes import ResponseShape, modal_filters, modal_spectrum, shape_at
 from chladni.modal.spectral_bell import Bell, BellData, fit_bell
 from chladni.modal.spectral_decomposition import SpectralDecomposition, decompose
@@ -107,7 +107,8 @@ class EnhancedFrequencyDomainDecomposition:
         # All peaks together, also those that turn out to be none: they are in the spectra of the others.
         filters = modal_filters([shape.vector for shape in shapes])
         modes: list[ResponseMode] = []
-        notes, harmonics = [*picked.notes, *nothing_found(picked)], []
+        close = close_mode_notes(decomposition, picked.peaks, widths)
+        notes, harmonics = [*picked.notes, *nothing_found(picked), *close], []
         for row, peak in enumerate(picked.peaks):
             realm = _realm(decomposition, picked.peaks, row)
             spectrum = modal_spectrum(decomposition, filters[row])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chladni.modal.lag_window import LagWindow, lag_window
 from chladni.modal.response_modes import ResponseMode, response_mode_set
-from chladni.modal.response_peaks import PickedPeaks, ResponsePeak, pick_peaks
+from chladni.modal.response_peaks import PickedPeaks, ResponsePeak, close_mode_notes, pick_peaks
 from chladni.modal.response_shapes import shape_at
 from chladni.modal.spectral_bell import own_half_width
 from chladni.modal.spectral_decomposition import SpectralDecomposition, decompose, relative_std
@@ -31,7 +31,8 @@ class FrequencyDomainDecomposition:
 
     Frequencies lie between the lines by interpolation; the shape is the first singular vector over the top of the
     peak; the damping ratio is half the half-power width over the frequency, corrected for what the window widens.
-    Modes closer than their half-power widths make one peak and are found as one, or left out for their mixed shape.
+    Modes closer than two half-power widths make one peak: they are found as one, with a note that the second singular
+    value rises too, or left out for their mixed shape.
 
     Attributes
     ----------
@@ -106,8 +107,10 @@ class FrequencyDomainDecomposition:
             false_alarm=self.false_alarm,
             min_mac=self.min_mac,
         )
-        modes = [_mode(decomposition, peak) for peak in picked.peaks]
-        notes = (*picked.notes, *nothing_found(picked), HALF_POWER)
+        widths = [half_power_half_width(decomposition, peak) for peak in picked.peaks]
+        modes = [_mode(decomposition, peak, width) for peak, width in zip(picked.peaks, widths, strict=True)]
+        close = close_mode_notes(decomposition, picked.peaks, widths)
+        notes = (*picked.notes, *nothing_found(picked), *close, HALF_POWER)
         return response_mode_set(decomposition, modes, estimator="FDD", notes=notes)
 
 
@@ -144,8 +147,7 @@ def required_lag_window(decomposition: SpectralDecomposition) -> LagWindow:
     return window
 
 
-def _mode(decomposition: SpectralDecomposition, peak: ResponsePeak) -> ResponseMode:
-    half_width_hz = half_power_half_width(decomposition, peak)
+def _mode(decomposition: SpectralDecomposition, peak: ResponsePeak, half_width_hz: float) -> ResponseMode:
     scatter = relative_std(decomposition)
     # Near its half-power point a Lorentzian falls by its own value in a half width: a line wrong by sigma moves its
     # crossing by sigma half widths; the top, chosen as the highest of many lines, is wrong by more and moves both.

@@ -22,6 +22,8 @@ MOST_PEAKS = 200
 NEIGHBOURS = 2
 # A frequency given by hand means the highest line this near.
 NEAR_LINES = 3
+# A second singular value that rises so far under a peak is no scatter of a few lines.
+SECOND_RISE = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,6 +104,35 @@ def modal_coherence(decomposition: SpectralDecomposition, line: int) -> float:
     beside = [row for step in range(1, NEIGHBOURS + 1) for row in (line - step, line + step)]
     inside = [row for row in beside if 0 <= row < len(first)]
     return float(np.mean(np.abs(first[inside].conj() @ first[line]) ** 2))
+
+
+def close_mode_notes(
+    decomposition: SpectralDecomposition, peaks: Sequence[ResponsePeak], half_widths_hz: Sequence[float]
+) -> tuple[str, ...]:
+    """Say under which peaks the second singular value rises too: more than one mode, or a machine, is in them."""
+    notes = []
+    for peak, half_width_hz in zip(peaks, half_widths_hz, strict=True):
+        if _second_rise(decomposition, peak.line, half_width_hz / decomposition.spacing_hz) > SECOND_RISE:
+            notes.append(
+                f"the second singular value rises with the first at {peak.frequency_hz:.4g} Hz: two close modes or a "
+                "machine may be in this peak, and its damping and shape theirs together; a finer resolution or "
+                "CovarianceDrivenSubspace may part them"
+            )
+    return tuple(notes)
+
+
+def _second_rise(decomposition: SpectralDecomposition, line: int, half_width: float) -> float:
+    """Second singular value at a peak over that beside it; 1 where another mode's flank or noise makes it."""
+    if decomposition.values.shape[1] < 2:
+        return 1.0
+    second = decomposition.values[:, 1]
+    # The window spreads the peak over two lines in any case.
+    core, near = int(half_width) + 1, int(4 * half_width) + 4
+    inside = second[max(line - core, 0) : line + core + 1]
+    beside = [second[max(line - 2 * near, 0) : max(line - near, 0)], second[line + near : line + 2 * near]]
+    # The higher side: the flank of a strong neighbour falls across the peak without being its own.
+    level = max((float(side.mean()) for side in beside if side.size), default=0.0)
+    return float(inside.mean()) / max(level, np.finfo(float).eps * float(decomposition.values[line, 0]))
 
 
 def _significant(

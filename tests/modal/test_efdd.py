@@ -11,7 +11,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.cross_spectra import cross_spectra
 from tests.modal.made_spectra import expected_spectra
-from tests.modal.truth import ModalTruth, ambient_record, chain, noise_record
+from tests.modal.truth import ModalTruth, ambient_record, chain, close_modes, noise_record
 
 METHOD = EnhancedFrequencyDomainDecomposition()
 
@@ -164,3 +164,14 @@ def test_a_hump_too_wide_for_a_resonance_is_left_out():
     modes = METHOD.identify(replace(spectra, density=density), frequencies_hz=[7.0])
     assert modes.frequency_hz.size == 0
     assert any("no resonance to speak of" in note for note in modes.provenance.notes)
+
+
+def test_close_modes_found_as_one_are_told_and_single_ones_are_not():
+    rng = np.random.default_rng(6)
+    for apart, expected in ((0.01, True), (0.02, True), (0.2, False)):
+        record = ambient_record(close_modes(apart=apart), cycles=4000, rng=rng, noise=0.02)
+        modes = METHOD.identify(cross_spectra(record, resolution_hz=0.05))
+        assert modes.frequency_hz.size == (1 if expected else 2)
+        assert any("second singular value rises" in note for note in modes.provenance.notes) == expected
+    record = ambient_record(chain(), cycles=1000, rng=rng, noise=0.05)
+    assert not any("second singular" in note for note in METHOD.identify(cross_spectra(record)).provenance.notes)
