@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import rerun as rr
 from numpy.typing import NDArray
+from rerun.chunk import RrdReader
 
 from chladni.signals.study import Study
 from chladni.signals.time_series import TimeSeries
@@ -209,6 +210,32 @@ def test_time_is_active_unless_only_shapes_were_drawn(arm: Contents, tmp_path: P
     assert first(arm) == ("time", rr.blueprint.components.LoopMode.All.value)
     assert first(contents(made.one_mode(), tmp_path))[0] == "phase"
     assert first(contents(made.without_modes(), tmp_path))[0] == "time"
+
+
+def active_page(path: Path) -> str:
+    """Name of the page that a file opens with."""
+    reader = RrdReader(path)
+    (blueprint,) = reader.blueprints()
+    rows: dict[str, dict[str, Any]] = {}
+    for chunk in reader.stream(store=blueprint):
+        rows.setdefault(chunk.entity_path.strip("/"), {}).update(chunk.to_record_batch().to_pylist()[0])
+    kind = "ContainerBlueprint:"
+    names = {where: row[f"{kind}display_name"][0] for where, row in rows.items() if row.get(f"{kind}display_name")}
+    overview = next(where for where, name in names.items() if name == "Overview")
+    root = next(row for row in rows.values() if overview in row.get(f"{kind}contents", []))
+    return names[root[f"{kind}active_tab"][0]]
+
+
+def test_the_first_page_is_the_overview_unless_it_has_words_alone(tmp_path: Path) -> None:
+    series = TimeSeries(values=np.zeros((1, 50)), sample_rate_hz=100.0, channels=MODES.channels[:1])
+    study = replace(made.one_mode(), series=(series,))
+    assert active_page(write_rrd(ARM, tmp_path / "a.rrd")) == "Modes"
+    assert active_page(write_rrd(study, tmp_path / "b.rrd")) == "Overview"
+
+
+def test_overview_has_the_modes_in_its_findings(arm: Contents) -> None:
+    (text,) = arm.static("/findings")["TextDocument:text"]
+    assert "24.6728 ± 0.0049" in text
 
 
 def test_stabilisation_shows_every_pole_where_it_belongs(arm: Contents) -> None:

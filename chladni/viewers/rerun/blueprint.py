@@ -90,7 +90,7 @@ def arrange(views: Views) -> rrb.Blueprint:
         pages.append(_modes(views.modes))
     # Nothing is left to heuristics: they would add a view for every entity.
     return rrb.Blueprint(
-        rrb.Tabs(*pages, active_tab=0),
+        rrb.Tabs(*pages, active_tab=_first_page(views, len(pages))),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         # Paused: a file that starts to play runs away from whoever wants to read it.
@@ -134,6 +134,11 @@ def _response(response: ResponseViews, name: str) -> rrb.Container:
     curves = rrb.Vertical(response.magnitude, response.phase, response.coherence, row_shares=[2, 1, 1])
     side = [response.nyquist] if response.deflection is None else [response.deflection, response.nyquist]
     return rrb.Horizontal(curves, rrb.Vertical(*side), column_shares=[1.9, 1], name=name)
+
+
+def _first_page(views: Views, count: int) -> int:
+    """The overview, unless it has words alone and there are modes to look at, which come last."""
+    return count - 1 if views.modes is not None and not (views.waveforms or views.densities) else 0
 
 
 def _first_timeline(views: Views) -> str:

@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 from chladni.signals.peak import Peak
 from chladni.signals.study import Study
 from chladni.viewers.labels import printed_unit, value_with_deviation
+from chladni.viewers.mode_tables import Row, mode_table
 from chladni.viewers.style import Style
 
 PATH = "/findings"
@@ -44,11 +45,26 @@ def escaped(text: str) -> str:
 def _page(study: Study, style: Style) -> Iterator[str]:
     yield f"# {escaped(study.title)}\n"
     yield from (f"- {escaped(finding)}" for finding in study.findings)
+    yield from _modes(study)
     yield from _peaks("Peaks of the spectra", study.peaks, style, channels="channels")
     yield from _peaks("Peaks of the frequency responses", study.response_peaks, style, channels="response, reference")
     yield from _method(study)
     yield "\n## How to read the plots\n"
     yield from (f"- {sentence}" for sentence in HOW_TO_READ)
+
+
+def _modes(study: Study) -> Iterator[str]:
+    if study.modes is None or not study.modes.frequency_hz.size:
+        return
+    yield "\n## Modes\n"
+    yield from markdown_table(*mode_table(study.modes, study.validation))
+
+
+def markdown_table(headings: Row, rows: Sequence[Row]) -> Iterator[str]:
+    """Give the lines of a table of texts, which are made inert here."""
+    yield f"| {' | '.join(headings)} |"
+    yield "|---" * len(headings) + "|"
+    yield from (f"| {' | '.join(escaped(text) for text in row)} |" for row in rows)
 
 
 def _peaks(title: str, peaks: Sequence[Peak], style: Style, *, channels: str) -> Iterator[str]:

@@ -7,8 +7,8 @@ import rerun.blueprint as rrb
 
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.study import Study
-from chladni.viewers.mode_tables import Row, advice, first_of_each, mode_table, motion_table
-from chladni.viewers.rerun.findings import escaped
+from chladni.viewers.mode_tables import advice, first_of_each, mode_table, motion_table
+from chladni.viewers.rerun.findings import escaped, markdown_table
 from chladni.viewers.style import Style
 
 PATH = "/modes"
@@ -32,7 +32,7 @@ def _page(study: Study, modes: ModeSet, style: Style) -> Iterator[str]:
     found = modes.frequency_hz.size > 0
     if found:
         yield "± is one sigma.\n"
-        yield from _table(*mode_table(modes, study.validation))
+        yield from markdown_table(*mode_table(modes, study.validation))
     else:
         yield "No mode was found."
     told = advice(modes, study.validation)
@@ -53,10 +53,4 @@ def _motions(study: Study, modes: ModeSet, style: Style) -> Iterator[str]:
     shown = first_of_each(rows, MOTIONS_OF_A_MODE)
     if len(shown) < len(rows):
         yield f"The {MOTIONS_OF_A_MODE} greatest of each mode.\n"
-    yield from _table(headings, shown)
-
-
-def _table(headings: Row, rows: list[Row]) -> Iterator[str]:
-    yield f"| {' | '.join(headings)} |"
-    yield "|---" * len(headings) + "|"
-    yield from (f"| {' | '.join(escaped(text) for text in row)} |" for row in rows)
+    yield from markdown_table(headings, shown)
