@@ -204,7 +204,9 @@ def _mode_set(correlations: CorrelationFunctions, poles: _Poles, chosen: ChosenP
     stds = np.zeros_like(shapes)
     for mode, row in enumerate(rows.tolist()):
         vector = table.vector[row]
-        shapes[mode] = vector / vector[np.argmax(np.abs(vector))]
+        largest = np.argmax(np.abs(vector))
+        shapes[mode] = vector / vector[largest]
+        shapes[mode, largest] = 1.0
         stds[mode] = shape_std(propagation.shape(*poles.locate(row)))
     return ModeSet(
         frequency_hz=frequency_hz,

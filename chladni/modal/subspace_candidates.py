@@ -13,6 +13,7 @@ from chladni.modal.pole_table import PoleTable
 from chladni.modal.replication import replication
 from chladni.signals.machine_harmonic import MachineHarmonic
 
+Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
@@ -23,8 +24,9 @@ class ResponseRules:
 
     Attributes
     ----------
-    replication
-        Least share of it that comes back in data that it was not found in (`replication`).
+    replication, least_replication
+        Least share of it that comes back in data that it was not found in (`replication`): the second for a pole
+        without error bar, rising with its relative standard deviation to the first.
     damping_std
         Largest standard deviation of the damping ratio over the ratio, and of the frequency over the half-power
         half-width.
@@ -39,6 +41,7 @@ class ResponseRules:
     """
 
     replication: float = 0.55
+    least_replication: float = 0.25
     damping_std: float = 0.7
     over_least_std: float = 12.0
     harmonic_distance: float = 0.01
@@ -104,7 +107,7 @@ def choose_poles(
         [certain_pole(table, np.flatnonzero(found.member == mode)) for mode in range(found.row.size)], dtype=np.int64
     )
     shares = replication(correlations, table, found, block_rows=block_rows)
-    unsure = (shares < rules.replication) | _too_wide(table, rows, correlations.duration_s, rules)
+    unsure = _unsure(table, rows, shares, correlations.duration_s, rules)
     machine = np.array([_is_harmonic(table, row, harmonics, rules) for row in rows], dtype=np.bool_)
     if frequencies_hz is not None:
         kept, notes = np.arange(rows.size), _doubts(table, rows, unsure, machine)
@@ -122,12 +125,16 @@ def _of_full_models(table: PoleTable, found: PoleSelection, kept: Rows) -> Rows:
     return np.array([certain_pole(table, cluster, least_order=least) for cluster in clusters], dtype=np.int64)
 
 
-def _too_wide(table: PoleTable, rows: Rows, duration_s: float, rules: ResponseRules) -> Bools:
+def _unsure(table: PoleTable, rows: Rows, shares: Floats, duration_s: float, rules: ResponseRules) -> Bools:
     frequency_hz, damping = table.frequency_hz[rows], table.damping_ratio[rows]
     frequency_std, damping_std = pole_std(table, rows)
     spread = np.hypot(frequency_std / frequency_hz, damping_std) / np.sqrt(2)
     least = least_std(frequency_hz, damping, duration_s)[1]
-    return np.asarray((spread > rules.damping_std * damping) | (spread > rules.over_least_std * least))
+    # A pole of noise that many channels make look sure doesn't come back at all; one of a mode may come back in part,
+    # where half of the record gives its models two poles for it.
+    needed = np.minimum(rules.replication, rules.least_replication + spread / damping)
+    wide = (spread > rules.damping_std * damping) | (spread > rules.over_least_std * least)
+    return np.asarray((shares < needed) | wide, dtype=np.bool_)
 
 
 def _is_harmonic(table: PoleTable, row: int, harmonics: Sequence[MachineHarmonic], rules: ResponseRules) -> bool:

@@ -29,6 +29,7 @@ FEWEST_ROWS = 10
 SPANS_IN_RECORD = 20
 # A Hankel matrix of this side is decomposed in about a second.
 MOST_SIDE = 1500
+LARGEST_SIDE = 4000
 MOST_REFERENCES = 12
 # More peaks than this say no more about where the band of interest begins and ends.
 MOST_PEAKS = 500
@@ -114,9 +115,15 @@ def plan_subspace(
                 f"the lags span {spanned:.1f} cycles of the lowest peak ({lowest_hz:.3g} Hz) only: higher peaks need "
                 "the sample rate; identify the low modes on their own, in a band that ends above them"
             )
+    side = block_rows * min(channels, len(rows))
+    if side > LARGEST_SIDE:
+        raise SetupError(
+            f"{block_rows} block rows of {channels} channels and {len(rows)} references make a matrix of side "
+            f"{side}; at most {LARGEST_SIDE} is decomposed in reasonable time, so take fewer block rows or references"
+        )
     if decimation > 1:
         notes.append(
-            f"correlations are taken at every {decimation}th sample ({rate_hz:.4g} Hz) behind an anti-alias filter "
+            f"correlations are taken every {decimation} samples (at {rate_hz:.4g} Hz), behind an anti-alias filter "
             f"that passes up to {_passed_hz(rate_hz, decimation):.4g} Hz"
         )
     passed = _passed_hz(rate_hz, decimation)
