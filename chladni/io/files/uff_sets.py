@@ -1,5 +1,6 @@
 """The door to universal files that all their readers and writers go through: datasets by pyuff, checked."""
 
+import tempfile
 import warnings
 from pathlib import Path
 from typing import Any
@@ -113,7 +114,12 @@ def append_datasets(path: Path, datasets: list[Dataset]) -> None:
     """Write datasets behind what `path` holds, if there is anything."""
     import pyuff
 
-    with warnings.catch_warnings():
+    with tempfile.TemporaryDirectory() as folder, path.open("ab") as whole, warnings.catch_warnings():
         # Pyuff leaves closing its second handle to the interpreter, which does it before the call returns.
         warnings.simplefilter("ignore", ResourceWarning)
-        pyuff.UFF(str(path)).write_sets(datasets, mode="add" if path.exists() else "overwrite")
+        # Pyuff reads a file again before each dataset that it adds: thousands of them go through small files.
+        part = Path(folder) / "part.uff"
+        for dataset in datasets:
+            pyuff.UFF(str(part)).write_sets(dataset, mode="add")
+            whole.write(part.read_bytes())
+            part.unlink()
