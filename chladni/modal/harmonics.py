@@ -72,10 +72,10 @@ def machine_harmonics(
 
     With G the one-sided density of the random response around it and T the length of the record, a steady sine is
     found in half of all records when its mean square is 70 G/T, in nearly all from 150 G/T on; times what the ratio
-    of the narrowest mode is allowed (3 when least_damping f T is 6, 1.3 at 16, hardly more than 1 from 30 on). On top
-    of a mode with 1 % damping that has all of the power, 6000 cycles long, that is a sine as strong as the response;
-    two of its half-power widths away, -10 dB, four widths, -20 dB. One that wanders needs more than half of the power
-    in a band of 24/T or wider. False alarms were 0 in 600 records of modes with 0.1 to 1 % damping.
+    of the narrowest mode is allowed (3 when least_damping f T is 6, 1.4 at 16, 1.1 at 30). On top of a mode with 1 %
+    damping that has all of the power, 6000 cycles long, that is a sine as strong as the response; -10 dB two of its
+    half-power widths away, -20 dB six widths away. One that wanders needs more than half of the power in a band of
+    24/T or wider. False alarms were 0 in 600 records of modes with 0.1 to 1 % damping.
 
     Responses to periodic excitation (multisine, sweep that repeats) are harmonics throughout.
 
