@@ -69,7 +69,7 @@ def mean_phase(shapes: ArrayLike) -> MeanPhase:
     """Mean phase and mean phase deviation of each shape.
 
     The line is the first right singular vector of [Re phi, Im phi]: it has the least summed squares of distances
-    (Heylen, Lammens & Sas 1997; Reynders, Houbrechts & De Roeck 2012, Mech. Syst. Signal Process. 29, section 4.1).
+    (Heylen, Lammens & Sas 1997; Reynders, Houbrechts & De Roeck 2012, Mech. Syst. Signal Process. 29).
 
     Parameters
     ----------

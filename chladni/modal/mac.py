@@ -36,8 +36,8 @@ class SharedChannel:
 def mac(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
     """Compare each shape of `a` with each of `b`: abs(a^H b)^2/((a^H a)(b^H b)).
 
-    Allemang (2003), "The modal assurance criterion: twenty years of use and abuse", Sound and Vibration 37(8),
-    equation 1, for complex shapes.
+    Allemang (2003), "The modal assurance criterion: twenty years of use and abuse", Sound and Vibration 37(8), for
+    complex shapes.
 
     Parameters
     ----------
