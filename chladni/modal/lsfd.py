@@ -25,7 +25,7 @@ Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 
 # Rounds that bring the solution from the precision of normal equations to that of the data.
-REFINEMENTS = 12
+REFINEMENTS = 40
 SETTLED = 1e-12
 RESIDUAL_COLUMNS = 4
 
@@ -160,16 +160,7 @@ def solve_shapes(
         part = symmetric_inverse(shape_equations(table.gram(lines.weights[batch]), participation))
         inverse[batch], deficient[batch] = part.inverse, part.deficient
     equations = SymmetricSolver(inverse=inverse, deficient=deficient)
-    coefficients = np.zeros((responses, size))
-    residual = np.asarray(lines.values, dtype=np.complex128)
-    for _ in range(REFINEMENTS):
-        gradient = shape_gradient(projections(functions, lines.weights * residual), participation)
-        step = np.einsum("iab,ib->ia", inverse, gradient)
-        coefficients += step
-        residual = lines.values - synthesis(basis, coefficients, participation)
-        gained = float(np.sum(gradient * step))
-        if gained < enough or np.all(np.abs(step) <= SETTLED * np.abs(coefficients).max(axis=-1, keepdims=True)):
-            break
+    coefficients, residual = _refined(lines, basis, participation, inverse, enough)
     return ShapeSolution(
         coefficients=coefficients,
         participation=participation,
@@ -177,6 +168,39 @@ def solve_shapes(
         equations=equations,
         basis=basis,
     )
+
+
+def _refined(
+    lines: ModelLines, basis: ModalBasis, participation: Complex, inverse: Floats, enough: float
+) -> tuple[Floats, Complex]:
+    """Conjugate gradients on each response's equations, preconditioned by their approximate inverse.
+
+    Where the inverse is exact the first round solves, and the second adds the digits that normal equations lose.
+    """
+    functions = np.concatenate([basis.modes, basis.residuals])
+
+    def slope(left: Complex) -> Floats:
+        return shape_gradient(projections(functions, lines.weights * left), participation)
+
+    coefficients = np.zeros(inverse.shape[:2])
+    residual = np.asarray(lines.values, dtype=np.complex128)
+    direction, gradient, gain = np.zeros_like(coefficients), np.zeros_like(coefficients), np.ones(len(inverse))
+    for _ in range(REFINEMENTS):
+        before, gain_before, gradient = gradient, gain, slope(residual)
+        step = np.einsum("iab,ib->ia", inverse, gradient)
+        gain = np.sum(gradient * step, axis=1)
+        again = np.maximum(np.sum((gradient - before) * step, axis=1), 0.0)
+        again = np.divide(again, gain_before, out=np.zeros_like(gain), where=gain_before > 0)
+        direction = step + again[:, np.newaxis] * direction * np.any(before != 0)
+        change = synthesis(basis, direction, participation)
+        bend = np.sum(lines.weights * np.abs(change) ** 2, axis=(1, 2))
+        length = np.divide(np.sum(gradient * direction, axis=1), bend, out=np.zeros_like(gain), where=bend > 0)
+        coefficients += length[:, np.newaxis] * direction
+        residual = residual - length[:, np.newaxis, np.newaxis] * change
+        moved = np.abs(length[:, np.newaxis] * direction)
+        if gain.sum() < enough or np.all(moved <= SETTLED * np.abs(coefficients).max(axis=-1, keepdims=True)):
+            break
+    return coefficients, residual
 
 
 def synthesis(basis: ModalBasis, coefficients: Floats, participation: Complex) -> Complex:

@@ -114,7 +114,10 @@ def _fitted(
 def _minimise(lines: ModelLines, state: _State, max_iterations: int) -> _State:
     damping = FIRST_DAMPING
     for _ in range(max_iterations):
-        found = _step(lines, state, reduced_equations(lines, state.solution), damping)
+        equations = reduced_equations(lines, state.solution)
+        # Shorter and shorter steps would be tried in vain where there is nothing to gain.
+        worthless = lines.weighted and equations.promised() < ENOUGH
+        found = None if worthless else _step(lines, state, equations, damping)
         if found is None:
             break
         trial, damping = found

@@ -35,6 +35,10 @@ class ReducedEquations:
     coupling: Floats
     free: NDArray[np.intp]
 
+    def promised(self) -> float:
+        """What a full step lowers the cost by, to first order."""
+        return float(self.descent @ symmetric_inverse(self.curvature).inverse @ self.descent)
+
     def moved(self, poles: Complex, participation: Complex, damping: float) -> tuple[Complex, Complex]:
         """Take one step, shortened by `damping`."""
         damped = self.curvature + damping * np.diag(np.diag(self.curvature))
