@@ -1,12 +1,13 @@
 """Modes in words: titles of pictures, and rows of the tables that the report and rerun show."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from math import isfinite
 
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.relative_motion import RelativeMotion
+from chladni.signals.study import Study
 from chladni.viewers.drawing import Floats
 from chladni.viewers.labels import LONGEST_NAME, value_with_deviation
 from chladni.viewers.style import Style
@@ -105,11 +106,17 @@ def between(motion: RelativeMotion, style: Style, *, longest: int = LONGEST_NAME
     return " – ".join(_shortened(style.labels.get(name, name), longest) for name in motion.between)
 
 
-def advice(modes: ModeSet, validation: ModeValidation | None) -> list[str]:
-    """Give what must be known before the modes are relied upon: findings, machine lines, notes of the method."""
-    findings = [] if validation is None else list(validation.findings)
+def advice(study: Study, modes: ModeSet, *, told: Collection[str] = ()) -> list[str]:
+    """Give what must be known before the modes are relied upon: findings, machine lines, notes of the method.
+
+    Sentences that are `told` elsewhere in the same place, and notes that came with the frequency responses and stand
+    beside those, are not repeated.
+    """
+    findings = [] if study.validation is None else list(study.validation.findings)
     harmonics = [f"{hertz(line.frequency_hz)} Hz is no mode: {line.reason}" for line in modes.harmonics]
-    return list(dict.fromkeys([*findings, *harmonics, *modes.provenance.notes]))
+    inherited = () if study.response is None else study.response.provenance.notes
+    sentences = dict.fromkeys([*findings, *harmonics, *modes.provenance.notes])
+    return [sentence for sentence in sentences if sentence not in told and sentence not in inherited]
 
 
 def _shortened(name: str, longest: int) -> str:

@@ -94,10 +94,17 @@ def test_gains_that_one_pair_lacks_are_left_empty() -> None:
 
 def test_advice_is_findings_machine_lines_and_notes_once_each() -> None:
     noted = replace(MODES, provenance=MODES.provenance.with_notes("Mode 5 rests on few orders."))
-    assert advice(noted, STUDY.validation) == [
+    assert advice(STUDY, noted) == [
         "5 modes, all shapes are told apart.",
         "Mode 5 rests on few orders.",
         "120.0 Hz is no mode: kurtosis 1.52 where noise has 3",
         "An advice.",
     ]
-    assert advice(MODES, None)[0].startswith("120.0 Hz")
+    assert advice(replace(STUDY, validation=None), MODES)[0].startswith("120.0 Hz")
+
+
+def test_what_is_told_elsewhere_is_not_repeated() -> None:
+    assert STUDY.response is not None
+    response = replace(STUDY.response, provenance=STUDY.response.provenance.with_notes("An advice."))
+    told = advice(replace(STUDY, response=response), MODES, told=("Mode 5 rests on few orders.",))
+    assert told == ["5 modes, all shapes are told apart.", "120.0 Hz is no mode: kurtosis 1.52 where noise has 3"]

@@ -6,6 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.study import Study
@@ -16,7 +17,7 @@ from chladni.viewers.mode_tables import mode_title
 from chladni.viewers.style import AMPLITUDES, Style
 from chladni.viewers.wireframe import DRAWN_SHARE, Motion, Wireframe, along, amplitude, furthest
 
-GHOST = "#bbbbbb"
+GHOST, NAMES = "#bbbbbb", "#777777"
 SHAPES_IN_A_FIGURE = 6
 PANE_HEIGHT_IN = 2.0
 PIECES, SEGMENTS = 8, 1200
@@ -82,15 +83,11 @@ def _draw(axes: Axes, wireframe: Wireframe, moved: Floats, motion: Motion, scale
     axes.scatter(rest[:, 0], rest[:, 1], s=4 if few else 0.5, color=GHOST, zorder=2, linewidths=0)
     if len(wireframe.names) <= POINTS_NAMED:
         for name, place in zip(wireframe.names, rest, strict=True):
-            axes.annotate(
-                plain(name),
-                place,
-                xytext=(-3, 3),
-                textcoords="offset points",
-                ha="right",
-                fontsize=6,
-                color="#777777",
+            text = axes.annotate(
+                plain(name), place, (-3, 3), textcoords="offset points", ha="right", fontsize=6, color=NAMES, zorder=5
             )
+            # A wire that moves over a name must not make it unreadable.
+            text.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
 
 
 def _one_scale(stack: list[Axes], wireframe: Wireframe, moved: Floats) -> None:

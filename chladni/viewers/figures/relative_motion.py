@@ -45,7 +45,7 @@ def _figure(study: Study, found: Sequence[tuple[int, list[RelativeMotion]]], sty
     )
     columns = 2 if longest <= SHORT_NAMES else 1
     figure, stack = panes(len(found), columns=columns, height_in=0.35 + BAR_HEIGHT_IN * max(bars, 2), sharex=True)
-    greatest = max(motion.ratio or 0.0 for _, motions in found for motion in motions) or 1.0
+    greatest = max(_end(motion) for _, motions in found for motion in motions) or 1.0
     for axes, (row, motions) in zip(stack, found, strict=True):
         _draw(axes, sorted(motions, key=lambda motion: -(motion.ratio or 0.0)), style)
         axes.set_ylim(bars - 0.4, -0.6)
@@ -58,14 +58,21 @@ def _figure(study: Study, found: Sequence[tuple[int, list[RelativeMotion]]], sty
     return figure
 
 
+def _end(motion: RelativeMotion) -> float:
+    """Where a bar ends, its sigma included; one that is larger than the bar itself may leave the frame."""
+    ratio = motion.ratio or 0.0
+    return ratio + min(_sigma(motion), ratio)
+
+
+def _sigma(motion: RelativeMotion) -> float:
+    return motion.ratio_std if motion.ratio_std is not None and np.isfinite(motion.ratio_std) else 0.0
+
+
 def _draw(axes: Axes, motions: Sequence[RelativeMotion], style: Style) -> None:
     shown = motions[:PAIRS]
     places = np.arange(len(shown))
     ratios = [motion.ratio or 0.0 for motion in shown]
-    sigma = [
-        motion.ratio_std if motion.ratio_std is not None and np.isfinite(motion.ratio_std) else 0.0
-        for motion in shown
-    ]
+    sigma = [_sigma(motion) for motion in shown]
     colours = [GREATEST] + [OTHERS] * (len(shown) - 1)
     axes.barh(places, ratios, height=0.7, color=colours, xerr=sigma, error_kw={"linewidth": 0.7})
     axes.set_yticks(places, [plain(between(motion, style, longest=LONGEST_POINT)) for motion in shown], fontsize=6.5)

@@ -35,6 +35,21 @@ def _figure(modes: ModeSet, diagram: StabilisationDiagram) -> Figure:
     _draw_indicator(poles, modes, diagram)
     poles.set_xlim(*frequency_range(modes, diagram))
     poles.set_ylim(*order_range(diagram))
+    _draw_poles(poles, diagram)
+    poles.set_xlabel("Frequency [Hz]")
+    poles.set_ylabel("Model order")
+    names = [(float(hz), "black") for hz in modes.frequency_hz]
+    names += [(line.frequency_hz, MACHINE) for line in modes.harmonics]
+    low_hz, high_hz = poles.get_xlim()
+    names = [(hertz, colour) for hertz, colour in names if low_hz <= hertz <= high_hz]
+    for hertz, colour in names:
+        poles.axvline(hertz, color=colour, linewidth=0.4, alpha=0.5, zorder=2)
+    legend(poles, above_points=name_above(poles, names))
+    return figure
+
+
+def _draw_poles(poles: Axes, diagram: StabilisationDiagram) -> None:
+    """Poles by status, each kind with a mark and a colour of its own, and a ring round those that became modes."""
     for status, (name, mark) in enumerate(zip(STATUS_NAMES, MARKS, strict=True)):
         chosen = diagram.status == status
         poles.plot(
@@ -61,16 +76,6 @@ def _figure(modes: ModeSet, diagram: StabilisationDiagram) -> Figure:
         label="taken for a mode",
         zorder=8,
     )
-    poles.set_xlabel("Frequency [Hz]")
-    poles.set_ylabel("Model order")
-    names = [(float(hz), "black") for hz in modes.frequency_hz]
-    names += [(line.frequency_hz, MACHINE) for line in modes.harmonics]
-    low_hz, high_hz = poles.get_xlim()
-    names = [(hertz, colour) for hertz, colour in names if low_hz <= hertz <= high_hz]
-    for hertz, colour in names:
-        poles.axvline(hertz, color=colour, linewidth=0.4, alpha=0.5, zorder=2)
-    legend(poles, above_points=name_above(poles, names))
-    return figure
 
 
 def _draw_indicator(poles: Axes, modes: ModeSet, diagram: StabilisationDiagram) -> None:

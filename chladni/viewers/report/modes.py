@@ -1,7 +1,6 @@
 """The report's sections about modes."""
 
 from chladni.signals.mode_set import ModeSet
-from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.study import Study
 from chladni.viewers.mode_tables import advice, first_of_each, mode_table, motion_table
 from chladni.viewers.report.markup import element, escaped, table
@@ -11,11 +10,11 @@ from chladni.viewers.style import Style
 MOTIONS_OF_A_MODE = 3
 
 
-def modes_section(modes: ModeSet, validation: ModeValidation | None) -> str:
+def modes_section(study: Study, modes: ModeSet) -> str:
     """Give the table of modes, or that there is none, with what must be known before they are relied upon."""
-    headings, rows = mode_table(modes, validation)
+    headings, rows = mode_table(modes, study.validation)
     found = table(headings, rows, numbers=range(len(headings))) or element("p", "No mode was found.")
-    told = "".join(element("li", escaped(sentence)) for sentence in advice(modes, validation))
+    told = "".join(element("li", escaped(sentence)) for sentence in advice(study, modes, told=study.findings))
     made = element("p", escaped(_made(modes)), class_="note")
     return found + made + (element("ul", told) if told else "")
 

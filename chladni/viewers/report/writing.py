@@ -69,7 +69,7 @@ def _body(study: Study, album: Album) -> Iterator[str]:
 def _modes(study: Study, style: Style) -> Iterator[str]:
     if study.modes is None:
         return
-    yield _section("Modes", modes_section(study.modes, study.validation))
+    yield _section("Modes", modes_section(study, study.modes))
     yield _section("Relative motion between neighbours", relative_motion_section(study, study.modes, style))
 
 

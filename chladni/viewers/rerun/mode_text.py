@@ -35,7 +35,7 @@ def _page(study: Study, modes: ModeSet, style: Style) -> Iterator[str]:
         yield from markdown_table(*mode_table(modes, study.validation))
     else:
         yield "No mode was found."
-    told = advice(modes, study.validation)
+    told = advice(study, modes)
     if told:
         yield "\n### What to know\n"
         yield from (f"- {escaped(sentence)}" for sentence in told)
