@@ -118,6 +118,6 @@ def _study(log: Log, modes: ModeSet, response: FrequencyResponse | None, checks:
         validation=validation,
         relative_motion=motions,
         geometry=log.geometry,
-        findings=tuple(dict.fromkeys([*checks, *summarise(modes, validation, motions)])),
+        findings=tuple(dict.fromkeys([*checks, *summarise(modes, validation, motions, geometry=log.geometry)])),
     )
     return ModalStudy(modes=modes, validation=validation, study=study)

@@ -83,7 +83,7 @@ def _with_checks(study: Study, modes: ModeSet) -> Study:
         study,
         validation=validation,
         relative_motion=motions,
-        findings=(*study.findings, *summarise(modes, validation, motions)),
+        findings=(*study.findings, *summarise(modes, validation, motions, geometry=study.geometry)),
     )
 
 

@@ -151,7 +151,7 @@ def _print_relative_motion(out: Output, modes: "ModeSet", motions: "tuple[Relati
     rows = [
         [f"{modes.frequency_hz[row]:.5g}", " - ".join(one.between), _ratio(one), *_gains(one)]
         for row in range(modes.frequency_hz.size)
-        for one in [motion for motion in motions if motion.mode == row][:MOST_PAIRS]
+        for one in [motion for motion in motions if motion.mode == row and motion.ratio is not None][:MOST_PAIRS]
     ]
     if not rows:
         return

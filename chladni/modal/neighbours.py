@@ -48,7 +48,7 @@ def neighbours(channels: Sequence[Channel], geometry: Geometry) -> tuple[Neighbo
 
     Two points compare along the directions that the sensors of both can measure: translations where both have a
     common one, else rotations. Without a setup file, channels whose names end with the same axis (``.x``) count as
-    one direction, and so do all those whose names end with none.
+    one direction; those whose names end with none have no direction in common with any.
     """
     at_points = _points(channels)
     named = list(_along_lines(geometry, at_points))
@@ -61,7 +61,10 @@ def neighbours(channels: Sequence[Channel], geometry: Geometry) -> tuple[Neighbo
     for row, channel in enumerate(channels):
         groups.setdefault((_kind(channel), _label(channel)), []).append(row)
     pairs = [pair for rows in groups.values() for pair in pairwise(rows)]
-    return tuple(_alone(channels, pair) for pair in sorted(pairs))
+    # Sensors whose direction nothing tells are likely to stand across each other.
+    return tuple(
+        _alone(channels, pair) if _label(channels[pair[0]]) else _apart(channels, pair) for pair in sorted(pairs)
+    )
 
 
 def neighbour_note(channels: Sequence[Channel], geometry: Geometry) -> str | None:
@@ -72,9 +75,15 @@ def neighbour_note(channels: Sequence[Channel], geometry: Geometry) -> str | Non
     if len(at_points) > 1:
         order = joined([*at_points])
         return f"No line joins the points; they were taken for neighbours in the order of the channels: {order}."
+    if any(_label(channel) for channel in channels):
+        return (
+            "The channels have no points: relative motion is between channels of one direction in the order listed, "
+            "by the last letter of their names, which needn't be neighbours; give a setup file with points, "
+            "directions and lines, and the joint to treat is named."
+        )
     return (
-        "The channels have no points: relative motion is between channels of one direction in the order listed, by "
-        "the last letter of their names; give a setup file with points, directions and lines."
+        "Nothing tells where the channels measure and along which direction, so that there is no relative motion; "
+        "give a setup file with points, directions and lines."
     )
 
 
@@ -102,6 +111,11 @@ def _alone(channels: Sequence[Channel], rows: tuple[int, int]) -> Neighbours:
     return Neighbours(between=(channels[rows[0]].name, channels[rows[1]].name), first=first, second=second)
 
 
+def _apart(channels: Sequence[Channel], rows: tuple[int, int]) -> Neighbours:
+    none = np.zeros((0, len(channels)))
+    return Neighbours(between=(channels[rows[0]].name, channels[rows[1]].name), first=none, second=none)
+
+
 def _compare(channels: Sequence[Channel], between: tuple[str, str], at_points: dict[str, list[int]]) -> Neighbours:
     rows = (at_points[between[0]], at_points[between[1]])
     for kind in sorted({_kind(channels[row]) for row in rows[0]}, reverse=True):
@@ -127,7 +141,7 @@ def _common_axes(
     for a in first:
         for b in second:
             unknown = channels[a].direction is None and channels[b].direction is None
-            if unknown and _label(channels[a]) == _label(channels[b]):
+            if unknown and _label(channels[a]) == _label(channels[b]) != "":
                 pair = _alone(channels, (a, b))
                 return pair.first, pair.second
     return None

@@ -115,7 +115,9 @@ def _neighbours(modes: ModeSet, motions: Sequence[RelativeMotion], geometry: Geo
 
 
 def _joints(modes: ModeSet, validation: ModeValidation, motions: Sequence[RelativeMotion]) -> list[str]:
-    found = treatments(modes, motions)
+    names = {channel.name for channel in modes.channels}
+    # Channels that follow each other in a list need not be neighbours: nobody should build a damper on that.
+    found = treatments(modes, [one for one in motions if not names.issuperset(one.between)])
     doubtful = {row for pair in validation.alike for row in pair}
     scaled = [one for one in found if one.damper is not None]
     if not scaled:

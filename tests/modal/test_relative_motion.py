@@ -230,3 +230,11 @@ def test_ratios_stay_within_their_bounds(modes, geometry) -> None:  # type: igno
         assert own[: len(known)] == sorted(known, reverse=True)
         # Two vectors of up to four components, none above 1.
         assert all(0 <= ratio <= 2 * sqrt(3) * 1.001 + 2 for ratio in known)
+
+
+def test_channels_that_nothing_gives_a_direction_have_no_relative_motion() -> None:
+    (unknown,) = relative_motion(mode_set([[1.0, 0.5]]), Geometry())
+    assert (unknown.between, unknown.ratio) == (("c0", "c1"), None)
+    (known,) = relative_motion(mode_set([[1.0, 0.5]], names=("/a.z", "/b.z")), Geometry())
+    assert known.ratio == pytest.approx(0.5)
+    assert "no relative motion" in (neighbour_note(mode_set([[1.0, 0.5]]).channels, Geometry()) or "")

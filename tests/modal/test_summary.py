@@ -20,6 +20,13 @@ def summary_of(modes: ModeSet, geometry: Geometry | None = None) -> tuple[str, .
     return summarise(modes, validate(modes), relative_motion(modes, geometry or Geometry()))
 
 
+def at_points(modes: ModeSet) -> ModeSet:
+    """The same modes with sensors at points p0, p1, ... of one direction."""
+    up = (0.0, 0.0, 1.0)
+    placed = [replace(one, point=f"p{row}", direction=up) for row, one in enumerate(modes.channels)]
+    return replace(modes, channels=tuple(placed))
+
+
 def test_sound_modes() -> None:
     text = summary_of(mode_set(SOUND, provenance=Provenance(notes=("Measured at night.",))))
     assert text[0] == (
@@ -31,7 +38,7 @@ def test_sound_modes() -> None:
 
 
 def test_findings_take_the_place_of_praise() -> None:
-    text = summary_of(mode_set([[1.0, 0.5], [1.0, 0.55]]))
+    text = summary_of(at_points(mode_set([[1.0, 0.5], [1.0, 0.55]])))
     assert "The checks found nothing to distrust." not in text
     assert any("don't tell the shapes" in sentence for sentence in text)
     assert any("check before building" in sentence for sentence in text)
@@ -81,18 +88,18 @@ def test_the_joints_of_the_sharpest_modes_are_named_with_a_number() -> None:
 
 
 def test_unscaled_modes_name_each_joint_once() -> None:
-    text = summary_of(mode_set([[1.0, 0.5, 0.4], [1.0, -0.5, -0.4], [0.1, 1.0, -0.2]]))
+    text = summary_of(at_points(mode_set([[1.0, 0.5, 0.4], [1.0, -0.5, -0.4], [0.1, 1.0, -0.2]])))
     assert (
-        "c0 and c1 move most against each other in modes 1 and 2 (10 and 20 Hz), by 0.50 and 1.50 of the largest "
+        "p0 and p1 move most against each other in modes 1 and 2 (10 and 20 Hz), by 0.50 and 1.50 of the largest "
         in (" ".join(text))
     )
-    assert "c1 and c2 move most against each other in mode 3 (30 Hz), by 1.20 of" in " ".join(text)
+    assert "p1 and p2 move most against each other in mode 3 (30 Hz), by 1.20 of" in " ".join(text)
     assert sum("measure a driving point" in sentence for sentence in text) == 1
 
 
 def test_what_stood_in_for_the_lines_is_said() -> None:
-    bare = mode_set([[1.0, 0.5]])
-    assert any("The channels have no points" in sentence for sentence in summary_of(bare))
+    named = mode_set([[1.0, 0.5]], names=("/a.z", "/b.z"))
+    assert any("The channels have no points" in sentence for sentence in summary_of(named))
     modes = scaled_modes()
     motions = relative_motion(modes, Geometry(points=GEOMETRY.points))
     loose = summarise(modes, validate(modes), motions, geometry=Geometry(points=GEOMETRY.points))
@@ -100,3 +107,11 @@ def test_what_stood_in_for_the_lines_is_said() -> None:
     joined = summarise(modes, validate(modes), motions, geometry=GEOMETRY)
     assert not any("joins the points" in sentence or "no points" in sentence for sentence in joined)
     assert not any("no points" in sentence for sentence in summarise(modes, validate(modes), motions))
+
+
+def test_no_joint_is_named_that_only_the_order_of_channels_suggests() -> None:
+    shapes = [[1.0, 0.5, 0.4], [1.0, -0.5, -0.4]]
+    for names in ((), ("/a.z", "/b.z", "/c.z")):
+        text = " ".join(summary_of(mode_set(shapes, names=names)))
+        assert "against each other" not in text
+        assert "give a setup file with points, directions and lines" in text
