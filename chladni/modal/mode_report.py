@@ -7,9 +7,11 @@ from numpy.typing import NDArray
 
 from chladni.modal.candidates import Candidates
 from chladni.modal.cmif import complex_mode_indicator
+from chladni.modal.grouped_refinement import select_modes
 from chladni.modal.lsfd import least_squares_frequency_domain
 from chladni.modal.modal_model import ModalModel
 from chladni.modal.pruned_fit import PrunedFit
+from chladni.modal.scaling import modal_scale
 from chladni.modal.stabilisation import StabilityLimits, stabilisation_diagram
 from chladni.modal.synthesis import modal_fit
 from chladni.signals.frequency_response import FrequencyResponse
@@ -45,30 +47,37 @@ class ModeReport:
         What was chosen from.
     stability
         Limits of the diagram.
+    driving_point
+        Names of response and reference that scale the modes; None takes a pair at one point along one axis.
     """
 
     response: FrequencyResponse
     measured: FrequencyResponse
     candidates: Candidates
     stability: StabilityLimits
+    driving_point: tuple[str, str] | None = None
 
     def mode_set(self, fit: PrunedFit | None, *, count: int | None, notes: tuple[str, ...]) -> ModeSet:
         """Give the modes asked for; an empty set, with the reason, when the data need none."""
         if fit is None:
             return self._empty(count, notes)
         shown = self._shown(fit, count)
-        fitted, model = fit.fitted, fit.fitted.model.select(shown)
-        started = fit.started[shown]
+        fitted = select_modes(fit.fitted, np.isin(np.arange(fit.started.size), shown))
+        model, started = fitted.model, fit.started[shown]
+        scaling = modal_scale(
+            fitted, self.response.responses, self.response.references, driving_point=self.driving_point
+        )
         return ModeSet(
             frequency_hz=model.frequency_hz,
-            frequency_std_hz=fitted.frequency_std_hz[shown],
+            frequency_std_hz=fitted.frequency_std_hz,
             damping_ratio=model.damping_ratio,
-            damping_std=fitted.damping_std[shown],
+            damping_std=fitted.damping_std,
             shapes=model.shapes,
-            shape_std=fitted.shape_std[shown],
+            shape_std=fitted.shape_std,
             channels=self.response.responses,
             references=self.response.references,
             participation=model.participation,
+            scale=scaling.scale,
             spread=self._spread(started),
             fit=self._fit(model),
             stabilisation=self._diagram(started),
@@ -76,6 +85,7 @@ class ModeReport:
                 *notes,
                 *self.candidates.notes,
                 *fitted.notes,
+                *scaling.notes,
                 *self._advice(fit, shown),
                 *_shortfall(count, shown.size),
             ),

@@ -48,6 +48,8 @@ class PolyReferenceLeastSquares:
         What a candidate must show to be a mode.
     stability
         Limits of the stabilisation diagram.
+    driving_point
+        Names of response and reference that scale the modes; None takes a pair at one point along one axis.
 
     Examples
     --------
@@ -58,6 +60,7 @@ class PolyReferenceLeastSquares:
     selection: SelectionRules = field(default_factory=_generous)
     significance: SignificanceRules = field(default_factory=SignificanceRules)
     stability: StabilityLimits = field(default_factory=StabilityLimits)
+    driving_point: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
         if self.max_order is not None and self.max_order < 1:
@@ -110,7 +113,13 @@ class PolyReferenceLeastSquares:
         measured = replace(measured, excited=np.isin(response.frequency_hz, lines.frequency_hz))
         candidates = self._candidates(measured, lines, frequencies_hz)
         fit = pruned_fit(measured, lines, candidates, self.significance)
-        report = ModeReport(response=response, measured=measured, candidates=candidates, stability=self.stability)
+        report = ModeReport(
+            response=response,
+            measured=measured,
+            candidates=candidates,
+            stability=self.stability,
+            driving_point=self.driving_point,
+        )
         modes = report.mode_set(fit, count=count, notes=notes)
         decay_per_s = response.provenance.window_decay_per_s
         return without_window_damping(modes, decay_per_s) if decay_per_s > 0 else modes

@@ -8,11 +8,9 @@ from numpy.typing import NDArray
 
 from chladni.modal.candidates import Candidates
 from chladni.modal.fitted_modes import FittedModes
-from chladni.modal.grouped_refinement import grouped_refinement, select_modes
+from chladni.modal.grouped_refinement import grouped_refinement, grouped_synthesis, select_modes
 from chladni.modal.judged_lines import JudgedLines
-from chladni.modal.lsfd import least_squares_frequency_domain
 from chladni.modal.significance import FEWEST_LINES, REACH, ModeSignificance, SignificanceRules, mode_significance
-from chladni.modal.synthesis import modal_fit
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.spectral.forms import ORDER, form
 
@@ -26,8 +24,7 @@ UNSURE = 0.5
 SAME_SIGMAS, SAME_MAC = 2.0, 0.9
 # Each refinement may take a few modes along; more rounds than this would only shuffle them.
 ROUNDS = 8
-# Enough to see which modes stand up, and for the last fit.
-STEPS, LAST_STEPS = 6, 25
+STEPS = 15
 
 
 def needed_modes(
@@ -109,9 +106,8 @@ def explained(
     kept = needed_modes(lines, found.pole, found.vector, rules, always=found.asked)
     if not kept.any():
         return np.zeros_like(lines.values)
-    model = least_squares_frequency_domain(response, found.pole[kept], found.vector[kept])
     factor = (2j * pi * lines.frequency_hz) ** ORDER[form(response)]
-    return np.asarray(modal_fit(response, model).synthesised / factor, dtype=np.complex128)
+    return grouped_synthesis(response, lines.frequency_hz, found.pole[kept], found.vector[kept]) / factor
 
 
 def pruned_fit(
@@ -127,32 +123,24 @@ def pruned_fit(
     poles, participation, always = candidates.pole, candidates.vector, candidates.asked
     started = np.flatnonzero(needed_modes(lines, poles, participation, rules, always=always))
     poles, participation, always = poles[started], participation[started], always[started]
-    steps = STEPS
-    for rounds_left in reversed(range(ROUNDS)):
+    for _ in range(ROUNDS):
         if not poles.size:
             return None
-        fitted = grouped_refinement(response, poles, participation, max_iterations=steps)
-        poles, participation, significance = _state(lines, fitted)
+        fitted = grouped_refinement(response, poles, participation, max_iterations=STEPS)
+        poles, participation = fitted.model.poles, np.asarray(fitted.model.participation, dtype=np.complex128)
+        significance = mode_significance(lines, poles, participation)
         started, always = started[fitted.kept], always[fitted.kept]
         stays = always | ~_doubtful(lines, fitted, significance, rules)
-        if stays.all() and steps == LAST_STEPS:
-            break
-        if stays.all() or rounds_left == 1:
-            # The rounds so far only told which modes stay.
-            steps = LAST_STEPS
         poles, participation = poles[stays], participation[stays]
         started, always = started[stays], always[stays]
+        if stays.all():
+            break
     if started.size == fitted.kept.size:
         return PrunedFit(fitted=fitted, significance=significance, started=started)
     # The rounds are used up: what still doesn't stand up goes, without another fit of the rest.
     if not started.size:
         return None
     return PrunedFit(fitted=select_modes(fitted, stays), significance=significance.select(stays), started=started)
-
-
-def _state(lines: JudgedLines, fitted: FittedModes) -> tuple[Complex, Complex, ModeSignificance]:
-    poles, participation = fitted.model.poles, np.asarray(fitted.model.participation, dtype=np.complex128)
-    return poles, participation, mode_significance(lines, poles, participation)
 
 
 def _doubtful(lines: JudgedLines, fitted: FittedModes, found: ModeSignificance, rules: SignificanceRules) -> Mask:

@@ -16,7 +16,7 @@ Complex = NDArray[np.complex128]
 
 # Half-power half-widths on either side of a mode in which it is weighed against what else could explain the lines.
 REACH = 8.0
-FEWEST_LINES, MOST_LINES = 12, 256
+FEWEST_LINES, MOST_LINES = 12, 128
 # Modes elsewhere bend the functions here no more than a parabola does.
 BACKGROUND = 3
 
@@ -179,8 +179,10 @@ def _local_fit(lines: JudgedLines, places: NDArray[np.intp], poles: Complex, par
     squares = np.repeat((weight**2).reshape(weight.shape[0], -1), 2, axis=1)
     data = np.ascontiguousarray(values.reshape(values.shape[0], -1)).view(np.float64)
     columns = design.shape[1]
-    products = (design[:, :, None] * design[:, None, :]).reshape(-1, columns**2)
-    gram = (squares @ products).reshape(-1, columns, columns)
+    upper = np.triu_indices(columns)
+    gram = np.empty((weight.shape[0], columns, columns))
+    gram[:, upper[0], upper[1]] = squares @ (design[:, upper[0]] * design[:, upper[1]])
+    gram[:, upper[1], upper[0]] = gram[:, upper[0], upper[1]]
     right = (squares * data) @ design
     inverse = np.linalg.pinv(gram, rcond=1e-13, hermitian=True)
     answer = np.einsum("ipq,iq->ip", inverse, right)
