@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 # Share of the new half rate that passes unchanged; above it the power falls like a raised cosine, to nothing at the
 # half rate itself.
 PASS_BAND = 0.8
-# The filter's own correlation is below 1e-7 of its maximum beyond so many new samples.
+# The filter's own correlation is some millionths of its maximum beyond so many new samples.
 REACH = 64
 
 
