@@ -94,8 +94,14 @@ def modal_study(
         )
         return _study(log, found, None, ())
     response = modal_response(log, references, channels, averaging=averaging, span=part, progress=progress)
-    checks = (check_driving_point(response).finding, check_reciprocity(response).finding)
-    return _study(log, modes_of_response(response, method=chosen, wanted=request), response, checks)
+    return _study(log, modes_of_response(response, method=chosen, wanted=request), response, _checks(response))
+
+
+def _checks(response: FrequencyResponse) -> tuple[str, ...]:
+    """Say what the functions themselves tell before any fit; nothing where there is nothing to check."""
+    driving, reciprocity = check_driving_point(response), check_reciprocity(response)
+    found = [driving.finding] if driving.points else []
+    return (*found, reciprocity.finding) if reciprocity.pairs else tuple(found)
 
 
 def _require_consistent(references: Sequence[str] | None, operational: bool, method: MethodName | None) -> None:

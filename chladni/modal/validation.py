@@ -109,15 +109,20 @@ def _poor_fit(modes: ModeSet) -> list[str]:
     fit = modes.fit
     if fit is None:
         return []
-    sentences = _poor_functions(modes, fit)
-    for band in np.flatnonzero(fit.band_error > _FIT_ERROR):
-        low_hz, high_hz = fit.bands_hz[band]
-        sentences.append(
-            f"Between {low_hz:.4g} and {high_hz:.4g} Hz the synthesis is off by {100 * fit.band_error[band]:.0f} % "
-            f"(RMS over RMS, limit {100 * _FIT_ERROR:.0f} %): a mode is missing there, or the structure isn't "
-            "linear; fit that band alone, or allow a higher model order."
-        )
-    return sentences
+    poor = np.flatnonzero(fit.band_error > _FIT_ERROR)
+    if not poor.size:
+        return _poor_functions(modes, fit)
+    worst_first = poor[np.argsort(-fit.band_error[poor], kind="stable")]
+    named = [
+        f"between {fit.bands_hz[band, 0]:.4g} and {fit.bands_hz[band, 1]:.4g} Hz ({100 * fit.band_error[band]:.0f} %)"
+        for band in worst_first
+    ]
+    sentence = (
+        f"The synthesis is off by more than {100 * _FIT_ERROR:.0f} % (RMS over RMS) {joined(named, most=3)}: noise, "
+        "a missing mode, or a structure that isn't linear; look at the coherence, fit that band alone, or allow a "
+        "higher model order."
+    )
+    return [*_poor_functions(modes, fit), sentence]
 
 
 def _poor_functions(modes: ModeSet, fit: ModalFit) -> list[str]:
