@@ -143,15 +143,16 @@ def log_f_tail(ratio: float, upper: float, lower: float) -> float:
     """Natural logarithm of the probability that an F statistic exceeds `ratio`, far beyond what a float can hold.
 
     The tail is a regularised incomplete beta function I_x(b, a) with x = b/(b + a ratio), a, b half the degrees of
-    freedom; where it underflows its leading term x^b (1 - x)^a / (b B(a, b)) (NIST DLMF 8.17.8) bounds it within a
-    factor that is near 1.
+    freedom. Where it underflows, the series of NIST DLMF 8.17.8 is bounded by a geometric one: terms shrink at least
+    as fast as the first two.
     """
     a, b = upper / 2, lower / 2
     x = b / (b + a * ratio)
     tail = float(betainc(b, a, x))
     if tail > 1e-280:
         return float(np.log(tail))
-    return float(b * np.log(x) + a * np.log1p(-x) - np.log(b) - betaln(a, b))
+    shrinking = x * max(a + b, b + 1) / (b + 1)
+    return float(b * np.log(x) + a * np.log1p(-x) - np.log(b) - betaln(a, b) - np.log1p(-shrinking))
 
 
 def _nearest_lines(lines: JudgedLines, own_hz: float, reach_hz: float) -> NDArray[np.intp]:
