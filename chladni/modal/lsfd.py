@@ -27,6 +27,7 @@ Floats = NDArray[np.float64]
 # Rounds that bring the solution from the precision of normal equations to that of the data.
 REFINEMENTS = 40
 SETTLED = 1e-12
+ROUGH = 1e-7
 RESIDUAL_COLUMNS = 4
 
 
@@ -198,7 +199,9 @@ def _refined(
         coefficients += length[:, np.newaxis] * direction
         residual = residual - length[:, np.newaxis, np.newaxis] * change
         moved = np.abs(length[:, np.newaxis] * direction)
-        if gain.sum() < enough or np.all(moved <= SETTLED * np.abs(coefficients).max(axis=-1, keepdims=True)):
+        # Far from a fit its last digits are of no use.
+        worth = max(enough, ROUGH * float(np.sum(lines.weights * np.abs(residual) ** 2))) if enough else 0.0
+        if gain.sum() < worth or np.all(moved <= SETTLED * np.abs(coefficients).max(axis=-1, keepdims=True)):
             break
     return coefficients, residual
 
