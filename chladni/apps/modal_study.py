@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from chladni.apps.modes import Method, Wanted, modal_response, modes_of_response, modes_of_responses
 from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging
+from chladni.io.files.uff_modes import read_uff_modes
 from chladni.io.log import Log
 from chladni.modal.circle_fit import CircleFit
 from chladni.modal.driving_point import check_driving_point
@@ -19,8 +21,9 @@ from chladni.modal.relative_motion import relative_motion
 from chladni.modal.subspace import CovarianceDrivenSubspace
 from chladni.modal.summary import summarise
 from chladni.modal.validation import validate
-from chladni.signals.errors import SetupError
+from chladni.signals.errors import LogError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.geometry import Geometry
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.study import Study
@@ -35,6 +38,7 @@ METHODS: dict[MethodName, type[Method]] = {
     "fdd": FrequencyDomainDecomposition,
     "efdd": EnhancedFrequencyDomainDecomposition,
 }
+UNIVERSAL_FILES = (".uff", ".unv")
 FROM_RESPONSES: tuple[MethodName, ...] = ("ssi-cov", "fdd", "efdd")
 
 
@@ -92,9 +96,30 @@ def modal_study(
         found = modes_of_responses(
             log, channels=channels, method=chosen, wanted=request, averaging=averaging, span=part, progress=progress
         )
-        return _study(log, found, None, ())
+        return _study(log.path, log.geometry, found, None)
     response = modal_response(log, references, channels, averaging=averaging, span=part, progress=progress)
-    return _study(log, modes_of_response(response, method=chosen, wanted=request), response, _checks(response))
+    found = modes_of_response(response, method=chosen, wanted=request)
+    return _study(log.path, log.geometry, found, response, notes=_checks(response))
+
+
+def universal_file_study(path: Path, *, method: MethodName | None = None, wanted: Wanted | None = None) -> ModalStudy:
+    """Identify the modes of the frequency responses in a universal file; without any, take the modes that it holds.
+
+    Raises
+    ------
+    LogError
+        When the file can't be read, or holds neither frequency responses nor modes.
+    EstimateError
+        When there is too little to identify from.
+    """
+    held, chosen = read_uff_modes(path), None if method is None else METHODS[method]()
+    if held.response is not None:
+        found = modes_of_response(held.response, method=chosen, wanted=wanted or Wanted())
+        return _study(path, held.geometry, found, held.response, notes=(*held.notes, *_checks(held.response)))
+    if held.modes is None:
+        raise LogError(f"{path}: holds neither frequency responses (dataset 58) nor modes (dataset 55)")
+    told = "the modes are those that the file holds: there are no frequency responses in it to identify others from"
+    return _study(path, held.geometry, held.modes, None, notes=(*held.notes, told))
 
 
 def _checks(response: FrequencyResponse) -> tuple[str, ...]:
@@ -114,16 +139,22 @@ def _require_consistent(references: Sequence[str] | None, operational: bool, met
         )
 
 
-def _study(log: Log, modes: ModeSet, response: FrequencyResponse | None, checks: tuple[str, ...]) -> ModalStudy:
-    validation = validate(modes)
-    motions = relative_motion(modes, log.geometry)
+def _study(
+    path: Path,
+    geometry: Geometry,
+    modes: ModeSet,
+    response: FrequencyResponse | None,
+    *,
+    notes: tuple[str, ...] = (),
+) -> ModalStudy:
+    validation, motions = validate(modes), relative_motion(modes, geometry)
     study = Study(
-        title=log.path.name,
+        title=path.name,
         response=response,
         modes=modes,
         validation=validation,
         relative_motion=motions,
-        geometry=log.geometry,
-        findings=tuple(dict.fromkeys([*checks, *summarise(modes, validation, motions, geometry=log.geometry)])),
+        geometry=geometry,
+        findings=tuple(dict.fromkeys([*notes, *summarise(modes, validation, motions, geometry=geometry)])),
     )
     return ModalStudy(modes=modes, validation=validation, study=study)

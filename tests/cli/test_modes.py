@@ -99,3 +99,39 @@ def test_bad_options_are_told_in_one_line(run, arm_log, arguments, words):
     assert outcome.code == 2
     assert words in outcome.err
     assert outcome.err.count("\n") == 1
+
+
+def test_a_universal_file_gives_the_modes_of_its_functions(run, arm_log, tmp_path, truth):
+    setup = arm_log.with_name("setup.toml")
+    first = run("modes", arm_log, "--setup", setup, "--uff", tmp_path / "arm.uff", "--json", tmp_path / "arm.json")
+    assert first.code == 0, first.err
+    document = run("modes", tmp_path / "arm.uff", "--json", "-").document
+    found = [mode["frequency_hz"] for mode in document["modes"]]
+    assert found == pytest.approx(truth.frequency_hz, rel=1e-3)
+
+
+def test_a_universal_file_without_functions_shows_the_modes_that_it_holds(run, arm_log, tmp_path, truth):
+    from chladni.io.files.uff_modes import write_uff_modes
+    from chladni.io.log import open_log
+
+    with open_log(arm_log, setup=arm_log.with_name("setup.toml")) as log:
+        import chladni
+
+        modes = chladni.identify_modes(log)
+        write_uff_modes(tmp_path / "shapes.uff", modes, geometry=log.geometry)
+    outcome = run("modes", tmp_path / "shapes.uff")
+    assert outcome.code == 0, outcome.err
+    assert "those that the file holds" in " ".join(outcome.out.split())
+    assert "5 modes" in outcome.out
+
+
+def test_options_of_logs_are_refused_for_a_universal_file(run, tmp_path):
+    outcome = run("modes", tmp_path / "arm.uff", "--operational")
+    assert outcome.code == 2
+    assert "--operational is for logs" in outcome.err
+
+
+def test_a_universal_file_with_neither_is_refused(run, shared_data):
+    outcome = run("modes", next(iter(sorted(shared_data.glob("*.uff")))))
+    assert outcome.code == 2
+    assert outcome.err.count("\n") == 1
