@@ -31,9 +31,7 @@ class HeadlessViewer:
         }
         chosen = next(path for path, content in containers.items() if content.get("display_name") == page)
         while True:
-            parent = next(
-                (path for path, content in containers.items() if chosen in content.get("contents", [])), None
-            )
+            parent = next((path for path, content in containers.items() if chosen in _contents(content)), None)
             if parent is None:
                 break
             if containers[parent]["container_kind"] == "Tabs":
@@ -56,6 +54,12 @@ class HeadlessViewer:
         reports = [f"{view.name}: {report.summary}" for view in self.views() for report in view.reports]
         logs = [entry.message for entry in self.client.get_logs() if entry.level != "INFO"]
         return reports + [message for message in logs if "oftware rasterizer" not in message]
+
+
+def _contents(container: dict[str, Any]) -> list[str]:
+    """Paths in a container; the viewer gives one alone as text, and after a change it puts a slash before each."""
+    contents = container.get("contents", [])
+    return [path.strip("/") for path in ([contents] if isinstance(contents, str) else contents)]
 
 
 @contextmanager
