@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from chladni.modal.judged_lines import JudgedLines
+from chladni.modal.judged_lines import TOLERATED, JudgedLines
 from chladni.modal.plscf import polyreference_poles
 from chladni.modal.pole_table import PoleTable
 from chladni.signals.errors import EstimateError
@@ -110,7 +110,9 @@ def closer_search(
 def unexplained_lines(lines: JudgedLines, synthesised: NDArray[np.complex128]) -> NDArray[np.bool_]:
     """``[line]`` where the mean square of what is left, over any of `SCALES`, is more than noise and model error."""
     weight = lines.weight**2 / 2
-    left = weight * np.abs(lines.values - synthesised) ** 2
+    # Between resonances a fit may be off by a share of what is near, not of the little that is left there.
+    near = uniform_filter1d(np.abs(lines.values) ** 2, SHORTEST_LOOK // 2, axis=-1, mode="nearest")
+    left = weight * np.abs(lines.values - synthesised) ** 2 / (1 + weight * TOLERATED**2 * near)
     used = np.count_nonzero(lines.weight, axis=(0, 1))
     mean = left.sum(axis=(0, 1)) / np.maximum(used, 1)
     found = np.zeros(mean.shape, bool)
@@ -149,7 +151,9 @@ def _poles(
 ) -> PoleTable:
     first = max(int(np.searchsorted(lines.frequency_hz, core[0])) - margin, 0)
     last = min(int(np.searchsorted(lines.frequency_hz, core[1])) + margin, lines.frequency_hz.size - 1)
-    order = max_order or default_order(last + 1 - first, lines.values.shape[1])
+    # A short look carries no more than its lines do, whatever order was asked for.
+    few = default_order(last + 1 - first, lines.values.shape[1])
+    order = few if max_order is None else min(max_order, few) if margin else max_order
     band = (float(lines.frequency_hz[first]), float(lines.frequency_hz[last]))
     table = polyreference_poles(response, max_order=order, band_hz=band)
     return _chosen(table, (table.frequency_hz >= core[0]) & (table.frequency_hz <= core[1]))
