@@ -261,18 +261,24 @@ def test_stabilisation_shows_every_pole_where_it_belongs(arm: Contents) -> None:
 
 
 def test_stabilisation_names_modes_machine_lines_and_axes(arm: Contents) -> None:
-    assert arm.static("/stabilisation/modes/names")["Points2D:labels"] == [
-        "24.67",
-        "47.97",
-        "66.32",
-        "97.79",
-        "169.3",
-    ]
-    assert arm.static("/stabilisation/harmonics/names")["Points2D:labels"] == ["120.0 (machine)"]
+    names = arm.static("/stabilisation/names/1")
+    assert names["Points2D:labels"] == ["24.67", "47.97", "66.32", "97.79", "169.3", "120.0"]
+    assert names["Points2D:colors"][-1] != names["Points2D:colors"][0]
+    assert "line of a machine" in arm.static("/stabilisation/legend/names")["Points2D:labels"]
     assert {"Frequency [Hz]", "Model order", "20", "40"} <= set(
         arm.static("/stabilisation/axes/numbers")["Points2D:labels"]
     )
     assert "CMIF [dB re 1 (m/s²)/N]" in arm.static("/stabilisation/indicator/numbers")["Points2D:labels"]
+
+
+def test_close_modes_are_named_above_one_another(tmp_path: Path) -> None:
+    close = replace(MODES, frequency_hz=np.array([24.0, 24.5, 25.0, 97.0, 97.5]), harmonics=())
+    found = contents(Study(title="close", modes=close), tmp_path)
+    first, second = (found.static(f"/stabilisation/names/{row}") for row in (1, 2))
+    assert first["Points2D:labels"] == ["24.00", "97.00"]
+    assert second["Points2D:labels"] == ["24.50", "97.50"]
+    assert second["Points2D:positions"][0][1] < first["Points2D:positions"][0][1]
+    assert "line of a machine" not in found.static("/stabilisation/legend/names")["Points2D:labels"]
 
 
 def test_stabilisation_of_nothing_is_drawn_all_the_same(tmp_path: Path) -> None:

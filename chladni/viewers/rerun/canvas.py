@@ -55,7 +55,8 @@ class Canvas:
         numbers = [f"{at:g}" for at in (*x, *y)]
         below = self.places(x, np.full(x.size, low)) + BELOW
         beside = self.places(np.full(y.size, left), y) - BESIDE
-        names = [(self.width / 2, self.height + 1.4 * LETTERS), (0.0, -2.2 * LETTERS)]
+        # Above what may be written over the frame.
+        names = [(self.width / 2, self.height + 1.4 * LETTERS), (0.0, -3.2 * LETTERS)]
         draw_labels(recording, f"{path}/numbers", np.vstack([below, beside, names]), [*numbers, x_name, y_name])
 
     def view(

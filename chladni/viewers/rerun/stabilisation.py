@@ -18,12 +18,15 @@ from chladni.viewers.style import STATUS_ON_DARK
 
 PATH = "/stabilisation"
 # With the synthesis below it, and alone on its page.
-WIDTH, HEIGHT, ALONE = 1440.0, 320.0, 690.0
+WIDTH, HEIGHT, ALONE = 1440.0, 300.0, 670.0
 # Half of a letter, to set a text right.
 HALF_LETTER = 3.7
 INDICATOR_COLOUR = (120, 120, 120)
 MODE_COLOUR = (245, 245, 245)
 HARMONIC_COLOUR = (235, 80, 80)
+UPRIGHT = np.array([(0.0, -6.0), (0.0, 6.0)])
+# Close modes are named above one another, as far as these rows go.
+ROWS_OF_NAMES, NAME_WIDTH = 2, 54.0
 ABOVE_RIGHT = np.array([1.2, -0.5]) * LETTERS
 
 
@@ -39,9 +42,9 @@ def draw_stabilisation(recording: rr.RecordingStream, modes: ModeSet) -> rrb.Vie
     _draw_modes(recording, canvas, modes)
     for status, name in enumerate(STATUS_NAMES):
         _draw_poles(recording, canvas, diagram, status, name)
-    _draw_legend(recording)
+    _draw_legend(recording, with_machines=len(modes.harmonics) > 0)
     return canvas.view(
-        PATH, f"Stabilisation over {diagram.indicator_name} · point at a pole to read it", right=80.0, above=115.0
+        PATH, f"Stabilisation over {diagram.indicator_name} · point at a pole to read it", right=80.0, above=140.0
     )
 
 
@@ -65,29 +68,30 @@ def _draw_indicator(recording: rr.RecordingStream, canvas: Canvas, diagram: Stab
     numbers = ticks(low, high, count=8)
     right = over.places(np.full(numbers.size, canvas.x_range[1]), numbers) + ABOVE_RIGHT
     name = f"{title(diagram)} [{decibel_unit(diagram.indicator_unit)}]"
-    places = np.vstack([right, [(WIDTH + 2 * LETTERS - HALF_LETTER * len(name), -2.2 * LETTERS)]])
+    places = np.vstack([right, [(WIDTH + 2 * LETTERS - HALF_LETTER * len(name), -3.2 * LETTERS)]])
     draw_labels(recording, f"{PATH}/indicator/numbers", places, [*(f"{number:g}" for number in numbers), name])
 
 
 def _draw_modes(recording: rr.RecordingStream, canvas: Canvas, modes: ModeSet) -> None:
     """An upright line at each mode and at each line of a machine, named above the frame where there is room."""
-    low, high = canvas.y_range
-    marks = [
-        ("modes", modes.frequency_hz, MODE_COLOUR, ""),
-        ("harmonics", np.array([line.frequency_hz for line in modes.harmonics]), HARMONIC_COLOUR, " (machine)"),
-    ]
-    for kind, everywhere_hz, colour, word in marks:
-        inside = (everywhere_hz >= canvas.x_range[0]) & (everywhere_hz <= canvas.x_range[1])
-        frequencies_hz = everywhere_hz[inside]
-        strips = [canvas.places([at, at], [low, high]) for at in frequencies_hz]
+    marks = [("modes", float(hertz), MODE_COLOUR) for hertz in modes.frequency_hz]
+    marks += [("harmonics", line.frequency_hz, HARMONIC_COLOUR) for line in modes.harmonics]
+    shown = [mark for mark in marks if canvas.x_range[0] <= mark[1] <= canvas.x_range[1]]
+    for kind, colour in (("modes", MODE_COLOUR), ("harmonics", HARMONIC_COLOUR)):
+        strips = [canvas.places([at, at], canvas.y_range) for name, at, _ in shown if name == kind]
         lines = rr.LineStrips2D(
             strips, colors=[(*colour, 90)] * len(strips), radii=rr.Radius.ui_points(0.5), draw_order=-2.0
         )
         recording.log(f"{PATH}/{kind}", lines, static=True)
-        tops = canvas.places(frequencies_hz, np.full(frequencies_hz.size, high)) - [0.0, LETTERS]
-        named = spread(tops, apart=(52.0 + 8 * len(word), 1.0))
-        texts = [hertz(float(frequencies_hz[row])) + word for row in named]
-        draw_labels(recording, f"{PATH}/{kind}/names", tops[named], texts, colours=[colour] * len(texts))
+    unnamed = list(range(len(shown)))
+    for row in range(ROWS_OF_NAMES):
+        tops = canvas.places([shown[place][1] for place in unnamed], np.full(len(unnamed), canvas.y_range[1]))
+        named = spread(tops, apart=(NAME_WIDTH, 1.0))
+        marked = [shown[unnamed[place]] for place in named]
+        texts = [hertz(at) for _, at, _ in marked]
+        above = tops[named] - [0.0, (1 + row) * LETTERS]
+        draw_labels(recording, f"{PATH}/names/{row + 1}", above, texts, colours=[colour for _, _, colour in marked])
+        unnamed = [place for at, place in enumerate(unnamed) if at not in named]
 
 
 def _draw_poles(
@@ -131,13 +135,16 @@ def _ring(place: Floats) -> Floats:
     return np.asarray(place + 4.2 * np.column_stack([np.cos(angle), np.sin(angle)]))
 
 
-def _draw_legend(recording: rr.RecordingStream) -> None:
-    """A row above the frame: a dot of each colour, and its meaning below it."""
-    count = len(STATUS_NAMES) + 1
-    across = WIDTH * (0.22 + 0.56 * np.arange(count) / (count - 1))
-    places = np.column_stack([across, np.full(count, -4.4 * LETTERS)])
-    dots = rr.Points2D(places[:-1], colors=list(STATUS_ON_DARK), radii=rr.Radius.ui_points(4.0), show_labels=False)
+def _draw_legend(recording: rr.RecordingStream, *, with_machines: bool) -> None:
+    """A row above the frame: a mark of each kind, and its meaning below it."""
+    names = [*STATUS_NAMES, "taken for a mode", *(["line of a machine"] if with_machines else [])]
+    across = WIDTH * (0.22 + 0.112 * np.arange(len(names)))
+    places = np.column_stack([across, np.full(len(names), -5.4 * LETTERS)])
+    kinds = len(STATUS_NAMES)
+    dots = rr.Points2D(places[:kinds], colors=list(STATUS_ON_DARK), radii=rr.Radius.ui_points(4.0), show_labels=False)
     recording.log(f"{PATH}/legend/dots", dots, static=True)
-    ring = rr.LineStrips2D([_ring(places[-1])], colors=[MODE_COLOUR], radii=rr.Radius.ui_points(0.5))
-    recording.log(f"{PATH}/legend/ring", ring, static=True)
-    draw_labels(recording, f"{PATH}/legend/names", places + BELOW, [*STATUS_NAMES, "taken for a mode"])
+    strips = [_ring(places[kinds]), *(place + UPRIGHT for place in places[kinds + 1 :])]
+    colours = [MODE_COLOUR, HARMONIC_COLOUR][: len(strips)]
+    marks = rr.LineStrips2D(strips, colors=colours, radii=rr.Radius.ui_points(0.5))
+    recording.log(f"{PATH}/legend/marks", marks, static=True)
+    draw_labels(recording, f"{PATH}/legend/names", places + BELOW, names)
