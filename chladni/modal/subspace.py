@@ -38,6 +38,11 @@ ONE_CHANNEL = (
 )
 
 
+def _generous() -> SelectionRules:
+    # What follows tests each candidate against the data, so that few orders are enough for one.
+    return SelectionRules(share=0.15)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CovarianceDrivenSubspace:
     """Identify modes from responses alone (SSI-cov): output-only modal analysis.
@@ -70,7 +75,7 @@ class CovarianceDrivenSubspace:
     block_rows: int | None = None
     max_order: int | None = None
     references: Sequence[str] | None = None
-    selection: SelectionRules = field(default_factory=SelectionRules)
+    selection: SelectionRules = field(default_factory=_generous)
     rules: ResponseRules = field(default_factory=ResponseRules)
     stability: StabilityLimits = field(default_factory=StabilityLimits)
 

@@ -32,6 +32,9 @@ class ResponseRules:
         half-width.
     over_least_std
         Largest standard deviation over the least that a record of this length allows (`least_std`).
+    share, over_least_std_of_few
+        Part of the model orders below which a candidate must be surer than that: richer models may give a strong mode
+        two poles, so that few orders hold it as one.
     harmonic_distance, harmonic_damping
         A pole within this share of the frequency of a machine's line and with no more than this damping ratio is
         that line.
@@ -44,6 +47,8 @@ class ResponseRules:
     least_replication: float = 0.25
     damping_std: float = 0.7
     over_least_std: float = 12.0
+    share: float = 0.3
+    over_least_std_of_few: float = 3.0
     harmonic_distance: float = 0.01
     harmonic_damping: float = 0.005
     same_shape: float = 0.9
@@ -107,12 +112,13 @@ def choose_poles(
         [certain_pole(table, np.flatnonzero(found.member == mode)) for mode in range(found.row.size)], dtype=np.int64
     )
     shares = replication(correlations, table, found, block_rows=block_rows)
-    unsure = _unsure(table, rows, shares, correlations.duration_s, rules)
+    few = found.spread.orders < round(rules.share * table.orders.size)
+    unsure = _unsure(table, rows, shares, few, correlations.duration_s, rules)
     machine = np.array([_is_harmonic(table, row, harmonics, rules) for row in rows], dtype=np.bool_)
     if frequencies_hz is not None:
         kept, notes = np.arange(rows.size), _doubts(table, rows, unsure, machine)
     else:
-        kept, notes = _kept(table, rows, found, unsure, machine, count, rules)
+        kept, notes = _kept(table, rows, found, unsure, machine, few, count, rules)
     final = _of_full_models(table, found, kept)
     rising = np.argsort(table.frequency_hz[final], kind="stable")
     return ChosenPoles(selection=found, clusters=kept[rising], rows=final[rising], notes=found.notes + notes)
@@ -125,7 +131,9 @@ def _of_full_models(table: PoleTable, found: PoleSelection, kept: Rows) -> Rows:
     return np.array([certain_pole(table, cluster, least_order=least) for cluster in clusters], dtype=np.int64)
 
 
-def _unsure(table: PoleTable, rows: Rows, shares: Floats, duration_s: float, rules: ResponseRules) -> Bools:
+def _unsure(
+    table: PoleTable, rows: Rows, shares: Floats, few: Bools, duration_s: float, rules: ResponseRules
+) -> Bools:
     frequency_hz, damping = table.frequency_hz[rows], table.damping_ratio[rows]
     frequency_std, damping_std = pole_std(table, rows)
     spread = np.hypot(frequency_std / frequency_hz, damping_std) / np.sqrt(2)
@@ -133,7 +141,8 @@ def _unsure(table: PoleTable, rows: Rows, shares: Floats, duration_s: float, rul
     # A pole of noise that many channels make look sure doesn't come back at all; one of a mode may come back in part,
     # where half of the record gives its models two poles for it.
     needed = np.minimum(rules.replication, rules.least_replication + spread / damping)
-    wide = (spread > rules.damping_std * damping) | (spread > rules.over_least_std * least)
+    most = np.where(few, rules.over_least_std_of_few, rules.over_least_std)
+    wide = (spread > rules.damping_std * damping) | (spread > most * least)
     return np.asarray((shares < needed) | wide, dtype=np.bool_)
 
 
@@ -149,13 +158,15 @@ def _kept(
     found: PoleSelection,
     unsure: Bools,
     machine: Bools,
+    few: Bools,
     count: int | None,
     rules: ResponseRules,
 ) -> tuple[Rows, tuple[str, ...]]:
     kept, notes = np.flatnonzero(~unsure & ~machine), []
     if np.any(machine):
         notes.append(f"{_at(table, rows[machine])}: lines of machines, not modes")
-    noise = unsure & ~machine
+    # What few orders show is nothing that a person would ask about.
+    noise = unsure & ~machine & ~few
     if np.any(noise):
         notes.append(
             f"{_at(table, rows[noise])}: many orders hold a pole there, but it doesn't come back in the other half "
