@@ -17,6 +17,7 @@ from chladni.signals.wording import counted
 _MAIN_MODES = 6
 _GOOD_FIT = 0.05
 _MOST_JOINTS = 3
+_FEW_MACHINES = 2
 _DOUBT = "The shapes aren't all told apart: check before building."
 
 
@@ -99,6 +100,11 @@ def _fit(modes: ModeSet) -> list[str]:
 
 
 def _harmonics(modes: ModeSet) -> list[str]:
+    if len(modes.harmonics) > _FEW_MACHINES:
+        listed = joined([f"{harmonic.frequency_hz:.4g}" for harmonic in modes.harmonics], most=12)
+        return [
+            f"Lines of machines, no modes: {listed} Hz; each has its reason in the report and in the JSON document."
+        ]
     return [
         f"{harmonic.frequency_hz:.4g} Hz is a line of a machine, no mode ({harmonic.reason})."
         for harmonic in modes.harmonics

@@ -65,12 +65,17 @@ def mode_table(modes: ModeSet, validation: ModeValidation | None) -> tuple[Row, 
 
 
 def motion_table(motions: Sequence[RelativeMotion], modes: ModeSet, style: Style) -> tuple[Row, list[Row]]:
-    """Give headings and rows of relative motion, mode by mode, the greatest ratio of each mode first."""
+    """Give headings and rows of relative motion, mode by mode, the greatest ratio of each mode first.
+
+    There is no row at all when no two neighbours have a common direction: a page of blanks says nothing.
+    """
     scaled = any(motion.damping_gain is not None or motion.stiffness_gain_hz is not None for motion in motions)
     headings: Row = ("Mode", "Frequency [Hz]", "Between", "Ratio")
     if scaled:
         headings += ("Δζ [% per N s/m]", "Δf [Hz per N/m]")
-    rows = []
+    rows: list[Row] = []
+    if all(motion.ratio is None for motion in motions):
+        return headings, rows
     for motion in sorted(motions, key=_mode_then_ratio):
         ratio = "no common direction" if motion.ratio is None else _estimate(motion.ratio, motion.ratio_std)
         row: Row = (

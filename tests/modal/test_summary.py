@@ -115,3 +115,9 @@ def test_no_joint_is_named_that_only_the_order_of_channels_suggests() -> None:
         text = " ".join(summary_of(mode_set(shapes, names=names)))
         assert "against each other" not in text
         assert "give a setup file with points, directions and lines" in text
+
+
+def test_many_machines_take_one_sentence() -> None:
+    lines = tuple(MachineHarmonic(frequency_hz=25.0 * k, reason="kurtosis 1.5") for k in (1, 2, 3))
+    (told,) = [one for one in summary_of(mode_set(SOUND, harmonics=lines)) if "machine" in one]
+    assert told.startswith("Lines of machines, no modes: 25, 50 and 75 Hz")

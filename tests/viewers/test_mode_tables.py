@@ -108,3 +108,8 @@ def test_what_is_told_elsewhere_is_not_repeated() -> None:
     response = replace(STUDY.response, provenance=STUDY.response.provenance.with_notes("An advice."))
     told = advice(replace(STUDY, response=response), MODES, told=("Mode 5 rests on few orders.",))
     assert told == ["5 modes, all shapes are told apart.", "120.0 Hz is no mode: kurtosis 1.52 where noise has 3"]
+
+
+def test_motions_without_any_common_direction_make_no_table() -> None:
+    apart = RelativeMotion(mode=0, between=("base", "arm"), ratio=None, ratio_std=None)
+    assert motion_table((apart, apart), MODES, STYLE)[1] == []
