@@ -27,7 +27,7 @@ MAX_ORDER = 60
 FEWEST_ROWS = 10
 # A record holds the lags so many times at least, for the scatter between blocks.
 SPANS_IN_RECORD = 20
-# A Hankel matrix of this side is decomposed in about a second.
+# A square Hankel matrix of this side is decomposed in a second or two, a higher one of as many operations too.
 MOST_SIDE = 1500
 LARGEST_SIDE = 4000
 MOST_REFERENCES = 12
@@ -115,11 +115,11 @@ def plan_subspace(
                 f"the lags span {spanned:.1f} cycles of the lowest peak ({lowest_hz:.3g} Hz) only: higher peaks need "
                 "the sample rate; identify the low modes on their own, in a band that ends above them"
             )
-    side = block_rows * min(channels, len(rows))
+    side = round(block_rows * _side(channels, len(rows)))
     if side > LARGEST_SIDE:
         raise SetupError(
-            f"{block_rows} block rows of {channels} channels and {len(rows)} references make a matrix of side "
-            f"{side}; at most {LARGEST_SIDE} is decomposed in reasonable time, so take fewer block rows or references"
+            f"{block_rows} block rows of {channels} channels and {len(rows)} references make as much work as a square "
+            f"matrix of side {side}; {LARGEST_SIDE} is the most, so take fewer block rows or references"
         )
     if decimation > 1:
         notes.append(
@@ -169,10 +169,15 @@ def _block_rows(
 ) -> tuple[int, float]:
     """Block rows, and the cycles of the lowest peak that the lags then span."""
     wanted = ceil(CYCLES * rate_hz / lowest_hz / 2)
-    most = min(max(MOST_SIDE // min(channels, references), FEWEST_ROWS), longest)
+    most = min(max(int(MOST_SIDE / _side(channels, references)), FEWEST_ROWS), longest)
     least = max(FEWEST_ROWS, ceil(order / channels) + 1, ceil(order / references))
     chosen = max(min(wanted, most), least)
     return chosen, 2 * chosen * lowest_hz / rate_hz
+
+
+def _side(channels: int, references: int) -> float:
+    """Side of the square matrix whose decomposition is as much work as that of one block row and column."""
+    return float(np.cbrt(channels * references * references))
 
 
 def _references(spectra: CrossSpectra, names: Sequence[str] | None, band_hz: Band) -> tuple[int, ...]:

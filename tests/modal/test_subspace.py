@@ -266,7 +266,7 @@ def test_impossible_requests_are_told():
         identify(record, band_hz=(40.0, 60.0))
     with pytest.raises(EstimateError, match=r"too few for correlations over .* take a longer record or fewer block"):
         CovarianceDrivenSubspace(block_rows=200).identify(record.window(end_s=40.0))
-    with pytest.raises(SetupError, match="matrix of side 5000"):
+    with pytest.raises(SetupError, match="square matrix of side 5000"):
         CovarianceDrivenSubspace(block_rows=1000).identify(record)
     broken = record.values.copy()
     broken[1, 5] = np.inf

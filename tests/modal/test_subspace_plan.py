@@ -90,7 +90,7 @@ def test_what_can_not_be_planned_is_told():
         plan(record, references=["/x"])
     with pytest.raises(SetupError, match="above half the sample rate, 25 Hz"):
         plan(record, band_hz=(30.0, 40.0))
-    with pytest.raises(SetupError, match="matrix of side 6000"):
+    with pytest.raises(SetupError, match="square matrix of side 6000"):
         plan(record, block_rows=2000)
 
 
