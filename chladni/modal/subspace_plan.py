@@ -118,8 +118,8 @@ def plan_subspace(
     side = round(block_rows * _side(channels, len(rows)))
     if side > LARGEST_SIDE:
         raise SetupError(
-            f"{block_rows} block rows of {channels} channels and {len(rows)} references make as much work as a square "
-            f"matrix of side {side}; {LARGEST_SIDE} is the most, so take fewer block rows or references"
+            f"{block_rows} block rows of {channels} channels and {len(rows)} references make as much work as a "
+            f"square matrix of side {side}; {LARGEST_SIDE} is the most, so take fewer block rows or references"
         )
     if decimation > 1:
         notes.append(
