@@ -15,14 +15,19 @@ from chladni.modal.circle_fit import CircleFit
 from chladni.modal.efdd import EnhancedFrequencyDomainDecomposition
 from chladni.modal.fdd import FrequencyDomainDecomposition
 from chladni.modal.half_power import HalfPower
+from chladni.modal.harmonics import LONGEST_SEGMENT_SHARE, SHORTEST_SEGMENT, machine_harmonics
+from chladni.modal.machine_lines import without_machines
 from chladni.modal.polyreference import PolyReferenceLeastSquares
 from chladni.modal.subspace import CovarianceDrivenSubspace
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.machine_harmonic import MachineHarmonic
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.adaptive import adaptive_cross_spectra
+from chladni.spectral.blocks import leading_part
+from chladni.spectral.stretches import valid_runs
 
 Band = tuple[float, float]
 FromResponses = CovarianceDrivenSubspace | FrequencyDomainDecomposition | EnhancedFrequencyDomainDecomposition
@@ -33,6 +38,8 @@ Method = FromFunctions | FromResponses
 # the lines in each peak. Each further reference takes some of the averages for itself.
 SEGMENTS, SEGMENTS_A_REFERENCE = 8, 4
 LONGEST_SEGMENT = 1 << 16
+# Machines are looked for in the beginning of a stream, in one piece.
+SAMPLES_FOR_MACHINES = 1 << 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -224,10 +231,22 @@ def _from_samples(
             raise EstimateError("responses alone are identified in one band; give the band that holds them all")
         band = wanted.bands_hz[0] if wanted.bands_hz else None
         return method.identify(samples, band_hz=band, count=wanted.count, frequencies_hz=wanted.frequencies_hz)
+    lead, blocks = leading_part(samples, SAMPLES_FOR_MACHINES)
     spectra = adaptive_cross_spectra(
-        samples, resolution_hz=averaging.resolution_hz, window=averaging.window, overlap=averaging.overlap
+        samples if isinstance(samples, TimeSeries) else blocks,
+        resolution_hz=averaging.resolution_hz,
+        window=averaging.window,
+        overlap=averaging.overlap,
     )
-    return modes_of_spectra(spectra, method=method, wanted=wanted)
+    line_hz = float(spectra.frequency_hz[1] - spectra.frequency_hz[0])
+    found = modes_of_spectra(spectra, method=method, wanted=wanted)
+    return without_machines(found, _machines(lead[0]), line_hz=line_hz)
+
+
+def _machines(series: TimeSeries) -> tuple[MachineHarmonic, ...]:
+    longest = max((end - begin for begin, end in valid_runs(series)), default=0)
+    # Kurtosis needs a stretch of its own; in a shorter one nothing can be told.
+    return machine_harmonics(series) if longest >= LONGEST_SEGMENT_SHARE * SHORTEST_SEGMENT else ()
 
 
 def _bands(band_hz: Band | Sequence[Band] | None) -> tuple[Band, ...]:

@@ -11,7 +11,6 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.modal_scale import ModalScale
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.order_spread import OrderSpread
-from chladni.signals.stabilisation_diagram import StabilisationDiagram
 from chladni.spectral.forms import MOTION_ORDER
 
 Floats = NDArray[np.float64]
@@ -155,7 +154,7 @@ def _shifted_spread(spread: OrderSpread, decay_per_s: float) -> OrderSpread:
 
 def _kept(modes: ModeSet, frequency_hz: Floats, damping_ratio: Floats) -> ModeSet:
     """Give the modes whose pole is still on the stable side, by rising frequency, at their new place."""
-    # Close modes of unequal damping may have changed places.
+    # Close modes of unequal damping may have changed places, which a set in the making must not show.
     rows = np.argsort(frequency_hz, kind="stable")
     rows = rows[damping_ratio[rows] > 0]
     return replace(
@@ -167,36 +166,10 @@ def _kept(modes: ModeSet, frequency_hz: Floats, damping_ratio: Floats) -> ModeSe
         shapes=modes.shapes[rows],
         shape_std=modes.shape_std[rows],
         participation=None if modes.participation is None else modes.participation[rows],
-        scale=None if modes.scale is None else _selected_scale(modes.scale, rows),
-        spread=None if modes.spread is None else _selected_spread(modes.spread, rows),
-        stabilisation=None if modes.stabilisation is None else _renumbered(modes.stabilisation, rows),
+        scale=None if modes.scale is None else modes.scale.select(rows),
+        spread=None if modes.spread is None else modes.spread.select(rows),
+        stabilisation=None if modes.stabilisation is None else modes.stabilisation.select(rows),
     )
-
-
-def _selected_scale(scale: ModalScale, rows: Rows) -> ModalScale:
-    return replace(
-        scale,
-        modal_a=scale.modal_a[rows],
-        modal_mass=scale.modal_mass[rows],
-        modal_mass_std=scale.modal_mass_std[rows],
-    )
-
-
-def _selected_spread(spread: OrderSpread, rows: Rows) -> OrderSpread:
-    return OrderSpread(
-        orders=spread.orders[rows],
-        frequency_hz=spread.frequency_hz[rows],
-        frequency_std_hz=spread.frequency_std_hz[rows],
-        damping_ratio=spread.damping_ratio[rows],
-        damping_std=spread.damping_std[rows],
-    )
-
-
-def _renumbered(diagram: StabilisationDiagram, rows: Rows) -> StabilisationDiagram:
-    """Diagram of the poles as they were fitted, with the numbers that their modes have now."""
-    numbers = {int(row): number for number, row in enumerate(rows)}
-    mode = np.array([numbers.get(int(row), -1) for row in diagram.mode], dtype=np.int64)
-    return replace(diagram, mode=mode)
 
 
 def _notes(modes: ModeSet, damping_ratio: Floats, damping_std: Floats, decay_per_s: float) -> list[str]:

@@ -1,7 +1,7 @@
 """Modal mass and modal A: what turns shapes into receptances."""
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,3 +35,12 @@ class ModalScale(Value):
         for name in ("modal_mass", "modal_mass_std"):
             require_shape(name, getattr(self, name), self.modal_a.shape, "modes")
         self._freeze()
+
+    def select(self, rows: NDArray[np.intp]) -> Self:
+        """Give the scale of some modes, in the order asked for."""
+        return replace(
+            self,
+            modal_a=self.modal_a[rows],
+            modal_mass=self.modal_mass[rows],
+            modal_mass_std=self.modal_mass_std[rows],
+        )

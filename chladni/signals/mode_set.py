@@ -1,8 +1,8 @@
 """Natural modes: frequencies, damping ratios and modal vectors, each with its uncertainty."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +79,9 @@ class ModeSet(Value):
         if self.participation is not None:
             expected = (count, len(self.references))
             require_shape("participation", self.participation, expected, "modes x references")
+        if self.fit is not None:
+            expected = (len(self.channels), len(self.references))
+            require_shape("fit.function_error", self.fit.function_error, expected, "channels x references")
         if np.any(np.diff(self.frequency_hz) < 0) or np.any(self.frequency_hz <= 0):
             raise EstimateError("frequency_hz of modes must be positive and rising")
         self._freeze()
@@ -88,3 +91,25 @@ class ModeSet(Value):
         """``[mode]`` -zeta omega + j omega sqrt(1 - zeta^2) in rad/s."""
         omega = 2 * pi * self.frequency_hz
         return -self.damping_ratio * omega + 1j * omega * np.sqrt(1 - self.damping_ratio**2)
+
+    def select(self, rows: NDArray[np.intp]) -> Self:
+        """Give some of the modes, by rising frequency; the fit stays that of all of them.
+
+        Parameters
+        ----------
+        rows
+            ``[mode]`` rows to keep, by rising frequency.
+        """
+        return replace(
+            self,
+            frequency_hz=self.frequency_hz[rows],
+            frequency_std_hz=self.frequency_std_hz[rows],
+            damping_ratio=self.damping_ratio[rows],
+            damping_std=self.damping_std[rows],
+            shapes=self.shapes[rows],
+            shape_std=self.shape_std[rows],
+            participation=None if self.participation is None else self.participation[rows],
+            scale=None if self.scale is None else self.scale.select(rows),
+            spread=None if self.spread is None else self.spread.select(rows),
+            stabilisation=None if self.stabilisation is None else self.stabilisation.select(rows),
+        )

@@ -1,6 +1,7 @@
 """How the poles of each mode scatter over the model orders they were found at."""
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,3 +33,13 @@ class OrderSpread(Value):
         for name in ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std"):
             require_shape(name, getattr(self, name), self.orders.shape, "modes")
         self._freeze()
+
+    def select(self, rows: NDArray[np.intp]) -> Self:
+        """Give the spread of some modes, in the order asked for."""
+        return type(self)(
+            orders=self.orders[rows],
+            frequency_hz=self.frequency_hz[rows],
+            frequency_std_hz=self.frequency_std_hz[rows],
+            damping_ratio=self.damping_ratio[rows],
+            damping_std=self.damping_std[rows],
+        )

@@ -1,7 +1,7 @@
 """Poles over model orders, as an analyst looks at them."""
 
-from dataclasses import dataclass
-from typing import Literal, get_args
+from dataclasses import dataclass, replace
+from typing import Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,3 +52,8 @@ class StabilisationDiagram(Value):
         curves = self.indicator.shape[:1]
         require_shape("indicator", self.indicator, (*curves, self.indicator_hz.size), "curves x lines")
         self._freeze()
+
+    def select(self, rows: NDArray[np.intp]) -> Self:
+        """Give the same poles with the numbers that some modes have when only those are kept, in the order given."""
+        numbers = {int(row): number for number, row in enumerate(rows)}
+        return replace(self, mode=np.array([numbers.get(int(row), -1) for row in self.mode], dtype=np.int64))
