@@ -16,11 +16,15 @@ from chladni.apps.demo_log import (
     make_demo_log,
     setup_text,
 )
+from chladni.apps.modes import Wanted, modes_of_response
+from chladni.apps.show import gather
 from chladni.apps.sources import Progress, no_progress
 from chladni.io.atomic import atomic_write
 from chladni.io.log import open_log
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.errors import LogError
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.mode_set import ModeSet
 from chladni.signals.study import Study
 
 RESOLUTION_HZ = 0.125
@@ -84,7 +88,10 @@ def run_tour(folder: Path, *, progress: Progress = no_progress) -> Tour:
     with open_log(log_path, setup=setup_path) as log:
         study = analyse(log, resolution_hz=RESOLUTION_HZ)
         gaps = next(one.gaps for one in log.info().channels if one.channel.name == _name(LOST_SENSOR))
-    progress(0.6)
+    progress(0.55)
+    modes = modes_of_response(_shaken(study), method=None, wanted=Wanted())
+    study = gather(study, modes)
+    progress(0.65)
     recording = write_rrd(study, folder / "arm.rrd")
     progress(0.7)
     album = Album.of(study)
@@ -94,7 +101,11 @@ def run_tour(folder: Path, *, progress: Progress = no_progress) -> Tour:
     progress(1.0)
     return Tour(
         study=study,
-        comparisons=(*_peaks_beside_truth(study, made), *_gap_beside_truth(gaps)),
+        comparisons=(
+            *_modes_beside_truth(modes, made),
+            *_peaks_beside_truth(study, made),
+            *_gap_beside_truth(gaps),
+        ),
         files=(recording, report, log_path, setup_path, *figures),
     )
 
@@ -117,6 +128,37 @@ class _Top:
     frequency_hz: float
     height: float
     prominence_db: float
+
+
+def _shaken(study: Study) -> FrequencyResponse:
+    if study.response is None:
+        raise AssertionError("the tour's log has a force")
+    return study.response
+
+
+def _modes_beside_truth(modes: ModeSet, made: DemoLog) -> list[Comparison]:
+    """For each natural mode, set the identified one nearest to it beside its closed form."""
+    true = zip(made.modes.frequency_hz.tolist(), made.modes.damping_ratio.tolist(), strict=True)
+    return [row for number, (f, zeta) in enumerate(true, 1) for row in _mode_beside_truth(modes, number, f, zeta)]
+
+
+def _mode_beside_truth(modes: ModeSet, number: int, frequency_hz: float, damping: float) -> list[Comparison]:
+    near = np.flatnonzero(np.abs(modes.frequency_hz / frequency_hz - 1) < SAME_PEAK)
+    nearest = near[np.argsort(np.abs(modes.frequency_hz[near] - frequency_hz))[:1]]
+    numbers = (
+        ("natural frequency", modes.frequency_hz, modes.frequency_std_hz, frequency_hz, "Hz"),
+        ("damping ratio", 100 * modes.damping_ratio, 100 * modes.damping_std, 100 * damping, "%"),
+    )
+    return [
+        Comparison(
+            what=f"mode {number}: {what}",
+            found=float(found[nearest[0]]) if nearest.size else None,
+            std=float(std[nearest[0]]) if nearest.size else 0.0,
+            truth=truth,
+            unit=unit,
+        )
+        for what, found, std, truth, unit in numbers
+    ]
 
 
 def _peaks_beside_truth(study: Study, made: DemoLog) -> list[Comparison]:

@@ -83,7 +83,10 @@ def _with_checks(study: Study, modes: ModeSet) -> Study:
         study,
         validation=validation,
         relative_motion=motions,
-        findings=(*study.findings, *summarise(modes, validation, motions, geometry=study.geometry)),
+        # The notes of the functions stand in both.
+        findings=tuple(
+            dict.fromkeys([*study.findings, *summarise(modes, validation, motions, geometry=study.geometry)])
+        ),
     )
 
 

@@ -63,4 +63,4 @@ def has_display() -> bool:
 
 def _row(one: "Comparison") -> list[str]:
     found = "not found" if one.found is None else with_error(one.found, one.std)
-    return [one.what, found, number(one.truth, digits=5), unit(one.unit)]
+    return [one.what, found, number(one.truth, digits=7), unit(one.unit)]

@@ -156,7 +156,8 @@ def _poor_support(modes: ModeSet) -> list[str]:
             f"{capital(mode_names(modes, few.tolist()))} came out at only {counts} model orders (the best "
             f"supported at {spread.orders.max()}): look at the stabilisation diagram before believing it."
         )
-    return sentences + _scatter(modes, spread)
+    # Modes from functions are refined together: how the poles that they began from scatter says nothing of them.
+    return sentences if modes.references else sentences + _scatter(modes, spread)
 
 
 def _scatter(modes: ModeSet, spread: OrderSpread) -> list[str]:

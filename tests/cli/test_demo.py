@@ -20,10 +20,10 @@ def tour(tmp_path_factory):
 
 def test_everything_found_is_true_within_its_uncertainty(tour):
     _, document, _ = tour
-    assert len(document["comparisons"]) == 2 * 5 + 2
+    assert len(document["comparisons"]) == 2 * 5 + 2 * 5 + 2
     for one in document["comparisons"]:
         assert one["found"] is not None, one
-        # Four sigma: of ten numbers none should be further off. The lost stretch is known to a sample.
+        # Four sigma: of twenty numbers none should be further off. The lost stretch is known to a sample.
         assert abs(one["found"] - one["truth"]) <= max(4 * one["std"], 0.0011), one
 
 
