@@ -7,6 +7,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import fft, ifft, next_fast_len
+from scipy.special import ndtri, stdtrit
 
 from chladni.modal.correlation import CorrelationFunctions
 from chladni.modal.ssi_cov import FIRST_LAG, OrderModel, SubspaceDecomposition, continuous
@@ -173,6 +174,17 @@ def all_pole_deviations(
     poles = [continuous(model.eigenvalue, decomposition.sample_rate_hz) for model in models]
     none = np.zeros((0, correlations.blocks), dtype=np.complex128)
     return pole_deviations(np.concatenate([none[:, 0], *poles]), np.concatenate([none, *moved]))
+
+
+def student_factor(blocks: int) -> float:
+    """Factor that makes 1.96 sigma a 95 % interval when sigma itself is estimated from so many blocks.
+
+    Examples
+    --------
+    >>> round(student_factor(51), 3)
+    1.025
+    """
+    return float(stdtrit(blocks - 1, 0.975) / ndtri(0.975))
 
 
 def shape_std(deviations: Complexes) -> Complexes:

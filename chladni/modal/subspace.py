@@ -15,7 +15,7 @@ from chladni.modal.pole_table import PoleTable
 from chladni.modal.response_record import ResponseRecord, first_stretch, lead_spectra, open_record, read_record
 from chladni.modal.spectral_decomposition import decompose as decompose_spectra
 from chladni.modal.ssi_cov import OrderModel, SubspaceDecomposition, decompose, order_models, pole_table
-from chladni.modal.ssi_uncertainty import ErrorPropagation, all_pole_deviations, shape_std
+from chladni.modal.ssi_uncertainty import ErrorPropagation, all_pole_deviations, shape_std, student_factor
 from chladni.modal.stabilisation import StabilityLimits, stabilisation_diagram
 from chladni.modal.subspace_candidates import ChosenPoles, ResponseRules, choose_poles
 from chladni.modal.subspace_plan import SubspacePlan, plan_subspace
@@ -205,6 +205,7 @@ def _mode_set(correlations: CorrelationFunctions, poles: _Poles, chosen: ChosenP
     # Fifty blocks know their scatter to a tenth: below what is possible it's known to be too low.
     least_hz, least_damping = least_std(frequency_hz, damping, correlations.duration_s)
     propagation = ErrorPropagation(correlations, poles.decomposition)
+    factor = student_factor(correlations.blocks)
     shapes = np.zeros((rows.size, len(correlations.channels)), dtype=np.complex128)
     stds = np.zeros_like(shapes)
     for mode, row in enumerate(rows.tolist()):
@@ -212,12 +213,12 @@ def _mode_set(correlations: CorrelationFunctions, poles: _Poles, chosen: ChosenP
         largest = np.argmax(np.abs(vector))
         shapes[mode] = vector / vector[largest]
         shapes[mode, largest] = 1.0
-        stds[mode] = shape_std(propagation.shape(*poles.locate(row)))
+        stds[mode] = factor * shape_std(propagation.shape(*poles.locate(row)))
     return ModeSet(
         frequency_hz=frequency_hz,
-        frequency_std_hz=np.maximum(frequency_std, least_hz),
+        frequency_std_hz=np.maximum(factor * frequency_std, least_hz),
         damping_ratio=damping,
-        damping_std=np.maximum(damping_std, least_damping),
+        damping_std=np.maximum(factor * damping_std, least_damping),
         shapes=shapes,
         shape_std=stds,
         channels=correlations.channels,

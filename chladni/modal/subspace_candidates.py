@@ -17,6 +17,10 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+# Relative standard deviations between which the replication asked for rises. Poles of white noise have 0.4 with two
+# channels, of which half may come back, and 0.15 with ten, of which less than a sixth does.
+SURE = (0.1, 0.26)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResponseRules:
@@ -26,7 +30,7 @@ class ResponseRules:
     ----------
     replication, least_replication
         Least share of it that comes back in data that it was not found in (`replication`): the second for a pole
-        without error bar, rising with its relative standard deviation to the first.
+        whose damping is known to a tenth, rising to the first for one that is known to a quarter.
     damping_std
         Largest standard deviation of the damping ratio over the ratio, and of the frequency over the half-power
         half-width.
@@ -44,7 +48,7 @@ class ResponseRules:
     """
 
     replication: float = 0.55
-    least_replication: float = 0.25
+    least_replication: float = 0.15
     damping_std: float = 0.7
     over_least_std: float = 12.0
     share: float = 0.3
@@ -140,7 +144,7 @@ def _unsure(
     least = least_std(frequency_hz, damping, duration_s)[1]
     # A pole of noise that many channels make look sure doesn't come back at all; one of a mode may come back in part,
     # where half of the record gives its models two poles for it.
-    needed = np.minimum(rules.replication, rules.least_replication + spread / damping)
+    needed = np.interp(spread / damping, SURE, (rules.least_replication, rules.replication))
     most = np.where(few, rules.over_least_std_of_few, rules.over_least_std)
     wide = (spread > rules.damping_std * damping) | (spread > most * least)
     return np.asarray((shares < needed) | wide, dtype=np.bool_)

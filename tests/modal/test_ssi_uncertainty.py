@@ -7,7 +7,13 @@ import pytest
 
 from chladni.modal.correlation import correlation_functions
 from chladni.modal.ssi_cov import continuous, decompose, order_models, shapes_of
-from chladni.modal.ssi_uncertainty import ErrorPropagation, all_pole_deviations, pole_deviations, shape_std
+from chladni.modal.ssi_uncertainty import (
+    ErrorPropagation,
+    all_pole_deviations,
+    pole_deviations,
+    shape_std,
+    student_factor,
+)
 from chladni.signals.errors import EstimateError
 from tests.modal.test_ssi_cov import TRUTH, exact_functions
 from tests.modal.truth import ambient_record, chain
@@ -109,6 +115,15 @@ def test_more_record_gives_smaller_error_bars():
         bars.append(np.sort(all_pole_deviations(correlations, decomposition, [model]).frequency_std_hz))
     # Twice as sure with four times the record; each sigma is known to a tenth.
     np.testing.assert_allclose(bars[0] / bars[1], 2.0, rtol=0.5)
+
+
+def test_an_estimated_sigma_is_widened_as_student_says():
+    rng = np.random.default_rng(0)
+    samples = rng.standard_normal((20_000, 8))
+    z = samples.mean(axis=1) / (samples.std(axis=1, ddof=1) / np.sqrt(8))
+    # One sigma of the share of 20 000 is 0.15 %.
+    assert np.mean(np.abs(z) < 1.96 * student_factor(8)) == pytest.approx(0.95, abs=0.006)
+    assert student_factor(10_000) == pytest.approx(1.0, abs=1e-3)
 
 
 def test_sigmas_of_real_and_imaginary_parts_are_packed():
