@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -12,7 +11,6 @@ from chladni.modal.fitted_modes import FittedModes
 from chladni.modal.lsfd import least_squares_frequency_domain
 from chladni.modal.maximum_likelihood import refine
 from chladni.modal.modal_model import ModalModel
-from chladni.modal.synthesis import modal_fit
 from chladni.signals.frequency_response import FrequencyResponse
 
 Complex = NDArray[np.complex128]
@@ -50,36 +48,16 @@ def grouped_refinement(
         return _refined(response, poles, participation, None, max_iterations)
     rising = np.argsort(poles.imag, kind="stable")
     parts = []
-    for own in _groups(poles[rising]):
+    for own in groups_of(poles[rising]):
         group = rising[own]
-        band, members = _surroundings(response, poles, group)
+        band, members = surroundings(response, poles, group)
         fitted = _refined(response, poles[members], participation[members], band, max_iterations)
         fitted = replace(fitted, kept=members[fitted.kept])
         parts.append(select_modes(fitted, np.isin(fitted.kept, group)))
     return _joined(parts)
 
 
-def grouped_synthesis(
-    response: FrequencyResponse, frequency_hz: NDArray[np.float64], poles: Complex, participation: Complex
-) -> Complex:
-    """``[response, reference, line]`` that modes explain of the excited lines, each group where it is nearest."""
-    found = np.zeros((len(response.responses), len(response.references), frequency_hz.size), dtype=complex)
-    rising = np.argsort(poles.imag, kind="stable")
-    groups = [rising[own] for own in _groups(poles[rising])]
-    groups.sort(key=lambda group: float(poles[group].imag.min()))
-    # Up to midway between the outer modes of neighbouring groups.
-    borders_hz = [(poles[below].imag.max() + poles[above].imag.min()) / (4 * pi) for below, above in pairwise(groups)]
-    cuts = [0, *np.searchsorted(frequency_hz, borders_hz).tolist(), frequency_hz.size]
-    for group, (start, stop) in zip(groups, pairwise(cuts), strict=True):
-        if stop > start:
-            band, members = _surroundings(response, poles, group)
-            model = least_squares_frequency_domain(response, poles[members], participation[members], band_hz=band)
-            core = (float(frequency_hz[start]), float(frequency_hz[stop - 1]))
-            found[..., start:stop] = modal_fit(response, model, band_hz=core).synthesised
-    return found
-
-
-def _surroundings(response: FrequencyResponse, poles: Complex, group: Rows) -> tuple[tuple[float, float], Rows]:
+def surroundings(response: FrequencyResponse, poles: Complex, group: Rows) -> tuple[tuple[float, float], Rows]:
     """Band in which a group is fitted, and its modes followed by those of other groups that lie there."""
     band = _band(response, poles, group)
     inside = np.flatnonzero((poles.imag >= 2 * pi * band[0]) & (poles.imag <= 2 * pi * band[1]))
@@ -97,7 +75,7 @@ def _refined(
     return refine(response, model, band_hz=band_hz, max_iterations=max_iterations)
 
 
-def _groups(poles: Complex) -> list[Rows]:
+def groups_of(poles: Complex) -> list[Rows]:
     """Cut rising poles at the gap that is widest for its half-widths, until no group is too large."""
     waiting, found = [np.arange(poles.size)], []
     while waiting:

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from chladni.modal.candidates import Candidates
 from chladni.modal.fitted_modes import FittedModes
-from chladni.modal.grouped_refinement import grouped_refinement, grouped_synthesis, select_modes
+from chladni.modal.grouped_refinement import grouped_refinement, select_modes
+from chladni.modal.grouped_synthesis import grouped_fit
 from chladni.modal.judged_lines import JudgedLines
 from chladni.modal.significance import FEWEST_LINES, REACH, ModeSignificance, SignificanceRules, mode_significance
 from chladni.signals.frequency_response import FrequencyResponse
@@ -107,7 +108,7 @@ def explained(
     if not kept.any():
         return np.zeros_like(lines.values)
     factor = (2j * pi * lines.frequency_hz) ** ORDER[form(response)]
-    return grouped_synthesis(response, lines.frequency_hz, found.pole[kept], found.vector[kept]) / factor
+    return np.asarray(grouped_fit(response, found.pole[kept], found.vector[kept]).synthesised / factor)
 
 
 def pruned_fit(

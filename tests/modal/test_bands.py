@@ -117,7 +117,7 @@ def test_bands_of_different_tests_are_not_joined(bands):
     other = replace(bands[0], channels=tuple(channel.with_name("/x" + channel.name) for channel in bands[0].channels))
     with pytest.raises(EstimateError, match="bands have different channels"):
         join_bands([bands[0], other])
-    alone = replace(bands[0], references=(), participation=None)
+    alone = replace(bands[0], references=(), participation=None, fit=None)
     with pytest.raises(EstimateError, match=r"different references: /force0.z against none"):
         join_bands([bands[0], alone])
     with pytest.raises(EstimateError, match="no sets of modes"):
