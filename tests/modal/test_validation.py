@@ -1,6 +1,5 @@
 """Findings on modes: each one when its cause is there, and none on sound modes."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,14 @@ from tests import strategies as ours
 from tests.modal.mode_makers import mode_set
 
 SOUND = np.array([[1.0, 0.5, -0.3], [-0.4, 1.0, 0.2]])
+
+
+REFERENCE = (Channel(name="hammer", unit="N", role="reference"),)
+
+
+def fitted(fit: ModalFit, **fields: Any) -> ModeSet:
+    """The sound modes, from functions."""
+    return mode_set(SOUND, references=REFERENCE, participation=np.ones((2, 1), complex), fit=fit, **fields)
 
 
 def fit_of(function_error: list[float], band_error: list[float]) -> ModalFit:
@@ -44,15 +51,12 @@ def spread_of(orders: list[int], factor: float = 1.0) -> OrderSpread:
 
 
 def test_sound_modes_have_no_finding() -> None:
-    found = validate(mode_set(SOUND, spread=spread_of([20, 18]), fit=fit_of([0.01] * 3, [0.01, 0.02])))
+    found = validate(fitted(fit_of([0.01] * 3, [0.01, 0.02]), spread=spread_of([20, 18])))
     assert found.findings == ()
     assert found.alike == ()
     np.testing.assert_allclose(found.mpc, 1.0)
     np.testing.assert_allclose(found.mpd_deg, 0.0, atol=1e-12)
     np.testing.assert_allclose(found.mean_phase_deg, 0.0, atol=1e-12)
-
-
-REFERENCE = (Channel(name="hammer", unit="N", role="reference"),)
 
 
 @pytest.mark.parametrize(
@@ -65,11 +69,11 @@ REFERENCE = (Channel(name="hammer", unit="N", role="reference"),)
         ),
         (mode_set([[1.0, 0.0], [0.0, 1.0], [1.0, -1.0]]), "2 channels for 3 modes: shapes of so few components"),
         (
-            mode_set(SOUND, fit=fit_of([0.3, 0.01, 0.5], [0.01, 0.02])),
+            fitted(fit_of([0.3, 0.01, 0.5], [0.01, 0.02])),
             "The synthesis misses c2 over hammer (50 %) and c0 over hammer (30 %) by more than 20 %",
         ),
         (
-            mode_set(SOUND, fit=fit_of([0.01] * 3, [0.3, 0.4])),
+            fitted(fit_of([0.01] * 3, [0.3, 0.4])),
             "The synthesis is off by more than 20 % (RMS over RMS) between 15 and 25 Hz (40 %) and between 5",
         ),
         (mode_set(SOUND, spread=spread_of([3, 30])), "Mode 1 (10 Hz) came out at only 3 model orders (the best"),
@@ -102,8 +106,6 @@ REFERENCE = (Channel(name="hammer", unit="N", role="reference"),)
     ],
 )
 def test_each_cause_has_its_finding(modes: ModeSet, words: str) -> None:
-    if modes.fit is not None:
-        modes = replace(modes, references=REFERENCE, participation=np.ones((2, 1), complex))
     findings = validate(modes).findings
     assert any(finding.startswith(words) for finding in findings), findings
     assert all("\n" not in finding and finding.endswith(".") for finding in findings)
