@@ -10,12 +10,13 @@ from chladni.modal.modal_basis import ModalBasis, modal_basis
 from chladni.modal.modal_model import ModalModel
 from chladni.modal.model_lines import ModelLines, model_lines
 from chladni.modal.normal_equations import (
-    SymmetricSolver,
+    combinations,
     product_table,
     projections,
     rotated,
     rotated_rows,
     symmetric_inverse,
+    weighted_power,
 )
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
@@ -106,8 +107,8 @@ class ShapeSolution:
         ``[mode, reference]`` that the shapes were solved for.
     residual
         ``[response, reference, line]`` measured minus model.
-    equations
-        Inverse of each response's normal equations.
+    inverse
+        ``[response, column, column]`` of the normal equations.
     basis
         The functions that the coefficients combine.
     """
@@ -115,7 +116,7 @@ class ShapeSolution:
     coefficients: Floats
     participation: Complex
     residual: Complex
-    equations: SymmetricSolver
+    inverse: Floats
     basis: ModalBasis
 
     @property
@@ -152,22 +153,15 @@ def solve_shapes(
 
     Ends when the last digits stand still, or when a round improves the weighted sum of squares by less than `enough`.
     """
-    functions = np.concatenate([basis.modes, basis.residuals])
-    table = product_table(functions, lines.weights)
+    table = product_table(basis.functions, lines.weights)
     responses, references, _ = lines.values.shape
     size = 2 * len(participation) + RESIDUAL_COLUMNS * references
-    inverse, deficient = np.empty((responses, size, size)), np.empty(responses, dtype=np.int64)
+    inverse = np.empty((responses, size, size))
     for batch in table.batches(responses, references):
-        part = symmetric_inverse(shape_equations(table.gram(lines.weights[batch]), participation))
-        inverse[batch], deficient[batch] = part.inverse, part.deficient
-    equations = SymmetricSolver(inverse=inverse, deficient=deficient)
+        inverse[batch] = symmetric_inverse(shape_equations(table.gram(lines.weights[batch]), participation))
     coefficients, residual = _refined(lines, basis, participation, inverse, enough)
     return ShapeSolution(
-        coefficients=coefficients,
-        participation=participation,
-        residual=residual,
-        equations=equations,
-        basis=basis,
+        coefficients=coefficients, participation=participation, residual=residual, inverse=inverse, basis=basis
     )
 
 
@@ -178,30 +172,33 @@ def _refined(
 
     Where the inverse is exact the first round solves, and the second adds the digits that normal equations lose.
     """
-    functions = np.concatenate([basis.modes, basis.residuals])
-
-    def slope(left: Complex) -> Floats:
-        return shape_gradient(projections(functions, lines.weights * left), participation)
-
     coefficients = np.zeros(inverse.shape[:2])
-    residual = np.asarray(lines.values, dtype=np.complex128)
+    residual = np.array(lines.values, dtype=np.complex128)
     direction, gradient, gain = np.zeros_like(coefficients), np.zeros_like(coefficients), np.ones(len(inverse))
+    moved = np.ones(len(inverse))
     for _ in range(REFINEMENTS):
-        before, gain_before, gradient = gradient, gain, slope(residual)
+        weighted = lines.weights * residual
+        # Far from a fit its last digits are of no use.
+        worth = max(enough, ROUGH * float(weighted_power(weighted, residual).sum())) if enough else 0.0
+        before, gain_before, moved_before = gradient, gain, moved
+        gradient = shape_gradient(projections(basis.functions, weighted), participation)
         step = np.einsum("iab,ib->ia", inverse, gradient)
         gain = np.sum(gradient * step, axis=1)
         again = np.maximum(np.sum((gradient - before) * step, axis=1), 0.0)
         again = np.divide(again, gain_before, out=np.zeros_like(gain), where=gain_before > 0)
         direction = step + again[:, np.newaxis] * direction * np.any(before != 0)
         change = synthesis(basis, direction, participation)
-        bend = np.sum(lines.weights * np.abs(change) ** 2, axis=(1, 2))
+        bend = weighted_power(lines.weights * change, change)
         length = np.divide(np.sum(gradient * direction, axis=1), bend, out=np.zeros_like(gain), where=bend > 0)
-        coefficients += length[:, np.newaxis] * direction
-        residual = residual - length[:, np.newaxis, np.newaxis] * change
-        moved = np.abs(length[:, np.newaxis] * direction)
-        # Far from a fit its last digits are of no use.
-        worth = max(enough, ROUGH * float(np.sum(lines.weights * np.abs(residual) ** 2))) if enough else 0.0
-        if gain.sum() < worth or np.all(moved <= SETTLED * np.abs(coefficients).max(axis=-1, keepdims=True)):
+        taken = length[:, np.newaxis] * direction
+        coefficients += taken
+        change *= length[:, np.newaxis, np.newaxis]
+        residual -= change
+        largest = np.abs(coefficients).max(axis=-1)
+        moved = np.abs(taken).max(axis=-1) / np.where(largest > 0, largest, 1.0)
+        # The next round would move less than this one, in the same proportion.
+        ahead = moved * np.minimum(moved / np.maximum(moved_before, SETTLED), 1)
+        if gain.sum() < worth or np.all(ahead <= SETTLED):
             break
     return coefficients, residual
 
@@ -212,13 +209,7 @@ def synthesis(basis: ModalBasis, coefficients: Floats, participation: Complex) -
     shapes = np.ascontiguousarray(coefficients[:, : 2 * modes]).view(np.complex128)
     residues = np.ascontiguousarray(shapes[:, np.newaxis] * participation.T)
     tails = coefficients[:, 2 * modes :].reshape(len(coefficients), references, RESIDUAL_COLUMNS)
-    weights = np.concatenate([residues.view(np.float64), tails], axis=-1)
-    functions = np.concatenate([basis.modes, basis.residuals])
-    rows = weights.reshape(-1, len(functions))
-    # Two real products cost half of a complex one.
-    total = np.empty((len(rows), functions.shape[1]), dtype=np.complex128)
-    total.real, total.imag = rows @ functions.real, rows @ functions.imag
-    return total.reshape(len(coefficients), references, -1)
+    return combinations(np.concatenate([residues.view(np.float64), tails], axis=-1), basis.functions)
 
 
 def shape_equations(gram: Floats, participation: Complex) -> Floats:

@@ -24,29 +24,35 @@ class ModalBasis(Value):
 
     Attributes
     ----------
-    modes
-        ``[2 mode, line]`` for Re, Im of each mode's residue.
+    functions
+        ``[2 mode + 4, line]`` for Re, Im of each mode's residue, then for Re, Im of two residual terms, orthonormal
+        over the lines.
     slopes
-        ``[2 mode, line]`` the same of the derivative to lambda, for Re, Im of residue times change of the pole.
-    residuals
-        ``[4, line]`` for Re, Im of two residual terms, orthonormal over the lines.
+        ``[2 mode, line]`` the derivative to lambda, for Re, Im of residue times change of the pole.
     residual_terms
         ``[2, 2]`` the two terms as combinations of s^(p-2) (lower) and s^p (upper).
     """
 
-    modes: Complex
+    functions: Complex
     slopes: Complex
-    residuals: Complex
     residual_terms: Floats
 
     def __post_init__(self) -> None:
         self._freeze()
 
+    @property
+    def modes(self) -> Complex:
+        """``[2 mode, line]`` of the functions."""
+        return self.functions[: len(self.slopes)]
+
+    @property
+    def residuals(self) -> Complex:
+        """``[4, line]`` of the functions."""
+        return self.functions[len(self.slopes) :]
+
     def at(self, near: slice) -> Self:
         """Give the basis on some of the lines."""
-        return replace(
-            self, modes=self.modes[:, near], slopes=self.slopes[:, near], residuals=self.residuals[:, near]
-        )
+        return replace(self, functions=self.functions[:, near], slopes=self.slopes[:, near])
 
 
 def modal_basis(lines: ModelLines, poles: Complex) -> ModalBasis:
@@ -55,7 +61,9 @@ def modal_basis(lines: ModelLines, poles: Complex) -> ModalBasis:
     partner, partner_slope = _functions(lines, poles.conj())
     residuals, terms = _residual_functions(lines)
     return ModalBasis(
-        modes=_pairs(direct, partner), slopes=_pairs(slope, partner_slope), residuals=residuals, residual_terms=terms
+        functions=np.concatenate([_pairs(direct, partner), residuals]),
+        slopes=_pairs(slope, partner_slope),
+        residual_terms=terms,
     )
 
 

@@ -12,8 +12,12 @@ Floats = NDArray[np.float64]
 LARGEST_TABLE = 2**22
 # Largest set of Gram matrices held at once, in numbers.
 LARGEST_BATCH = 2**23
+# Weights that differ by less, relative to each other, differ by rounding.
+ALIKE = 1e-12
 # Directions weaker than this, relative to the strongest, can't be told from rounding.
 WEAKEST = 1e-13
+# A matrix whose weakest direction is this much stronger is inverted at a fifth of the cost of looking at directions.
+WELL_ABOVE = 1e4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -23,26 +27,25 @@ class ProductTable:
     Weights differ from function to function, products don't: with the table, the Gram matrices of all functions are
     one matrix product. Blocks are single lines unless the table would be too large; then a function's weights, over
     the profile that all functions have in common, are averaged within a block. That alters the curvature that steps
-    and error bars come from a little, and the solution not at all.
+    and error bars come from a little, and the solution not at all. Where the weights of all functions are the
+    profile up to a factor, one block of all lines is exact.
 
     Attributes
     ----------
     products
-        ``[block, column, column]`` Re(conj(P_a) P_b) times the profile.
+        ``[pair, block]`` Re(conj(P_a) P_b) times the profile, for the pairs of `numpy.triu_indices`.
     profile
         ``[line]`` common course of the weights.
     block
         Lines in a block.
+    columns
+        Number of basis functions.
     """
 
     products: Floats
     profile: Floats
     block: int
-
-    @property
-    def columns(self) -> int:
-        """Number of basis functions."""
-        return int(self.products.shape[-1])
+    columns: int
 
     def batches(self, responses: int, references: int) -> list[slice]:
         """Cut the responses so that their Gram matrices fit in memory."""
@@ -51,39 +54,78 @@ class ProductTable:
 
     def gram(self, weights: Floats) -> Floats:
         """Give ``[..., column, column]`` from weights ``[..., line]``."""
-        blocks = len(self.products)
-        ratios = np.divide(weights, self.profile, out=np.zeros_like(weights), where=self.profile > 0)
+        profile, means = self._summed(self.profile), self._summed(weights)
+        means = np.divide(means, profile, out=np.zeros_like(means), where=profile > 0)
+        rows, columns = np.triu_indices(self.columns)
+        place = np.empty((self.columns, self.columns), dtype=np.intp)
+        place[rows, columns] = place[columns, rows] = np.arange(rows.size)
+        return np.asarray(np.take(means @ self.products.T, place, axis=-1), dtype=np.float64)
+
+    def _summed(self, lines: Floats) -> Floats:
         if self.block == 1:
-            means = ratios
-        else:
-            padded = np.zeros((*weights.shape[:-1], blocks * self.block))
-            padded[..., : weights.shape[-1]] = ratios
-            # The last block may be short; its missing lines count for nothing.
-            sizes = np.minimum(self.block, weights.shape[-1] - self.block * np.arange(blocks))
-            means = padded.reshape(*weights.shape[:-1], blocks, self.block).sum(axis=-1) / sizes
-        table = self.products.reshape(blocks, -1)
-        return np.asarray((means @ table).reshape(*weights.shape[:-1], self.columns, self.columns), dtype=np.float64)
+            return lines
+        starts = np.arange(0, self.profile.size, self.block)
+        return np.asarray(np.add.reduceat(lines, starts, axis=-1), dtype=np.float64)
 
 
 def product_table(functions: Complex, weights: Floats) -> ProductTable:
     """Tabulate the products of basis functions ``[column, line]`` for weights ``[response, reference, line]``."""
     columns, lines = functions.shape
     strongest = weights.max(axis=-1, keepdims=True)
-    profile = np.mean(np.divide(weights, strongest, out=np.zeros_like(weights), where=strongest > 0), axis=(0, 1))
-    block = max(1, -(-lines * columns**2 // LARGEST_TABLE))
+    used = strongest[..., 0] > 0
+    courses = weights[used] / strongest[used]
+    profile = courses.mean(axis=0) if len(courses) else np.zeros(lines)
+    if np.all(np.abs(courses - profile) <= ALIKE * profile):
+        block = lines
+    else:
+        block = max(1, -(-lines * columns**2 // LARGEST_TABLE))
+    scaled = functions * np.sqrt(profile)
+    products = _line_products(scaled) if block == 1 else _block_products(scaled, block)
+    return ProductTable(products=products, profile=profile, block=block, columns=columns)
+
+
+def _line_products(functions: Complex) -> Floats:
+    columns, lines = functions.shape
+    real, imag = np.ascontiguousarray(functions.real), np.ascontiguousarray(functions.imag)
+    products = np.empty((columns * (columns + 1) // 2, lines))
+    first = 0
+    for row in range(columns):
+        pairs = products[first : first + columns - row]
+        np.multiply(real[row], real[row:], out=pairs)
+        pairs += imag[row] * imag[row:]
+        first += columns - row
+    return products
+
+
+def _block_products(functions: Complex, block: int) -> Floats:
+    columns, lines = functions.shape
     blocks = -(-lines // block)
     padded = np.zeros((columns, blocks * block), dtype=np.complex128)
-    padded[:, :lines] = functions * np.sqrt(profile)
-    parts = padded.reshape(columns, blocks, block).transpose(1, 2, 0)
-    stacked = np.concatenate([parts.real, parts.imag], axis=1)
-    return ProductTable(products=stacked.transpose(0, 2, 1) @ stacked, profile=profile, block=block)
+    padded[:, :lines] = functions
+    parts = padded.view(np.float64).reshape(columns, blocks, -1).transpose(1, 0, 2)
+    rows, others = np.triu_indices(columns)
+    return np.ascontiguousarray((parts @ parts.transpose(0, 2, 1))[:, rows, others].T)
 
 
 def projections(functions: Complex, weighted: Complex) -> Floats:
     """Give ``[..., column]``: Re of the sum over lines of conj(P_a) times `weighted` ``[..., line]``."""
-    rows = weighted.reshape(-1, weighted.shape[-1])
-    answer = rows.real @ functions.real.T + rows.imag @ functions.imag.T
-    return np.asarray(answer.reshape(*weighted.shape[:-1], len(functions)), dtype=np.float64)
+    return np.asarray(_parts(weighted) @ _parts(functions).T, dtype=np.float64)
+
+
+def combinations(coefficients: Floats, functions: Complex) -> Complex:
+    """Add up functions ``[column, line]`` with real ``coefficients[..., column]``."""
+    return np.asarray((coefficients @ _parts(functions)).view(np.complex128), dtype=np.complex128)
+
+
+def weighted_power(weighted: Complex, values: Complex) -> Floats:
+    """``[row]`` sum of weight |value|^2, from ``[row, ...]`` weight times value and value."""
+    rows = len(values)
+    return np.asarray(np.einsum("ik,ik->i", _parts(weighted).reshape(rows, -1), _parts(values).reshape(rows, -1)))
+
+
+def _parts(values: Complex) -> Floats:
+    """Re and Im of each line side by side: real products of them cost half of complex ones, and no copy."""
+    return np.ascontiguousarray(values).view(np.float64)
 
 
 def rotated(pairs: Floats, factors: Complex) -> Floats:
@@ -106,32 +148,35 @@ def rotated_rows(matrix: Floats, factors: Complex) -> Floats:
     return np.swapaxes(rotated(np.swapaxes(matrix, -1, -2), factors[..., np.newaxis, :]), -1, -2)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SymmetricSolver:
-    """Inverse of each of a stack of symmetric positive matrices, scaled to a unit diagonal before.
+def symmetric_inverse(matrices: Floats) -> Floats:
+    """Invert a stack of symmetric non-negative matrices, each scaled to a unit diagonal before.
 
-    Attributes
-    ----------
-    inverse
-        ``[..., row, row]``; directions that the data say nothing about are left at zero.
-    deficient
-        ``[...]`` how many such directions there are.
+    Directions that the data say nothing about are left at zero.
     """
-
-    inverse: Floats
-    deficient: NDArray[np.int64]
-
-
-def symmetric_inverse(matrices: Floats) -> SymmetricSolver:
-    """Invert a stack of symmetric non-negative matrices."""
     diagonal = np.einsum("...aa->...a", matrices)
     scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
-    scaled = matrices * scale[..., :, np.newaxis] * scale[..., np.newaxis, :]
+    scales = scale[..., :, np.newaxis] * scale[..., np.newaxis, :]
+    scaled = matrices * scales
+    inverse, sure = _plain_inverse(scaled)
+    if not np.all(sure):
+        inverse[~sure] = _inverse_of_strong(scaled[~sure])
+    return np.asarray(inverse * scales, dtype=np.float64)
+
+
+def _plain_inverse(scaled: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Invert without looking for weak directions, and tell which matrices surely have none."""
+    try:
+        inverse = np.linalg.inv(scaled)
+    except np.linalg.LinAlgError:
+        # One that is exactly singular stops all.
+        return np.zeros_like(scaled), np.zeros(scaled.shape[:-2], dtype=np.bool_)
+    # The trace of a positive matrix's inverse bounds the inverse of its least eigenvalue from above.
+    bound = np.einsum("...aa->...", np.abs(inverse))
+    return (inverse + np.swapaxes(inverse, -1, -2)) / 2, np.asarray(bound * WELL_ABOVE * WEAKEST * len(scaled.T) < 1)
+
+
+def _inverse_of_strong(scaled: Floats) -> Floats:
     strengths, directions = np.linalg.eigh(scaled)
     strong = strengths > WEAKEST * strengths.shape[-1]
     gains = np.where(strong, 1 / np.where(strong, strengths, 1.0), 0.0)
-    inverse = (directions * gains[..., np.newaxis, :]) @ np.swapaxes(directions, -1, -2)
-    return SymmetricSolver(
-        inverse=inverse * scale[..., :, np.newaxis] * scale[..., np.newaxis, :],
-        deficient=np.count_nonzero(~strong, axis=-1),
-    )
+    return np.asarray((directions * gains[..., np.newaxis, :]) @ np.swapaxes(directions, -1, -2), dtype=np.float64)

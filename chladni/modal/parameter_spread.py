@@ -141,7 +141,7 @@ def parameter_spread(lines: ModelLines, solution: ShapeSolution) -> ParameterSpr
     modes, references = solution.participation.shape
     size = 2 * modes * (1 + references)
     theta = np.zeros((size, size))
-    theta[np.ix_(equations.free, equations.free)] = symmetric_inverse(equations.curvature).inverse
+    theta[np.ix_(equations.free, equations.free)] = symmetric_inverse(equations.curvature)
     coupling = np.zeros((*equations.coupling.shape[:2], size))
     # Shapes and residuals follow the parameters so that the misfit stays least.
     coupling[..., equations.free] = -equations.coupling
@@ -151,7 +151,7 @@ def parameter_spread(lines: ModelLines, solution: ShapeSolution) -> ParameterSpr
     strengths, directions = np.linalg.eigh(theta / safe[:, np.newaxis] / safe)
     root = sizes[:, np.newaxis] * directions * np.sqrt(np.maximum(strengths, 0.0))
     return ParameterSpread(
-        own=solution.equations.inverse,
+        own=solution.inverse,
         coupling=coupling,
         theta=theta,
         root=root,

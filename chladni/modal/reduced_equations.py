@@ -37,13 +37,13 @@ class ReducedEquations:
 
     def promised(self) -> float:
         """What a full step lowers the cost by, to first order."""
-        return float(self.descent @ symmetric_inverse(self.curvature).inverse @ self.descent)
+        return float(self.descent @ symmetric_inverse(self.curvature) @ self.descent)
 
     def moved(self, poles: Complex, participation: Complex, damping: float) -> tuple[Complex, Complex]:
         """Take one step, shortened by `damping`."""
         damped = self.curvature + damping * np.diag(np.diag(self.curvature))
         step = np.zeros(2 * poles.size * (1 + participation.shape[1]))
-        step[self.free] = symmetric_inverse(damped).inverse @ self.descent
+        step[self.free] = symmetric_inverse(damped) @ self.descent
         changes = step.view(np.complex128).reshape(1 + participation.shape[1], poles.size)
         return poles + changes[0], participation + changes[1:].T
 
@@ -63,7 +63,7 @@ def reduced_equations(lines: ModelLines, solution: ShapeSolution) -> ReducedEqua
         gram = table.gram(lines.weights[batch])
         own, cross = _blocks(gram, shapes, vectors)
         cross = cross[..., free]
-        eliminated = solution.equations.inverse[batch] @ cross
+        eliminated = solution.inverse[batch] @ cross
         coupling[batch] = eliminated
         curvature += own[np.ix_(free, free)] - np.einsum("icp,icq->pq", cross, eliminated, optimize=True)
         projected = projections(functions[: 4 * len(vectors)], lines.weights[batch] * solution.residual[batch])
