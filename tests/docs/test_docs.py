@@ -11,7 +11,7 @@ from chladni.cli.main import app
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "benchmarks").glob("*.md")])
 LINK = re.compile(r"\]\((?!https?://)([^)#]+)[^)]*\)")
-COMMAND = re.compile(r"chladni (info|psd|frf|view|compare|convert|demo)\b")
+COMMAND = re.compile(r"chladni (info|psd|frf|modes|view|compare|convert|demo)\b")
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
