@@ -11,6 +11,7 @@ from chladni.modal.fitted_modes import FittedModes
 from chladni.modal.lsfd import least_squares_frequency_domain
 from chladni.modal.maximum_likelihood import refine
 from chladni.modal.modal_model import ModalModel
+from chladni.modal.synthesis import modal_fit
 from chladni.signals.frequency_response import FrequencyResponse
 
 Complex = NDArray[np.complex128]
@@ -18,6 +19,8 @@ Rows = NDArray[np.intp]
 
 # The work grows with the square of the modes fitted together, and with the lines.
 ALONE, GROUP = 12, 8
+# Each group is fitted twice, the second time with what the others have become.
+SWEEPS = 2
 # Half-power half-widths beyond the outer modes of a group that its fit takes in.
 MARGIN = 10.0
 FEWEST_LINES = 32
@@ -41,43 +44,50 @@ def grouped_refinement(
     -------
     FittedModes
         Up to a dozen modes are fitted together. More are cut into groups of neighbours at the widest gaps; each is
-        fitted to the lines around it with the modes of other groups that lie there, whose results are thrown away,
-        and with residuals of its own for all the rest.
+        fitted to the lines around it, after the modes far from it are taken off, with those of other groups that lie
+        there and with residuals of its own.
     """
+    whole = least_squares_frequency_domain(response, poles, participation)
     if poles.size <= ALONE:
-        return _refined(response, poles, participation, None, max_iterations)
-    rising = np.argsort(poles.imag, kind="stable")
-    parts = []
-    for own in groups_of(poles[rising]):
-        group = rising[own]
-        band, members = surroundings(response, poles, group)
-        fitted = _refined(response, poles[members], participation[members], band, max_iterations)
-        fitted = replace(fitted, kept=members[fitted.kept])
-        parts.append(select_modes(fitted, np.isin(fitted.kept, group)))
-    return _joined(parts)
+        return refine(response, whole, max_iterations=max_iterations)
+    started = np.arange(poles.size)
+    for _ in range(SWEEPS):
+        fitted = _joined([_refined(response, whole, group, max_iterations) for group in _groups(whole.poles)])
+        if not fitted.kept.size:
+            return fitted
+        whole = least_squares_frequency_domain(response, fitted.model.poles, fitted.model.participation)
+        started = started[fitted.kept]
+    return replace(fitted, kept=started)
 
 
-def surroundings(response: FrequencyResponse, poles: Complex, group: Rows) -> tuple[tuple[float, float], Rows]:
+def _refined(response: FrequencyResponse, whole: ModalModel, group: Rows, max_iterations: int) -> FittedModes:
+    """Refine a group on what the modes far from it, as they are so far, leave of the functions around it."""
+    band, members = _surroundings(response, whole.poles, group)
+    far = np.setdiff1d(np.arange(whole.poles.size), members)
+    inside = response.excited & (response.frequency_hz >= band[0]) & (response.frequency_hz <= band[1])
+    values = np.array(response.values, dtype=np.complex128)
+    # Residuals of the whole band are smooth here, and the group's own take them up.
+    values[..., inside] -= modal_fit(response, _without_residuals(whole.select(far)), band_hz=band).synthesised
+    rest = replace(response, values=values)
+    fitted = refine(rest, whole.select(members), band_hz=band, max_iterations=max_iterations)
+    fitted = replace(fitted, kept=members[fitted.kept])
+    return select_modes(fitted, np.isin(fitted.kept, group))
+
+
+def _without_residuals(model: ModalModel) -> ModalModel:
+    return replace(model, lower=np.zeros_like(model.lower), upper=np.zeros_like(model.upper))
+
+
+def _surroundings(response: FrequencyResponse, poles: Complex, group: Rows) -> tuple[tuple[float, float], Rows]:
     """Band in which a group is fitted, and its modes followed by those of other groups that lie there."""
     band = _band(response, poles, group)
     inside = np.flatnonzero((poles.imag >= 2 * pi * band[0]) & (poles.imag <= 2 * pi * band[1]))
     return band, np.concatenate([group, np.setdiff1d(inside, group)])
 
 
-def _refined(
-    response: FrequencyResponse,
-    poles: Complex,
-    participation: Complex,
-    band_hz: tuple[float, float] | None,
-    max_iterations: int,
-) -> FittedModes:
-    model = least_squares_frequency_domain(response, poles, participation, band_hz=band_hz)
-    return refine(response, model, band_hz=band_hz, max_iterations=max_iterations)
-
-
-def groups_of(poles: Complex) -> list[Rows]:
-    """Cut rising poles at the gap that is widest for its half-widths, until no group is too large."""
-    waiting, found = [np.arange(poles.size)], []
+def _groups(poles: Complex) -> list[Rows]:
+    """Cut poles at the gap that is widest for its half-widths, until no group is too large."""
+    waiting, found = [np.argsort(poles.imag, kind="stable")], []
     while waiting:
         rows = waiting.pop()
         if rows.size <= GROUP:

@@ -8,11 +8,14 @@ from numpy.typing import NDArray
 from chladni.modal.candidates import Candidates
 from chladni.modal.cmif import complex_mode_indicator
 from chladni.modal.grouped_refinement import select_modes
-from chladni.modal.grouped_synthesis import grouped_fit
+from chladni.modal.lsfd import least_squares_frequency_domain
+from chladni.modal.modal_model import ModalModel
 from chladni.modal.pruned_fit import PrunedFit
 from chladni.modal.scaling import modal_scale
 from chladni.modal.stabilisation import StabilityLimits, stabilisation_diagram
+from chladni.modal.synthesis import modal_fit
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.modal_fit import ModalFit
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.order_spread import OrderSpread
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
@@ -76,7 +79,7 @@ class ModeReport:
             participation=model.participation,
             scale=scaling.scale,
             spread=self._spread(started),
-            fit=grouped_fit(self.measured, model.poles, np.asarray(model.participation, dtype=np.complex128)),
+            fit=self._fit(model),
             stabilisation=self._diagram(started),
             provenance=replace(self.response.provenance, estimator=ESTIMATOR).with_notes(
                 *notes,
@@ -87,6 +90,11 @@ class ModeReport:
                 *_shortfall(count, shown.size),
             ),
         )
+
+    def _fit(self, model: ModalModel) -> ModalFit:
+        # Shapes that were fitted group by group have no residuals for the whole band.
+        whole = least_squares_frequency_domain(self.measured, model.poles, model.participation)
+        return modal_fit(self.measured, whole)
 
     def _shown(self, fit: PrunedFit, count: int | None) -> Rows:
         rows = np.arange(fit.started.size)

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from chladni.modal.candidates import Candidates
 from chladni.modal.fitted_modes import FittedModes
 from chladni.modal.grouped_refinement import grouped_refinement, select_modes
-from chladni.modal.grouped_synthesis import grouped_fit
 from chladni.modal.judged_lines import JudgedLines
+from chladni.modal.lsfd import least_squares_frequency_domain
 from chladni.modal.significance import FEWEST_LINES, REACH, ModeSignificance, SignificanceRules, mode_significance
+from chladni.modal.synthesis import modal_fit
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.spectral.forms import ORDER, form
 
@@ -108,7 +109,8 @@ def explained(
     if not kept.any():
         return np.zeros_like(lines.values)
     factor = (2j * pi * lines.frequency_hz) ** ORDER[form(response)]
-    return np.asarray(grouped_fit(response, found.pole[kept], found.vector[kept]).synthesised / factor)
+    model = least_squares_frequency_domain(response, found.pole[kept], found.vector[kept])
+    return np.asarray(modal_fit(response, model).synthesised / factor)
 
 
 def pruned_fit(
