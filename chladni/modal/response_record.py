@@ -18,6 +18,8 @@ from chladni.spectral.stretches import Stretch
 
 # The beginning of a stream that choices are made from: some tens of megabytes.
 SAMPLES_TO_PLAN_FROM = 1 << 19
+# Fewer give spectra of less than 16 lines.
+FEWEST_SAMPLES = 512
 # Spectra by default resolve the band asked for this finely, where the record is long enough for so many segments.
 LINES_IN_BAND = 400
 SEGMENTS = 16
@@ -91,7 +93,18 @@ def open_record(source: Source) -> ResponseRecord:
 
 
 def lead_spectra(record: ResponseRecord, band_hz: tuple[float, float] | None) -> CrossSpectra:
-    """Cross-spectra of the lead, fine enough for the band."""
+    """Cross-spectra of the lead, fine enough for the band.
+
+    Raises
+    ------
+    EstimateError
+        When the record is too short for spectra in which peaks can be told.
+    """
+    if record.samples < FEWEST_SAMPLES:
+        raise EstimateError(
+            f"{record.samples} samples ({record.samples / record.sample_rate_hz:g} s) are too few to tell peaks in "
+            f"their spectra; at least {FEWEST_SAMPLES} are needed, and some hundred cycles of the lowest mode"
+        )
     spectra = cross_spectra(record.lead)
     if band_hz is None:
         return spectra

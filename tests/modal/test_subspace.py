@@ -266,6 +266,8 @@ def test_impossible_requests_are_told():
         identify(record, band_hz=(40.0, 60.0))
     with pytest.raises(EstimateError, match=r"too few for correlations over .* take a longer record or fewer block"):
         CovarianceDrivenSubspace(block_rows=200).identify(record.window(end_s=40.0))
+    with pytest.raises(EstimateError, match="at least 512 are needed, and some hundred cycles of the lowest mode"):
+        identify(record.window(end_s=5.0))
     with pytest.raises(SetupError, match="square matrix of side 5000"):
         CovarianceDrivenSubspace(block_rows=1000).identify(record)
     broken = record.values.copy()
