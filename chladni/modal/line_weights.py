@@ -75,8 +75,9 @@ def weighted_lines(
     """
     if weighting not in get_args(Weighting):
         raise EstimateError(f"weighting {weighting!r} is none of {', '.join(get_args(Weighting))}")
-    chosen = _lines(response, band_hz)
-    usable = np.isfinite(response.values).all(axis=1)[:, chosen]
+    finite = np.isfinite(response.values).all(axis=1)
+    chosen = _lines(response, finite.any(axis=0), band_hz)
+    usable = finite[:, chosen]
     # A weight is one for all references of a response, so that a line counts with all of them or not at all.
     values = np.asarray(np.where(usable[:, None], response.values[..., chosen], 0), dtype=np.complex128)
     if not np.any(values):
@@ -89,14 +90,15 @@ def weighted_lines(
     return _by_magnitude(frequency_hz, values, usable, relative=weighting == "relative")
 
 
-def _lines(response: FrequencyResponse, band_hz: tuple[float, float] | None) -> NDArray[np.intp]:
+def _lines(
+    response: FrequencyResponse, finite: NDArray[np.bool_], band_hz: tuple[float, float] | None
+) -> NDArray[np.intp]:
     frequency_hz = response.frequency_hz
     low, high = band_hz if band_hz is not None else (float(frequency_hz[0]), float(frequency_hz[-1]))
     if not 0 <= low < high:
         raise EstimateError(f"band {low:g} to {high:g} Hz: the first must be 0 or more and less than the second")
     inside = (frequency_hz >= low) & (frequency_hz <= high) & (frequency_hz > 0) & response.excited
-    inside &= np.isfinite(response.values).all(axis=1).any(axis=0)
-    chosen = np.flatnonzero(inside)
+    chosen = np.flatnonzero(inside & finite)
     if chosen.size < 4:
         raise EstimateError(
             f"{chosen.size} excited lines with values between {low:g} and {high:g} Hz; poles need at least 4: "
@@ -163,7 +165,10 @@ def _typical(numbers: NDArray[np.float64], axis: int | tuple[int, ...]) -> NDArr
 
 
 def _rms(values: NDArray[Any], axis: tuple[int, ...]) -> NDArray[np.float64]:
-    return np.asarray(np.sqrt(np.mean(values.real**2 + values.imag**2, axis=axis)), dtype=np.float64)
+    power = values.real**2
+    if np.iscomplexobj(values):
+        power += values.imag**2
+    return np.asarray(np.sqrt(power.mean(axis=axis)), dtype=np.float64)
 
 
 def _or_one(numbers: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -101,20 +101,21 @@ def _highest_order(lines: WeightedLines) -> int:
 def _pole_table(lines: WeightedLines, circle: UnitCircle, orders: range, notes: tuple[str, ...]) -> PoleTable:
     references = lines.reference_scale.size
     matrix = reduced_normal_matrix(lines, circle, orders[-1])
-    poles, vectors = [], []
+    counts, poles, vectors = [], [], []
     for coefficients in denominators(matrix, references, orders):
         roots = stable_roots(coefficients)
         pole = circle.pole(roots)
         kept = _in_band(pole, lines.frequency_hz, circle.step_hz)
         # Roots outside the band belong to the gap of the circle and to modes that the lines don't show.
         kept = kept[np.argsort(pole[kept].imag)]
+        counts.append(kept.size)
         poles.append(pole[kept])
-        vectors.append(_unit(participation(coefficients, roots[kept]) * lines.reference_scale))
+        vectors.append(participation(coefficients, roots[kept]))
     return PoleTable(
         orders=np.array(orders, dtype=np.int64),
-        order=np.repeat(np.array(orders, dtype=np.int64), [pole.size for pole in poles]),
+        order=np.repeat(np.array(orders, dtype=np.int64), counts),
         pole=np.concatenate(poles),
-        vector=np.concatenate(vectors),
+        vector=_unit(np.concatenate(vectors) * lines.reference_scale),
         notes=notes,
     )
 

@@ -49,14 +49,18 @@ def reduced_normal_matrix(lines: WeightedLines, circle: UnitCircle, order: int) 
     power = lines.weight**2
     references = lines.values.shape[1]
     # Sum over the responses before the FFT: there are references^2 of these, however many responses.
-    squares = np.einsum("ok,oik,ojk->ijk", power, np.conj(lines.values), lines.values, optimize=True)
+    squares = np.zeros((references, *lines.values.shape[1:]), dtype=np.complex128)
+    eliminated = np.zeros(((order + 1) * references,) * 2, dtype=np.complex128)
+    for part in _chunks(lines.weight.shape[0], references * max((order + 1) ** 2, circle.length)):
+        values = lines.values[part]
+        weighted = power[part, None] * values
+        squares += np.einsum("oik,ojk->ijk", values.conj(), weighted)
+        eliminated += _eliminated(circle, power[part], circle.moments(weighted, order))
     blocks = _toeplitz(circle.moments(squares, order), order)
-    matrix = np.array(blocks.transpose(2, 0, 3, 1), order="C").reshape((order + 1) * references, -1)
+    matrix = np.array(blocks.transpose(2, 0, 3, 1), order="C").reshape(eliminated.shape)
     diagonal = np.diag_indices_from(matrix)
     ridge = DENOMINATOR_RIDGE * matrix[diagonal].real
-    for part in _chunks(lines.weight.shape[0], references * max((order + 1) ** 2, circle.length)):
-        cross = circle.moments(power[part, None] * lines.values[part], order)
-        matrix -= _eliminated(circle, power[part], _toeplitz(cross, order))
+    matrix -= eliminated
     matrix = without_noise((matrix + matrix.conj().T) / 2, lines, circle, order)
     matrix[diagonal] += ridge
     return matrix
@@ -74,22 +78,24 @@ def _chunks(responses: int, numbers: int) -> list[slice]:
 
 
 def _eliminated(
-    circle: UnitCircle, power: NDArray[np.float64], cross: NDArray[np.complex128]
+    circle: UnitCircle, power: NDArray[np.float64], moments: NDArray[np.complex128]
 ) -> NDArray[np.complex128]:
     """Sum over the responses of S^H R^-1 S, by the Cholesky factors of R."""
-    responses, _, order_1 = cross.shape[:3]
+    responses, order = len(moments), moments.shape[-1] // 2
     share, common = _common_power(power)
     if common is None:
-        factor = _factors(_toeplitz(circle.moments(power, order_1 - 1), order_1 - 1))
-        stacked = np.array(cross.transpose(0, 2, 3, 1), order="C").reshape(responses, order_1, -1)
+        factor = _factors(_toeplitz(circle.moments(power, order), order))
+        cross = _toeplitz(moments, order)
+        stacked = np.array(cross.transpose(0, 2, 3, 1), order="C").reshape(responses, order + 1, -1)
         for response in range(responses):
             _solve_in_place(factor[response], stacked[response])
-        return _gram(stacked.reshape(responses * order_1, -1))
+        return _gram(stacked.reshape(responses * (order + 1), -1))
     # Responses weighted alike share R, up to a factor that goes into S.
-    factor = _factors(_toeplitz(circle.moments(common[None], order_1 - 1), order_1 - 1))
-    wide = np.array((cross / np.sqrt(share)[:, None, None, None]).transpose(2, 0, 3, 1), order="C")
-    _solve_in_place(factor[0], wide.reshape(order_1, -1))
-    return _gram(wide.reshape(order_1 * responses, -1))
+    factor = _factors(_toeplitz(circle.moments(common[None], order), order))
+    cross = _toeplitz(moments / np.sqrt(share)[:, None, None], order)
+    wide = np.array(cross.transpose(2, 0, 3, 1), order="C")
+    _solve_in_place(factor[0], wide.reshape(order + 1, -1))
+    return _gram(wide.reshape((order + 1) * responses, -1))
 
 
 def _common_power(power: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
