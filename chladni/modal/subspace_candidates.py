@@ -44,7 +44,8 @@ class ResponseRules:
         that line.
     same_shape
         Two poles whose shapes have this MAC or more, and whose frequencies lie within half a half-power width, are
-        one mode that the models told twice: these sensors couldn't tell two such modes apart.
+        one mode that the models told twice: these sensors couldn't tell two such modes apart. So are two poles that
+        near which never stand in one model.
     """
 
     replication: float = 0.55
@@ -176,10 +177,11 @@ def _kept(
             f"{_at(table, rows[noise])}: many orders hold a pole there, but it doesn't come back in the other half "
             "of the record, or its error bar is as wide as what it says: noise, unless a longer record shows it again"
         )
-    twice = _repeated(table, rows[kept], found.spread.orders[kept], rules)
+    twice = _repeated(table, rows[kept], [np.flatnonzero(found.member == mode) for mode in kept], rules)
     if np.any(twice):
         notes.append(
-            f"{_at(table, rows[kept[twice]])}: a second pole of a mode with the same shape beside it, left out"
+            f"{_at(table, rows[kept[twice]])}: a second pole of the mode beside it, with the same shape or never in "
+            "one model with it, left out"
         )
         kept = kept[~twice]
     if count is not None:
@@ -190,17 +192,23 @@ def _kept(
     return kept, tuple(notes)
 
 
-def _repeated(table: PoleTable, rows: Rows, orders: Rows, rules: ResponseRules) -> Bools:
-    """Poles within the half-power half-width of one that more orders hold, with its shape."""
+def _repeated(table: PoleTable, rows: Rows, clusters: Sequence[Rows], rules: ResponseRules) -> Bools:
+    """Poles within the half-power half-width of one that more orders hold, and that no model tells from it.
+
+    Two close modes have different shapes, and a model that is rich enough has a pole for each of them: what has the
+    same shape, or never stands beside the other in one model, is the other.
+    """
     repeated = np.zeros(rows.size, dtype=np.bool_)
-    strongest = np.argsort(-orders, kind="stable")
+    strongest = np.argsort([-cluster.size for cluster in clusters], kind="stable")
     frequency_hz, width_hz = table.frequency_hz[rows], (table.frequency_hz * table.damping_ratio)[rows]
     # Vectors have length 1, so that the MAC is their product squared.
     alike = np.abs(table.vector[rows].conj() @ table.vector[rows].T) ** 2 >= rules.same_shape
+    orders = [table.order[cluster] for cluster in clusters]
+    apart = np.array([[np.intersect1d(one, other).size == 0 for other in orders] for one in orders], dtype=np.bool_)
     for place, row in enumerate(strongest):
         stronger = strongest[:place][~repeated[strongest[:place]]]
         near = np.abs(frequency_hz[stronger] - frequency_hz[row]) <= np.maximum(width_hz[stronger], width_hz[row])
-        repeated[row] = bool(np.any(near & alike[row, stronger]))
+        repeated[row] = bool(np.any(near & (alike[row, stronger] | apart[row, stronger])))
     return repeated
 
 
