@@ -3,6 +3,7 @@
 import argparse
 import os
 from collections.abc import Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -51,38 +52,50 @@ def shape_deviations(modes: ModeSet, row: int, true: np.ndarray) -> np.ndarray:
     return np.concatenate([off.real[free] / std.real[free], off.imag[free] / std.imag[free]])
 
 
-def campaign(truth: ModalTruth, *, runs: int, cycles: int, noise: float, seed: int) -> Campaign:
-    """Identify the modes of many records without a word of advice."""
-    rows: list[tuple[float, ...]] = []
-    shape_z: list[np.ndarray] = []
-    missed = extra = 0
-    for run in range(runs):
-        record = ambient_record(truth, cycles=cycles, rng=np.random.default_rng([seed, run]), noise=noise)
-        modes = CovarianceDrivenSubspace().identify(record)
-        found = matched(modes, truth)
-        if found is None:
-            missed += 1
-            continue
-        extra += int(modes.frequency_hz.size > truth.frequency_hz.size)
-        for mode, row in enumerate(found):
-            off_hz = modes.frequency_hz[row] - truth.frequency_hz[mode]
-            off_damping = modes.damping_ratio[row] - truth.damping_ratio[mode]
-            rows.append(
-                (
-                    off_hz / truth.frequency_hz[mode],
-                    off_damping / truth.damping_ratio[mode],
-                    off_damping / modes.damping_std[row],
-                    off_hz / modes.frequency_std_hz[row],
-                    mac(modes.shapes[row], truth.shapes[mode]),
-                )
+def one_record(run: int, *, truth: ModalTruth, cycles: int, noise: float, seed: int) -> tuple[list, list, int] | None:
+    """Numbers of each mode, deviations of its shape, and extra modes; None when a mode is missing."""
+    record = ambient_record(truth, cycles=cycles, rng=np.random.default_rng([seed, run]), noise=noise)
+    modes = CovarianceDrivenSubspace().identify(record)
+    found = matched(modes, truth)
+    if found is None:
+        return None
+    rows, shape_z = [], []
+    for mode, row in enumerate(found):
+        off_hz = modes.frequency_hz[row] - truth.frequency_hz[mode]
+        off_damping = modes.damping_ratio[row] - truth.damping_ratio[mode]
+        rows.append(
+            (
+                off_hz / truth.frequency_hz[mode],
+                off_damping / truth.damping_ratio[mode],
+                off_damping / modes.damping_std[row],
+                off_hz / modes.frequency_std_hz[row],
+                mac(modes.shapes[row], truth.shapes[mode]),
             )
-            shape_z.append(shape_deviations(modes, row, truth.shapes[mode]))
-    columns = np.array(rows).reshape(-1, 5).T
-    return Campaign(*columns[:4], np.array(shape_z), columns[4], runs, missed, extra)
+        )
+        shape_z.append(shape_deviations(modes, row, truth.shapes[mode]))
+    return rows, shape_z, modes.frequency_hz.size - truth.frequency_hz.size
 
 
-def accuracy_rows(runs: int) -> list[tuple[str, str, str]]:
-    found = campaign(chain(), runs=runs, cycles=20_000, noise=0.01, seed=1)
+def campaign(pool: Executor, truth: ModalTruth, *, runs: int, cycles: int, noise: float, seed: int) -> Campaign:
+    """Identify the modes of many records without a word of advice."""
+    one = partial(one_record, truth=truth, cycles=cycles, noise=noise, seed=seed)
+    found = [result for result in pool.map(one, range(runs)) if result is not None]
+    columns = np.array([row for rows, _, _ in found for row in rows]).reshape(-1, 5).T
+    shape_z = np.array([one for _, shapes, _ in found for one in shapes])
+    extra = sum(extra > 0 for _, _, extra in found)
+    return Campaign(*columns[:4], shape_z, columns[4], runs, runs - len(found), extra)
+
+
+def false_mode(run: int, channels: int) -> bool:
+    """Whether any mode is claimed in white noise."""
+    noise = np.random.default_rng([3, channels, run]).standard_normal((channels, 20_000))
+    names = tuple(Channel(name=f"/{row}", unit="m/s^2") for row in range(channels))
+    record = TimeSeries(values=noise, sample_rate_hz=100.0, channels=names)
+    return CovarianceDrivenSubspace().identify(record).frequency_hz.size > 0
+
+
+def accuracy_rows(pool: Executor, runs: int) -> list[tuple[str, str, str]]:
+    found = campaign(pool, chain(), runs=runs, cycles=20_000, noise=0.01, seed=1)
     return [
         ("chain, 20 000 cycles, 1 % noise: largest error of frequency", _percent(found.frequency_error), "0.1 %"),
         ("largest error of damping", _percent(found.damping_error), "10 %"),
@@ -92,8 +105,8 @@ def accuracy_rows(runs: int) -> list[tuple[str, str, str]]:
     ]
 
 
-def coverage_rows(runs: int) -> list[tuple[str, str, str]]:
-    found = campaign(chain(), runs=runs, cycles=2000, noise=0.01, seed=2)
+def coverage_rows(pool: Executor, runs: int) -> list[tuple[str, str, str]]:
+    found = campaign(pool, chain(), runs=runs, cycles=2000, noise=0.01, seed=2)
     named = (("frequency", found.frequency_z), ("damping", found.damping_z), ("shape components", found.shape_z))
     return [
         (f"95 % intervals of {name}, {runs} records of 2000 cycles", f"{np.mean(np.abs(z) < 1.96):.1%}", "92 to 98 %")
@@ -101,17 +114,12 @@ def coverage_rows(runs: int) -> list[tuple[str, str, str]]:
     ] + [("of these, records with a missed mode; with an extra one", f"{found.missed}; {found.extra}", "")]
 
 
-def false_rows(runs: int) -> list[tuple[str, str, str]]:
+def false_rows(pool: Executor, runs: int) -> list[tuple[str, str, str]]:
     rows = []
     for channels in (3, 6, 12):
-        false = 0
-        for run in range(runs):
-            noise = np.random.default_rng([3, channels, run]).standard_normal((channels, 20_000))
-            names = tuple(Channel(name=f"/{row}", unit="m/s^2") for row in range(channels))
-            record = TimeSeries(values=noise, sample_rate_hz=100.0, channels=names)
-            false += int(CovarianceDrivenSubspace().identify(record).frequency_hz.size > 0)
+        false = sum(pool.map(partial(false_mode, channels=channels), range(runs)))
         rows.append((f"white noise, {channels} channels: records with any mode", f"{false} of {runs}", "0"))
-    found = campaign(chain(), runs=runs, cycles=20_000, noise=1.0, seed=4)
+    found = campaign(pool, chain(), runs=runs, cycles=20_000, noise=1.0, seed=4)
     return [
         *rows,
         ("chain at 0 dB: records with all five modes", f"{runs - found.missed} of {runs}", "95 %"),
@@ -119,7 +127,7 @@ def false_rows(runs: int) -> list[tuple[str, str, str]]:
     ]
 
 
-def building_rows() -> list[tuple[str, str, str]]:
+def building_rows(_pool: Executor, _runs: int) -> list[tuple[str, str, str]]:
     folder = Path(os.environ.get("CHLADNI_DATA", Path(__file__).parents[2] / "shared" / "data"))
     path = folder / "palisaden.mcap"
     if not path.exists():
@@ -141,21 +149,21 @@ def _percent(errors: np.ndarray) -> str:
     return f"{np.abs(errors).max():.3%}"
 
 
+PARTS = {"building": building_rows, "accuracy": accuracy_rows, "coverage": coverage_rows, "false": false_rows}
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=20, help="records of each campaign; 500 for coverage in full")
-    runs = parser.parse_args(arguments).runs
+    parser.add_argument("--part", choices=PARTS, action="append", help="only this part; may be repeated")
+    parser.add_argument("--workers", type=int, default=2, help="processes")
+    chosen = parser.parse_args(arguments)
     print("| what | found | asked |")
     print("| --- | --- | --- |")
-    parts = (
-        building_rows,
-        partial(accuracy_rows, min(runs, 100)),
-        partial(coverage_rows, runs),
-        partial(false_rows, min(runs, 100)),
-    )
-    for part in parts:
-        for what, value, asked in part():
-            print(f"| {what} | {value} | {asked} |", flush=True)
+    with ProcessPoolExecutor(chosen.workers) as pool:
+        for part in chosen.part or PARTS:
+            for what, value, asked in PARTS[part](pool, chosen.runs):
+                print(f"| {what} | {value} | {asked} |", flush=True)
 
 
 if __name__ == "__main__":
