@@ -11,11 +11,11 @@ from chladni.modal.modal_model import ModalModel
 from chladni.modal.model_lines import ModelLines, model_lines
 from chladni.modal.normal_equations import (
     combinations,
-    product_table,
     projections,
     rotated,
     rotated_rows,
     symmetric_inverse,
+    weight_course,
     weighted_power,
 )
 from chladni.signals.errors import EstimateError
@@ -153,12 +153,13 @@ def solve_shapes(
 
     Ends when the last digits stand still, or when a round improves the weighted sum of squares by less than `enough`.
     """
-    table = product_table(basis.functions, lines.weights)
+    course = weight_course(lines.weights, len(participation))
     responses, references, _ = lines.values.shape
     size = 2 * len(participation) + RESIDUAL_COLUMNS * references
     inverse = np.empty((responses, size, size))
-    for batch in table.batches(responses, references):
-        inverse[batch] = symmetric_inverse(shape_equations(table.gram(lines.weights[batch]), participation))
+    for batch in course.batches(responses, references, len(basis.functions)):
+        gram = course.gram(basis.functions, lines.weights[batch])
+        inverse[batch] = symmetric_inverse(shape_equations(gram, participation))
     coefficients, residual = _refined(lines, basis, participation, inverse, enough)
     return ShapeSolution(
         coefficients=coefficients, participation=participation, residual=residual, inverse=inverse, basis=basis

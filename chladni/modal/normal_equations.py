@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 
-# Largest table of products of basis functions, in numbers (32 MB); beyond it weights are averaged over neighbours.
+# Products of basis functions that are held at once, in numbers (32 MB).
 LARGEST_TABLE = 2**22
+# Multiplications that a set of Gram matrices may take (some seconds); beyond it weights are averaged over neighbours.
+LARGEST_WORK = 2**34
 # Largest set of Gram matrices held at once, in numbers.
 LARGEST_BATCH = 2**23
 # Weights that differ by less, relative to each other, differ by rounding.
@@ -21,70 +23,72 @@ WELL_ABOVE = 1e4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ProductTable:
-    """Products of all pairs of basis functions, summed over blocks of neighbouring lines.
+class WeightCourse:
+    """What the weights of all functions have in common along the lines, and how many lines are taken together.
 
-    Weights differ from function to function, products don't: with the table, the Gram matrices of all functions are
-    one matrix product. Blocks are single lines unless the table would be too large; then a function's weights, over
-    the profile that all functions have in common, are averaged within a block. That alters the curvature that steps
-    and error bars come from a little, and the solution not at all. Where the weights of all functions are the
-    profile up to a factor, one block of all lines is exact.
+    Weights differ from function to function, products of basis functions don't: the Gram matrices of all functions
+    are one matrix product of weights and products. Blocks are single lines unless that would take too long; then a
+    function's weights, over the profile that all functions have in common, are averaged within a block. That alters
+    the curvature that steps and error bars come from, and the solution not at all. Where the weights of all functions
+    are the profile up to a factor, one block of all lines is exact.
 
     Attributes
     ----------
-    products
-        ``[pair, block]`` Re(conj(P_a) P_b) times the profile, for the pairs of `numpy.triu_indices`.
     profile
-        ``[line]`` common course of the weights.
+        ``[line]``.
     block
         Lines in a block.
-    columns
-        Number of basis functions.
     """
 
-    products: Floats
     profile: Floats
     block: int
-    columns: int
 
-    def batches(self, responses: int, references: int) -> list[slice]:
-        """Cut the responses so that their Gram matrices fit in memory."""
-        size = max(1, LARGEST_BATCH // (references * self.columns**2))
-        return [slice(first, min(first + size, responses)) for first in range(0, responses, size)]
-
-    def gram(self, weights: Floats) -> Floats:
-        """Give ``[..., column, column]`` from weights ``[..., line]``."""
-        profile, means = self._summed(self.profile), self._summed(weights)
-        means = np.divide(means, profile, out=np.zeros_like(means), where=profile > 0)
-        rows, columns = np.triu_indices(self.columns)
-        place = np.empty((self.columns, self.columns), dtype=np.intp)
-        place[rows, columns] = place[columns, rows] = np.arange(rows.size)
-        return np.asarray(np.take(means @ self.products.T, place, axis=-1), dtype=np.float64)
-
-    def _summed(self, lines: Floats) -> Floats:
+    def summed(self, lines: Floats) -> Floats:
+        """``[..., block]`` sums over the lines of each block."""
         if self.block == 1:
             return lines
         starts = np.arange(0, self.profile.size, self.block)
         return np.asarray(np.add.reduceat(lines, starts, axis=-1), dtype=np.float64)
 
+    def batches(self, responses: int, references: int, columns: int) -> list[slice]:
+        """Cut the responses so that their Gram matrices fit in memory."""
+        size = max(1, LARGEST_BATCH // (references * columns**2))
+        return [slice(first, min(first + size, responses)) for first in range(0, responses, size)]
 
-def product_table(functions: Complex, weights: Floats) -> ProductTable:
-    """Tabulate the products of basis functions ``[column, line]`` for weights ``[response, reference, line]``."""
-    columns, lines = functions.shape
+    def gram(self, functions: Complex, weights: Floats) -> Floats:
+        """Give ``[..., column, column]`` Re(sum of w conj(P_a) P_b) from ``[column, line]`` and ``[..., line]``."""
+        columns = len(functions)
+        profile, means = self.summed(self.profile), self.summed(weights)
+        means = np.divide(means, profile, out=np.zeros_like(means), where=profile > 0)
+        scaled = functions * np.sqrt(self.profile)
+        rows, others = np.triu_indices(columns)
+        upper = np.zeros((*weights.shape[:-1], rows.size))
+        step = max(1, LARGEST_TABLE // rows.size)
+        for first in range(0, means.shape[-1], step):
+            part = scaled[:, first * self.block : (first + step) * self.block]
+            products = _line_products(part) if self.block == 1 else _block_products(part, self.block)
+            upper += means[..., first : first + step] @ products.T
+        place = np.empty((columns, columns), dtype=np.intp)
+        place[rows, others] = place[others, rows] = np.arange(rows.size)
+        return np.take(upper, place, axis=-1)
+
+
+def weight_course(weights: Floats, modes: int) -> WeightCourse:
+    """Plan the Gram matrices of so many modes and their slopes for weights ``[response, reference, line]``."""
+    lines = weights.shape[-1]
     strongest = weights.max(axis=-1, keepdims=True)
     used = strongest[..., 0] > 0
     courses = weights[used] / strongest[used]
     profile = courses.mean(axis=0) if len(courses) else np.zeros(lines)
     if np.all(np.abs(courses - profile) <= ALIKE * profile):
-        block = lines
-    else:
-        block = max(1, -(-lines * columns**2 // LARGEST_TABLE))
-    scaled = functions * np.sqrt(profile)
-    products = _line_products(scaled) if block == 1 else _block_products(scaled, block)
-    return ProductTable(products=products, profile=profile, block=block, columns=columns)
+        return WeightCourse(profile=profile, block=lines)
+    # Shapes have fewer functions than slopes. Blocks of the same size keep what is left of the curvature positive.
+    columns = 4 * modes + 4
+    return WeightCourse(profile=profile, block=-(-weights.size * columns * (columns + 1) // (2 * LARGEST_WORK)))
 
 
 def _line_products(functions: Complex) -> Floats:
+    """``[pair, line]`` Re(conj(P_a) P_b), for the pairs of `numpy.triu_indices`."""
     columns, lines = functions.shape
     real, imag = np.ascontiguousarray(functions.real), np.ascontiguousarray(functions.imag)
     products = np.empty((columns * (columns + 1) // 2, lines))
@@ -98,6 +102,7 @@ def _line_products(functions: Complex) -> Floats:
 
 
 def _block_products(functions: Complex, block: int) -> Floats:
+    """``[pair, block]`` sums of the same over blocks of lines."""
     columns, lines = functions.shape
     blocks = -(-lines // block)
     padded = np.zeros((columns, blocks * block), dtype=np.complex128)

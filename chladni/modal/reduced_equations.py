@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from chladni.modal.lsfd import ShapeSolution
 from chladni.modal.model_lines import ModelLines
-from chladni.modal.normal_equations import product_table, projections, rotated, rotated_rows, symmetric_inverse
+from chladni.modal.normal_equations import projections, rotated, rotated_rows, symmetric_inverse, weight_course
 
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
@@ -52,16 +52,15 @@ def reduced_equations(lines: ModelLines, solution: ShapeSolution) -> ReducedEqua
     """Set up the equations at the best coefficients for given poles and participation."""
     basis, vectors = solution.basis, solution.participation
     functions = np.concatenate([basis.modes, basis.slopes, basis.residuals])
-    table = product_table(functions, lines.weights)
+    course = weight_course(lines.weights, len(vectors))
     responses, references, _ = lines.values.shape
     free = _free(vectors)
     curvature = np.zeros((free.size, free.size))
     descent = np.zeros(free.size)
     coupling = np.empty((responses, solution.coefficients.shape[1], free.size))
-    for batch in table.batches(responses, references):
+    for batch in course.batches(responses, references, len(functions)):
         shapes = solution.shapes.T[batch]
-        gram = table.gram(lines.weights[batch])
-        own, cross = _blocks(gram, shapes, vectors)
+        own, cross = _blocks(course.gram(functions, lines.weights[batch]), shapes, vectors)
         cross = cross[..., free]
         eliminated = solution.inverse[batch] @ cross
         coupling[batch] = eliminated

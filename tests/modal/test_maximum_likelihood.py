@@ -155,7 +155,8 @@ def test_blocks_of_lines_alter_error_bars_little(monkeypatch):
     truth = chain()
     response, start = measured(truth, (0, 1)), started(truth, (0, 1), RNG(4))
     whole = refine(response, start)
-    monkeypatch.setattr(normal_equations, "LARGEST_TABLE", 24**2 * 200)
+    monkeypatch.setattr(normal_equations, "LARGEST_WORK", 10 * 600 * 24 * 25 // (2 * 3))
+    monkeypatch.setattr(normal_equations, "LARGEST_TABLE", 24**2 * 60)
     monkeypatch.setattr(normal_equations, "LARGEST_BATCH", 24**2 * 2)
     blocks = refine(response, start)
     # Both stop within a hundredth of a sigma of the optimum.
