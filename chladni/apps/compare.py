@@ -6,11 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from chladni.apps.analyse import excitations
+from chladni.apps.modes import identify_modes
 from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging, densities, transfer
 from chladni.io.log import Log
+from chladni.modal.mode_comparison import compare_modes
+from chladni.modal.validation import validate
 from chladni.signals.comparison import DensityComparison, ResponseComparison
 from chladni.signals.errors import EstimateError
+from chladni.signals.mode_change import ModeChange
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
 from chladni.spectral.comparison import compare_densities, compare_responses
@@ -28,6 +32,8 @@ class LogComparison:
         Levels, spectra and peaks, one value for each sampling grid that both have.
     response
         Transfer functions to the references that both have; None when there is none.
+    modes
+        What became of each mode; None when modes were not asked for.
     notes
         What could not be compared, and why.
     """
@@ -35,6 +41,7 @@ class LogComparison:
     densities: tuple[DensityComparison, ...]
     response: ResponseComparison | None
     notes: tuple[str, ...]
+    modes: tuple[ModeChange, ...] | None = None
 
 
 def compare_logs(
@@ -44,9 +51,11 @@ def compare_logs(
     channels: Sequence[str] | None = None,
     references: Sequence[str] | None = None,
     resolution_hz: float | None = None,
+    modes: bool = False,
+    operational: bool = False,
     progress: Progress = no_progress,
 ) -> LogComparison:
-    """Compare the spectra and transfer functions of two logs.
+    """Compare the spectra, transfer functions and modes of two logs.
 
     Parameters
     ----------
@@ -58,6 +67,10 @@ def compare_logs(
         Excitations; None takes the channels whose role is reference, else the first force.
     resolution_hz
         Distance of the spectral lines; None chooses the coarser of what would suit each log.
+    modes
+        Whether to identify the modes of both, too.
+    operational
+        Whether to identify them from responses alone, see `identify_modes`.
     progress
         Called with the share done, 0 to 1.
 
@@ -66,7 +79,7 @@ def compare_logs(
     LogError
         When there is no such channel.
     EstimateError
-        When the logs share no channel at the same sample rate.
+        When the logs share no channel at the same sample rate, or modes are asked for and can't be identified.
     """
     pairs = _matched_densities(before, after, channels, resolution_hz)
     progress(0.5)
@@ -74,13 +87,45 @@ def compare_logs(
     moving = [channel for comparison in compared for channel in comparison.channels]
     chosen = tuple(references or excitations(moving))
     transferred = _responses(before, after, channels, chosen, resolution_hz)
+    progress(0.7)
+    changes: tuple[ModeChange, ...] | None = None
+    doubts: tuple[str, ...] = ()
+    if modes or operational:
+        changes, doubts = _modes(before, after, chosen, channels, resolution_hz, operational)
     progress(1.0)
     accounts = [(one.provenance, other.provenance) for one, other in pairs]
     return LogComparison(
         densities=compared,
         response=transferred.comparison,
-        notes=(*_told([*accounts, *transferred.accounts]), *transferred.reasons),
+        modes=changes,
+        notes=(*_told([*accounts, *transferred.accounts]), *transferred.reasons, *doubts),
     )
+
+
+def _modes(
+    before: Log,
+    after: Log,
+    references: Sequence[str],
+    channels: Sequence[str] | None,
+    resolution_hz: float | None,
+    operational: bool,
+) -> tuple[tuple[ModeChange, ...], tuple[str, ...]]:
+    named = None if channels is None else [name for name in channels if name not in references]
+    old, new = (
+        identify_modes(
+            log,
+            reference=None if operational else references or None,
+            operational=operational,
+            channels=named or None,
+            resolution_hz=None if operational else resolution_hz,
+        )
+        for log in (before, after)
+    )
+    alike = [validate(one).alike for one in (old, new)]
+    doubts = (
+        "these sensors can't tell all shapes apart: modes are paired by their frequencies more than by their shapes",
+    )
+    return compare_modes(old, new), doubts if any(alike) else ()
 
 
 def _told(accounts: Sequence[tuple[Provenance, Provenance]]) -> tuple[str, ...]:

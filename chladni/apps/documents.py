@@ -75,6 +75,7 @@ def comparison_document(comparison: "LogComparison") -> Document:
         "bands": [_level_change(one) for density in comparison.densities for one in density.bands],
         "peaks": [_peak_change(one) for density in comparison.densities for one in density.peaks],
         "response_peaks": [] if response is None else [_peak_change(one) for one in response.peaks],
+        "modes": None if comparison.modes is None else [asdict(one) for one in comparison.modes],
         "spectra": [_density_change(density, row) for density in comparison.densities for row in _rows(density)],
         "notes": [*comparison.notes, *(note for density in comparison.densities for note in density.notes)],
     }

@@ -7,7 +7,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.output import Output
-from chladni.cli.words import number, unit, with_error
+from chladni.cli.words import NOTHING, number, unit, with_error
 from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from chladni.apps.compare import LogComparison
     from chladni.signals.comparison import LevelChange, PeakChange
+    from chladni.signals.mode_change import ModeChange
 
 MOST_ROWS = 25
 UNCHANGED = "nothing that scatter doesn't explain"
@@ -32,12 +33,16 @@ def compare(
         ),
     ] = None,
     resolution: options.Resolution = None,
+    modes: Annotated[bool, typer.Option("--modes", help="Identify the modes of both and compare them, too.")] = False,
+    operational: Annotated[
+        bool, typer.Option("--operational", help="The same from responses alone: the excitation wasn't measured.")
+    ] = False,
     setup: options.Setup = None,
     stamp: options.Stamp = "auto",
     json: options.Json = None,
     figures: options.Figures = None,
 ) -> None:
-    """Levels, spectra and transfer functions of two logs side by side, with what is significant."""
+    """Levels, spectra, transfer functions and modes of two logs side by side, with what is significant."""
     from chladni.apps.compare import compare_logs
     from chladni.apps.documents import comparison_document
     from chladni.io.log import open_log
@@ -49,7 +54,14 @@ def compare(
         out.progress(f"{before.name}, {after.name}") as progress,
     ):
         found = compare_logs(
-            old, new, channels=channel, references=reference, resolution_hz=resolution, progress=progress
+            old,
+            new,
+            channels=channel,
+            references=reference,
+            resolution_hz=resolution,
+            modes=modes,
+            operational=operational,
+            progress=progress,
         )
     for density in found.densities:
         _print_levels(out, density.overall)
@@ -58,6 +70,8 @@ def compare(
     if found.response is not None:
         _print_peaks(out, "Peaks of the transfer functions", found.response.peaks)
         out.lines(found.response.notes)
+    if found.modes is not None:
+        _print_modes(out, found.modes)
     out.lines(found.notes)
     if figures is not None:
         _save_figures(out, found, figures)
@@ -108,3 +122,28 @@ def _print_peaks(out: Output, title: str, changes: "Sequence[PeakChange]") -> No
     if len(told) > MOST_ROWS:
         title = f"{title}: {MOST_ROWS} of {len(told)} changes, all of them with --json"
     out.table(title, ["channels", "what", "before [Hz]", "after [Hz]", "shift [Hz]"], rows)
+
+
+def _print_modes(out: Output, changes: "Sequence[ModeChange]") -> None:
+    if not changes:
+        out.line("No mode was found in either log.")
+        return
+    out.table(
+        "Modes",
+        ["what", "before [Hz]", "after [Hz]", "shift [Hz]", "change of damping ratio [%]", "MAC"],
+        [
+            [
+                one.fate,
+                number(one.before_hz, digits=5),
+                number(one.after_hz, digits=5),
+                _difference(one.shift_hz, one.shift_std_hz),
+                _difference(one.damping_change, one.damping_change_std, factor=100),
+                number(one.mac, digits=3),
+            ]
+            for one in changes
+        ],
+    )
+
+
+def _difference(value: float | None, std: float | None, *, factor: float = 1.0) -> str:
+    return NOTHING if value is None or std is None else with_error(factor * value, factor * std)

@@ -56,3 +56,22 @@ def test_a_long_list_of_changes_is_cut_with_a_word(run, monkeypatch):
     out = SimpleNamespace(table=lambda title, _columns, rows: told.append((title, len(rows))))
     compare._print_peaks(out, "Peaks", [gone] * 5)
     assert told == [("Peaks: 2 of 5 changes, all of them with --json", 2)]
+
+
+def test_modes_of_both_are_compared_when_asked_for(run, arm_log, tmp_path):
+    from tests.arm import write_arm
+
+    # A sensor's gain changes one component of every shape, but no frequency and no damping.
+    louder = write_arm(tmp_path, gain=1.2)
+    document = run("compare", arm_log, louder, "--modes", "--json", "-").document
+    assert [one["fate"] for one in document["modes"]] == ["unchanged"] * 5
+    assert all(one["mac"] < 1 for one in document["modes"])
+    assert all(one["shift_std_hz"] > 0 for one in document["modes"])
+    outcome = run("compare", arm_log, louder, "--modes")
+    assert "change of damping ratio" in outcome.out
+    assert run("compare", arm_log, louder, "--json", "-").document["modes"] is None
+
+
+def test_modes_from_responses_alone_are_compared_too(run, arm_log):
+    document = run("compare", arm_log, arm_log, "--operational", "--json", "-").document
+    assert {one["fate"] for one in document["modes"]} == {"unchanged"}
