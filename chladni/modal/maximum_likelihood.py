@@ -1,6 +1,6 @@
 """Maximum-likelihood refinement of a modal model (MLMM)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 from chladni.modal.fit_covariance import fitted_modes, no_modes
 from chladni.modal.fit_inflation import misfit
 from chladni.modal.fitted_modes import FittedModes
-from chladni.modal.lsfd import ShapeSolution, checked_modes, solve_shapes
+from chladni.modal.lsfd import ROUGH, ShapeSolution, checked_modes, solve_shapes
 from chladni.modal.modal_basis import modal_basis
 from chladni.modal.modal_model import ModalModel
 from chladni.modal.mode_guard import lost_mode
 from chladni.modal.model_lines import ModelLines, model_lines, reweighted
 from chladni.modal.reduced_equations import ReducedEquations, reduced_equations
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.wording import counted
 
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
@@ -22,7 +23,10 @@ Floats = NDArray[np.float64]
 # A step that moves no pole by more than this share of its decay rate ends the iteration, and so does one that
 # improves a fit with known variances by less than this: it is a small part of a sigma.
 CONVERGED, ENOUGH = 1e-7, 1e-4
+# What is left to gain beyond this shifts the modes by a third of one sigma or more, all together.
+UNSETTLED = 0.1
 FIRST_DAMPING, LARGEST_DAMPING = 1e-6, 1e6
+SLOWEST = 0.99
 
 
 def refine(
@@ -49,7 +53,8 @@ def refine(
     Returns
     -------
     FittedModes
-        Modes that leave the lines, run away or run into another mode are left out, and a note says so.
+        Modes that leave the lines, run away or run into another mode are left out, and a note says so. Where steps
+        run out before the misfit is least, error bars are widened by what is left, with a note.
 
     Raises
     ------
@@ -66,10 +71,14 @@ def refine(
     poles, vectors = checked_modes(response, model.poles, model.participation)
     kept, notes = np.arange(poles.size), list(lines.notes)
     while kept.size:
-        lines, state = _fitted(lines, poles[kept], _unit_largest(vectors[kept]), max_iterations)
+        lines, state, left = _fitted(lines, poles[kept], _unit_largest(vectors[kept]), max_iterations)
         lost = lost_mode(lines, poles[kept], state.poles, state.solution.strength)
         if lost is None:
             found = misfit(lines, state.solution, response.provenance)
+            if left > UNSETTLED + ROUGH * state.cost:
+                # A step to the optimum is as long in sigmas as the root of what it gains.
+                found = replace(found, excess=found.excess * (1 + left))
+                notes.append(_unsettled(max_iterations, left))
             return fitted_modes(
                 lines,
                 state.poles,
@@ -103,30 +112,46 @@ class _State:
 
 def _fitted(
     lines: ModelLines, poles: Complex, participation: Complex, max_iterations: int
-) -> tuple[ModelLines, _State]:
-    state = _minimise(lines, _State.at(lines, poles, participation), max_iterations)
+) -> tuple[ModelLines, _State, float]:
+    state, left = _minimise(lines, _State.at(lines, poles, participation), max_iterations)
     if lines.weighted:
-        return lines, state
+        return lines, state, left
     lines = reweighted(lines, state.solution.residual, parameters=state.solution.coefficients.shape[1])
-    return lines, _minimise(lines, _State.at(lines, state.poles, state.participation), max_iterations)
+    return lines, *_minimise(lines, _State.at(lines, state.poles, state.participation), max_iterations)
 
 
-def _minimise(lines: ModelLines, state: _State, max_iterations: int) -> _State:
-    damping = FIRST_DAMPING
+def _minimise(lines: ModelLines, state: _State, max_iterations: int) -> tuple[_State, float]:
+    """Step until nothing is worth another step; give what more steps would lower the cost by."""
+    damping, gains = FIRST_DAMPING, (0.0, 0.0)
     for _ in range(max_iterations):
         equations = reduced_equations(lines, state.solution)
         # Shorter and shorter steps would be tried in vain where there is nothing to gain.
-        worthless = lines.weighted and equations.promised() < ENOUGH
-        found = None if worthless else _step(lines, state, equations, damping)
+        if lines.weighted and equations.promised() < ENOUGH:
+            return state, 0.0
+        found = _step(lines, state, equations, damping)
         if found is None:
-            break
+            # Without noise to compare with, rounding stops the steps.
+            return state, equations.promised() if lines.weighted else 0.0
         trial, damping = found
         moved = np.abs(trial.poles - state.poles) / -state.poles.real
-        done = moved.max() < CONVERGED or (lines.weighted and state.cost - trial.cost < ENOUGH)
+        gains = gains[1], state.cost - trial.cost
         state = trial
-        if done:
-            break
-    return state
+        if moved.max() < CONVERGED or (lines.weighted and gains[1] < ENOUGH):
+            return state, 0.0
+    return state, max(reduced_equations(lines, state.solution).promised(), _geometric_rest(*gains))
+
+
+def _geometric_rest(before: float, last: float) -> float:
+    """Sum of all gains to come, when each is to the one before it as the last was."""
+    ratio = min(last / before, SLOWEST) if before > 0 else 0.0
+    return last * ratio / (1 - ratio)
+
+
+def _unsettled(steps: int, left: float) -> str:
+    return (
+        f"the refinement didn't settle within {counted(steps, 'step')}, and the weighted sum of squares may still "
+        f"fall by {left:.2g}: error bars are widened for it; fit fewer modes together, or look at a narrower band"
+    )
 
 
 def _step(
