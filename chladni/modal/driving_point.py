@@ -122,7 +122,12 @@ def driving_points(responses: Sequence[Channel], references: Sequence[Channel]) 
 
 def same_place(one: Channel, other: Channel) -> int:
     """Give 1 for channels at one point along one direction, -1 for opposite directions, 0 for two places."""
-    if one.point is None or one.point != other.point or one.direction is None or other.direction is None:
+    return same_direction(one, other) if one.point is not None and one.point == other.point else 0
+
+
+def same_direction(one: Channel, other: Channel) -> int:
+    """Give 1 for channels along one direction, -1 for opposite ones, 0 for others or unknown ones."""
+    if one.direction is None or other.direction is None:
         return 0
     cosine = float(np.dot(one.direction, other.direction))
     return int(np.sign(cosine)) if abs(cosine) >= 1 - SAME_DIRECTION else 0

@@ -159,11 +159,15 @@ class ModeReport:
         coarse = shown[fit.significance.width[shown] < COARSE]
         if coarse.size:
             frequencies = ", ".join(f"{frequency_hz:.4g}" for frequency_hz in fit.fitted.model.frequency_hz[coarse])
-            finest = fit.significance.width[coarse].min()
-            notes.append(
-                f"modes at {frequencies} Hz are less than {COARSE:g} lines wide at half power: their damping is only "
-                f"as good as the model of the window; ask for lines {COARSE / finest:.2g} times closer or more"
+            factor = f"{COARSE / fit.significance.width[coarse].min():.2g} times"
+            # Whole periods have no window.
+            limit = (
+                f"few lines carry their damping; a period {factor} as long or more helps"
+                if self.response.provenance.averaging == "periodic"
+                else "their damping is only as good as the model of the window; "
+                f"ask for lines {factor} closer or more"
             )
+            notes.append(f"modes at {frequencies} Hz are less than {COARSE:g} lines wide at half power: {limit}")
         return tuple(notes)
 
 

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.modal.driving_point import driving_points, same_direction
 from chladni.modal.fitted_modes import FittedModes
 from chladni.signals.channel import Channel, find_channel
 from chladni.signals.modal_scale import ModalScale
 from chladni.spectral.forms import MOTION_ORDER
 
-# Response and reference count along one axis when the cosine between them is this near to 1.
-SAME_AXIS = 1 - 1e-6
+# Rows of a response and a reference, and -1 where they point oppositely.
+Pair = tuple[int, int, int]
 # Motions that a force, or a torque, does work on.
 _MOTIONS = {"N": ("m", "m/s", "m/s^2"), "N m": ("rad", "rad/s", "rad/s^2")}
 # A modal mass whose own sigma is more than this share of it is worth a word.
@@ -34,15 +35,6 @@ class Scaling:
 
     scale: ModalScale | None
     notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DrivingPoint:
-    """Rows of a response and a reference at one point along one axis; `sign` is -1 when they point oppositely."""
-
-    response: int
-    reference: int
-    sign: int
 
 
 def modal_scale(
@@ -79,10 +71,10 @@ def modal_scale(
     a_r = psi_d/L_d and m_r = Re(a_r/(2 j omega_d)) for shapes of largest component 1 (Maia & Silva 1997, section
     2.4); for a lightly damped real mode m_r is the modal mass phi^T M phi.
     """
-    pairs = driving_points(responses, references, driving_point)
+    pairs = _pairs(responses, references, driving_point)
     if not pairs:
         return Scaling(scale=None, notes=(_no_pair(responses, references),))
-    forces = [pair for pair in pairs if _does_work(responses[pair.response], references[pair.reference])]
+    forces = [pair for pair in pairs if _does_work(responses[pair[0]], references[pair[1]])]
     if not forces:
         return Scaling(scale=None, notes=(_no_force(responses, references, pairs[0]),))
     pair = min(forces, key=lambda pair: _worst(fitted, pair))
@@ -103,31 +95,15 @@ def unit_modal_mass_shapes(
     return unit
 
 
-def driving_points(
-    responses: Sequence[Channel], references: Sequence[Channel], named: tuple[str, str] | None = None
-) -> list[DrivingPoint]:
-    """Find the pairs of response and reference at one point along one axis, or the named pair."""
-    if named is not None:
-        row, column = (
-            find_channel(responses, named[0], role="response"),
-            find_channel(references, named[1], role="reference"),
-        )
-        return [DrivingPoint(response=row, reference=column, sign=_sign(responses[row], references[column]) or 1)]
-    pairs = [
-        DrivingPoint(response=row, reference=column, sign=_sign(response, reference))
-        for row, response in enumerate(responses)
-        for column, reference in enumerate(references)
-        if response.point is not None and response.point == reference.point
-    ]
-    return [pair for pair in pairs if pair.sign]
-
-
-def _sign(response: Channel, reference: Channel) -> int:
-    """1 or -1 for two directions along one axis, 0 when they aren't."""
-    if response.direction is None or reference.direction is None:
-        return 0
-    cosine = float(np.dot(response.direction, reference.direction))
-    return 0 if abs(cosine) < SAME_AXIS else (1 if cosine > 0 else -1)
+def _pairs(
+    responses: Sequence[Channel], references: Sequence[Channel], named: tuple[str, str] | None
+) -> tuple[Pair, ...]:
+    """The pairs at one point along one direction, or the named pair wherever it is."""
+    if named is None:
+        return driving_points(responses, references)
+    row = find_channel(responses, named[0], role="response")
+    column = find_channel(references, named[1], role="reference")
+    return ((row, column, same_direction(responses[row], references[column]) or 1),)
 
 
 def _does_work(response: Channel, reference: Channel) -> bool:
@@ -135,27 +111,25 @@ def _does_work(response: Channel, reference: Channel) -> bool:
 
 
 def _scale(
-    fitted: FittedModes, responses: Sequence[Channel], references: Sequence[Channel], pair: DrivingPoint
+    fitted: FittedModes, responses: Sequence[Channel], references: Sequence[Channel], pair: Pair
 ) -> ModalScale:
-    model = fitted.model
+    model, (row, column, sign) = fitted.model, pair
     with np.errstate(divide="ignore", invalid="ignore"):
-        modal_a = pair.sign * model.shapes[:, pair.response] / model.participation[:, pair.reference]
+        modal_a = sign * model.shapes[:, row] / model.participation[:, column]
     return ModalScale(
-        response=responses[pair.response].name,
-        reference=references[pair.reference].name,
+        response=responses[row].name,
+        reference=references[column].name,
         modal_a=modal_a,
         modal_mass=np.asarray((modal_a / (2j * model.poles.imag)).real, dtype=np.float64),
-        modal_mass_std=fitted.modal_mass_std[:, pair.response, pair.reference],
+        modal_mass_std=fitted.modal_mass_std[:, row, column],
     )
 
 
-def _worst(fitted: FittedModes, pair: DrivingPoint) -> float:
-    model = fitted.model
+def _worst(fitted: FittedModes, pair: Pair) -> float:
+    model, (row, column, _) = fitted.model, pair
     with np.errstate(divide="ignore", invalid="ignore"):
-        mass = np.abs(
-            model.shapes[:, pair.response] / model.participation[:, pair.reference] / (2 * model.poles.imag)
-        )
-        doubt = fitted.modal_mass_std[:, pair.response, pair.reference] / mass
+        mass = np.abs(model.shapes[:, row] / model.participation[:, column] / (2 * model.poles.imag))
+        doubt = fitted.modal_mass_std[:, row, column] / mass
     return float(np.max(np.nan_to_num(doubt, nan=np.inf), initial=0.0))
 
 
@@ -189,8 +163,8 @@ def _no_pair(responses: Sequence[Channel], references: Sequence[Channel]) -> str
     )
 
 
-def _no_force(responses: Sequence[Channel], references: Sequence[Channel], pair: DrivingPoint) -> str:
-    response, reference = responses[pair.response], references[pair.reference]
+def _no_force(responses: Sequence[Channel], references: Sequence[Channel], pair: Pair) -> str:
+    response, reference = responses[pair[0]], references[pair[1]]
     if reference.unit in _MOTIONS:
         return (
             f"unscaled: {response.name} in {response.unit} is no motion that {reference.name} in {reference.unit} "

@@ -176,3 +176,18 @@ def test_several_references_need_participation():
     truth, response = exact((0, 1))
     with pytest.raises(EstimateError, match="2 references need participation vectors"):
         least_squares_frequency_domain(response, truth.poles)
+
+
+@pytest.mark.parametrize("form", ["receptance", "accelerance"])
+def test_sdypy_finds_the_same_constants(form):
+    """An independent program on noisy functions that all lines of which count alike, as they do for it."""
+    from sdypy.EMA.EMA import LSFD
+
+    truth = chain()
+    response = convert_form(noisy_response(truth, FREQUENCY_HZ, (0,), noise=0.1, rng=RNG(4)), form)
+    flat = replace(response, std=np.ones_like(response.std))
+    poles = truth.poles[1:4] * (1 + 1e-3)
+    last = FREQUENCY_HZ.size
+    expected, *_ = LSFD(poles, response.values[:, 0], FREQUENCY_HZ, True, True, 0, last, form)
+    model = least_squares_frequency_domain(flat, poles)
+    np.testing.assert_allclose(model.residues[..., 0].T, expected, atol=1e-8 * np.abs(expected).max())

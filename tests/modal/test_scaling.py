@@ -88,6 +88,20 @@ def test_opposite_directions_turn_the_sign():
     assert np.all(np.isnan(unit_modal_mass_shapes(modes.model.shapes, scaling.scale)))
 
 
+def test_directions_that_differ_a_little_are_one_axis_as_in_the_check_of_driving_points():
+    _, response, modes = fitted(at=(0,))
+    tilted = tuple(replace(channel, direction=(0.02, 0.0, np.sqrt(1 - 0.02**2))) for channel in response.references)
+    assert modal_scale(modes, response.responses, tilted).scale is not None
+
+
+def test_a_named_driving_point_counts_with_its_sign():
+    _, response, modes = fitted(at=(0,))
+    turned = tuple(replace(channel, point="other", direction=(0.0, 0.0, -1.0)) for channel in response.references)
+    names = (response.responses[0].name, response.references[0].name)
+    scale = modal_scale(modes, response.responses, turned, driving_point=names).scale
+    assert np.all(scale.modal_mass < 0)
+
+
 def test_a_driving_point_can_be_named():
     truth, response, modes = fitted()
     bare = tuple(replace(channel, point=None, direction=None) for channel in response.responses)
