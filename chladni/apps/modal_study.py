@@ -97,7 +97,9 @@ def modal_study(
             log, channels=channels, method=chosen, wanted=request, averaging=averaging, span=part, progress=progress
         )
         return _study(log.path, log.geometry, found, None)
-    response = modal_response(log, references, channels, averaging=averaging, span=part, progress=progress)
+    response = modal_response(
+        log, references, channels, wanted=request, averaging=averaging, span=part, progress=progress
+    )
     found = modes_of_response(response, method=chosen, wanted=request)
     return _study(log.path, log.geometry, found, response, notes=_checks(response))
 

@@ -27,6 +27,7 @@ from chladni.signals.mode_set import ModeSet
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.adaptive import adaptive_cross_spectra
 from chladni.spectral.blocks import leading_part
+from chladni.spectral.excitation import HAMMER_RANGE
 from chladni.spectral.stretches import valid_runs
 
 Band = tuple[float, float]
@@ -40,6 +41,9 @@ SEGMENTS, SEGMENTS_A_REFERENCE = 8, 4
 LONGEST_SEGMENT = 1 << 16
 # Machines are looked for in the beginning of a stream, in one piece.
 SAMPLES_FOR_MACHINES = 1 << 20
+# A hammer drives modes as far as its force stays within 20 dB (ISO 7626-5); beyond, side lobes of its pulse still make
+# coherent peaks, of which only who asks for them knows what they are worth.
+HAMMER_DRIVES = 1e-2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,7 +98,8 @@ def identify_modes(
         `CovarianceDrivenSubspace` (the default for responses alone), `FrequencyDomainDecomposition`,
         `EnhancedFrequencyDomainDecomposition` (the default for cross-spectra).
     band_hz
-        Only modes between these frequencies; several bands are fitted one by one and joined.
+        Only modes between these frequencies; several bands are fitted one by one and joined. None takes all lines
+        that are excited; of a hammer test those where the force is less than 20 dB down.
     count
         At most so many modes, the most certain ones. When the data hold fewer, a note says why.
     frequencies_hz
@@ -131,7 +136,7 @@ def identify_modes(
         return modes_of_responses(
             source, channels=channels, method=method, wanted=wanted, averaging=averaging, span=span
         )
-    response = modal_response(source, reference, channels, averaging=averaging, span=span)
+    response = modal_response(source, reference, channels, wanted=wanted, averaging=averaging, span=span)
     return modes_of_response(response, method=method, wanted=wanted)
 
 
@@ -181,11 +186,14 @@ def modal_response(
     reference: str | Sequence[str] | None,
     channels: Sequence[str] | None,
     *,
+    wanted: Wanted,
     averaging: Averaging,
     span: Span,
     progress: Progress = no_progress,
 ) -> FrequencyResponse:
     """Estimate the frequency responses that modes are identified from: those of motions in one unit.
+
+    Unless bands or frequencies are wanted, a hammer excites no further than it drives modes.
 
     Raises
     ------
@@ -196,15 +204,35 @@ def modal_response(
         references = excitation_names(source, span)
     else:
         references = (reference,) if isinstance(reference, str) else tuple(reference)
+    anywhere = not wanted.bands_hz and wanted.frequencies_hz is None
     response = transfer(
-        source, references, channels, estimator="H1", averaging=averaging, span=span, progress=progress
+        source,
+        references,
+        channels,
+        estimator="H1",
+        averaging=averaging,
+        span=span,
+        hammer_range=HAMMER_DRIVES if anywhere else HAMMER_RANGE,
+        progress=progress,
     )
     finer = _modal_averaging(response, averaging)
     if finer != averaging:
         response = transfer(source, references, channels, estimator="H1", averaging=finer, span=span)
     names, notes = motions_of_one_unit(response.responses, named=channels is not None)
     chosen = response.select(names)
-    return replace(chosen, provenance=chosen.provenance.with_notes(*notes))
+    told = _end_of_hammer(chosen) if anywhere else ()
+    return replace(chosen, provenance=chosen.provenance.with_notes(*notes, *told))
+
+
+def _end_of_hammer(response: FrequencyResponse) -> tuple[str, ...]:
+    """Say where a hammer stops driving modes, when lines are left beyond."""
+    if response.provenance.averaging != "impact" or not response.excited.any() or response.excited[-1]:
+        return ()
+    last_hz = response.frequency_hz[response.excited][-1]
+    return (
+        f"the force of the hits is 20 dB down above {last_hz:.4g} Hz: no mode is looked for there; give a band to look "
+        "further",
+    )
 
 
 def _modal_averaging(response: FrequencyResponse, averaging: Averaging) -> Averaging:

@@ -16,6 +16,7 @@ from chladni.signals.time_series import TimeSeries
 from chladni.spectral.adaptive import adaptive_cross_spectra
 from chladni.spectral.bands import total_rms
 from chladni.spectral.blocks import Source
+from chladni.spectral.excitation import HAMMER_RANGE
 from chladni.spectral.frequency_response import Estimator, frequency_response
 from chladni.spectral.power_spectral_density import power_spectral_density
 from chladni.spectral.windows import Window
@@ -213,15 +214,22 @@ def transfer(
     estimator: Estimator,
     averaging: Averaging,
     span: Span,
+    hammer_range: float = HAMMER_RANGE,
     progress: Progress = no_progress,
 ) -> FrequencyResponse:
-    """Do the work of `frf`, with progress."""
+    """Do the work of `frf`, with progress; see `excited_lines` for `hammer_range`."""
     if not references:
         raise EstimateError("no reference is given; name the channel of the excitation")
     names = None if responses is None else tuple(dict.fromkeys((*references, *responses)))
     if isinstance(source, TimeSeries):
         spectra = averaging.spectra(_of_series(source, names, span), references)
-        return frequency_response(spectra, references=references, responses=responses, estimator=estimator)
+        return frequency_response(
+            spectra,
+            references=references,
+            responses=responses,
+            estimator=estimator,
+            hammer_range=hammer_range,
+        )
     # A path may be written in more than one way; the channels that come back have one name each.
     references = source.names(references)
     grid = _grid_of(source, references, names, span, progress)
@@ -230,7 +238,9 @@ def transfer(
         spectra = averaging.spectra(grid, references)
         _require_moving(grid, references)
         spectra = _without_constant(spectra, grid, keep=(*references, *(named or ())))
-        return frequency_response(spectra, references=references, responses=named, estimator=estimator)
+        return frequency_response(
+            spectra, references=references, responses=named, estimator=estimator, hammer_range=hammer_range
+        )
     except EstimateError as error:
         raise EstimateError(f"{source.path.name}: {error}") from error
 

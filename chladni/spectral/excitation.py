@@ -22,13 +22,13 @@ SMALLEST_SHARE = 0.02
 FEWEST_LINES = 8
 
 
-def excited_lines(spectra: CrossSpectra, references: Sequence[str]) -> Mask:
+def excited_lines(spectra: CrossSpectra, references: Sequence[str], *, hammer_range: float = HAMMER_RANGE) -> Mask:
     """Tell which lines each reference excites.
 
     A line counts as excited when its power
 
     1. is above 1e-6 of the strongest (the 99th percentile of lines, so that one hum doesn't set the scale), for hits
-       of a hammer above 1e-3 of it,
+       of a hammer above `hammer_range` of it,
     2. stands out of the scatter between periods, for periodic excitation: M |mean|^2 / scatter above the quantile of
        F(2, 2M - 2) that a tenth of a line in the whole spectrum would exceed by chance (Pintelon & Schoukens 2012,
        section 2.5), and
@@ -41,6 +41,8 @@ def excited_lines(spectra: CrossSpectra, references: Sequence[str]) -> Mask:
         Averaged cross-spectra that hold the references.
     references
         Names of the excitations.
+    hammer_range
+        Least power of a hammer's lines over that of its strongest.
 
     Returns
     -------
@@ -49,7 +51,7 @@ def excited_lines(spectra: CrossSpectra, references: Sequence[str]) -> Mask:
     """
     rows = [spectra.index(name) for name in references]
     powers = auto_densities(repeated_density(spectra))[rows]
-    share = HAMMER_RANGE if spectra.provenance.averaging == "impact" else DYNAMIC_RANGE
+    share = hammer_range if spectra.provenance.averaging == "impact" else DYNAMIC_RANGE
     mask = powers > share * np.percentile(powers, 99, axis=1, keepdims=True)
     if spectra.noise_density is not None:
         scatter = auto_densities(spectra.noise_density)[rows]

@@ -11,7 +11,7 @@ from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.spectral.channel_choice import ChannelChoice, choose_channels
 from chladni.spectral.coherence import share
-from chladni.spectral.excitation import excitation_notes, excited_lines, repeated_density
+from chladni.spectral.excitation import HAMMER_RANGE, excitation_notes, excited_lines, repeated_density
 from chladni.spectral.line_algebra import LineSolution, solve_lines
 from chladni.spectral.power_spectral_density import auto_densities
 from chladni.spectral.response_advice import response_notes
@@ -29,6 +29,7 @@ def frequency_response(
     references: str | Sequence[str],
     responses: str | Sequence[str] | None = None,
     estimator: Estimator = "H1",
+    hammer_range: float = HAMMER_RANGE,
 ) -> FrequencyResponse:
     """Estimate H = response/reference, with the convention e^{+j w t}: a delay tau gives the phase -w tau.
 
@@ -46,6 +47,8 @@ def frequency_response(
         (with several references it needs as many responses); ``Hv``, total least squares with every channel scaled
         to unit power, shares the noise between them (Rocklin, Crowley & Vold 1985; for one reference it's the
         geometric mean of H1 and H2). For periodic excitation the mean periods are divided, where all three agree.
+    hammer_range
+        Least power of a hammer's lines over that of its strongest; see `excited_lines`.
 
     Returns
     -------
@@ -70,7 +73,7 @@ def frequency_response(
     solution = solve_lines(density, chosen.references, chosen.responses)
     values = _estimate(estimator, density, chosen, solution)
     names = [spectra.channels[row].name for row in chosen.references]
-    excited = excited_lines(spectra, names)
+    excited = excited_lines(spectra, names, hammer_range=hammer_range)
     # The matrix of references is solved as a whole, so that a line must be excited by all of them.
     everywhere = np.logical_and.reduce(excited)
     response = FrequencyResponse(

@@ -14,6 +14,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.cross_spectra import cross_spectra
 from tests.arm import FORCE, TOOL, WRIST, short_arm, write_arm
+from tests.modal.truth import ModalTruth, channels
 
 # Twenty-five seconds give half a percent of the lowest mode's frequency at the default resolution.
 SIGMAS = 4.0
@@ -152,3 +153,31 @@ def test_a_band_is_two_numbers(band):
 def test_responses_alone_are_identified_in_one_band():
     with pytest.raises(EstimateError, match="in one band"):
         identify_modes(series_of_arm(), operational=True, band_hz=[(10, 40), (40, 80)])
+
+
+def test_a_hammer_drives_modes_as_far_as_its_force_stays_within_20_db():
+    rate_hz, samples, hits = 2048, 8192, 5
+    # A half sine of 6 samples is 20 dB down at 444 Hz, and has a side lobe 23 dB down around 640 Hz.
+    end_hz = 444.0
+    made = ModalTruth(
+        frequency_hz=np.array([90.0, 300.0, 640.0]),
+        damping_ratio=np.full(3, 0.005),
+        shapes=np.array([[1.0, 0.5], [0.8, -1.0], [-0.6, 1.0]]),
+    )
+    force = np.zeros((1, 4 * hits * samples))
+    for hit in range(hits):
+        first = hit * samples + 200
+        force[0, first : first + 6] = 100 * np.sin(np.pi * (np.arange(6) + 0.5) / 6)
+    values = np.concatenate([force, made.respond(force, (0,), rate_hz)])[:, : hits * samples]
+    values += 1e-4 * np.random.default_rng(1).standard_normal(values.shape)
+    forces, motions = channels(2, (0,))
+    series = TimeSeries(values=values, sample_rate_hz=rate_hz, channels=(*forces, *motions))
+    driven = identify_modes(series)
+    assert driven.provenance.averaging == "impact"
+    np.testing.assert_allclose(driven.frequency_hz, made.frequency_hz[made.frequency_hz < end_hz], rtol=1e-4)
+    (told,) = [note for note in driven.provenance.notes if "20 dB down" in note]
+    assert float(told.split(" Hz")[0].split()[-1]) == pytest.approx(end_hz, rel=0.02)
+    for wanted in ({"band_hz": (20.0, 800.0)}, {"frequencies_hz": made.frequency_hz.tolist()}):
+        further = identify_modes(series, **wanted)
+        np.testing.assert_allclose(further.frequency_hz, made.frequency_hz, rtol=1e-4)
+        assert not any("20 dB down" in note for note in further.provenance.notes)
