@@ -41,8 +41,8 @@ SEGMENTS, SEGMENTS_A_REFERENCE = 8, 4
 LONGEST_SEGMENT = 1 << 16
 # Machines are looked for in the beginning of a stream, in one piece.
 SAMPLES_FOR_MACHINES = 1 << 20
-# A hammer drives modes as far as its force stays within 20 dB (ISO 7626-5); beyond, side lobes of its pulse still make
-# coherent peaks, of which only who asks for them knows what they are worth.
+# A hammer drives modes as far as its force stays within 20 dB (ISO 7626-5); beyond, side lobes of its pulse still
+# make coherent peaks, of which only who asks for them knows what they are worth.
 HAMMER_DRIVES = 1e-2
 
 
@@ -229,10 +229,8 @@ def _end_of_hammer(response: FrequencyResponse) -> tuple[str, ...]:
     if response.provenance.averaging != "impact" or not response.excited.any() or response.excited[-1]:
         return ()
     last_hz = response.frequency_hz[response.excited][-1]
-    return (
-        f"the force of the hits is 20 dB down above {last_hz:.4g} Hz: no mode is looked for there; give a band to look "
-        "further",
-    )
+    told = f"the force of the hits is 20 dB down above {last_hz:.4g} Hz: no mode is looked for there"
+    return (f"{told}; give a band to look further",)
 
 
 def _modal_averaging(response: FrequencyResponse, averaging: Averaging) -> Averaging:
