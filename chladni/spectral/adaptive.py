@@ -13,7 +13,7 @@ from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.impact import find_impacts, impact_cross_spectra, is_impact_test
 from chladni.spectral.period import Period, find_period
 from chladni.spectral.periodic import periodic_cross_spectra
-from chladni.spectral.segmentation import Detrend
+from chladni.spectral.segmentation import Detrend, require_resolution
 from chladni.spectral.stretches import valid_runs
 from chladni.spectral.windows import Window
 
@@ -83,6 +83,8 @@ def adaptive_cross_spectra(
 
 def _hits(blocks: tuple[TimeSeries, ...], force: str, resolution_hz: float | None) -> CrossSpectra:
     series = _joined(blocks)
+    if resolution_hz is not None:
+        require_resolution(resolution_hz, series.sample_rate_hz)
     record_s = None if resolution_hz is None else 1 / resolution_hz
     spectra = impact_cross_spectra(series, find_impacts(series, force=force, record_s=record_s))
     beyond_s = sum(block.duration_s for block in blocks) - series.duration_s

@@ -132,12 +132,17 @@ def _default_samples(samples_available: int | None) -> int:
     return int(2 ** floor(log2(longest)))
 
 
-def _samples_for(resolution_hz: float, sample_rate_hz: float, samples_available: int | None) -> int:
+def require_resolution(resolution_hz: float, sample_rate_hz: float) -> None:
+    """Raise `SetupError` for a distance of lines that no spectrum of this sample rate has."""
     if not (isfinite(resolution_hz) and 0 < resolution_hz <= sample_rate_hz / SHORTEST_SEGMENT):
         raise SetupError(
             f"resolution {resolution_hz} Hz must be above 0 and at most {sample_rate_hz / SHORTEST_SEGMENT:g} Hz, "
             f"a quarter of the sample rate {sample_rate_hz:g} Hz"
         )
+
+
+def _samples_for(resolution_hz: float, sample_rate_hz: float, samples_available: int | None) -> int:
+    require_resolution(resolution_hz, sample_rate_hz)
     # What was asked for comes before a length that transforms fast: the transform takes any length.
     samples = round(sample_rate_hz / resolution_hz)
     if samples_available is not None and samples_available < samples:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.signals.errors import EstimateError
+from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.testing import assert_close
 from chladni.spectral import adaptive as module
 from chladni.spectral.adaptive import adaptive_cross_spectra
@@ -132,6 +132,12 @@ def test_the_hits_of_a_hammer_are_averaged(references):
     assert spectra.provenance.averaging == "impact"
     assert_close(spectra, impact_cross_spectra(source, find_impacts(source, force="a")), rtol=0)
     assert_close(adaptive_cross_spectra(blocks(source, [7000] * 7 + [1000])), spectra, rtol=0)
+
+
+@pytest.mark.parametrize("resolution_hz", [0.0, -1.0, float("nan"), float("inf"), 2000.0])
+def test_an_impossible_resolution_of_hits_is_refused_with_its_bounds(resolution_hz):
+    with pytest.raises(SetupError, match=r"resolution .* Hz must be above 0 and at most 1250 Hz"):
+        adaptive_cross_spectra(hammer_test(), references="a", resolution_hz=resolution_hz)
 
 
 def test_the_resolution_sets_the_length_of_a_hits_record():
