@@ -101,7 +101,7 @@ def _of_series(series: TimeSeries, channels: Sequence[str] | None, span: Span) -
         names, notes = motions_of_one_unit(part.select(list(channels)).channels, named=True)
     else:
         still = _constant(part, [channel.name for channel in part.channels], Span())
-        names, notes = motions_of_one_unit(_responses(part.channels, still), named=False)
+        names, notes = _moving_motions(part.channels, still)
     if not names:
         raise EstimateError("the series holds no response that changes; nothing to identify modes from")
     return part.select(list(names)), notes
@@ -119,10 +119,10 @@ def _of_named(log: Log, names: tuple[str, ...], span: Span, progress: Progress) 
 
 def _of_log(log: Log, span: Span, progress: Progress) -> tuple[Watched, tuple[str, ...]]:
     known = {channel.name: channel for channel in log.channels}
-    offers: list[Chosen] = []
-    for grid in log.grids(start_s=span.start_s, end_s=span.end_s):
-        moving = _responses([known[name] for name in grid.names], _constant(log, grid.names, span))
-        offers.append(motions_of_one_unit(moving, named=False))
+    offers = [
+        _moving_motions([known[name] for name in grid.names], _constant(log, grid.names, span))
+        for grid in log.grids(start_s=span.start_s, end_s=span.end_s)
+    ]
     names, notes = max(offers, key=lambda offer: len(offer[0]), default=((), ()))
     if not names:
         raise EstimateError(f"{log.path.name}: no response changes; nothing to identify modes from")
@@ -132,12 +132,12 @@ def _of_log(log: Log, span: Span, progress: Progress) -> tuple[Watched, tuple[st
     return _of_named(log, names, span, progress), notes
 
 
-def _responses(channels: Sequence[Channel], constant: Sequence[str]) -> list[Channel]:
-    return [
-        channel
-        for channel in channels
-        if channel.role != "reference" and channel.unit not in FORCE_UNITS and channel.name not in constant
-    ]
+def _moving_motions(channels: Sequence[Channel], constant: Sequence[str]) -> Chosen:
+    """Choose among the responses that change, and say which don't."""
+    responses = [one for one in channels if one.role != "reference" and one.unit not in FORCE_UNITS]
+    names, notes = motions_of_one_unit([one for one in responses if one.name not in constant], named=False)
+    still = [one.name for one in responses if one.name in constant]
+    return names, (*notes, f"channels that never change are left out: {some_of(still)}") if still else notes
 
 
 def _constant(source: Log | TimeSeries, names: Sequence[str], span: Span) -> tuple[str, ...]:

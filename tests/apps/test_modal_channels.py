@@ -73,6 +73,7 @@ def test_responses_of_a_series_leave_out_forces_and_what_stands_still():
     assert [channel.name for channel in samples.channels] == ["one"]
     assert samples.samples == 200
     assert "gyro" in notes[0]
+    assert notes[1] == "channels that never change are left out: two"
 
 
 def test_a_series_without_response_is_refused():
@@ -95,6 +96,7 @@ def test_a_log_gives_the_grid_with_most_responses_that_change(log):
     samples, notes = responses_alone(log, None, Span(), progress=no_progress)
     assert samples.names == ("/fast/a.accel.linear.x", "/fast/b.accel.linear.x")
     assert any("/slow/a.accel.linear.x" in note for note in notes)
+    assert any("never change" in note and "/fast/c.accel.linear.x" in note for note in notes)
 
 
 def test_named_channels_of_a_log_are_taken_as_they_are(log):
