@@ -1,6 +1,7 @@
 """The modal analyst's job: a log to validated modes and everything that can be said and shown of them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -21,7 +22,7 @@ from chladni.modal.relative_motion import relative_motion
 from chladni.modal.subspace import CovarianceDrivenSubspace
 from chladni.modal.summary import summarise
 from chladni.modal.validation import validate
-from chladni.signals.errors import LogError, SetupError
+from chladni.signals.errors import EstimateError, LogError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry
 from chladni.signals.mode_set import ModeSet
@@ -93,14 +94,22 @@ def modal_study(
     averaging, request, part = Averaging(resolution_hz=resolution_hz), wanted or Wanted(), span or Span()
     chosen = None if method is None else METHODS[method]()
     if operational or method in FROM_RESPONSES:
-        found = modes_of_responses(
-            log, channels=channels, method=chosen, wanted=request, averaging=averaging, span=part, progress=progress
-        )
+        with _told_of(log.path):
+            found = modes_of_responses(
+                log,
+                channels=channels,
+                method=chosen,
+                wanted=request,
+                averaging=averaging,
+                span=part,
+                progress=progress,
+            )
         return _study(log.path, log.geometry, found, None)
-    response = modal_response(
-        log, references, channels, wanted=request, averaging=averaging, span=part, progress=progress
-    )
-    found = modes_of_response(response, method=chosen, wanted=request)
+    with _told_of(log.path):
+        response = modal_response(
+            log, references, channels, wanted=request, averaging=averaging, span=part, progress=progress
+        )
+        found = modes_of_response(response, method=chosen, wanted=request)
     return _study(log.path, log.geometry, found, response, notes=_checks(response))
 
 
@@ -116,12 +125,23 @@ def universal_file_study(path: Path, *, method: MethodName | None = None, wanted
     """
     held, chosen = read_uff_modes(path), None if method is None else METHODS[method]()
     if held.response is not None:
-        found = modes_of_response(held.response, method=chosen, wanted=wanted or Wanted())
+        with _told_of(path):
+            found = modes_of_response(held.response, method=chosen, wanted=wanted or Wanted())
         return _study(path, held.geometry, found, held.response, notes=(*held.notes, *_checks(held.response)))
     if held.modes is None:
         raise LogError(f"{path}: holds neither frequency responses (dataset 58) nor modes (dataset 55)")
     told = "the modes are those that the file holds: there are no frequency responses in it to identify others from"
     return _study(path, held.geometry, held.modes, None, notes=(*held.notes, told))
+
+
+@contextmanager
+def _told_of(path: Path) -> Iterator[None]:
+    """Let each `EstimateError` name the file: the estimators know nothing of files."""
+    try:
+        yield
+    except EstimateError as error:
+        told = str(error)
+        raise EstimateError(told if told.startswith(f"{path.name}: ") else f"{path.name}: {told}") from error
 
 
 def _checks(response: FrequencyResponse) -> tuple[str, ...]:

@@ -88,7 +88,8 @@ def test_no_mode_is_an_answer_with_its_reason(run, arm_log):
         (["--reference", FORCE, "--method", "fdd"], "method fdd uses responses alone"),
         (["--operational", "--method", "plscf"], "method plscf needs an excitation"),
         (["--reference", "/nowhere"], "/nowhere"),
-        (["--band", 400, 450], "band"),
+        (["--band", 400, 450], "arm.mcap: band 400 to 450 Hz"),
+        (["--operational", "--start", 0, "--end", 0.1], "arm.mcap: 100 samples"),
         (["--count", 0], "count"),
         (["--method", "magic"], "'magic'"),
         (["--channel", "/base.accel.linear.q", "--operational"], "/base.accel.linear.q"),
@@ -134,4 +135,5 @@ def test_options_of_logs_are_refused_for_a_universal_file(run, tmp_path):
 def test_a_universal_file_with_neither_is_refused(run, shared_data):
     outcome = run("modes", next(iter(sorted(shared_data.glob("*.uff")))))
     assert outcome.code == 2
+    assert "chladni convert" in outcome.err
     assert outcome.err.count("\n") == 1

@@ -125,7 +125,8 @@ def read_uff_modes(path: Path | str) -> UffModes:
     if not found and not nodes.positions and response is None:
         kinds = ", ".join(sorted({str(header["type"]) for header in headers}))
         raise LogError(
-            f"{path}: holds no mode, node or frequency response (datasets 55, 15, 58), but datasets {kinds}"
+            f"{path}: holds no mode, node or frequency response (datasets 55, 15, 58 of function type 4), but "
+            f"datasets {kinds}; chladni convert makes a log of time records, whose modes can be identified"
         )
     _require_nodes(path, found, nodes.positions)
     modes, mode_notes = mode_set_of(found, nodes, response, kilogram=newton / metre) if found else (None, ())
