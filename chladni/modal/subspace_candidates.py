@@ -169,7 +169,7 @@ def _kept(
 ) -> tuple[Rows, tuple[str, ...]]:
     kept, notes = np.flatnonzero(~unsure & ~machine), []
     if np.any(machine):
-        notes.append(f"{_at(table, rows[machine])}: lines of machines, not modes")
+        notes.append(f"{_at(table, rows[machine])}: poles next to lines of machines are left out")
     # What few orders show is nothing that a person would ask about.
     noise = unsure & ~machine & ~few
     if np.any(noise):
