@@ -72,10 +72,10 @@ def relative_motion(modes: ModeSet, geometry: Geometry) -> tuple[RelativeMotion,
     >>> modes = ModeSet(
     ...     frequency_hz=10 * one, frequency_std_hz=0.01 * one, damping_ratio=0.01 * one, damping_std=1e-4 * one,
     ...     shapes=np.array([[1.0, 0.8, -0.5]], complex), shape_std=np.zeros((1, 3), complex),
-    ...     channels=tuple(Channel(name=name) for name in ("base", "arm", "wrist")), provenance=Provenance(),
+    ...     channels=tuple(Channel(name=name) for name in ("/base.x", "/arm.x", "/wrist.x")), provenance=Provenance(),
     ... )
     >>> [(joint.between, round(joint.ratio, 2)) for joint in relative_motion(modes, Geometry())]
-    [(('arm', 'wrist'), 1.3), (('base', 'arm'), 0.2)]
+    [(('/arm.x', '/wrist.x'), 1.3), (('/base.x', '/arm.x'), 0.2)]
     """
     pairs = neighbours(modes.channels, geometry)
     mass = kilogram_scale(modes)
