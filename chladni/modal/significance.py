@@ -157,9 +157,11 @@ def log_f_tail(ratio: float, upper: float, lower: float) -> float:
 
 def _nearest_lines(lines: JudgedLines, own_hz: float, reach_hz: float) -> NDArray[np.intp]:
     distance = np.abs(lines.frequency_hz - own_hz)
-    # Of a mode hundreds of lines wide the middle says enough.
-    count = int(np.clip(np.count_nonzero(distance <= reach_hz), FEWEST_LINES, MOST_LINES))
-    return np.sort(np.argsort(distance, kind="stable")[:count])
+    count = max(np.count_nonzero(distance <= reach_hz), FEWEST_LINES)
+    nearest = np.sort(np.argsort(distance, kind="stable")[:count])
+    # Of a mode hundreds of lines wide a part of the lines says enough, but from all of its width: the middle alone is
+    # a parabola.
+    return nearest[:: -(-nearest.size // MOST_LINES)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -51,6 +51,16 @@ def test_modes_of_a_structure_are_needed():
     np.testing.assert_allclose(found.width, 2 * 0.01 * CHAIN.frequency_hz / 0.02, rtol=1e-3)
 
 
+@pytest.mark.parametrize("step_hz", [0.02, 0.002])
+def test_modes_hundreds_of_lines_wide_are_needed_however_fine_the_lines(step_hz):
+    # Ten per cent are up to 670 lines here, of which the middle alone would be a parabola.
+    model = truth.chain(damping=0.1)
+    response = truth.noisy_response(
+        model, np.arange(step_hz, 12.0, step_hz), (0,), noise=0.03, rng=np.random.default_rng(1)
+    )
+    assert significance(response, model.poles).passes(SignificanceRules()).all()
+
+
 def test_a_pole_where_there_is_none_is_not_needed():
     found = significance(noisy(1), np.append(CHAIN.poles, pole(3.7)))
     assert found.passes(SignificanceRules()).tolist() == [True] * 5 + [False]
