@@ -68,9 +68,9 @@ def treatments(modes: ModeSet, motions: Sequence[RelativeMotion]) -> tuple[Joint
     -----
     A damper c between two points adds delta zeta = c (delta phi)^2/(2 omega), a spring k delta omega =
     k (delta phi)^2/(2 omega), with shapes of unit modal mass: the first-order change of an eigenvalue (Fox & Kapoor
-    1968, AIAA Journal 6(12)). Both grow with the square of the relative motion, so that the joint that moves most is
-    the one to treat. The linear law holds while the change stays small against the value itself; a damper that is
-    far larger locks the joint instead of damping it.
+    1968, AIAA Journal 6(12)); for complex modes see `relative_motion`. Both grow with the square of the relative
+    motion, so that the joint that moves most is the one to treat. The linear law holds while the change stays small
+    against the value itself; a damper that is far larger locks the joint instead of damping it.
     """
     best: dict[int, RelativeMotion] = {}
     for motion in motions:
@@ -105,8 +105,8 @@ def _treatment(modes: ModeSet, motion: RelativeMotion) -> JointTreatment:
     ratio = 0.0 if motion.ratio is None else motion.ratio
     gain, stiffness_gain = motion.damping_gain, motion.stiffness_gain_hz
     damper = spring = None
-    # A gain of zero belongs to a joint that doesn't move: no damper is large enough.
-    if gain and stiffness_gain:
+    # A joint that doesn't move has no gain, and in a complex mode one can be negative: no damper is large enough.
+    if gain is not None and stiffness_gain is not None and gain > 0 and stiffness_gain > 0:
         damper = max(float(modes.damping_ratio[motion.mode]), 0.0) / gain
         spring = _FREQUENCY_STEP * float(modes.frequency_hz[motion.mode]) / stiffness_gain
     return JointTreatment(
@@ -129,7 +129,7 @@ def _gain_std(modes: ModeSet, motion: RelativeMotion, ratio: float) -> float | N
         return None
     mass = float(kilogram_scale(modes)[motion.mode])
     relative = np.hypot(2 * motion.ratio_std / ratio, float(modes.scale.modal_mass_std[motion.mode]) / mass)
-    return float(motion.damping_gain * relative) if np.isfinite(relative) else None
+    return float(abs(motion.damping_gain) * relative) if np.isfinite(relative) else None
 
 
 def _sentence(

@@ -60,9 +60,11 @@ def relative_motion(modes: ModeSet, geometry: Geometry) -> tuple[RelativeMotion,
     directions that both sets span. `ratio_std` takes the errors of the components as independent, which the
     components of one mode are roughly: they share only the one that is 1 by convention.
 
-    The gains are those of a damper c and a spring k between the two, delta zeta = c (delta phi)^2/(2 omega) and
-    delta omega = k (delta phi)^2/(2 omega), with shapes of unit modal mass. They are to first order in c and k, and
-    stated when the modes are scaled in kilograms: by a force in N and responses that are translations.
+    The gains are those of a damper c and a spring k between the two, from the first-order change of the pole,
+    delta lambda = -(c lambda + k) (delta psi)^2/a with modal A a (Adhikari 1999, AIAA Journal 37(11)). For a real shape of unit modal mass that is delta zeta =
+    c (delta phi)^2/(2 omega) and delta omega = k (delta phi)^2/(2 omega); in a complex mode a damper can do less than
+    that, or even take damping away. Stated when the modes are scaled in kilograms: by a force in N and responses that
+    are translations.
 
     Examples
     --------
@@ -132,22 +134,27 @@ def _joint(modes: ModeSet, mode: int, pair: Neighbours, mass: float) -> Relative
     std_real = float(np.linalg.norm(motion.weights * modes.shape_std[mode].real))
     std_imag = float(np.linalg.norm(motion.weights * modes.shape_std[mode].imag))
     std = magnitude_std(motion.relative, std_real, std_imag) / largest
-    gain = _gain(modes, mode, motion, mass)
+    gain, stiffness_gain_hz = _gains(modes, mode, motion, mass)
     return RelativeMotion(
         mode=mode,
         between=pair.between,
         ratio=abs(motion.relative) / largest,
         ratio_std=std if isfinite(std) else None,
         damping_gain=gain,
-        stiffness_gain_hz=None if gain is None else gain / (2 * pi),
+        stiffness_gain_hz=stiffness_gain_hz,
     )
 
 
-def _gain(modes: ModeSet, mode: int, motion: JointMotion, mass: float) -> float | None:
-    """(delta phi)^2/(2 omega) with a shape of unit modal mass, in s/kg."""
+def _gains(modes: ModeSet, mode: int, motion: JointMotion, mass: float) -> tuple[float | None, float | None]:
+    """Added damping ratio per N s/m and natural frequency in Hz per N/m, from the change of the pole."""
     used = np.flatnonzero(motion.weights)
     # In radians delta phi would make the gain one for a rotary damper.
     translations = all(modes.channels[row].unit in ("m", "m/s", "m/s^2") for row in used)
-    if not (isfinite(mass) and translations):
-        return None
-    return abs(motion.relative) ** 2 / mass / (2 * 2 * pi * float(modes.frequency_hz[mode]))
+    if not (isfinite(mass) and translations) or modes.scale is None:
+        return None, None
+    damping = float(modes.damping_ratio[mode])
+    swing = sqrt(1 - damping**2)
+    # The change of the pole is -lambda times this for each N s/m, and minus this for each N/m.
+    reach = motion.relative**2 / complex(modes.scale.modal_a[mode])
+    along_pole = -damping * reach.real + swing * reach.imag
+    return -swing * reach.imag, -along_pole / (2 * pi)

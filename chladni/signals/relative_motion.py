@@ -17,8 +17,8 @@ class RelativeMotion:
         abs(phi_a - phi_b) along one common direction over the largest abs(phi) of the mode, and one sigma of it; None
         when the two have no common direction.
     damping_gain
-        Added damping ratio for a damper of 1 N s/m put between the two, (delta phi)^2/(2 omega) with shapes of unit
-        modal mass; None when the modes are unscaled.
+        Added damping ratio for a damper of 1 N s/m put between the two, (delta phi)^2/(2 omega) with real shapes
+        of unit modal mass; None when the modes are unscaled.
     stiffness_gain_hz
         Added natural frequency for a spring of 1 N/m put there, (delta phi)^2/(2 omega)/(2 pi); None likewise.
     """

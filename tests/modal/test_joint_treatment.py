@@ -160,3 +160,59 @@ def test_motion_within_its_error_bar_is_no_joint() -> None:
     blurred = replace(modes, shape_std=np.full(modes.shapes.shape, 3.0 * (1 + 1j)))
     assert treatments(blurred, relative_motion(blurred, GEOMETRY)) == ()
     assert best_joint(blurred, relative_motion(blurred, GEOMETRY)) is None
+
+
+def test_gains_of_complex_modes_are_the_derivatives_of_the_exact_eigenvalues() -> None:
+    # A strong damper in one joint of three makes the modes complex, one of them with a collinearity of 0.8.
+    mass, stiffness = np.diag([2.0, 1.0, 3.0]), _tied([4e4, 2e4, 3e4])
+    damping = _tied([5.0, 120.0, 2.0])
+    pole, shape = _poles(mass, damping, stiffness)
+    # psi^T (2 lambda M + C) psi, the residue's denominator.
+    modal_a = np.einsum("ri,rij,rj->r", shape, 2 * pole[:, None, None] * mass + damping, shape)
+    channels = tuple(Channel(name=f"/{name}.a", unit="m/s^2", point=name, direction=AXES["+x"]) for name in NAMES[1:])
+    modes = ModeSet(
+        frequency_hz=np.abs(pole) / (2 * np.pi),
+        frequency_std_hz=np.full(3, 1e-3),
+        damping_ratio=-pole.real / np.abs(pole),
+        damping_std=np.full(3, 1e-5),
+        shapes=shape,
+        shape_std=np.zeros((3, 3), complex),
+        channels=channels,
+        references=(Channel(name="hammer", unit="N", role="reference"),),
+        participation=np.ones((3, 1), complex),
+        scale=ModalScale(
+            response=channels[0].name,
+            reference="hammer",
+            modal_a=modal_a,
+            modal_mass=(modal_a / (2j * pole.imag)).real,
+            modal_mass_std=np.zeros(3),
+        ),
+        provenance=Provenance(),
+    )
+    step = np.array([[0.0, 0, 0], [0, 1, -1], [0, -1, 1]])
+    damped, _ = _poles(mass, damping + 1e-3 * step, stiffness)
+    stiffened, _ = _poles(mass, damping, stiffness + 1e-1 * step)
+    gains = {one.mode: one for one in relative_motion(modes, GEOMETRY) if one.between == NAMES[2:4]}
+    added = (-damped.real / np.abs(damped) - modes.damping_ratio) / 1e-3
+    shifted_hz = (np.abs(stiffened) / (2 * np.pi) - modes.frequency_hz) / 1e-1
+    # Steps of 1e-5 of the joint's own damper and spring leave the linear law as good as that.
+    np.testing.assert_allclose([gains[mode].damping_gain for mode in range(3)], added, rtol=1e-4)
+    np.testing.assert_allclose([gains[mode].stiffness_gain_hz for mode in range(3)], shifted_hz, rtol=1e-4)
+
+
+def _tied(values: list[float]) -> np.ndarray:
+    """Matrix of a chain from the ground."""
+    ends = np.eye(3) - np.eye(3, k=-1)
+    return np.asarray(ends.T @ np.diag(values) @ ends)
+
+
+def _poles(mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Poles by rising frequency, and shapes ``[mode, mass]`` with the largest component 1."""
+    state = np.block(
+        [[np.zeros((3, 3)), np.eye(3)], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]]
+    )
+    values, vectors = np.linalg.eig(state)
+    order = [row for row in np.argsort(np.abs(values)) if values[row].imag > 0]
+    shapes = vectors[:3, order].T
+    largest = np.argmax(np.abs(shapes), axis=1)[:, None]
+    return values[order], shapes / np.take_along_axis(shapes, largest, axis=1)

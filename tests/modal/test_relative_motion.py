@@ -175,7 +175,7 @@ def scaled(unit: str = "N", motion: str = "m/s^2", mass: float = 2.0) -> ModeSet
     scale = ModalScale(
         response=modes.channels[0].name,
         reference="hammer",
-        modal_a=np.array([1j]),
+        modal_a=2j * 2 * pi * modes.frequency_hz * np.sqrt(1 - modes.damping_ratio**2) * mass,
         modal_mass=np.array([mass]),
         modal_mass_std=np.array([0.1]),
     )
