@@ -62,7 +62,7 @@ def relative_motion(modes: ModeSet, geometry: Geometry) -> tuple[RelativeMotion,
 
     The gains are those of a damper c and a spring k between the two, from the first-order change of the pole,
     delta lambda = -(c lambda + k) (delta psi)^2/a with modal A a (Adhikari 1999, AIAA Journal 37(11)). For a real
-    shape of unit modal mass that is delta zeta = c (delta phi)^2/(2 omega) and delta omega = k (delta phi)^2/(2 omega);
+    shape of unit modal mass that is delta zeta = c (delta phi)^2/(2 omega), delta omega = k (delta phi)^2/(2 omega);
     in a complex mode a damper can do less than that, or even take damping away. Stated when the modes are scaled in
     kilograms: by a force in N and responses that are translations.
 
