@@ -10,6 +10,7 @@ from chladni.apps.modal_channels import excitation_names, motions_of_one_unit, r
 from chladni.apps.sources import Progress, Span, Watched, no_progress
 from chladni.apps.spectra import Averaging, transfer
 from chladni.io.log import Log
+from chladni.io.log_info import some_of
 from chladni.modal.bands import join_bands
 from chladni.modal.circle_fit import CircleFit
 from chladni.modal.efdd import EnhancedFrequencyDomainDecomposition
@@ -28,6 +29,7 @@ from chladni.signals.time_series import TimeSeries
 from chladni.spectral.adaptive import adaptive_cross_spectra
 from chladni.spectral.blocks import leading_part
 from chladni.spectral.excitation import HAMMER_RANGE
+from chladni.spectral.forms import MOTION_ORDER
 from chladni.spectral.stretches import valid_runs
 
 Band = tuple[float, float]
@@ -148,7 +150,18 @@ def modes_of_response(response: FrequencyResponse, *, method: Method | None, wan
     if len(wanted.bands_hz) > 1:
         return join_bands([modes_of_response(response, method=chosen, wanted=one) for one in _band_by_band(wanted)])
     band = wanted.bands_hz[0] if wanted.bands_hz else None
-    return chosen.identify(response, band_hz=band, count=wanted.count, frequencies_hz=wanted.frequencies_hz)
+    found = chosen.identify(response, band_hz=band, count=wanted.count, frequencies_hz=wanted.frequencies_hz)
+    return replace(found, provenance=found.provenance.with_notes(*_held_still(response)))
+
+
+def _held_still(response: FrequencyResponse) -> tuple[str, ...]:
+    """Say of which structure the modes are when the reference is a motion, and not a force."""
+    motions = [channel.name for channel in response.references if channel.unit in MOTION_ORDER]
+    if not motions:
+        return ()
+    told = f"{some_of(motions)} is a motion, not a force: these are modes of the structure held still there"
+    remedy = "those of the structure as it stands need a force as reference, or responses alone"
+    return (f"{told}, as on a shaking table; {remedy}",)
 
 
 def modes_of_spectra(spectra: CrossSpectra, *, method: Method | None, wanted: Wanted) -> ModeSet:

@@ -79,7 +79,7 @@ class ModeReport:
             participation=model.participation,
             scale=scaling.scale,
             spread=self._spread(started),
-            fit=self._fit(model),
+            fit=self._fit(fit.fitted.model),
             stabilisation=self._diagram(started),
             provenance=replace(self.response.provenance, estimator=ESTIMATOR).with_notes(
                 *notes,
@@ -92,6 +92,7 @@ class ModeReport:
         )
 
     def _fit(self, model: ModalModel) -> ModalFit:
+        # All modes that were found, shown or not: one that nobody asked for is no reason to distrust the others.
         # Shapes that were fitted group by group have no residuals for the whole band.
         whole = least_squares_frequency_domain(self.measured, model.poles, model.participation)
         return modal_fit(self.measured, whole)

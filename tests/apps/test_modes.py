@@ -181,3 +181,18 @@ def test_a_hammer_drives_modes_as_far_as_its_force_stays_within_20_db():
         further = identify_modes(series, **wanted)
         np.testing.assert_allclose(further.frequency_hz, made.frequency_hz, rtol=1e-4)
         assert not any("20 dB down" in note for note in further.provenance.notes)
+
+
+def test_a_motion_as_reference_holds_its_point_still(arm, truth):
+    def warnings(modes):
+        return [note for note in modes.provenance.notes if "held still there" in note]
+
+    (warning,) = warnings(identify_modes(arm, reference=TOOL, band_hz=FORCED_HZ))
+    assert TOOL in warning
+    assert not warnings(identify_modes(arm))
+
+
+def test_modes_that_nobody_asked_for_are_no_misfit(arm):
+    everything, first = identify_modes(arm), identify_modes(arm, count=1)
+    assert first.frequency_hz.size == 1
+    assert first.fit.error == pytest.approx(everything.fit.error, rel=1e-9)
