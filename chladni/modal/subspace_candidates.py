@@ -50,7 +50,7 @@ class ResponseRules:
 
     replication: float = 0.55
     least_replication: float = 0.15
-    damping_std: float = 0.7
+    damping_std: float = 0.5
     over_least_std: float = 12.0
     share: float = 0.3
     over_least_std_of_few: float = 3.0
@@ -123,8 +123,13 @@ def choose_poles(
     if frequencies_hz is not None:
         kept, notes = np.arange(rows.size), _doubts(table, rows, unsure, machine)
     else:
-        kept, notes = _kept(table, rows, found, unsure, machine, few, count, rules)
+        kept, notes = _kept(table, rows, found, unsure, machine, few, rules)
+    # Of models that hold all modes, wanted or not: how many are asked for changes none of them.
     final = _of_full_models(table, found, kept)
+    if frequencies_hz is None and count is not None:
+        strongest = np.argsort(-found.spread.orders[kept], kind="stable")[:count]
+        notes += _shortfall(count, kept.size)
+        kept, final = kept[strongest], final[strongest]
     rising = np.argsort(table.frequency_hz[final], kind="stable")
     return ChosenPoles(selection=found, clusters=kept[rising], rows=final[rising], notes=found.notes + notes)
 
@@ -164,7 +169,6 @@ def _kept(
     unsure: Bools,
     machine: Bools,
     few: Bools,
-    count: int | None,
     rules: ResponseRules,
 ) -> tuple[Rows, tuple[str, ...]]:
     kept, notes = np.flatnonzero(~unsure & ~machine), []
@@ -184,12 +188,13 @@ def _kept(
             "one model with it, left out"
         )
         kept = kept[~twice]
-    if count is not None:
-        if kept.size < count:
-            notes.append(f"{count} modes were asked for, but the record holds no more than {kept.size} that are sure")
-        strongest = np.argsort(-found.spread.orders[kept], kind="stable")
-        kept = kept[strongest[:count]]
     return kept, tuple(notes)
+
+
+def _shortfall(count: int, found: int) -> tuple[str, ...]:
+    if found >= count:
+        return ()
+    return (f"{count} modes were asked for, but the record holds no more than {found} that are sure",)
 
 
 def _repeated(table: PoleTable, rows: Rows, clusters: Sequence[Rows], rules: ResponseRules) -> Bools:

@@ -179,6 +179,15 @@ def test_a_count_keeps_the_strongest_and_says_what_is_missing():
     )
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_count_changes_none_of_the_modes_that_it_keeps(seed):
+    record = chain_record(seed, cycles=600)
+    whole, few = identify(record), identify(record, count=2)
+    same = [int(np.argmin(np.abs(whole.frequency_hz - own_hz))) for own_hz in few.frequency_hz]
+    np.testing.assert_array_equal(few.frequency_hz, whole.frequency_hz[same])
+    np.testing.assert_array_equal(few.damping_ratio, whole.damping_ratio[same])
+
+
 def test_a_user_names_the_frequencies():
     found = identify(chain_record(0, cycles=600), frequencies_hz=[4.6, 1.0, 3.7])
     np.testing.assert_allclose(found.frequency_hz, TRUTH.frequency_hz[[0, 2]], rtol=0.01)
