@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from chladni.apps.modes import Method, Wanted, modal_response, modes_of_response, modes_of_responses
+from chladni.apps.modes import Method, Wanted, functions_and_modes, modes_of_response, modes_of_responses
 from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging
 from chladni.io.files.uff_modes import read_uff_modes
@@ -106,10 +106,16 @@ def modal_study(
             )
         return _study(log.path, log.geometry, found, None)
     with _told_of(log.path):
-        response = modal_response(
-            log, references, channels, wanted=request, averaging=averaging, span=part, progress=progress
+        response, found = functions_and_modes(
+            log,
+            references,
+            channels,
+            method=chosen,
+            wanted=request,
+            averaging=averaging,
+            span=part,
+            progress=progress,
         )
-        found = modes_of_response(response, method=chosen, wanted=request)
     return _study(log.path, log.geometry, found, response, notes=_checks(response))
 
 

@@ -26,6 +26,7 @@ from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.machine_harmonic import MachineHarmonic
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.wording import counted
 from chladni.spectral.adaptive import adaptive_cross_spectra
 from chladni.spectral.blocks import leading_part
 from chladni.spectral.excitation import HAMMER_RANGE
@@ -138,8 +139,9 @@ def identify_modes(
         return modes_of_responses(
             source, channels=channels, method=method, wanted=wanted, averaging=averaging, span=span
         )
-    response = modal_response(source, reference, channels, wanted=wanted, averaging=averaging, span=span)
-    return modes_of_response(response, method=method, wanted=wanted)
+    return functions_and_modes(
+        source, reference, channels, method=method, wanted=wanted, averaging=averaging, span=span
+    )[1]
 
 
 def modes_of_response(response: FrequencyResponse, *, method: Method | None, wanted: Wanted) -> ModeSet:
@@ -194,19 +196,22 @@ def modes_of_responses(
     return replace(found, provenance=found.provenance.with_notes(*notes))
 
 
-def modal_response(
+def functions_and_modes(
     source: Log | TimeSeries,
     reference: str | Sequence[str] | None,
     channels: Sequence[str] | None,
     *,
+    method: Method | None,
     wanted: Wanted,
     averaging: Averaging,
     span: Span,
     progress: Progress = no_progress,
-) -> FrequencyResponse:
-    """Estimate the frequency responses that modes are identified from: those of motions in one unit.
+) -> tuple[FrequencyResponse, ModeSet]:
+    """Estimate frequency responses of motions in one unit, and identify their modes.
 
-    Unless bands or frequencies are wanted, a hammer excites no further than it drives modes.
+    Unless bands or frequencies are wanted, a hammer excites no further than it drives modes. Unless the resolution
+    is chosen, two are tried: lines as for the eye, and finer ones, which part narrow modes but lie deeper in noise.
+    Those that more modes rise from are taken, the finer ones if it's the same.
 
     Raises
     ------
@@ -217,6 +222,32 @@ def modal_response(
         references = excitation_names(source, span)
     else:
         references = (reference,) if isinstance(reference, str) else tuple(reference)
+    coarse = _functions(source, references, channels, wanted, averaging, span, progress)
+    finer = _modal_averaging(coarse, averaging)
+    if finer == averaging:
+        return coarse, modes_of_response(coarse, method=method, wanted=wanted)
+    fine = _functions(source, references, channels, wanted, finer, span, no_progress)
+    modes, again = (modes_of_response(one, method=method, wanted=wanted) for one in (fine, coarse))
+    hidden = again.frequency_hz.size - modes.frequency_hz.size
+    if hidden <= 0:
+        return fine, modes
+    apart = [f"{one.frequency_hz[1] - one.frequency_hz[0]:.3g} Hz apart" for one in (fine, coarse)]
+    told = (
+        f"on lines {apart[0]} noise hides {counted(hidden, 'mode')}; the modes are from lines {apart[1]}: name every "
+        "excitation, or average longer, for surer ones"
+    )
+    return coarse, replace(again, provenance=again.provenance.with_notes(told))
+
+
+def _functions(
+    source: Log | TimeSeries,
+    references: Sequence[str],
+    channels: Sequence[str] | None,
+    wanted: Wanted,
+    averaging: Averaging,
+    span: Span,
+    progress: Progress,
+) -> FrequencyResponse:
     anywhere = not wanted.bands_hz and wanted.frequencies_hz is None
     response = transfer(
         source,
@@ -228,9 +259,6 @@ def modal_response(
         hammer_range=HAMMER_DRIVES if anywhere else HAMMER_RANGE,
         progress=progress,
     )
-    finer = _modal_averaging(response, averaging)
-    if finer != averaging:
-        response = transfer(source, references, channels, estimator="H1", averaging=finer, span=span)
     names, notes = motions_of_one_unit(response.responses, named=channels is not None)
     chosen = response.select(names)
     told = _end_of_hammer(chosen) if anywhere else ()

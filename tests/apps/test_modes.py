@@ -14,6 +14,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.cross_spectra import cross_spectra
 from tests.arm import FORCE, TOOL, WRIST, short_arm, write_arm
+from tests.modal import truth as made
 from tests.modal.truth import ModalTruth, channels
 
 # Twenty-five seconds give half a percent of the lowest mode's frequency at the default resolution.
@@ -196,3 +197,13 @@ def test_modes_that_nobody_asked_for_are_no_misfit(arm):
     everything, first = identify_modes(arm), identify_modes(arm, count=1)
     assert first.frequency_hz.size == 1
     assert first.fit.error == pytest.approx(everything.fit.error, rel=1e-9)
+
+
+def test_an_excitation_that_was_not_measured_does_not_hide_heavily_damped_modes():
+    # Half of the motion is due to the force at the other end: single fine lines are nothing but noise.
+    model = made.chain(damping=0.06)
+    series = made.record(model, cycles=1500, rng=np.random.default_rng(1), noise=0.01, at=(0, 4))
+    known = [channel.name for channel in series.channels if channel.name != made.FORCE.format(4)]
+    modes = identify_modes(series.select(known), reference=made.FORCE.format(0))
+    assert modes.frequency_hz.size >= 4
+    assert_near_truth(modes, model)
