@@ -19,6 +19,7 @@ from chladni.modal.half_power import HalfPower
 from chladni.modal.polyreference import PolyReferenceLeastSquares
 from chladni.modal.reciprocity import check_reciprocity
 from chladni.modal.relative_motion import relative_motion
+from chladni.modal.shape_transmissibility import ShapeTransmissibility, shape_transmissibility
 from chladni.modal.subspace import CovarianceDrivenSubspace
 from chladni.modal.summary import summarise
 from chladni.modal.validation import validate
@@ -45,10 +46,11 @@ FROM_RESPONSES: tuple[MethodName, ...] = ("ssi-cov", "fdd", "efdd")
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ModalStudy:
-    """Modes of a log with their checks, and the study that viewers draw."""
+    """Modes of a log with their checks, how vibration passes from point to point, and the study that viewers draw."""
 
     modes: ModeSet
     validation: ModeValidation
+    transmissibility: tuple[ShapeTransmissibility, ...]
     study: Study
 
 
@@ -185,4 +187,5 @@ def _study(
         geometry=geometry,
         findings=tuple(dict.fromkeys([*notes, *summarise(modes, validation, motions, geometry=geometry)])),
     )
-    return ModalStudy(modes=modes, validation=validation, study=study)
+    passed_on = shape_transmissibility(modes, geometry)
+    return ModalStudy(modes=modes, validation=validation, transmissibility=passed_on, study=study)

@@ -6,6 +6,7 @@ import numpy as np
 
 from chladni.apps.documents import Document, finite, plain
 from chladni.modal.joint_treatment import treatments
+from chladni.modal.shape_transmissibility import ShapeTransmissibility
 from chladni.signals.modal_fit import ModalFit
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
@@ -14,13 +15,16 @@ from chladni.signals.relative_motion import RelativeMotion
 
 
 def modes_document(
-    modes: ModeSet, validation: ModeValidation, relative_motion: Sequence[RelativeMotion] = ()
+    modes: ModeSet,
+    validation: ModeValidation,
+    relative_motion: Sequence[RelativeMotion] = (),
+    transmissibility: Sequence[ShapeTransmissibility] = (),
 ) -> Document:
     """Document of ``chladni modes``; numbers that aren't known are null.
 
     Parameters
     ----------
-    validation, relative_motion
+    validation, relative_motion, transmissibility
         Of the same modes.
 
     Returns
@@ -51,6 +55,7 @@ def modes_document(
             }
             for one in treatments(modes, relative_motion)
         ],
+        "transmissibility": [_passed_on(one) for one in transmissibility],
         "harmonics": [{"frequency_hz": finite(one.frequency_hz), "reason": one.reason} for one in modes.harmonics],
         "scale": None
         if modes.scale is None
@@ -59,6 +64,16 @@ def modes_document(
         "estimator": modes.provenance.estimator,
         "findings": list(validation.findings),
         "notes": list(modes.provenance.notes),
+    }
+
+
+def _passed_on(step: ShapeTransmissibility) -> Document:
+    return {
+        "mode": step.mode,
+        "between": list(step.between),
+        "ratio": step.ratio,
+        "ratio_std": step.ratio_std,
+        "phase_deg": step.phase_deg,
     }
 
 

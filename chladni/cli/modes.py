@@ -108,7 +108,8 @@ def modes(
     out.lines(damage + found.study.findings)
     _write(out, found, uff=uff, csv=csv, save=save)
     out.pictures(found.study, figures=figures, report=report)
-    out.json(modes_document(found.modes, found.validation, found.study.relative_motion))
+    motions, passed_on = found.study.relative_motion, found.transmissibility
+    out.json(modes_document(found.modes, found.validation, motions, passed_on))
 
 
 def _refuse(file: Path, given: Mapping[str, object]) -> None:

@@ -32,6 +32,10 @@ def test_the_document_holds_the_true_modes_within_their_error_bars(run, arm_log,
         # The mode at 98 Hz hardly moves the tool that is shaken: its own error bars allow no more.
         assert mac > 0.99
         assert {tuple(pair["between"]) for pair in mode["relative_motion"]} >= {("base", "column")}
+    # From the column to the base, in the first mode: how much less the base moves.
+    first = next(step for step in document["transmissibility"] if step["between"] == ["base", "column"])
+    exact = abs(truth.shapes[first["mode"], 1] / truth.shapes[first["mode"], 0])
+    assert first["ratio"] == pytest.approx(exact, abs=4 * first["ratio_std"])
 
 
 def test_people_get_a_table_with_error_bars_and_advice(run, arm_log):
