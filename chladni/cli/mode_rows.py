@@ -18,7 +18,7 @@ def print_modes(out: Output, modes: "ModeSet", validation: "ModeValidation") -> 
     """Print a table of modes with their error bars."""
     out.line(modes.provenance.estimator + (f" from {_sources(modes)}" if modes.references else ""), style="bold")
     if not modes.frequency_hz.size:
-        out.line("No mode was found.")
+        # The findings begin with it, and say why.
         return
     out.table(
         _title(modes),
