@@ -12,7 +12,7 @@ from chladni.modal.modal_model import ModalModel
 from chladni.modal.mode_scatter import ModeScatter
 from chladni.modal.model_lines import ModelLines
 from chladni.modal.parameter_spread import ParameterSpread, parameter_spread
-from chladni.modal.scatter_estimate import mode_scatter
+from chladni.modal.scatter_estimate import mode_scatters
 from chladni.signals.provenance import Provenance
 
 Complex = NDArray[np.complex128]
@@ -32,7 +32,7 @@ def fitted_modes(
     """Attach error bars to poles and their best shapes, with what was found of the misfit."""
     spread = parameter_spread(lines, solution)
     model, largest = _normalised(solution.model(poles))
-    scatters = [mode_scatter(lines, spread, poles, mode, found, provenance) for mode in range(poles.size)]
+    scatters = mode_scatters(lines, spread, poles, found, provenance)
     each = list(zip(range(poles.size), map(int, largest), scatters, strict=True))
     covariance, inflation = _covariance(poles, spread, scatters)
     std = np.sqrt(np.einsum("rara->ra", covariance))

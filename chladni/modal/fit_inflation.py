@@ -26,12 +26,15 @@ class Misfit:
         Weighted sum of squares over degrees of freedom, 1 for noise of the stated variance.
     correlation
         Factor on variances for the correlation of neighbouring lines, where errors are noise.
+    efficiency
+        Factor on variances for weights that are estimates themselves, at least 1.
     excess
-        ``[mode]`` factor on variances for misfit and for weights that are estimates themselves, at least 1.
+        ``[mode]`` factor on variances for misfit, at least 1.
     """
 
     chi_square: float
     correlation: float
+    efficiency: float
     excess: NDArray[np.float64]
 
 
@@ -46,8 +49,12 @@ def misfit(lines: ModelLines, solution: ShapeSolution, provenance: Provenance) -
     chi_square = float(normalised.sum() / free)
     overall = _excess(normalised.sum(), used.sum(), used.sum(), correlation)
     local = _excess(*_near_modes(lines, solution, normalised), correlation)
-    excess = efficiency * np.maximum(local, overall)
-    return Misfit(chi_square=chi_square, correlation=correlation, excess=excess)
+    return Misfit(
+        chi_square=chi_square,
+        correlation=correlation,
+        efficiency=efficiency,
+        excess=np.maximum(local, overall),
+    )
 
 
 def _estimated_weights(lines: ModelLines, provenance: Provenance) -> tuple[float, float]:

@@ -20,6 +20,8 @@ class ModeScatter:
         On what poles and participation add to ratios of components, which no common error moves.
     shares
         ``[response]`` on the own scatter of each response's shape.
+    common
+        ``[response, 2]`` variance of Re and Im of component over largest by errors that all responses have in common.
     amplitude
         On the variance of the scale: participation and modal mass.
     """
@@ -27,4 +29,5 @@ class ModeScatter:
     pole: Floats
     shared: float
     shares: Floats
+    common: Floats
     amplitude: float

@@ -54,11 +54,11 @@ class ParameterSpread:
         own, coupling = self._shape(mode)
         own = own * scatter.shares[:, np.newaxis, np.newaxis]
         # d(psi_i/psi_c) = (d psi_i - (psi_i/psi_c) d psi_c) / psi_c
-        through = coupling - _real(ratios) @ coupling[largest]
-        total = own + _real(ratios) @ own[largest] @ _real(ratios.conj())
+        through = coupling - real_matrices(ratios) @ coupling[largest]
+        total = own + real_matrices(ratios) @ own[largest] @ real_matrices(ratios.conj())
         total = total + scatter.shared * _squared(through)
         total[largest] = 0
-        return _packed(total, np.full(ratios.shape, 1 / scale))
+        return _packed(total, np.full(ratios.shape, 1 / scale), scatter.common)
 
     def participation_std(self, mode: int, largest: int) -> Complex:
         """``[reference]`` of participation times the largest component."""
@@ -66,8 +66,11 @@ class ParameterSpread:
         own, coupling = self._shape(mode)
         vector = self.participation[mode]
         # d(L_j psi_c) = psi_c d L_j + L_j d psi_c
-        through = _real(np.full(vector.shape, scale)) @ self._components(mode) + _real(vector) @ coupling[largest]
-        total = _real(vector) @ own[largest] @ _real(vector.conj()) + _squared(through)
+        through = (
+            real_matrices(np.full(vector.shape, scale)) @ self._components(mode)
+            + real_matrices(vector) @ coupling[largest]
+        )
+        total = real_matrices(vector) @ own[largest] @ real_matrices(vector.conj()) + _squared(through)
         return _packed(total, np.ones_like(vector))
 
     def amplitude(self, mode: int, largest: int) -> tuple[Floats, Floats]:
@@ -76,10 +79,10 @@ class ParameterSpread:
         They are of theta ``[2, parameter]`` and of the largest response's own scatter ``[2, coefficient]``.
         """
         reference = int(np.argmax(np.abs(self.participation[mode])))
-        factor = _real(self.participation[mode, reference])
+        factor = real_matrices(self.participation[mode, reference])
         rows = slice(2 * mode, 2 * mode + 2)
         through = factor @ self.rooted[largest, rows]
-        through += _real(self.shapes[mode, largest]) @ self._components(mode)[reference]
+        through += real_matrices(self.shapes[mode, largest]) @ self._components(mode)[reference]
         return through @ self.root.T, factor @ self.own[largest, rows]
 
     def field(self, near: slice, theta: Floats, own: tuple[int, Floats] | None = None) -> Complex:
@@ -114,11 +117,11 @@ class ParameterSpread:
         beside = -mass / self.participation[mode, reference]
         tuned = np.zeros((2, self.root.shape[1]))
         tuned[0] = self.root[2 * mode + 1] / pole.imag
-        direct = _real(np.full(mass.shape, here))
-        through = direct @ coupling + _real(there) @ coupling[largest]
-        through += _real(beside) @ self._components(mode)[reference] - _real(mass) @ tuned
+        direct = real_matrices(np.full(mass.shape, here))
+        through = direct @ coupling + real_matrices(there) @ coupling[largest]
+        through += real_matrices(beside) @ self._components(mode)[reference] - real_matrices(mass) @ tuned
         total = direct @ own @ np.swapaxes(direct, -1, -2)
-        shared = _real(there)
+        shared = real_matrices(there)
         total = total + shared @ own[largest] @ np.swapaxes(shared, -1, -2)
         # The largest component is one scatter, seen twice.
         both = direct[largest] + shared[largest]
@@ -160,7 +163,7 @@ def parameter_spread(lines: ModelLines, solution: ShapeSolution) -> ParameterSpr
     )
 
 
-def _real(factors: Complex | complex) -> Floats:
+def real_matrices(factors: Complex | complex) -> Floats:
     """``[..., 2, 2]`` matrices that multiply (Re, Im) by complex factors."""
     factors = np.asarray(factors)
     return np.stack(
@@ -172,8 +175,8 @@ def _squared(through: Floats) -> Floats:
     return np.asarray(through @ np.swapaxes(through, -1, -2), dtype=np.float64)
 
 
-def _packed(covariance: Floats, factors: Complex) -> Complex:
-    """One sigma of Re + j one sigma of Im, after multiplication by complex factors."""
-    turned = _real(factors) @ covariance @ np.swapaxes(_real(factors), -1, -2)
-    variances = np.maximum(np.einsum("...aa->...a", turned), 0.0)
+def _packed(covariance: Floats, factors: Complex, further: Floats | float = 0.0) -> Complex:
+    """One sigma of Re + j one sigma of Im, after multiplication by complex factors, and with further variance."""
+    turned = real_matrices(factors) @ covariance @ np.swapaxes(real_matrices(factors), -1, -2)
+    variances = np.maximum(np.einsum("...aa->...a", turned), 0.0) + further
     return np.asarray(np.ascontiguousarray(np.sqrt(variances)).view(np.complex128)[..., 0], dtype=np.complex128)

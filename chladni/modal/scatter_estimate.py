@@ -1,171 +1,133 @@
 """Scatter of each mode from noise, leakage and misfit together."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.modal.error_parts import ErrorParts, error_parts
 from chladni.modal.fit_inflation import Misfit
-from chladni.modal.leakage_scatter import LeakageScatter, leakage_scatter
+from chladni.modal.leakage_scatter import leakage_scatter
+from chladni.modal.lsfd import synthesis
 from chladni.modal.mode_scatter import ModeScatter
 from chladni.modal.model_lines import ModelLines
-from chladni.modal.parameter_spread import ParameterSpread
+from chladni.modal.parameter_spread import ParameterSpread, real_matrices
 from chladni.signals.provenance import Provenance
 
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
-
-# Rounds until the noise level beside the leakage settles.
-ROUNDS = 12
-# Standard deviations from few averages scatter; leakage that seems to explain everything leaves at least this share.
-LEAST_NOISE = 1e-4
+Parts = tuple[ErrorParts, ...]
 
 
-def mode_scatter(
-    lines: ModelLines, spread: ParameterSpread, poles: Complex, mode: int, found: Misfit, provenance: Provenance
-) -> ModeScatter:
-    """Estimate how one mode scatters.
+def mode_scatters(
+    lines: ModelLines, spread: ParameterSpread, poles: Complex, found: Misfit, provenance: Provenance
+) -> list[ModeScatter]:
+    """Estimate how each mode scatters.
 
-    The variance of each line near the mode is taken apart into three: leakage, which the model tells; noise of each
-    response, which is flat there; and what goes with abs(H)^2 in all responses alike, as noise of the reference and
-    unmeasured forces do. Only the second is independent from response to response.
+    Each output of the fit is a weighted sum of the errors of all lines. Its variance is added up from what the errors
+    consist of: leakage, which the model tells; noise of each response; and what goes with H in all responses alike,
+    as noise of the reference does. Only the second is independent from response to response; the others hardly move
+    ratios of components, but not nothing, since neighbouring modes and residuals have a share in H.
     """
-    excess, base = float(found.excess[mode]), spread.poles()[mode, :, mode]
-    leakage = leakage_scatter(lines, poles, mode, provenance) if lines.weighted else None
-    if leakage is None:
-        factor = excess * found.correlation
-        ones = np.full(lines.values.shape[0], factor)
-        return ModeScatter(pole=factor * base, shared=factor, shares=ones, amplitude=factor)
-    parts = _parts(lines, spread, leakage, _estimated(provenance, lines.values.shape[1]))
-    largest = int(np.argmax(np.abs(spread.shapes[mode])))
-    rows = [spread.theta[2 * mode], spread.theta[2 * mode + 1]]
-    fields = [spread.field(leakage.near, row) for row in (*rows, rows[0] + rows[1])]
-    leaks = [parts.leak(field) + found.correlation * parts.common(field) for field in fields]
-    both = (leaks[2] - leaks[0] - leaks[1]) / 2
-    noise = float(np.mean([parts.noise_share(field) for field in fields[:2]]))
-    pole = np.array([[leaks[0], both], [both, leaks[1]]]) + noise * found.correlation * base
+    stretches = leakage_scatter(lines, poles, provenance) if lines.weighted else ()
+    if not stretches:
+        return [_independent(lines, spread, found, mode) for mode in range(poles.size)]
+    parts = error_parts(lines, spread, stretches)
+    drives = _parameter_drives(spread, parts)
+    return [_scatter(spread, parts, drives, mode, float(found.excess[mode])) for mode in range(poles.size)]
+
+
+def _independent(lines: ModelLines, spread: ParameterSpread, found: Misfit, mode: int) -> ModeScatter:
+    """Lines that are as good as independent, or of one unknown variance."""
+    factor = float(found.excess[mode] * found.efficiency * found.correlation)
+    responses = lines.values.shape[0]
     return ModeScatter(
-        pole=excess * pole,
-        shared=excess * found.correlation * noise,
-        shares=excess * found.correlation * parts.own_shares(spread, mode),
-        amplitude=excess * _amplitude(spread, parts, mode, largest, found.correlation),
+        pole=factor * spread.poles()[mode, :, mode],
+        shared=factor,
+        shares=np.full(responses, factor),
+        common=np.zeros((responses, 2)),
+        amplitude=factor,
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Parts:
-    """Lines near a mode, with what leakage and noise are of their variance.
-
-    ``weights, noise[response, reference, line]`` 1/variance, and share of the variance that is noise;
-    ``functions[response, reference, line]``, and ``relative[reference]`` what their common error is of their squares;
-    ``residues[response, reference, other]``; ``levels[reference, reference]`` power of one reference over another.
-    """
-
-    near: slice
-    weights: Floats
-    noise: Floats
-    functions: Complex
-    relative: Floats
-    residues: Complex
-    levels: Floats
-    leakage: LeakageScatter
-
-    def noise_share(self, field: Complex) -> float:
-        """Share of the variance of an output with this field that noise makes."""
-        weighted = self.weights * np.abs(field) ** 2
-        total = weighted.sum()
-        return float((weighted * self.noise).sum() / total) if total > 0 else 1.0
-
-    def common(self, field: Complex) -> float:
-        """Variance that errors in proportion to all responses give to an output, for independent lines."""
-        drive = np.einsum("ijk,ijk->jk", self.weights * field.conj(), self.functions)
-        return float(np.sum(self.relative[:, np.newaxis] * np.abs(drive) ** 2))
-
-    def leak(self, field: Complex) -> float:
-        """Variance that leakage gives to an output with this field."""
-        # b[reference, source, other, line]: what a unit error by one source does through the lines of one reference.
-        drive = np.einsum("ijk,ilr->jlrk", self.weights * field.conj(), self.residues, optimize=True)
-        count, lines = len(self.levels), drive.shape[-1]
-        power = (drive * np.sqrt(self.levels)[..., np.newaxis, np.newaxis]).reshape(count**2, -1, lines)
-        plain = drive.reshape(count**2, -1, lines), drive.swapaxes(0, 1).reshape(count**2, -1, lines)
-        return max(self.leakage.variance(power, plain), 0.0)
-
-    def own_shares(self, spread: ParameterSpread, mode: int) -> Floats:
-        """``[response]`` share of noise where each response's own component is read."""
-        pair = spread.solution.basis.modes[2 * mode : 2 * mode + 2, self.near]
-        density = np.sum(np.abs(pair) ** 2, axis=0)
-        said = self.weights * density * (np.abs(spread.participation[mode]) ** 2)[:, np.newaxis]
-        total = said.sum(axis=(1, 2))
-        return np.asarray(
-            np.divide((said * self.noise).sum(axis=(1, 2)), total, out=np.ones_like(total), where=total > 0)
-        )
-
-
-def _estimated(provenance: Provenance, references: int) -> float:
-    """What estimated variances exceed those of known moments by: one average is spent on each reference."""
-    averages = provenance.effective_averages
-    return averages / (averages - references) if averages > references else 1.0
-
-
-def _parts(lines: ModelLines, spread: ParameterSpread, leakage: LeakageScatter, spent: float) -> _Parts:
-    near, weights = leakage.near, lines.weights[..., leakage.near]
-    residues = spread.shapes.T[:, np.newaxis, leakage.modes] * spread.participation.T[:, leakage.modes]
-    levels = _levels(weights)
-    power = np.einsum("ilr,ils,rsk->ilk", residues, residues.conj(), leakage.power(), optimize=True).real / 2
-    leak = spent * np.einsum("jl,ilk->ijk", levels, power)
-    functions = lines.values[..., near] - spread.solution.residual[..., near]
-    noise, relative = _noise_parts(weights, leak, np.abs(functions) ** 2)
-    return _Parts(
-        near=near,
-        weights=weights,
-        noise=noise,
-        functions=functions,
-        relative=relative,
-        residues=residues,
-        levels=levels,
-        leakage=leakage,
+def _scatter(
+    spread: ParameterSpread, parts: Parts, drives: list[tuple[Complex, Complex]], mode: int, excess: float
+) -> ModeScatter:
+    largest = int(np.argmax(np.abs(spread.shapes[mode])))
+    base = spread.poles()[mode, :, mode]
+    rows = spread.theta[2 * mode], spread.theta[2 * mode + 1]
+    totals, noises = np.zeros(3), np.zeros(3)
+    for part, (leak, common) in zip(parts, drives, strict=True):
+        pair = slice(2 * mode, 2 * mode + 2)
+        totals += part.common_variance(_with_sum(leak[pair]), _with_sum(common[pair]))
+        fields = np.stack([spread.field(part.near, row) for row in (*rows, rows[0] + rows[1])])
+        noises += part.noise_variance(fields).sum(axis=-1)
+    shares, shapes = _shapes(spread, parts, drives, mode, largest)
+    return ModeScatter(
+        pole=excess * _matrix(totals + noises),
+        shared=excess * float(np.mean(noises[:2] / np.diag(base))),
+        shares=excess * shares,
+        common=excess * shapes,
+        amplitude=excess * _amplitude(spread, parts, mode, largest),
     )
 
 
-def _levels(weights: Floats) -> Floats:
-    """``[reference, source]`` power of a source over that of a reference: variances go with 1/power."""
-    used = weights > 0
-    logs = np.where(used, np.log(np.where(used, weights, 1.0)), 0.0)
-    means = logs.sum(axis=(0, 2)) / np.maximum(used.sum(axis=(0, 2)), 1)
-    # weight is 1/variance and thus goes with the power of its own reference
-    return np.asarray(np.exp(means[np.newaxis, :] - means[:, np.newaxis]))
+def _with_sum(pair: Complex) -> Complex:
+    return np.concatenate([pair, pair.sum(axis=0, keepdims=True)])
 
 
-def _noise_parts(weights: Floats, leak: Floats, squares: Floats) -> tuple[Floats, Floats]:
-    """Fit variance = leakage + level of each function + relative of each reference x abs(H)^2.
-
-    Least squares, weighted by the fitted variance again and again; gives the level's share ``[..., line]`` of the
-    variance, and relative ``[reference]``.
-    """
-    used = weights > 0
-    variance = np.divide(1.0, weights, out=np.zeros_like(weights), where=used)
-    least = LEAST_NOISE * np.mean(variance, axis=-1, keepdims=True)
-    level = np.maximum(np.min(np.where(used, variance, np.inf), axis=-1, keepdims=True), least)
-    relative = np.zeros((1, squares.shape[1], 1))
-    left = variance - leak
-    for _ in range(ROUNDS):
-        trust = np.where(used, (np.maximum(leak, 0) + level + relative * squares) ** -2.0, 0.0)
-        total = np.maximum(np.sum(trust, axis=-1, keepdims=True), np.finfo(float).tiny)
-        left_mean, square_mean = (np.sum(trust * part, axis=-1, keepdims=True) / total for part in (left, squares))
-        aside = trust * (squares - square_mean)
-        size = np.sum(aside * squares, axis=(0, 2), keepdims=True)
-        slope = np.sum(aside * left, axis=(0, 2), keepdims=True)
-        relative = np.maximum(np.divide(slope, size, out=np.zeros_like(slope), where=size > 0), 0.0)
-        level = np.maximum(left_mean - relative * square_mean, least)
-    return np.where(used, np.minimum(weights * level, 1.0), 0.0), relative[0, :, 0]
+def _matrix(variances: Floats) -> Floats:
+    """Covariance of two numbers from the variances of each and of their sum."""
+    both = (variances[2] - variances[0] - variances[1]) / 2
+    return np.array([[variances[0], both], [both, variances[1]]])
 
 
-def _amplitude(spread: ParameterSpread, parts: _Parts, mode: int, largest: int, correlation: float) -> float:
+def _parameter_drives(spread: ParameterSpread, parts: Parts) -> list[tuple[Complex, Complex]]:
+    """What common errors do through all responses to each parameter, stretch by stretch."""
+    answer = []
+    for part in parts:
+        each = [part.drives(spread.field(part.near, row)[np.newaxis]) for row in spread.theta]
+        answer.append((np.concatenate([leak for leak, _ in each]), np.concatenate([common for _, common in each])))
+    return answer
+
+
+def _shapes(
+    spread: ParameterSpread, parts: Parts, drives: list[tuple[Complex, Complex]], mode: int, largest: int
+) -> tuple[Floats, Floats]:
+    """``[response]`` factor of own noise; ``[response, 2]`` variance of component over largest by common errors."""
+    pair = slice(2 * mode, 2 * mode + 2)
+    scale = spread.shapes[mode, largest]
+    turned = real_matrices(np.full(spread.shapes[mode].shape, 1 / scale))
+    beside = turned @ real_matrices(spread.shapes[mode] / scale)
+    coupling = spread.coupling[:, pair]
+    through = turned @ coupling - beside @ coupling[largest]
+    noise, variance = np.zeros(len(turned)), np.zeros((len(turned), 2))
+    for part, (leak, common) in zip(parts, drives, strict=True):
+        basis = spread.solution.basis.at(part.near)
+        own = [synthesis(basis, spread.own[:, row], spread.participation) for row in (2 * mode, 2 * mode + 1)]
+        fields = np.stack(own, axis=1)
+        noise += part.noise_variance(fields.swapaxes(0, 1)).sum(axis=0)
+        mine = part.each_drives(fields)
+        total = [
+            _combined(turned, one) - np.tensordot(beside, one[largest], axes=1) + np.tensordot(through, other, axes=1)
+            for one, other in zip(mine, (leak, common), strict=True)
+        ]
+        variance += part.common_variance(total[0], total[1])
+    variance[largest] = 0
+    plain = np.einsum("iaa->i", spread.own[:, pair, pair])
+    return np.divide(noise, plain, out=np.ones_like(plain), where=plain > 0), variance
+
+
+def _combined(matrices: Floats, pairs: Complex) -> Complex:
+    """Products of ``[response, 2, 2]`` with ``[response, 2, ...]``."""
+    flat = pairs.reshape(*pairs.shape[:2], -1)
+    return np.asarray(matrices @ flat).reshape(pairs.shape)
+
+
+def _amplitude(spread: ParameterSpread, parts: Parts, mode: int, largest: int) -> float:
     theta, own = spread.amplitude(mode, largest)
     total = base = 0.0
-    for row, own_row in zip(theta, own, strict=True):
-        field = spread.field(parts.near, row, (largest, own_row))
-        plain = float((parts.weights * np.abs(field) ** 2).sum())
-        total += parts.leak(field) + correlation * (parts.common(field) + parts.noise_share(field) * plain)
-        base += plain
-    return total / base if base > 0 else correlation
+    for part in parts:
+        for row, own_row in zip(theta, own, strict=True):
+            field = spread.field(part.near, row, (largest, own_row))[np.newaxis]
+            base += float((part.weights * np.abs(field[0]) ** 2).sum())
+            total += float(part.common_variance(*part.drives(field))[0] + part.noise_variance(field).sum())
+    return total / base if base > 0 else 1.0

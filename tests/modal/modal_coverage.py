@@ -80,9 +80,9 @@ def few_periods(truth, rng, *, at, noise=0.05, lines=600, band_hz=(0.25, 8.0), p
     return replace(response, std=estimated, provenance=few)
 
 
-def averaged_random(truth, rng, *, at, noise=0.01, cycles=1500, resolution_hz=None, window="hann"):
+def averaged_random(truth, rng, *, at, noise=0.01, force_noise=None, cycles=1500, resolution_hz=None, window="hann"):
     """H1 of records of white random forces, each channel with white noise, averaged over windowed segments."""
-    series = record(truth, cycles=cycles, rng=rng, at=at, noise=noise)
+    series = record(truth, cycles=cycles, rng=rng, at=at, noise=noise, force_noise=force_noise)
     spectra = cross_spectra(series, resolution_hz=resolution_hz, window=window)
     names = [channel.name for channel in series.channels if channel.role == "reference"]
     return frequency_response(spectra, references=names)

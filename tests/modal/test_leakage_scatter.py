@@ -23,7 +23,8 @@ def errors():
         spectra = cross_spectra(series, resolution_hz=1 / 64)
         response = frequency_response(spectra, references="/force0.z")
         values.append(response.values[0, 0])
-    scatter = leakage_scatter(model_lines(response, None), ONE.poles, 0, response.provenance)
+    stretches = leakage_scatter(model_lines(response, None), ONE.poles, response.provenance)
+    scatter = next(stretch for stretch in stretches if stretch.modes.size)
     off = (np.array(values) - np.mean(values, axis=0))[:, 1:][:, scatter.near] * (2j * ONE.poles[0].imag)
     return off, scatter, round(64 * 1.0) - 1 - scatter.near.start
 
@@ -33,7 +34,7 @@ def errors():
 def test_moments(errors, lag, place):
     off, scatter, peak = errors
     here, there = off[:, peak + place], off[:, peak + place + lag]
-    power = scatter.power()[0, 0, peak].real
+    power = scatter.hermitian[0, 0, 0, peak].real
     # 120 runs tell a moment within 9 % of the power; four of that.
     assert np.mean(here * there.conj()) / power == pytest.approx(
         scatter.hermitian[lag, 0, 0, peak + place] / power, abs=0.36
@@ -44,14 +45,14 @@ def test_moments(errors, lag, place):
 def test_the_power_where_it_is_largest(errors):
     off, scatter, peak = errors
     found = np.mean(np.abs(off[:, peak - 2 : peak + 3]) ** 2)
-    assert found == pytest.approx(scatter.power()[0, 0, peak - 2 : peak + 3].real.mean(), rel=0.25)
+    assert found == pytest.approx(scatter.hermitian[0, 0, 0, peak - 2 : peak + 3].real.mean(), rel=0.25)
 
 
 def test_the_variance_of_a_sum_over_lines(errors):
     off, scatter, peak = errors
     # Opposite weights on both sides of the resonance, as a frequency has; equal ones, as a damping has.
     for sign in (1, -1):
-        weights = np.zeros((1, 1, off.shape[1]), dtype=complex)
+        weights = np.zeros((1, 2, off.shape[1]), dtype=complex)
         weights[0, 0, peak - 2 : peak + 3] = [1, 1, 0, sign, sign]
         sums = (off @ weights[0, 0]).real
         expected = scatter.variance(weights, (weights, weights))
@@ -59,15 +60,19 @@ def test_the_variance_of_a_sum_over_lines(errors):
         assert np.var(sums) == pytest.approx(expected, rel=0.55)
 
 
-def test_none_where_nothing_leaks():
+def test_nothing_where_nothing_leaks():
     response = noisy_response(ONE, np.linspace(0.5, 2, 200), (0,), noise=0.1, rng=np.random.default_rng(0))
-    assert leakage_scatter(model_lines(response, None), ONE.poles, 0, response.provenance) is None
+    assert leakage_scatter(model_lines(response, None), ONE.poles, response.provenance) == ()
 
 
-def test_none_where_lines_are_missing(errors):
+def test_missing_lines_part_stretches():
     series = record(ONE, cycles=300, rng=np.random.default_rng(2))
     response = frequency_response(cross_spectra(series, resolution_hz=1 / 32), references="/force0.z")
     values = response.values.copy()
     values[..., 33] = np.nan
-    holed = replace(response, values=values)
-    assert leakage_scatter(model_lines(holed, None), ONE.poles, 0, response.provenance) is None
+    lines = model_lines(replace(response, values=values), None)
+    stretches = leakage_scatter(lines, ONE.poles, response.provenance)
+    # The line at 0 Hz isn't among the lines.
+    assert 32 in [stretch.near.start for stretch in stretches]
+    assert stretches[0].near.start == 0
+    assert stretches[-1].near.stop == lines.frequency_hz.size
