@@ -12,11 +12,16 @@ from chladni.modal.modal_model import ModalModel
 from chladni.modal.mode_scatter import ModeScatter
 from chladni.modal.model_lines import ModelLines
 from chladni.modal.parameter_spread import ParameterSpread, parameter_spread
-from chladni.modal.scatter_estimate import mode_scatters
+from chladni.modal.scatter_estimate import mode_scatters, too_many
 from chladni.signals.provenance import Provenance
 
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
+
+SIMPLE = (
+    "so many functions and lines that leakage isn't followed from line to line: error bars of frequency may be twice "
+    "too wide, those of shapes too narrow where the reference is noisy; a narrower band or fewer responses do better"
+)
 
 
 def fitted_modes(
@@ -52,7 +57,7 @@ def fitted_modes(
         modal_mass_std=(amplitude[:, np.newaxis, np.newaxis] * masses)[order],
         chi_square=found.chi_square if lines.weighted else float("nan"),
         inflation=inflation[order],
-        notes=notes,
+        notes=(*notes, SIMPLE) if too_many(lines, poles.size) else notes,
     )
 
 

@@ -16,6 +16,9 @@ Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 Parts = tuple[ErrorParts, ...]
 
+# Some twenty seconds of work. Beyond, lines are taken for independent but for what the window makes of neighbours.
+MOST_PRODUCTS = 1 << 24
+
 
 def mode_scatters(
     lines: ModelLines, spread: ParameterSpread, poles: Complex, found: Misfit, provenance: Provenance
@@ -27,12 +30,19 @@ def mode_scatters(
     as noise of the reference does. Only the second is independent from response to response; the others hardly move
     ratios of components, but not nothing, since neighbouring modes and residuals have a share in H.
     """
-    stretches = leakage_scatter(lines, poles, provenance) if lines.weighted else ()
+    parted = lines.weighted and not too_many(lines, poles.size)
+    stretches = leakage_scatter(lines, poles, provenance) if parted else ()
     if not stretches:
         return [_independent(lines, spread, found, mode) for mode in range(poles.size)]
     parts = error_parts(lines, spread, stretches)
     drives = _parameter_drives(spread, parts)
     return [_scatter(spread, parts, drives, mode, float(found.excess[mode])) for mode in range(poles.size)]
+
+
+def too_many(lines: ModelLines, modes: int) -> bool:
+    """Whether errors of leakage are too many to be followed from line to line, function to function, mode to mode."""
+    responses, references, count = lines.values.shape
+    return lines.window is not None and modes * responses * references**2 * count > MOST_PRODUCTS
 
 
 def _independent(lines: ModelLines, spread: ParameterSpread, found: Misfit, mode: int) -> ModeScatter:
@@ -56,6 +66,8 @@ def _scatter(
     rows = spread.theta[2 * mode], spread.theta[2 * mode + 1]
     totals, noises = np.zeros(3), np.zeros(3)
     for part, (leak, common) in zip(parts, drives, strict=True):
+        if mode not in part.leakage.modes:
+            continue
         pair = slice(2 * mode, 2 * mode + 2)
         totals += part.common_variance(_with_sum(leak[pair]), _with_sum(common[pair]))
         fields = np.stack([spread.field(part.near, row) for row in (*rows, rows[0] + rows[1])])
@@ -70,6 +82,11 @@ def _scatter(
     )
 
 
+def _felt(parts: Parts, mode: int) -> list[ErrorParts]:
+    """Stretches that say something about a pole: those within reach of its mode."""
+    return [part for part in parts if mode in part.leakage.modes]
+
+
 def _with_sum(pair: Complex) -> Complex:
     return np.concatenate([pair, pair.sum(axis=0, keepdims=True)])
 
@@ -81,12 +98,29 @@ def _matrix(variances: Floats) -> Floats:
 
 
 def _parameter_drives(spread: ParameterSpread, parts: Parts) -> list[tuple[Complex, Complex]]:
-    """What common errors do through all responses to each parameter, stretch by stretch."""
-    answer = []
-    for part in parts:
-        each = [part.drives(spread.field(part.near, row)[np.newaxis]) for row in spread.theta]
-        answer.append((np.concatenate([leak for leak, _ in each]), np.concatenate([common for _, common in each])))
-    return answer
+    """What common errors do through all responses to each parameter, stretch by stretch.
+
+    The parameters of modes that a stretch doesn't feel are left at zero: their lines are elsewhere.
+    """
+    return [_drives_of(spread, part) for part in parts]
+
+
+def _drives_of(spread: ParameterSpread, part: ErrorParts) -> tuple[Complex, Complex]:
+    rows = _rows(spread, part)
+    references, lines = part.functions.shape[1:]
+    sources = (references, references, part.residues.shape[2] + 1, lines)
+    leak = np.zeros((len(spread.theta), *sources), dtype=np.complex128)
+    common = np.zeros((len(spread.theta), references, lines), dtype=np.complex128)
+    for row in rows:
+        one = part.drives(spread.field(part.near, spread.theta[row])[np.newaxis])
+        leak[row], common[row] = one[0][0], one[1][0]
+    return leak, common
+
+
+def _rows(spread: ParameterSpread, part: ErrorParts) -> list[int]:
+    """Rows of the parameters of the modes that a stretch feels: Re and Im of poles, then of each participation."""
+    modes = len(spread.shapes)
+    return [row for row in range(len(spread.theta)) if (row // 2) % modes in part.leakage.modes]
 
 
 def _shapes(
@@ -100,6 +134,7 @@ def _shapes(
     coupling = spread.coupling[:, pair]
     through = turned @ coupling - beside @ coupling[largest]
     noise, variance = np.zeros(len(turned)), np.zeros((len(turned), 2))
+    # All of them: an error common to all responses reaches ratios of components through residuals and neighbours.
     for part, (leak, common) in zip(parts, drives, strict=True):
         basis = spread.solution.basis.at(part.near)
         own = [synthesis(basis, spread.own[:, row], spread.participation) for row in (2 * mode, 2 * mode + 1)]
@@ -125,7 +160,7 @@ def _combined(matrices: Floats, pairs: Complex) -> Complex:
 def _amplitude(spread: ParameterSpread, parts: Parts, mode: int, largest: int) -> float:
     theta, own = spread.amplitude(mode, largest)
     total = base = 0.0
-    for part in parts:
+    for part in _felt(parts, mode):
         for row, own_row in zip(theta, own, strict=True):
             field = spread.field(part.near, row, (largest, own_row))[np.newaxis]
             base += float((part.weights * np.abs(field[0]) ** 2).sum())
