@@ -16,10 +16,10 @@ from statistics import median
 import numpy as np
 from random_modes import RandomModes, accelerances, random_modes
 
-from chladni.modal.lsfd import least_squares_frequency_domain
-from chladni.modal.plscf import polyreference_poles
-from chladni.modal.pole_selection import select_poles
-from chladni.modal.stabilisation import pole_status
+from chladni.modal.fit.lsfd import least_squares_frequency_domain
+from chladni.modal.functions.plscf import polyreference_poles
+from chladni.modal.poles.pole_selection import select_poles
+from chladni.modal.poles.stabilisation import pole_status
 from chladni.signals.frequency_response import FrequencyResponse
 
 RESPONSES, LINES, ORDERS, MODES, TOP_HZ, NOISE = 60, 2048, 60, 10, 1024.0, 0.01

@@ -26,15 +26,15 @@ _HOME = {
     "cross_spectra": "chladni.spectral.cross_spectra",
     "coherence": "chladni.spectral.coherence",
     "waterfall": "chladni.spectral.waterfall",
-    "mac": "chladni.modal.mac",
-    "relative_motion": "chladni.modal.relative_motion",
-    "validate": "chladni.modal.validation",
-    "CircleFit": "chladni.modal.circle_fit",
-    "CovarianceDrivenSubspace": "chladni.modal.subspace",
-    "EnhancedFrequencyDomainDecomposition": "chladni.modal.efdd",
-    "FrequencyDomainDecomposition": "chladni.modal.fdd",
-    "HalfPower": "chladni.modal.half_power",
-    "PolyReferenceLeastSquares": "chladni.modal.polyreference",
+    "mac": "chladni.modal.shapes.mac",
+    "relative_motion": "chladni.modal.shapes.relative_motion",
+    "validate": "chladni.modal.shapes.validation",
+    "CircleFit": "chladni.modal.functions.circle_fit",
+    "CovarianceDrivenSubspace": "chladni.modal.responses.subspace",
+    "EnhancedFrequencyDomainDecomposition": "chladni.modal.responses.efdd",
+    "FrequencyDomainDecomposition": "chladni.modal.responses.fdd",
+    "HalfPower": "chladni.modal.functions.half_power",
+    "PolyReferenceLeastSquares": "chladni.modal.functions.polyreference",
     "load_setup": "chladni.io.setup",
     "open_log": "chladni.io.log",
     "write_mcap": "chladni.io.mcap.writer",
@@ -99,15 +99,15 @@ if TYPE_CHECKING:
     from chladni.io.log import open_log
     from chladni.io.mcap.writer import write_mcap
     from chladni.io.setup import load_setup
-    from chladni.modal.circle_fit import CircleFit
-    from chladni.modal.efdd import EnhancedFrequencyDomainDecomposition
-    from chladni.modal.fdd import FrequencyDomainDecomposition
-    from chladni.modal.half_power import HalfPower
-    from chladni.modal.mac import mac
-    from chladni.modal.polyreference import PolyReferenceLeastSquares
-    from chladni.modal.relative_motion import relative_motion
-    from chladni.modal.subspace import CovarianceDrivenSubspace
-    from chladni.modal.validation import validate
+    from chladni.modal.functions.circle_fit import CircleFit
+    from chladni.modal.functions.half_power import HalfPower
+    from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
+    from chladni.modal.responses.efdd import EnhancedFrequencyDomainDecomposition
+    from chladni.modal.responses.fdd import FrequencyDomainDecomposition
+    from chladni.modal.responses.subspace import CovarianceDrivenSubspace
+    from chladni.modal.shapes.mac import mac
+    from chladni.modal.shapes.relative_motion import relative_motion
+    from chladni.modal.shapes.validation import validate
     from chladni.signals.channel import Channel
     from chladni.signals.coherence import Coherence
     from chladni.signals.cross_spectra import CrossSpectra

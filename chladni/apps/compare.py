@@ -10,8 +10,8 @@ from chladni.apps.modes import identify_modes
 from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging, densities, transfer
 from chladni.io.log import Log
-from chladni.modal.mode_comparison import compare_modes
-from chladni.modal.validation import validate
+from chladni.modal.shapes.mode_comparison import compare_modes
+from chladni.modal.shapes.validation import validate
 from chladni.signals.comparison import DensityComparison, ResponseComparison
 from chladni.signals.errors import EstimateError
 from chladni.signals.mode_change import ModeChange

@@ -11,18 +11,18 @@ from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging
 from chladni.io.files.uff_modes import read_uff_modes
 from chladni.io.log import Log
-from chladni.modal.circle_fit import CircleFit
-from chladni.modal.driving_point import check_driving_point
-from chladni.modal.efdd import EnhancedFrequencyDomainDecomposition
-from chladni.modal.fdd import FrequencyDomainDecomposition
-from chladni.modal.half_power import HalfPower
-from chladni.modal.polyreference import PolyReferenceLeastSquares
-from chladni.modal.reciprocity import check_reciprocity
-from chladni.modal.relative_motion import relative_motion
-from chladni.modal.shape_transmissibility import ShapeTransmissibility, shape_transmissibility
-from chladni.modal.subspace import CovarianceDrivenSubspace
-from chladni.modal.summary import summarise
-from chladni.modal.validation import validate
+from chladni.modal.checks.driving_point import check_driving_point
+from chladni.modal.checks.reciprocity import check_reciprocity
+from chladni.modal.functions.circle_fit import CircleFit
+from chladni.modal.functions.half_power import HalfPower
+from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
+from chladni.modal.responses.efdd import EnhancedFrequencyDomainDecomposition
+from chladni.modal.responses.fdd import FrequencyDomainDecomposition
+from chladni.modal.responses.subspace import CovarianceDrivenSubspace
+from chladni.modal.shapes.relative_motion import relative_motion
+from chladni.modal.shapes.shape_transmissibility import ShapeTransmissibility, shape_transmissibility
+from chladni.modal.shapes.summary import summarise
+from chladni.modal.shapes.validation import validate
 from chladni.signals.errors import EstimateError, LogError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry

@@ -11,15 +11,15 @@ from chladni.apps.sources import Progress, Span, Watched, no_progress
 from chladni.apps.spectra import Averaging, transfer
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
-from chladni.modal.bands import join_bands
-from chladni.modal.circle_fit import CircleFit
-from chladni.modal.efdd import EnhancedFrequencyDomainDecomposition
-from chladni.modal.fdd import FrequencyDomainDecomposition
-from chladni.modal.half_power import HalfPower
-from chladni.modal.harmonics import LONGEST_SEGMENT_SHARE, SHORTEST_SEGMENT, machine_harmonics
-from chladni.modal.machine_lines import without_machines
-from chladni.modal.polyreference import PolyReferenceLeastSquares
-from chladni.modal.subspace import CovarianceDrivenSubspace
+from chladni.modal.functions.bands import join_bands
+from chladni.modal.functions.circle_fit import CircleFit
+from chladni.modal.functions.half_power import HalfPower
+from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
+from chladni.modal.responses.efdd import EnhancedFrequencyDomainDecomposition
+from chladni.modal.responses.fdd import FrequencyDomainDecomposition
+from chladni.modal.responses.harmonics import LONGEST_SEGMENT_SHARE, SHORTEST_SEGMENT, machine_harmonics
+from chladni.modal.responses.machine_lines import without_machines
+from chladni.modal.responses.subspace import CovarianceDrivenSubspace
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse

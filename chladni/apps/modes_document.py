@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from chladni.apps.documents import Document, finite, plain
-from chladni.modal.joint_treatment import treatments
-from chladni.modal.shape_transmissibility import ShapeTransmissibility
+from chladni.modal.shapes.joint_treatment import treatments
+from chladni.modal.shapes.shape_transmissibility import ShapeTransmissibility
 from chladni.signals.modal_fit import ModalFit
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation

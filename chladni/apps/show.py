@@ -5,9 +5,9 @@ from dataclasses import replace
 from chladni.apps.analyse import analyse
 from chladni.apps.unit_peaks import unit_peaks
 from chladni.io.log import Log
-from chladni.modal.relative_motion import relative_motion
-from chladni.modal.summary import summarise
-from chladni.modal.validation import validate
+from chladni.modal.shapes.relative_motion import relative_motion
+from chladni.modal.shapes.summary import summarise
+from chladni.modal.shapes.validation import validate
 from chladni.signals.errors import SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet

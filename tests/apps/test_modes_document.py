@@ -7,14 +7,14 @@ import numpy as np
 from hypothesis import given, settings
 
 from chladni.apps.modes_document import modes_document
-from chladni.modal.relative_motion import relative_motion
-from chladni.modal.validation import validate
+from chladni.modal.shapes.relative_motion import relative_motion
+from chladni.modal.shapes.validation import validate
 from chladni.signals.geometry import Geometry
 from chladni.signals.machine_harmonic import MachineHarmonic
 from tests import strategies as ours
 from tests.modal.mode_makers import mode_set
-from tests.modal.test_joint_treatment import GEOMETRY, scaled_modes
-from tests.modal.test_validation import REFERENCE, SOUND, fit_of, spread_of
+from tests.modal.shapes.test_joint_treatment import GEOMETRY, scaled_modes
+from tests.modal.shapes.test_validation import REFERENCE, SOUND, fit_of, spread_of
 
 CONTRACT = {"frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std", "mpc", "shape", "relative_motion"}
 

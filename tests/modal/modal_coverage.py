@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from chladni.modal.maximum_likelihood import refine
-from chladni.modal.modal_model import ModalModel
+from chladni.modal.fit.maximum_likelihood import refine
+from chladni.modal.fit.modal_model import ModalModel
 from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.frequency_response import frequency_response
 from tests.modal.truth import noisy_response, record

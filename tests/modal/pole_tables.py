@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from chladni.modal.pole_table import PoleTable
+from chladni.modal.poles.pole_table import PoleTable
 
 
 def made_table(modes, *, orders=range(2, 32), strays=0, rng=None, scatter=(2e-4, 2e-2), **sigmas):

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 
 from chladni.io.files.modes_table import write_modes_csv
-from chladni.modal.validation import validate
+from chladni.modal.shapes.validation import validate
 from chladni.signals.channel import AXES, Channel
 from chladni.signals.errors import LogError
 from chladni.signals.mode_set import ModeSet
 from tests import strategies as ours
 from tests.modal.mode_makers import mode_set
-from tests.modal.test_joint_treatment import scaled_modes
+from tests.modal.shapes.test_joint_treatment import scaled_modes
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:

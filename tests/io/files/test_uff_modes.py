@@ -22,7 +22,7 @@ from chladni.signals.provenance import Provenance
 from chladni.signals.testing import assert_close
 from tests import strategies as ours
 from tests.modal.mode_makers import mode_set
-from tests.modal.test_joint_treatment import GEOMETRY, arm, scaled_modes
+from tests.modal.shapes.test_joint_treatment import GEOMETRY, arm, scaled_modes
 
 # A file of six digits: half a unit in the last one.
 SIX_DIGITS = 5e-6

@@ -1,0 +1,1 @@
+"""What is done with frequency responses before, or beside, a fit."""

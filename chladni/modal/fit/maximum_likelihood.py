@@ -1,0 +1,173 @@
+"""Maximum-likelihood refinement of a modal model (MLMM)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.modal.fit.fit_covariance import fitted_modes, no_modes
+from chladni.modal.fit.fit_inflation import misfit
+from chladni.modal.fit.fitted_modes import FittedModes
+from chladni.modal.fit.lsfd import ROUGH, ShapeSolution, checked_modes, solve_shapes
+from chladni.modal.fit.modal_basis import modal_basis
+from chladni.modal.fit.modal_model import ModalModel
+from chladni.modal.fit.mode_guard import lost_mode
+from chladni.modal.fit.model_lines import ModelLines, model_lines, reweighted
+from chladni.modal.fit.reduced_equations import ReducedEquations, reduced_equations
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.wording import counted
+
+Complex = NDArray[np.complex128]
+Floats = NDArray[np.float64]
+
+# A step that moves no pole by more than this share of its decay rate ends the iteration, and so does one that
+# improves a fit with known variances by less than this: it is a small part of a sigma.
+CONVERGED, ENOUGH = 1e-7, 1e-4
+# What is left to gain beyond this shifts the modes by a third of one sigma or more, all together.
+UNSETTLED = 0.1
+FIRST_DAMPING, LARGEST_DAMPING = 1e-6, 1e6
+SLOWEST = 0.99
+
+
+def refine(
+    response: FrequencyResponse,
+    model: ModalModel,
+    *,
+    band_hz: tuple[float, float] | None = None,
+    max_iterations: int = 25,
+) -> FittedModes:
+    """Fit poles, participation, shapes and residuals together, so that the misfit weighs least against the noise.
+
+    Parameters
+    ----------
+    response
+        As for `least_squares_frequency_domain`. Where no `std` is known, each function is weighted by what the fit
+        leaves of it, and a note says so.
+    model
+        Where to begin: poles and participation; shapes and residuals are solved for.
+    band_hz
+        Lines to fit, default all.
+    max_iterations
+        Steps, at least 0.
+
+    Returns
+    -------
+    FittedModes
+        Modes that leave the lines, run away or run into another mode are left out, and a note says so. Where steps
+        run out before the misfit is least, error bars are widened by what is left, with a note.
+
+    Raises
+    ------
+    EstimateError
+        As `least_squares_frequency_domain`.
+
+    Notes
+    -----
+    El-Kafafy, De Troyer, Peeters & Guillaume (2014): Gauss-Newton with Levenberg's damping on poles and participation
+    for the cost sum |H - model|^2/var. Shapes and residuals enter linearly and are eliminated (Golub & Pereyra 1973,
+    in the approximation of Kaufman 1975).
+    """
+    lines = model_lines(response, band_hz)
+    poles, vectors = checked_modes(response, model.poles, model.participation)
+    kept, notes = np.arange(poles.size), list(lines.notes)
+    while kept.size:
+        lines, state, left = _fitted(lines, poles[kept], _unit_largest(vectors[kept]), max_iterations)
+        lost = lost_mode(lines, poles[kept], state.poles, state.solution.strength)
+        if lost is None:
+            found = misfit(lines, state.solution, response.provenance)
+            if left > UNSETTLED + ROUGH * state.cost:
+                # A step to the optimum is as long in sigmas as the root of what it gains.
+                found = replace(found, excess=found.excess * (1 + left))
+                notes.append(_unsettled(max_iterations, left))
+            return fitted_modes(
+                lines,
+                state.poles,
+                state.solution,
+                found=found,
+                provenance=response.provenance,
+                kept=kept,
+                notes=tuple(notes),
+            )
+        notes.append(f"{lost[1]} in the refinement and is left out")
+        kept = np.delete(kept, lost[0])
+    return no_modes(lines, tuple(notes))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _State:
+    """A point of the iteration: nonlinear parameters, the best coefficients for them, and the cost."""
+
+    poles: Complex
+    participation: Complex
+    solution: ShapeSolution
+    cost: float
+
+    @classmethod
+    def at(cls, lines: ModelLines, poles: Complex, participation: Complex) -> "_State":
+        enough = ENOUGH / 100 if lines.weighted else 0.0
+        solution = solve_shapes(lines, modal_basis(lines, poles), participation, enough=enough)
+        cost = float(np.sum(lines.weights * np.abs(solution.residual) ** 2))
+        return cls(poles=poles, participation=participation, solution=solution, cost=cost)
+
+
+def _fitted(
+    lines: ModelLines, poles: Complex, participation: Complex, max_iterations: int
+) -> tuple[ModelLines, _State, float]:
+    state, left = _minimise(lines, _State.at(lines, poles, participation), max_iterations)
+    if lines.weighted:
+        return lines, state, left
+    lines = reweighted(lines, state.solution.residual, parameters=state.solution.coefficients.shape[1])
+    return lines, *_minimise(lines, _State.at(lines, state.poles, state.participation), max_iterations)
+
+
+def _minimise(lines: ModelLines, state: _State, max_iterations: int) -> tuple[_State, float]:
+    """Step until nothing is worth another step; give what more steps would lower the cost by."""
+    damping, gains = FIRST_DAMPING, (0.0, 0.0)
+    for _ in range(max_iterations):
+        equations = reduced_equations(lines, state.solution)
+        # Shorter and shorter steps would be tried in vain where there is nothing to gain.
+        if lines.weighted and equations.promised() < ENOUGH:
+            return state, 0.0
+        found = _step(lines, state, equations, damping)
+        if found is None:
+            # Without noise to compare with, rounding stops the steps.
+            return state, equations.promised() if lines.weighted else 0.0
+        trial, damping = found
+        moved = np.abs(trial.poles - state.poles) / -state.poles.real
+        gains = gains[1], state.cost - trial.cost
+        state = trial
+        if moved.max() < CONVERGED or (lines.weighted and gains[1] < ENOUGH):
+            return state, 0.0
+    return state, max(reduced_equations(lines, state.solution).promised(), _geometric_rest(*gains))
+
+
+def _geometric_rest(before: float, last: float) -> float:
+    """Sum of all gains to come, when each is to the one before it as the last was."""
+    ratio = min(last / before, SLOWEST) if before > 0 else 0.0
+    return last * ratio / (1 - ratio)
+
+
+def _unsettled(steps: int, left: float) -> str:
+    return (
+        f"the refinement didn't settle within {counted(steps, 'step')}, and the weighted sum of squares may still "
+        f"fall by {left:.2g}: error bars are widened for it; fit fewer modes together, or look at a narrower band"
+    )
+
+
+def _step(
+    lines: ModelLines, state: _State, equations: ReducedEquations, damping: float
+) -> tuple[_State, float] | None:
+    """Take a step that lowers the cost, shorter and shorter until one does; None when none does."""
+    while damping < LARGEST_DAMPING:
+        poles, participation = equations.moved(state.poles, state.participation, damping)
+        if np.all(poles.real < 0) and np.all(poles.imag > 0):
+            trial = _State.at(lines, poles, participation)
+            if trial.cost <= state.cost:
+                return trial, max(damping / 10, FIRST_DAMPING**2)
+        damping *= 10
+    return None
+
+
+def _unit_largest(vectors: Complex) -> Complex:
+    largest = np.argmax(np.abs(vectors), axis=1)[:, np.newaxis]
+    return np.asarray(vectors / np.take_along_axis(vectors, largest, axis=1), dtype=np.complex128)

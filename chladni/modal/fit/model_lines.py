@@ -1,0 +1,121 @@
+"""The lines that a modal model is fitted to, with their weights."""
+
+from dataclasses import dataclass, replace
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.modal.fit.lag_window import LagWindow, lag_window
+from chladni.signals.errors import EstimateError
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.value import Value
+from chladni.spectral.forms import ORDER, form
+
+# Below this share of a function's largest magnitude a standard deviation is rounding, not noise.
+ROUNDING = 1e-8
+EXACT = 1e-13
+UNKNOWN_STD = "the functions carry no standard deviation: error bars rest on what the fit leaves of each function"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModelLines(Value):
+    """Excited and finite lines within a band.
+
+    Attributes
+    ----------
+    frequency_hz
+        ``[line]``, above 0.
+    values
+        ``[response, reference, line]`` complex; 0 where a function has no value.
+    weights
+        ``[response, reference, line]`` 1/variance, 0 where a function has no value. The variance is that of Re H and
+        of Im H: `FrequencyResponse.std` is the error along H, and that across H is as large.
+    order
+        2 for accelerance, 1 for mobility, 0 for receptance.
+    window
+        How averaging over segments shortens impulse responses; None where it doesn't.
+    weighted
+        Whether `weights` come from `std`; else they are the same over each function.
+    notes
+        Where the weights come from, when not from `std`.
+    """
+
+    frequency_hz: NDArray[np.float64]
+    values: NDArray[np.complexfloating[Any, Any]]
+    weights: NDArray[np.float64]
+    order: int
+    window: LagWindow | None
+    weighted: bool
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+    @property
+    def s(self) -> NDArray[np.complex128]:
+        """``[line]`` j omega in rad/s."""
+        return np.asarray(2j * pi * self.frequency_hz, dtype=np.complex128)
+
+
+def model_lines(response: FrequencyResponse, band_hz: tuple[float, float] | None) -> ModelLines:
+    """Choose the lines of a band that can be fitted.
+
+    Raises
+    ------
+    EstimateError
+        When the band is no band, or holds no excited line with a value.
+    """
+    low, high = band_hz or (0.0, np.inf)
+    if not low < high:
+        raise EstimateError(f"band {low:g} to {high:g} Hz is empty; give the lower end first")
+    inside = (response.frequency_hz >= low) & (response.frequency_hz <= high) & (response.frequency_hz > 0)
+    usable = np.isfinite(response.values)
+    lines = np.flatnonzero(inside & response.excited & usable.any(axis=(0, 1)))
+    if not lines.size:
+        raise EstimateError(
+            f"no excited line with a value between {low:g} and {high:g} Hz; the lines reach from "
+            f"{response.frequency_hz[0]:g} to {response.frequency_hz[-1]:g} Hz"
+        )
+    usable = usable[..., lines]
+    values = np.where(usable, response.values[..., lines], 0)
+    weights, weighted = _weights(values, response.std[..., lines], usable)
+    return ModelLines(
+        frequency_hz=response.frequency_hz[lines],
+        values=values,
+        weights=weights,
+        order=ORDER[form(response)],
+        # H2 and Hv see the window in another way, which is not modelled.
+        window=lag_window(response.provenance) if response.provenance.estimator == "H1" else None,
+        weighted=weighted,
+        notes=() if weighted else (UNKNOWN_STD,),
+    )
+
+
+def reweighted(lines: ModelLines, residual: NDArray[np.complex128], *, parameters: int) -> ModelLines:
+    """Weigh each function by what a fit with `parameters` real coefficients a response leaves of it."""
+    used = lines.weights > 0
+    share = parameters / lines.values.shape[1]
+    freedom = np.maximum(2 * used.sum(axis=-1) - share, 1.0)
+    variance = np.sum(np.where(used, np.abs(residual) ** 2, 0.0), axis=-1) / freedom
+    # A function that is fitted to the last digit must not drive all others out.
+    floor = (EXACT * np.abs(lines.values).max(axis=(-1))) ** 2
+    variance = np.maximum(variance, np.where(floor > 0, floor, floor.max()))
+    return replace(lines, weights=np.where(used, 1 / variance[..., np.newaxis], 0.0))
+
+
+def _weights(
+    values: NDArray[np.complex128], std: NDArray[np.float64], usable: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], bool]:
+    # A standard deviation of nothing but rounding, on some lines, must not make them outweigh all others.
+    floor = ROUNDING * np.abs(values).max(axis=-1, keepdims=True)
+    known = usable & np.isfinite(std) & (std > floor)
+    if not known.any():
+        power = np.sum(np.abs(values) ** 2, axis=-1) / np.maximum(usable.sum(axis=-1), 1)
+        # A function that is zero throughout says as much as the others do.
+        power = np.where(power > 0, power, power.max() or 1.0)
+        return np.where(usable, 1 / power[..., np.newaxis], 0.0), False
+    bounded = usable & np.isfinite(std)
+    least = np.maximum(std, np.where(floor > 0, floor, std[known].min()))
+    return np.divide(1.0, least**2, out=np.zeros(std.shape), where=bounded), True

@@ -1,0 +1,178 @@
+"""A fit of frequency responses as a set of modes, with all that tells whether to trust it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.modal.fit.lsfd import least_squares_frequency_domain
+from chladni.modal.fit.modal_model import ModalModel
+from chladni.modal.fit.scaling import modal_scale
+from chladni.modal.fit.synthesis import modal_fit
+from chladni.modal.functions.candidates import Candidates
+from chladni.modal.functions.cmif import complex_mode_indicator
+from chladni.modal.functions.grouped_refinement import select_modes
+from chladni.modal.functions.pruned_fit import PrunedFit
+from chladni.modal.poles.stabilisation import StabilityLimits, stabilisation_diagram
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.modal_fit import ModalFit
+from chladni.signals.mode_set import ModeSet
+from chladni.signals.order_spread import OrderSpread
+from chladni.signals.stabilisation_diagram import StabilisationDiagram
+
+ESTIMATOR = "pLSCF"
+# Half-power widths in lines below which the damping rests on the window as much as on the structure.
+COARSE = 2.0
+# Chi-square above which the modes don't explain the functions within their scatter.
+INFLATED = 2.0
+NO_MODE = (
+    "no mode: no pole is both found at enough model orders and needed to explain the functions; "
+    "average longer, or look at a band where the coherence is better"
+)
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModeReport:
+    """What a set of modes is made from besides the fit.
+
+    Attributes
+    ----------
+    response
+        As it was given.
+    measured
+        With a known form and only the lines that were fitted excited.
+    candidates
+        What was chosen from.
+    stability
+        Limits of the diagram.
+    driving_point
+        Names of response and reference that scale the modes; None takes a pair at one point along one axis.
+    """
+
+    response: FrequencyResponse
+    measured: FrequencyResponse
+    candidates: Candidates
+    stability: StabilityLimits
+    driving_point: tuple[str, str] | None = None
+
+    def mode_set(self, fit: PrunedFit | None, *, count: int | None, notes: tuple[str, ...]) -> ModeSet:
+        """Give the modes asked for; an empty set, with the reason, when the data need none."""
+        if fit is None:
+            return self._empty(count, notes)
+        shown = self._shown(fit, count)
+        fitted = select_modes(fit.fitted, np.isin(np.arange(fit.started.size), shown))
+        model, started = fitted.model, fit.started[shown]
+        scaling = modal_scale(
+            fitted, self.response.responses, self.response.references, driving_point=self.driving_point
+        )
+        return ModeSet(
+            frequency_hz=model.frequency_hz,
+            frequency_std_hz=fitted.frequency_std_hz,
+            damping_ratio=model.damping_ratio,
+            damping_std=fitted.damping_std,
+            shapes=model.shapes,
+            shape_std=fitted.shape_std,
+            channels=self.response.responses,
+            references=self.response.references,
+            participation=model.participation,
+            scale=scaling.scale,
+            spread=self._spread(started),
+            fit=self._fit(fit.fitted.model),
+            stabilisation=self._diagram(started),
+            provenance=replace(self.response.provenance, estimator=ESTIMATOR).with_notes(
+                *notes,
+                *self.candidates.notes,
+                *fitted.notes,
+                *scaling.notes,
+                *self._advice(fit, shown),
+                *_shortfall(count, shown.size),
+            ),
+        )
+
+    def _fit(self, model: ModalModel) -> ModalFit:
+        # All modes that were found, shown or not: one that nobody asked for is no reason to distrust the others.
+        # Shapes that were fitted group by group have no residuals for the whole band.
+        whole = least_squares_frequency_domain(self.measured, model.poles, model.participation)
+        return modal_fit(self.measured, whole)
+
+    def _shown(self, fit: PrunedFit, count: int | None) -> Rows:
+        rows = np.arange(fit.started.size)
+        if self.candidates.only_asked:
+            rows = rows[self.candidates.asked[fit.started]]
+        strongest = rows[np.argsort(fit.significance.log_false_alarm[rows], kind="stable")]
+        return np.sort(strongest[:count])
+
+    def _empty(self, count: int | None, notes: tuple[str, ...]) -> ModeSet:
+        none = np.zeros(0)
+        functions = np.zeros((0, len(self.response.responses)), complex)
+        return ModeSet(
+            frequency_hz=none,
+            frequency_std_hz=none,
+            damping_ratio=none,
+            damping_std=none,
+            shapes=functions,
+            shape_std=functions,
+            channels=self.response.responses,
+            references=self.response.references,
+            participation=np.zeros((0, len(self.response.references)), complex),
+            spread=self._spread(np.zeros(0, np.intp)),
+            stabilisation=self._diagram(np.zeros(0, np.intp)),
+            provenance=replace(self.response.provenance, estimator=ESTIMATOR).with_notes(
+                *notes, *self.candidates.notes, NO_MODE, *_shortfall(count, 0)
+            ),
+        )
+
+    def _spread(self, started: Rows) -> OrderSpread:
+        spread = self.candidates.spread
+        return OrderSpread(
+            orders=spread.orders[started],
+            frequency_hz=spread.frequency_hz[started],
+            frequency_std_hz=spread.frequency_std_hz[started],
+            damping_ratio=spread.damping_ratio[started],
+            damping_std=spread.damping_std[started],
+        )
+
+    def _diagram(self, started: Rows) -> StabilisationDiagram:
+        # Candidates that came to nothing, and poles of no candidate (-1, the last place), point to no mode.
+        place = np.full(self.candidates.pole.size + 1, -1)
+        place[started] = np.arange(started.size)
+        lines = self.measured.excited
+        return stabilisation_diagram(
+            self.candidates.table,
+            member=place[self.candidates.member],
+            indicator_hz=self.measured.frequency_hz[lines],
+            indicator=complex_mode_indicator(self.measured)[:, lines],
+            indicator_name="CMIF",
+            indicator_unit=self.response.unit(0, 0),
+            limits=self.stability,
+        )
+
+    def _advice(self, fit: PrunedFit, shown: Rows) -> tuple[str, ...]:
+        notes: list[str] = []
+        if fit.fitted.chi_square > INFLATED:
+            notes.append(
+                f"chi-square is {fit.fitted.chi_square:.3g} for each degree of freedom: the modes don't explain the "
+                "functions within their scatter (nonlinearity, a missing mode, a changing structure); error bars are "
+                "widened for it"
+            )
+        coarse = shown[fit.significance.width[shown] < COARSE]
+        if coarse.size:
+            frequencies = ", ".join(f"{frequency_hz:.4g}" for frequency_hz in fit.fitted.model.frequency_hz[coarse])
+            factor = f"{COARSE / fit.significance.width[coarse].min():.2g} times"
+            # Whole periods have no window.
+            limit = (
+                f"few lines carry their damping; a period {factor} as long or more helps"
+                if self.response.provenance.averaging == "periodic"
+                else "their damping is only as good as the model of the window; "
+                f"ask for lines {factor} closer or more"
+            )
+            notes.append(f"modes at {frequencies} Hz are less than {COARSE:g} lines wide at half power: {limit}")
+        return tuple(notes)
+
+
+def _shortfall(count: int | None, found: int) -> tuple[str, ...]:
+    if count is None or found >= count:
+        return ()
+    return (f"{count} modes were asked for, but the data need no more than {found}: more would only follow noise",)

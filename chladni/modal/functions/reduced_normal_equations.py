@@ -1,0 +1,131 @@
+"""Normal equations of a matrix-fraction fit of frequency responses, reduced to the denominator."""
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from chladni.modal.functions.line_weights import WeightedLines
+from chladni.modal.functions.noise_compensation import without_noise
+from chladni.modal.functions.unit_circle import UnitCircle
+
+# Powers of z on an arc are nearly dependent, more so on lines with gaps: this part of the mean diagonal keeps the
+# numerators' matrix positive definite above rounding.
+NUMERATOR_RIDGE = 1e-13
+# Without noise the denominator's matrix is singular, and any of many denominators fits. A ridge just above rounding
+# picks the shortest, whose surplus poles are unstable as they are under noise (Kumaresan and Tufts 1982).
+DENOMINATOR_RIDGE = 3e-13
+# Complex numbers held for one chunk of responses: 64 MB.
+CHUNK = 4_000_000
+
+
+def reduced_normal_matrix(lines: WeightedLines, circle: UnitCircle, order: int) -> NDArray[np.complex128]:
+    """Assemble M, whose quadratic form is the least-squares cost of a denominator with the best numerators.
+
+    Parameters
+    ----------
+    lines
+        Frequency responses and their weights.
+    circle
+        Where the lines lie.
+    order
+        Of denominator and numerators.
+
+    Returns
+    -------
+    ``[(order + 1) references, (order + 1) references]``, hermitian positive definite. Its leading blocks belong to
+    the lower orders of the denominator, with numerators of the full order.
+
+    Notes
+    -----
+    The right matrix fraction H(z) A(z) = B(z) with A = sum alpha_r z^r, B_o = sum beta_or z^r, is linear in the
+    coefficients; for each output o the normal equations have the blocks R_o, S_o, T_o, and eliminating the
+    numerators leaves M = sum_o T_o - S_o^H R_o^-1 S_o (Guillaume et al. 2003). On lines at
+    z = exp(j angle) every block depends on the difference of its row and column only and is read off one FFT
+    (Cauberghe 2004). Most of what noise of the known std contributes is taken off, see
+    `chladni.modal.functions.noise_compensation`.
+    """
+    # Numerators keep the full order at every order of the denominator: they only take lags at the end of the circle,
+    # where little is left of any mode, and one matrix then serves all orders.
+    power = lines.weight**2
+    references = lines.values.shape[1]
+    # Sum over the responses before the FFT: there are references^2 of these, however many responses.
+    squares = np.zeros((references, *lines.values.shape[1:]), dtype=np.complex128)
+    eliminated = np.zeros(((order + 1) * references,) * 2, dtype=np.complex128)
+    for part in _chunks(lines.weight.shape[0], references * max((order + 1) ** 2, circle.length)):
+        values = lines.values[part]
+        weighted = power[part, None] * values
+        squares += np.einsum("oik,ojk->ijk", values.conj(), weighted)
+        eliminated += _eliminated(circle, power[part], circle.moments(weighted, order))
+    blocks = _toeplitz(circle.moments(squares, order), order)
+    matrix = np.array(blocks.transpose(2, 0, 3, 1), order="C").reshape(eliminated.shape)
+    diagonal = np.diag_indices_from(matrix)
+    ridge = DENOMINATOR_RIDGE * matrix[diagonal].real
+    matrix -= eliminated
+    matrix = without_noise((matrix + matrix.conj().T) / 2, lines, circle, order)
+    matrix[diagonal] += ridge
+    return matrix
+
+
+def _toeplitz(moments: NDArray[np.complex128], order: int) -> NDArray[np.complex128]:
+    """``[..., row, column]`` with the moment of lag row - column, from ``[..., lag]``; a view."""
+    return sliding_window_view(moments, order + 1, axis=-1)[..., ::-1]
+
+
+def _chunks(responses: int, numbers: int) -> list[slice]:
+    """Cut the responses so that no more than a chunk's numbers are held at once, so many for each."""
+    size = max(1, CHUNK // numbers)
+    return [slice(start, start + size) for start in range(0, responses, size)]
+
+
+def _eliminated(
+    circle: UnitCircle, power: NDArray[np.float64], moments: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """Sum over the responses of S^H R^-1 S, by the Cholesky factors of R."""
+    responses, order = len(moments), moments.shape[-1] // 2
+    share, common = _common_power(power)
+    if common is None:
+        factor = _factors(_toeplitz(circle.moments(power, order), order))
+        cross = _toeplitz(moments, order)
+        stacked = np.array(cross.transpose(0, 2, 3, 1), order="C").reshape(responses, order + 1, -1)
+        for response in range(responses):
+            _solve_in_place(factor[response], stacked[response])
+        return _gram(stacked.reshape(responses * (order + 1), -1))
+    # Responses weighted alike share R, up to a factor that goes into S.
+    factor = _factors(_toeplitz(circle.moments(common[None], order), order))
+    cross = _toeplitz(moments / np.sqrt(share)[:, None, None], order)
+    wide = np.array(cross.transpose(2, 0, 3, 1), order="C")
+    _solve_in_place(factor[0], wide.reshape(order + 1, -1))
+    return _gram(wide.reshape((order + 1) * responses, -1))
+
+
+def _common_power(power: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Factor of each response and the lines' weights they share, None when they differ by more than rounding."""
+    total = power.sum(axis=1)
+    share = np.where(total > 0, total, 1.0)
+    common = power[np.argmax(total)] / share[np.argmax(total)]
+    alike = bool(np.all(total > 0)) and np.allclose(power / share[:, None], common, rtol=1e-12, atol=0)
+    return share, common if alike else None
+
+
+def _factors(numerators: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Lower Cholesky factors of matrices ``[response, row, row]``, kept positive definite."""
+    matrix = numerators.copy()
+    diagonal = np.einsum("orr->or", matrix)
+    # A response without a usable line has R = 0 and S = 0: any positive diagonal makes it vanish.
+    diagonal += np.where(diagonal.real > 0, NUMERATOR_RIDGE * diagonal.real, 1.0)
+    return np.asarray(np.linalg.cholesky(matrix), dtype=np.complex128)
+
+
+def _solve_in_place(factor: NDArray[np.complex128], right: NDArray[np.complex128]) -> None:
+    """Replace `right` by factor^-1 right; both are rows in memory, which BLAS sees as their transposes."""
+    from scipy.linalg.blas import ztrsm
+
+    ztrsm(1.0, factor.T, right.T, side=1, lower=0, overwrite_b=1)
+
+
+def _gram(tall: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """``tall^H tall``, half of which BLAS computes."""
+    from scipy.linalg.blas import zherk
+
+    upper = zherk(1.0, tall.T)
+    return np.asarray(upper.T + np.triu(upper, 1).conj())

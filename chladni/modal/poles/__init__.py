@@ -1,0 +1,1 @@
+"""Poles of models of rising order, and the choice among them."""

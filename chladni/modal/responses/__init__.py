@@ -1,0 +1,1 @@
+"""Modes from responses alone."""

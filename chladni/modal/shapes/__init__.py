@@ -1,0 +1,1 @@
+"""What modal vectors say: comparison, complexity, validation, relative motion."""
