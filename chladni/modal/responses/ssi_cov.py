@@ -76,10 +76,10 @@ class OrderModel:
         ``[pole]`` those inside the unit circle with a positive imaginary part.
     """
 
-    def __init__(self, triangle: Floats, basis: Floats, shifted: Floats) -> None:
-        self.order = int(triangle.shape[0])
-        self._triangle, self._basis = triangle, basis
-        state = solve_triangular(triangle, shifted, check_finite=False)
+    def __init__(self, inverse: Floats, basis: Floats, shifted: Floats) -> None:
+        self.order = int(inverse.shape[0])
+        self._inverse, self._basis = inverse, basis
+        state = inverse @ shifted
         eigenvalues, vectors = np.linalg.eig(state)
         self.eigenvalues, self.vectors = eigenvalues.astype(np.complex128), vectors.astype(np.complex128)
         self.kept = np.flatnonzero((self.eigenvalues.imag > 0) & (np.abs(self.eigenvalues) < 1))
@@ -102,7 +102,7 @@ class OrderModel:
     @cached_property
     def pseudo_inverse(self) -> Floats:
         """``[state, row]`` of the upper block rows of O."""
-        return np.asarray(solve_triangular(self._triangle, self._basis.T, check_finite=False), dtype=np.float64)
+        return self._inverse @ self._basis.T
 
 
 def decompose(
@@ -178,9 +178,12 @@ def order_models(decomposition: SubspaceDecomposition, orders: Sequence[int]) ->
     upper, lower = observability[: -decomposition.channels], observability[decomposition.channels :]
     basis, triangle = (np.asarray(part, dtype=np.float64) for part in qr(upper, mode="economic", check_finite=False))
     shifted = basis.T @ lower
+    # The inverse of a triangle's corner is the corner of its inverse: one solution serves all orders. NumPy and SciPy
+    # bring a BLAS each, whose waiting threads would fight for the cores if each order went through both.
+    inverse = solve_triangular(triangle, np.eye(len(triangle)), check_finite=False)
     for order in wanted:
         corner = slice(order), slice(order)
-        yield OrderModel(triangle[corner], basis[:, :order], shifted[corner])
+        yield OrderModel(inverse[corner], basis[:, :order], shifted[corner])
 
 
 def continuous(eigenvalue: Complexes, sample_rate_hz: float) -> Complexes:

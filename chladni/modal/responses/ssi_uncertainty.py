@@ -106,8 +106,11 @@ class ErrorPropagation:
         other = fft(inputs.reshape(-1, rows, references), length, axis=1)
         sensitivity = ifft(one[:, :, :, None] * other[:, :, None, :], axis=1)[:, : self._lags]
         flat = sensitivity.reshape(outputs.shape[0], -1)
-        # Two products of real matrices are half the work of one that takes the deviations for complex.
-        return np.asarray(flat.real @ self._deviations + 1j * (flat.imag @ self._deviations), dtype=np.complex128)
+        # One product of real matrices is half the work of one that takes the deviations for complex; BLAS wants the
+        # parts in one piece.
+        parts = np.concatenate([flat.real, flat.imag]) @ self._deviations
+        count = len(flat)
+        return np.asarray(parts[:count] + 1j * parts[count:], dtype=np.complex128)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
