@@ -6,6 +6,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+# Matrices in tests are small. Where several programs run, the waiting threads of BLAS would fight for the cores.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # How long an example takes depends on what else the machine does; speed is measured in benchmarks/.
 settings.register_profile("chladni", deadline=None)
 settings.load_profile("chladni")
