@@ -63,6 +63,8 @@ def report(pool: ProcessPoolExecutor, runs: int, cycles: int, force_noise: float
 
 def main() -> None:
     """Print the tables."""
+    # A campaign takes long: each table is shown when it's known, to a file as well.
+    sys.stdout.reconfigure(line_buffering=True)
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=500)
     parser.add_argument("--cycles", type=int, default=4000)
