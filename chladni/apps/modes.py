@@ -296,6 +296,11 @@ def _from_samples(
     if isinstance(method, CovarianceDrivenSubspace):
         if len(wanted.bands_hz) > 1:
             raise EstimateError("responses alone are identified in one band; give the band that holds them all")
+        if averaging.resolution_hz is not None:
+            raise EstimateError(
+                f"a resolution of {averaging.resolution_hz:g} Hz says nothing to the subspace method, which has no "
+                "lines; leave it out, or choose frequency domain decomposition"
+            )
         band = wanted.bands_hz[0] if wanted.bands_hz else None
         return method.identify(samples, band_hz=band, count=wanted.count, frequencies_hz=wanted.frequencies_hz)
     lead, blocks = leading_part(samples, SAMPLES_FOR_MACHINES)

@@ -86,7 +86,7 @@ def modes(
         _refuse(
             log,
             {"--reference": reference, "--operational": operational, "--channel": channel, "--resolution": resolution,
-             "--start": start, "--end": end, "--setup": setup},
+             "--start": start, "--end": end, "--setup": setup, "--stamp": None if stamp == "auto" else stamp},
         )  # fmt: skip
         found = universal_file_study(log, method=method, wanted=wanted)
     else:
@@ -117,7 +117,8 @@ def _refuse(file: Path, given: Mapping[str, object]) -> None:
     from chladni.signals.errors import SetupError
 
     for name, value in given.items():
-        if value:
+        # A zero was given, too.
+        if value is not None and value is not False:
             raise SetupError(f"{file}: {name} is for logs; a universal file holds averaged functions already")
 
 

@@ -91,6 +91,7 @@ def test_no_mode_is_an_answer_with_its_reason(run, arm_log):
         (["--reference", FORCE, "--operational"], "drop one of them"),
         (["--reference", FORCE, "--method", "fdd"], "method fdd uses responses alone"),
         (["--operational", "--method", "plscf"], "method plscf needs an excitation"),
+        (["--operational", "--resolution", 0.5], "resolution of 0.5 Hz says nothing"),
         (["--reference", "/nowhere"], "/nowhere"),
         (["--band", 400, 450], "arm.mcap: band 400 to 450 Hz"),
         (["--operational", "--start", 0, "--end", 0.1], "arm.mcap: 100 samples"),
@@ -130,10 +131,11 @@ def test_a_universal_file_without_functions_shows_the_modes_that_it_holds(run, a
     assert "5 modes" in outcome.out
 
 
-def test_options_of_logs_are_refused_for_a_universal_file(run, tmp_path):
-    outcome = run("modes", tmp_path / "arm.uff", "--operational")
+@pytest.mark.parametrize("option", [["--operational"], ["--start", 0], ["--resolution", 0], ["--stamp", "log"]])
+def test_options_of_logs_are_refused_for_a_universal_file(run, tmp_path, option):
+    outcome = run("modes", tmp_path / "arm.uff", *option)
     assert outcome.code == 2
-    assert "--operational is for logs" in outcome.err
+    assert f"{option[0]} is for logs" in outcome.err
 
 
 def test_a_universal_file_with_neither_is_refused(run, shared_data):

@@ -16,7 +16,7 @@ WORST_CONDITION = 20.0
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ResponseShape:
-    """A shape in the scale of the decomposition, length 1.
+    """A shape and its covariance, in a scale that whoever made it says.
 
     Attributes
     ----------

@@ -1,34 +1,18 @@
 """Shapes of one mode from several set-ups, brought to one scale by the channels they share."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.modal.responses.response_shapes import ResponseShape
 from chladni.modal.shapes.mac import SharedChannel
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class GrowingShape:
-    """A shape over the channels so far, in the scale of the first set-up.
-
-    Attributes
-    ----------
-    vector
-        ``[channel]``.
-    covariance
-        ``[channel, channel]`` E[d d^H] of its error d, as circular complex numbers.
-    """
-
-    vector: Complex
-    covariance: Complex
-
-
-def measured_shape(shape: Complex, std: Complex) -> GrowingShape:
+def measured_shape(shape: Complex, std: Complex) -> ResponseShape:
     """Free a shape of the error that its scale, largest component 1, has put into all components.
 
     The component that is 1 has no error by convention; its own went to the others. With errors of one size everywhere
@@ -40,12 +24,12 @@ def measured_shape(shape: Complex, std: Complex) -> GrowingShape:
     # No error bars at all: equal small errors give equal weights.
     typical = float(np.median(known)) if known.size else float(np.finfo(float).eps)
     own = np.where(own > 0, own, typical)
-    return GrowingShape(vector=np.asarray(shape, dtype=np.complex128), covariance=np.diag(own).astype(np.complex128))
+    return ResponseShape(vector=np.asarray(shape, dtype=np.complex128), covariance=np.diag(own).astype(np.complex128))
 
 
 def joined(
-    so_far: GrowingShape, shape: GrowingShape, shared: Sequence[SharedChannel], scaling: Sequence[SharedChannel]
-) -> GrowingShape:
+    so_far: ResponseShape, shape: ResponseShape, shared: Sequence[SharedChannel], scaling: Sequence[SharedChannel]
+) -> ResponseShape:
     """Add the channels of another set-up, scaled by weighted least squares on the `scaling` ones.
 
     With psi the shape so far and u the other, alpha = sum g conj(u) psi / sum g abs(u)^2 over these channels and g
@@ -84,11 +68,11 @@ def joined(
     vector[rows_a] = (1 - share) * so_far.vector[rows_a] + share * factor * other[rows_b]
     covariance = np.zeros((slopes.shape[1], slopes.shape[1]), dtype=np.complex128)
     covariance[:old, :old], covariance[old:, old:] = so_far.covariance, shape.covariance
-    return GrowingShape(vector=vector, covariance=slopes @ covariance @ slopes.conj().T)
+    return ResponseShape(vector=vector, covariance=slopes @ covariance @ slopes.conj().T)
 
 
 def _factor(
-    so_far: GrowingShape, shape: GrowingShape, other: Complex, rows_a: list[int], rows_b: list[int]
+    so_far: ResponseShape, shape: ResponseShape, other: Complex, rows_a: list[int], rows_b: list[int]
 ) -> tuple[complex, Complex, Complex]:
     """Scale of the other shape, and its derivatives by either at the shared channels."""
     mine, theirs = so_far.vector[rows_a], other[rows_b]
@@ -100,5 +84,5 @@ def _factor(
     return factor, by_first, -factor * by_first
 
 
-def _variances(shape: GrowingShape) -> Floats:
+def _variances(shape: ResponseShape) -> Floats:
     return np.asarray(np.diagonal(shape.covariance).real, dtype=np.float64)

@@ -10,7 +10,7 @@ import scipy.special
 from numpy.typing import NDArray
 
 from chladni.modal.responses.response_shapes import ResponseShape, largest_one
-from chladni.modal.responses.setup_shapes import GrowingShape, joined, measured_shape
+from chladni.modal.responses.setup_shapes import joined, measured_shape
 from chladni.modal.shapes.mac import SharedChannel, mac, shared_channels
 from chladni.signals.channel import Channel, find_channel
 from chladni.signals.errors import EstimateError
@@ -92,7 +92,7 @@ class _GrowingMode:
     """A mode that all set-ups so far have: its rows in them, and its shape over all their channels."""
 
     rows: tuple[int, ...]
-    shape: GrowingShape
+    shape: ResponseShape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -283,9 +283,8 @@ def _over_sets(mode: _GrowingMode, sets: Sequence[ModeSet], name: str, std_name:
     return _mean(values, np.array([getattr(one, std_name)[row] for one, row in pairs]))
 
 
-def _unit_shape(shape: GrowingShape) -> tuple[Complex, Complex]:
-    response = ResponseShape(vector=shape.vector, covariance=shape.covariance)
-    return largest_one(response, np.ones(shape.vector.size))
+def _unit_shape(shape: ResponseShape) -> tuple[Complex, Complex]:
+    return largest_one(shape, np.ones(shape.vector.size))
 
 
 def _differing(frequencies: Sequence[_Mean], dampings: Sequence[_Mean]) -> list[str]:
