@@ -6,8 +6,8 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.models.robot_arm import robot_arm
-from chladni.models.structure import NaturalModes, Structure
+from chladni.models.structures.robot_arm import robot_arm
+from chladni.models.structures.structure import NaturalModes, Structure
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from chladni.models.structure import Body, Joint, Structure
+from chladni.models.structures.structure import Body, Joint, Structure
 from chladni.signals.channel import Channel
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.provenance import Provenance

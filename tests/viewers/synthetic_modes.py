@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.models.robot_arm import robot_arm
-from chladni.models.structure import Structure
+from chladni.models.structures.robot_arm import robot_arm
+from chladni.models.structures.structure import Structure
 from chladni.signals.channel import Channel
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry, Point

@@ -9,7 +9,7 @@ import pytest
 from chladni.modal.shapes.joint_treatment import best_joint, treatments
 from chladni.modal.shapes.mode_words import prefixed
 from chladni.modal.shapes.relative_motion import relative_motion
-from chladni.models.structure import Body, Joint, Structure
+from chladni.models.structures.structure import Body, Joint, Structure
 from chladni.signals.channel import AXES, Channel
 from chladni.signals.geometry import Geometry, Point
 from chladni.signals.modal_scale import ModalScale

@@ -1,6 +1,6 @@
 """A robot arm as a chain of five bodies: the project's own example structure."""
 
-from chladni.models.structure import Body, Joint, Structure
+from chladni.models.structures.structure import Body, Joint, Structure
 
 
 def robot_arm() -> Structure:

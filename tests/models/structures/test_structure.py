@@ -3,7 +3,7 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from chladni.models.structure import Body, Joint, Structure
+from chladni.models.structures.structure import Body, Joint, Structure
 from chladni.signals.errors import ModelError
 
 

@@ -1,0 +1,1 @@
+"""What a model does: time and frequency characteristics, roots, influence, best values."""

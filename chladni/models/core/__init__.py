@@ -1,0 +1,1 @@
+"""Values and contracts that all simulated systems share: parameters, state space, ports, laws."""

@@ -1,0 +1,1 @@
+"""Elementary transfer functions and corrections."""

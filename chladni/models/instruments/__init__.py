@@ -1,0 +1,1 @@
+"""The virtual instruments: one a system, free of any framework."""

@@ -1,0 +1,1 @@
+"""The compiled integrator: any model with any set of laws."""

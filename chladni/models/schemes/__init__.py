@@ -1,0 +1,1 @@
+"""Block schemes with any number of loops."""
