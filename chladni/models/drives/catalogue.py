@@ -1,0 +1,12 @@
+"""The kinds of drive that there are, by the word that files and commands use."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from chladni.models.drives.drive_kind import DriveKind
+from chladni.models.drives.pneumatic_motor import PNEUMATIC_MOTOR
+
+# A kind joins by standing in this tuple.
+_KINDS: tuple[DriveKind, ...] = (PNEUMATIC_MOTOR,)
+
+DRIVES: Mapping[str, DriveKind] = MappingProxyType({kind.name: kind for kind in _KINDS})

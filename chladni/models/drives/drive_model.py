@@ -1,0 +1,160 @@
+"""A drive that can be simulated: a kind with its values, options, signals and effects."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.model import Effect, ModelKind
+from chladni.models.core.parameter import Parameters
+from chladni.models.core.simulation import Simulation
+from chladni.models.drives.drive_kind import DriveKind
+from chladni.models.drives.loop import close_loop
+from chladni.models.drives.selection import ChosenSignal, renamed, selected, signal_names
+from chladni.models.drives.validity import broken_limits
+from chladni.signals.errors import ModelError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DriveModel:
+    """One drive; made by `drive_model`.
+
+    Attributes
+    ----------
+    name
+        For people and files.
+    drive
+        What it is a drive of.
+    parameters
+        Those that act with the options chosen.
+    options
+        Word of every option.
+    inputs, outputs
+        Signals that the model shows, in order. An input that isn't shown stays at zero.
+    effects
+        In the order they attach.
+    """
+
+    name: str
+    drive: DriveKind
+    parameters: Parameters
+    options: Mapping[str, str]
+    inputs: tuple[ChosenSignal, ...]
+    outputs: tuple[ChosenSignal, ...]
+    effects: tuple[Effect, ...] = field(default=())
+
+    @property
+    def kind(self) -> ModelKind:
+        """``drive``, the word in the model file."""
+        return "drive"
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """Give the drive with some parameters replaced; `ModelError` for an unknown name or impossible value."""
+        return replace(self, parameters=self.parameters.with_values(values))
+
+    def with_effects(self, effects: Sequence[Effect]) -> Self:
+        """Give the drive with these effects in place of those it has."""
+        return replace(self, effects=tuple(effects))
+
+    def compile(self) -> CompiledModel:
+        """Give the equations.
+
+        Effects at joints and bodies attach first, then those at outputs, so that the loops feed back what the
+        sensors see; then loops are closed, then effects at inputs attach.
+        """
+        values, names = self.parameters.numbers(), signal_names((*self.inputs, *self.outputs))
+        compiled = renamed(self.drive.build(values, self.options), names)
+        outputs = {terminal.name for terminal in compiled.outputs}
+        moving = {port.name for port in compiled.ports if port.kind in ("joint", "body", "ground")}
+        compiled = _attached(compiled, [effect for effect in self.effects if effect.site in moving])
+        compiled = _attached(compiled, [effect for effect in self.effects if effect.site in outputs])
+        for loop in self.drive.loops(values, self.options):
+            compiled = close_loop(compiled, loop.renamed(names))
+        compiled = _attached(compiled, [e for e in self.effects if e.site not in moving | outputs])
+        return selected(compiled, self.inputs, self.outputs)
+
+    def flags(self, simulation: Simulation) -> tuple[str, ...]:
+        """Sentences about the limits of the drive that the simulation leaves, with numbers and time."""
+        terminals = dict(zip((choice.signal for choice in self.inputs), self.compile().inputs, strict=True))
+        limits = self.drive.limits(self.parameters.numbers(), self.options)
+        return broken_limits(limits, simulation, tuple(terminals.items()))
+
+
+def drive_model(
+    drive: DriveKind,
+    values: Mapping[str, float] | None = None,
+    options: Mapping[str, str] | None = None,
+    *,
+    name: str = "",
+    inputs: Sequence[ChosenSignal] = (),
+    outputs: Sequence[ChosenSignal] = (),
+) -> DriveModel:
+    """Make a drive of some kind.
+
+    Parameters
+    ----------
+    drive
+        One of `chladni.models.drives.catalogue.DRIVES`.
+    values
+        Parameters in SI that differ from their defaults.
+    options
+        Words that differ from their defaults.
+    name
+        Empty for the kind's.
+    inputs, outputs
+        Signals to show; none for all that the drive has with its options.
+
+    Raises
+    ------
+    ModelError
+        When a parameter, option or signal is unknown, a value impossible, or a name used twice.
+
+    Examples
+    --------
+    >>> from chladni.models.drives.catalogue import DRIVES
+    >>> motor = drive_model(DRIVES["pneumatic-motor"], {"active_area": 60e-4})
+    >>> motor.compile().states
+    ('displacement', 'velocity', 'pressure_drop')
+    """
+    chosen = drive.choices(options or {})
+    parameters = drive.with_values(values or {}, chosen)
+    _require_signals(drive, (*inputs, *outputs))
+    every = _signals(drive, parameters, chosen)
+    model = DriveModel(
+        name=name or drive.name,
+        drive=drive,
+        parameters=parameters,
+        options=chosen,
+        inputs=tuple(inputs) or every[0],
+        outputs=tuple(outputs) or every[1],
+    )
+    model.compile()
+    return model
+
+
+def _signals(
+    drive: DriveKind, parameters: Parameters, options: Mapping[str, str]
+) -> tuple[tuple[ChosenSignal, ...], tuple[ChosenSignal, ...]]:
+    compiled = drive.build(parameters.numbers(), options)
+    for loop in drive.loops(parameters.numbers(), options):
+        compiled = close_loop(compiled, loop)
+    return (
+        tuple(ChosenSignal(signal=terminal.name) for terminal in compiled.inputs),
+        tuple(ChosenSignal(signal=terminal.name) for terminal in compiled.outputs),
+    )
+
+
+def _require_signals(drive: DriveKind, chosen: Sequence[ChosenSignal]) -> None:
+    signals = [choice.signal for choice in chosen]
+    known = [terminal.name for terminal in (*drive.inputs, *drive.outputs)]
+    for signal in signals:
+        if signal not in known:
+            raise ModelError(f"{drive.name}: no signal {signal!r}; signals: {', '.join(known)}")
+        if signals.count(signal) > 1:
+            raise ModelError(f"{drive.name}: signal {signal!r} is chosen twice")
+
+
+def _attached(compiled: CompiledModel, effects: Sequence[Effect]) -> CompiledModel:
+    for effect in effects:
+        compiled = effect.attach(compiled)
+    return compiled

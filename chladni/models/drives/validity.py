@@ -1,0 +1,79 @@
+"""Where a simulation leaves what a drive's equations are valid for."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.core.port import Terminal
+from chladni.models.core.simulation import Simulation
+from chladni.signals.units import si_factor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limit:
+    """A range that a signal must not leave.
+
+    Attributes
+    ----------
+    signal
+        Name of a state, or of an input as the kind calls it.
+    low, high
+        SI; the ends belong to the range.
+    unit
+        That people read, such as ``cm``.
+    what
+        Of the signal, in words: ``displacement``.
+    why
+        What is no longer true outside, a clause: ``the piston would leave its stroke``.
+    """
+
+    signal: str
+    low: float = -inf
+    high: float = inf
+    unit: str
+    what: str
+    why: str
+
+
+def broken_limits(
+    limits: Sequence[Limit], simulation: Simulation, inputs: Sequence[tuple[str, Terminal]]
+) -> tuple[str, ...]:
+    """Give a sentence for each limit that the simulation breaks, with the numbers and the time.
+
+    `inputs` pairs the kind's word for each input with the model's terminal.
+    """
+    names = {signal: terminal.channel or terminal.name for signal, terminal in inputs}
+    sentences = []
+    for limit in limits:
+        samples = _samples(limit.signal, simulation, names)
+        if samples is not None and samples.size:
+            sentences.extend(_sentences(limit, samples, simulation.inputs.sample_rate_hz))
+    return tuple(sentences)
+
+
+def _samples(signal: str, simulation: Simulation, inputs: dict[str, str]) -> NDArray[np.float64] | None:
+    if signal in simulation.state_names:
+        return np.asarray(simulation.states[simulation.state_names.index(signal)])
+    recorded = [channel.name for channel in simulation.inputs.channels]
+    if signal in inputs and inputs[signal] in recorded:
+        return np.asarray(simulation.inputs.values[recorded.index(inputs[signal])], dtype=np.float64)
+    return None
+
+
+def _sentences(limit: Limit, samples: NDArray[np.float64], sample_rate_hz: float) -> list[str]:
+    factor, _ = si_factor(limit.unit)
+    found = []
+    for extreme, end, side, outside in (
+        (float(samples.max()), limit.high, "above", samples > limit.high),
+        (float(samples.min()), limit.low, "below", samples < limit.low),
+    ):
+        if outside.any():
+            first_s = int(np.argmax(outside)) / sample_rate_hz
+            found.append(
+                f"{limit.what} reaches {extreme / factor:.4g} {limit.unit}, {side} {end / factor:.4g} {limit.unit} "
+                f"from {first_s:.4g} s on: {limit.why}"
+            )
+    return found
