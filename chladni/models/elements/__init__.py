@@ -1,1 +1,1 @@
-"""Elementary transfer functions and corrections."""
+"""Elementary transfer functions and corrections: P to PID, dead time, electrical and mechanical networks."""

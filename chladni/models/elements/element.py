@@ -1,0 +1,68 @@
+"""An elementary block: a kind with named parameters, and one of that kind with its values."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal, Self
+
+from chladni.models.core.parameter import Parameters
+from chladni.models.elements.transfer_function import TransferFunction
+
+Group = Literal["basic", "regulator", "correction", "electrical", "mechanical"]
+Values = Mapping[str, float]
+Transfer = Callable[[Values], TransferFunction]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ElementKind:
+    """A kind of element, such as PT1.
+
+    Attributes
+    ----------
+    name
+        Word in files: ``pt1``, ``dead-time``.
+    title
+        For people.
+    formula
+        Transfer function as text, with the parameters' symbols.
+    group
+        What it's for.
+    parameters
+        With defaults, units, usual and possible ranges.
+    transfer
+        ``transfer(values) -> TransferFunction`` from every parameter's value.
+    input_unit, output_unit
+        SI units where the element has its own (ohm, newton); ``1`` where it takes those of its surroundings.
+    """
+
+    name: str
+    title: str
+    formula: str
+    group: Group
+    parameters: Parameters
+    transfer: Transfer
+    input_unit: str = "1"
+    output_unit: str = "1"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Element:
+    """One element: its kind and the values of its parameters.
+
+    Examples
+    --------
+    >>> from chladni.models.elements.catalogue import element
+    >>> element("pt1", gain=2.0, time_constant=0.1).transfer
+    TransferFunction(num=(2.0,), den=(0.1, 1.0), delay_s=0.0)
+    """
+
+    kind: ElementKind
+    parameters: Parameters
+
+    @property
+    def transfer(self) -> TransferFunction:
+        """Its transfer function."""
+        return self.kind.transfer(self.parameters.numbers())
+
+    def with_values(self, values: Values) -> Self:
+        """Give the element with some values replaced; `ModelError` for an unknown name or impossible value."""
+        return replace(self, parameters=self.parameters.with_values(values))
