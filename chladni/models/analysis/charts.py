@@ -1,0 +1,195 @@
+"""Charts of analyses, ready to draw: time, Bode, Nyquist, roots."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.analysis.frequency_curve import FrequencyCurve
+from chladni.models.analysis.linear_path import LinearPath
+from chladni.models.analysis.precision_stability import PrecisionStability
+from chladni.models.analysis.root_locus import RootLocus
+from chladni.models.analysis.step_response import TransientResponse
+from chladni.models.core.port import Terminal
+from chladni.models.core.reading import Chart, Curve
+
+Matrix = NDArray[np.float64]
+NOW = "now"
+# A Nyquist plot of an integrator goes to infinity: beyond this many times its size at its first corner it is cut.
+NYQUIST_REACH = 10.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shown:
+    """Analyses of one setting, under the label that its curves carry."""
+
+    label: str
+    step: TransientResponse
+    impulse: TransientResponse | None
+    curve: FrequencyCurve
+    path: LinearPath
+    size: float
+    load: TransientResponse | None = None
+    locus: RootLocus | None = None
+    field: PrecisionStability | None = None
+
+
+def step_charts(shown: Sequence[Shown]) -> list[Chart]:
+    """One chart for each output; each setting is a curve."""
+    first = shown[0].step
+    what = f"step of {first.source.name}, {shown[0].size:g} {first.source.unit}"
+    return [
+        Chart(
+            name=f"step.{output.name}",
+            title=f"{_words(output.name)} after a {what}",
+            x_label="time [s]",
+            y_label=_axis(output),
+            curves=_time_curves([(one.label, one.step) for one in shown], output.name),
+        )
+        for output in first.outputs
+    ]
+
+
+def response_chart(name: str, title: str, responses: Sequence[tuple[str, TransientResponse]], output: str) -> Chart:
+    """One output of several labelled responses."""
+    terminal = next(terminal for terminal in responses[0][1].outputs if terminal.name == output)
+    return Chart(
+        name=name, title=title, x_label="time [s]", y_label=_axis(terminal), curves=_time_curves(responses, output)
+    )
+
+
+def bode_charts(shown: Sequence[Shown]) -> list[Chart]:
+    """Magnitude and phase against frequency."""
+    path = shown[0].path
+    output, source = path.outputs[0], path.source
+    way = f"{_words(output.name)} over {_words(source.name)}"
+    common = {"x_label": "frequency [Hz]", "x_scale": "log"}
+    return [
+        Chart(
+            name="bode.magnitude",
+            title=f"Magnitude of {way}",
+            y_label=f"magnitude [dB re 1 {_ratio(output.unit, source.unit)}]",
+            curves=tuple(
+                _curve(one.label, one.curve.frequency_hz, _finite(one.curve.magnitude_db())) for one in shown
+            ),
+            x_label=common["x_label"],
+            x_scale="log",
+        ),
+        Chart(
+            name="bode.phase",
+            title=f"Phase of {way}",
+            y_label="phase [deg]",
+            curves=tuple(_curve(one.label, one.curve.frequency_hz, one.curve.phase_deg) for one in shown),
+            x_label=common["x_label"],
+            x_scale="log",
+        ),
+    ]
+
+
+def nyquist_chart(shown: Sequence[Shown]) -> Chart:
+    """Locus of the frequency response in the complex plane, for positive frequencies, and the point -1."""
+    path = shown[0].path
+    unit = _ratio(path.outputs[0].unit, path.source.unit)
+    curves = []
+    for one in shown:
+        response = one.curve.response.copy()
+        if one.path.integrators():
+            reach = NYQUIST_REACH * float(np.median(np.abs(response)))
+            response[np.abs(response) > reach] = np.nan
+        curves.append(_curve(one.label, response.real, response.imag))
+    curves.append(Curve(label="-1", x=np.array([-1.0]), y=np.zeros(1), points=True))
+    return Chart(
+        name="nyquist",
+        title=f"Nyquist plot of {_words(path.outputs[0].name)} over {_words(path.source.name)}",
+        x_label=f"real part [{unit}]",
+        y_label=f"imaginary part [{unit}]",
+        curves=tuple(curves),
+        equal=True,
+    )
+
+
+def pole_chart(shown: Sequence[Shown]) -> Chart:
+    """Poles and zeros in the complex plane."""
+    curves = []
+    for one in shown:
+        curves.append(_points(f"poles {one.label}" if len(shown) > 1 else "poles", one.path.poles))
+        if one.curve.zeros.size:
+            curves.append(_points(f"zeros {one.label}" if len(shown) > 1 else "zeros", one.curve.zeros))
+    name = _words(shown[0].path.outputs[0].name)
+    return Chart(
+        name="poles",
+        title=f"Poles and zeros of {name} over {_words(shown[0].path.source.name)}",
+        x_label="real part [rad/s]",
+        y_label="imaginary part [rad/s]",
+        curves=tuple(curves),
+    )
+
+
+def locus_chart(locus: RootLocus) -> Chart:
+    """Branches of a root locus, with where they begin and end."""
+    marks = [(label, roots) for label, roots in (("poles", locus.start), ("zeros", locus.end)) if roots.size]
+    unit = "" if locus.unit == "1" else f" {locus.unit}"
+    return Chart(
+        name="root-locus",
+        title=f"Root locus against {locus.name}, {locus.values[0]:.3g} to {locus.values[-1]:.3g}{unit}",
+        x_label="real part [rad/s]",
+        y_label="imaginary part [rad/s]",
+        curves=(
+            *(_curve(f"root {place + 1}", branch.real, branch.imag) for place, branch in enumerate(locus.roots)),
+            *(_points(label, roots) for label, roots in marks),
+        ),
+    )
+
+
+def precision_chart(field: PrecisionStability) -> Chart:
+    """Real part of each root against the error that stays."""
+    errors = {
+        "step": "share of a step that is not followed [1]",
+        "ramp": "lag behind a ramp [s]",
+        "parabola": "lag behind a parabola [s^2]",
+    }
+    return Chart(
+        name="precision-stability",
+        title="Precision-stability field: roots against the error that stays, as the loop gain rises",
+        x_label=errors[field.follows],
+        y_label="real part of the roots [1/s]",
+        curves=tuple(
+            _curve(f"root {place + 1}", field.error, branch.real) for place, branch in enumerate(field.roots)
+        ),
+        x_scale="log",
+    )
+
+
+def _time_curves(responses: Sequence[tuple[str, TransientResponse]], output: str) -> tuple[Curve, ...]:
+    curves = []
+    for label, response in responses:
+        row = [terminal.name for terminal in response.outputs].index(output)
+        curves.append(_curve(label, response.time_s[row], response.values[row]))
+    return tuple(curves)
+
+
+def _curve(label: str, x: Matrix, y: Matrix) -> Curve:
+    return Curve(label=label, x=np.asarray(x, dtype=np.float64), y=np.asarray(y, dtype=np.float64))
+
+
+def _points(label: str, roots: NDArray[np.complex128]) -> Curve:
+    return Curve(label=label, x=roots.real.copy(), y=roots.imag.copy(), points=True)
+
+
+def _finite(values: Matrix) -> Matrix:
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _axis(terminal: Terminal) -> str:
+    return f"{_words(terminal.name)} [{terminal.unit}]"
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _ratio(over: str, under: str) -> str:
+    if over == under:
+        return "1"
+    return over if under == "1" else f"({over})/({under})"

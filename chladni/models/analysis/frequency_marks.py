@@ -1,0 +1,131 @@
+"""Where a frequency response passes levels of phase and magnitude: margins, critical frequency, bandwidth, peak."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from chladni.models.analysis.frequency_curve import FrequencyCurve
+from chladni.models.analysis.resolvent import Resolvent
+
+Matrix = NDArray[np.float64]
+
+# Phases that touch a level by rounding only (two integrators lie at -180 degrees for ever) don't cross it.
+ROUNDING_DEG = 1e-7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Margin:
+    """One crossing that decides on stability when the loop is closed with unit negative feedback.
+
+    Attributes
+    ----------
+    frequency_hz
+        Where it is.
+    gain
+        Factor by which the loop gain may rise (or, under 1, must fall) to the limit of stability; at a crossing of
+        -180 degrees. 1 at a crossing of magnitude 1.
+    phase_deg
+        Phase above -180 degrees, at a crossing of magnitude 1. 0 at a crossing of -180 degrees.
+    """
+
+    frequency_hz: float
+    gain: float
+    phase_deg: float
+
+
+class FrequencyMarks:
+    """Finds crossings on the grid of a curve, and each to rounding by the exact response.
+
+    Parameters
+    ----------
+    curve
+        Of the path.
+    resolvent
+        Of the same path.
+    dead_time_s
+        Of the same path, outside of loops.
+    """
+
+    def __init__(self, curve: FrequencyCurve, resolvent: Resolvent, dead_time_s: float) -> None:
+        self._curve = curve
+        self._resolvent = resolvent
+        self._dead_time_s = dead_time_s
+        self._omega = 2 * pi * curve.frequency_hz
+
+    def response(self, omega: float) -> complex:
+        """Give the response at one angular frequency in rad/s, dead time included."""
+        value = self._resolvent(np.array([omega]))[0]
+        return complex(value * np.exp(-1j * omega * self._dead_time_s))
+
+    def phase_crossings(self, level_deg: float, *, falling_only: bool = False) -> list[float]:
+        """Give angular frequencies at which the unwrapped phase passes a level."""
+        away = self._curve.phase_deg - level_deg
+        away = np.where(np.abs(away) < ROUNDING_DEG, 0.0, away)
+        turn = np.exp(-1j * np.radians(level_deg))
+        return [
+            self._refined(lambda omega: float(np.angle(self.response(omega) * turn)), point)
+            for point in _sign_changes(away)
+            if not falling_only or away[point] > 0
+        ]
+
+    def magnitude_crossings(self, level: float, *, falling_only: bool = False) -> list[float]:
+        """Give angular frequencies at which the magnitude passes a level."""
+        away = np.abs(self._curve.response) - level
+        return [
+            self._refined(lambda omega: abs(self.response(omega)) - level, point)
+            for point in _sign_changes(away)
+            if not falling_only or away[point] > 0
+        ]
+
+    def gain_margins(self) -> list[Margin]:
+        """Give every crossing of -180 degrees, whole turns more or less included, by rising frequency."""
+        lowest, highest = float(self._curve.phase_deg.min()), float(self._curve.phase_deg.max())
+        turns = range(int(np.ceil((lowest + 180) / 360)), int(np.floor((highest + 180) / 360)) + 1)
+        found = sorted(omega for turn in turns for omega in self.phase_crossings(360.0 * turn - 180))
+        return [Margin(frequency_hz=w / (2 * pi), gain=1 / abs(self.response(w)), phase_deg=0.0) for w in found]
+
+    def phase_margins(self) -> list[Margin]:
+        """Give every crossing of magnitude 1, by rising frequency; margins from -180 to 180 degrees."""
+        return [
+            Margin(frequency_hz=w / (2 * pi), gain=1.0, phase_deg=float(np.degrees(np.angle(-self.response(w)))))
+            for w in self.magnitude_crossings(1.0)
+        ]
+
+    def peak(self) -> tuple[float, float] | None:
+        """Angular frequency and magnitude of the highest peak inside the curve; None without one."""
+        size = np.abs(self._curve.response)
+        inner = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
+        if not inner.size:
+            return None
+        top = int(inner[np.argmax(size[inner])])
+        # Rounding on a flat part makes peaks too; a real one rises above both ends of the curve's dip.
+        if size[top] <= size[:top].min() * (1 + 1e-9):
+            return None
+        omega = self._turning(float(self._omega[top - 1]), float(self._omega[top + 1]))
+        return omega, abs(self.response(omega))
+
+    def _turning(self, low: float, high: float) -> float:
+        """Angular frequency between two at which the magnitude stops rising."""
+
+        def rise(omega: float) -> float:
+            value, slope = self._resolvent.value_and_slope(omega)
+            return float((value.conjugate() * slope).real) / abs(value) ** 2
+
+        if rise(low) * rise(high) > 0:
+            return 0.5 * (low + high)
+        return float(brentq(rise, low, high, xtol=1e-15 * high, rtol=1e-14))
+
+    def _refined(self, away: Callable[[float], float], point: int) -> float:
+        low, high = float(self._omega[point]), float(self._omega[point + 1])
+        if away(low) * away(high) > 0:
+            # Only rounding parts them: the crossing lies at an end.
+            return low if abs(away(low)) < abs(away(high)) else high
+        return float(brentq(away, low, high, xtol=1e-15 * high, rtol=1e-14))
+
+
+def _sign_changes(signal: Matrix) -> list[int]:
+    return [int(point) for point in np.flatnonzero(signal[:-1] * signal[1:] < 0)]

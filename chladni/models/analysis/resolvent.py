@@ -1,0 +1,67 @@
+"""Frequency response of a linear path at many frequencies, by one Schur decomposition."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import schur
+
+from chladni.models.analysis.linear_path import LinearPath
+
+Matrix = NDArray[np.float64]
+ComplexMatrix = NDArray[np.complex128]
+
+
+class Resolvent:
+    """Evaluates ``H(j omega) = c (j omega I - A)^-1 b + d`` of a path to one output.
+
+    With ``A = Q T Q^H``, T upper triangular, each frequency takes a back substitution, done for all frequencies at
+    once (Laub 1981, with the complex Schur form in place of Hessenberg's).
+
+    Parameters
+    ----------
+    path
+        To one output.
+    """
+
+    def __init__(self, path: LinearPath) -> None:
+        self._path = path
+        triangle, basis = schur(path.a, output="complex") if path.b.size else (np.empty((0, 0)), np.empty((0, 0)))
+        self._triangle = np.asarray(triangle, dtype=np.complex128)
+        # Rounding errors of integrators would put a corner where there is none.
+        diagonal = np.diag(self._triangle).copy()
+        if path.integrators() and path.poles.any():
+            diagonal[np.abs(diagonal) <= 1e-9 * np.abs(path.poles).max()] = 0
+        self._diagonal = diagonal
+        self._entry = np.asarray(basis.conj().T @ path.b, dtype=np.complex128)
+        self._exit = np.asarray(path.c[0] @ basis, dtype=np.complex128)
+        if path.looped is not None:
+            names = [terminal.name for terminal in path.looped.inputs]
+            self._column = names.index(path.source.name)
+            self._row = path.looped.outputs.index(path.outputs[0])
+
+    def __call__(self, omega: Matrix) -> ComplexMatrix:
+        """Give H at angular frequencies in rad/s, ``[frequency]``, without the dead time outside of loops."""
+        omega = np.atleast_1d(np.asarray(omega, dtype=np.float64))
+        if self._path.looped is not None:
+            looped = self._path.looped.frequency_response(omega / (2 * np.pi))[self._row, self._column]
+            return np.asarray(looped * np.exp(1j * omega * self._path.dead_time_s[0]), dtype=np.complex128)
+        return self.at(np.asarray(1j * omega, dtype=np.complex128))
+
+    def at(self, s: ComplexMatrix) -> ComplexMatrix:
+        """Give H at points s of the complex plane in rad/s, ``[point]``; not with a dead time inside a loop."""
+        count = self._diagonal.size
+        solved = np.empty((count, s.size), dtype=np.complex128)
+        for row in range(count - 1, -1, -1):
+            coupled = self._triangle[row, row + 1 :] @ solved[row + 1 :]
+            solved[row] = (self._entry[row] + coupled) / (s - self._diagonal[row])
+        return np.asarray(self._exit @ solved + self._path.d[0], dtype=np.complex128)
+
+    def value_and_slope(self, omega: float) -> tuple[complex, complex]:
+        """Give H and dH/d omega at one angular frequency, without the dead time outside of loops."""
+        if self._path.looped is not None:
+            # No closed form through a loop with dead time: central differences, their error about 1e-10.
+            step = 1e-5 * omega
+            before, value, after = self(np.array([omega - step, omega, omega + step]))
+            return complex(value), complex((after - before) / (2 * step))
+        inverse = np.linalg.inv(1j * omega * np.eye(self._path.b.size) - self._path.a)
+        left, right = self._path.c[0] @ inverse, inverse @ self._path.b
+        return complex(left @ self._path.b + self._path.d[0]), complex(-1j * (left @ right))
