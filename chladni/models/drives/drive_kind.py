@@ -43,8 +43,7 @@ class DriveKind:
         Choices between words, such as ``end_stops``: off or on.
     build
         ``build(values, options) -> CompiledModel``: the equations before its loops are closed, with all of its
-        inputs, outputs, ports and own laws. Outputs that feed a loop have an ``output`` port, inputs that a loop
-        commands an ``input`` port.
+        inputs, outputs, ports and own laws. Signals that a loop goes through get their ports when it's closed.
     loops
         ``loops(values, options) -> [Loop, ...]``, the innermost first.
     limits

@@ -11,6 +11,7 @@ from chladni.models.core.simulation import Simulation
 from chladni.models.drives.drive_kind import DriveKind
 from chladni.models.drives.loop import close_loop
 from chladni.models.drives.selection import ChosenSignal, renamed, selected, signal_names
+from chladni.models.drives.signal_ports import with_output_port
 from chladni.models.drives.validity import broken_limits
 from chladni.signals.errors import ModelError
 
@@ -66,10 +67,13 @@ class DriveModel:
         compiled = renamed(self.drive.build(values, self.options), names)
         outputs = {terminal.name for terminal in compiled.outputs}
         moving = {port.name for port in compiled.ports if port.kind in ("joint", "body", "ground")}
+        loops = [loop.renamed(names) for loop in self.drive.loops(values, self.options)]
+        for name in (terminal.name for loop in loops for terminal in loop.controller.inputs):
+            compiled = with_output_port(compiled, name) if name in outputs else compiled
         compiled = _attached(compiled, [effect for effect in self.effects if effect.site in moving])
         compiled = _attached(compiled, [effect for effect in self.effects if effect.site in outputs])
-        for loop in self.drive.loops(values, self.options):
-            compiled = close_loop(compiled, loop.renamed(names))
+        for loop in loops:
+            compiled = close_loop(compiled, loop)
         compiled = _attached(compiled, [e for e in self.effects if e.site not in moving | outputs])
         return selected(compiled, self.inputs, self.outputs)
 

@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Terminal
+from chladni.models.core.port_law import PortLaw
 from chladni.models.core.state_space import StateSpace
+from chladni.models.drives.signal_ports import with_input_port
 from chladni.signals.errors import ModelError
 
 Matrix = NDArray[np.float64]
@@ -33,6 +35,13 @@ class Loop:
 
     controller: StateSpace
     tracking: tuple[float, ...] = ()
+    #: Laws at the commanded input, such as a limit of the command; their ``port`` is filled in.
+    laws: tuple[PortLaw, ...] = ()
+
+    @property
+    def command(self) -> str:
+        """Name of the input that the loop commands."""
+        return self.controller.outputs[0].name
 
     def renamed(self, names: Mapping[str, str]) -> "Loop":
         """Give the same loop with other names of its signals."""
@@ -56,8 +65,9 @@ def close_loop(plant: CompiledModel, loop: Loop) -> CompiledModel:
         When the command acts at once on what is fed back and the loop has no solution (``1 - D_k D = 0``); when
         something acts on the samples of a signal inside the loop.
     """
-    command = plant.column_of(loop.controller.outputs[0].name)
     _require_no_maps(plant, loop)
+    plant = with_input_port(plant, loop.command, loop.laws)
+    command = plant.column_of(loop.command)
     references = _references(plant, loop)
     n, m, k, r = len(plant.states), plant.columns, len(loop.controller.states), len(references)
     rest = [column for column in range(m) if column != command]
@@ -117,7 +127,7 @@ def _command_row(loop: Loop, own: Matrix, taken: Matrix, direct: Matrix) -> Matr
     around = (loop.controller.d @ direct).item()
     if abs(1.0 - around) < _ILL_POSED * max(1.0, abs(around)):
         raise ModelError(
-            f"the loop over {loop.controller.outputs[0].name!r} is ill-posed: its command acts on what it feeds back "
+            f"the loop over {loop.command!r} is ill-posed: its command acts on what it feeds back "
             "at once with a gain of one; put a lag into the loop"
         )
     return np.asarray((loop.controller.c @ own + loop.controller.d @ taken)[0] / (1.0 - around), dtype=np.float64)
@@ -126,7 +136,7 @@ def _command_row(loop: Loop, own: Matrix, taken: Matrix, direct: Matrix) -> Matr
 def _tracking(plant: CompiledModel, loop: Loop, columns: int) -> Matrix:
     rows = np.zeros((len(loop.controller.states), columns))
     if loop.tracking:
-        port = plant.port_index(loop.controller.outputs[0].name, "input")
+        port = plant.port_index(loop.command, "input")
         rows[:, columns - len(plant.ports) + port] = loop.tracking
     return rows
 
@@ -143,7 +153,7 @@ def _assembled(plant: CompiledModel, loop: Loop, references: list[int], old: Mat
     c, d, h = split(plant.c, plant.d, plant.h)
     pd, qd, rd = split(plant.displacement_state, plant.displacement_column, plant.displacement_port)
     ps, qs, rs = split(plant.velocity_state, plant.velocity_column, plant.velocity_port)
-    commanded = [t.name for t in plant.inputs].index(loop.controller.outputs[0].name)
+    commanded = [t.name for t in plant.inputs].index(loop.command)
     return replace(
         plant,
         a=np.vstack([a, rates[:, :states]]), b=np.vstack([b, rates[:, states:end]]), c=c, d=d,

@@ -60,11 +60,11 @@ _PARAMETERS = Parameters(
         ),
         Parameter(
             name="rated_flow", value=100e-6, unit="m^3/s", low=20e-6, high=100e-6, minimum=0.0, maximum=1.0,
-            symbol="Q", shown_unit="cm^3/s", role="function", meaning="largest flow that the supply gives; beyond it is flagged",
+            symbol="Q", shown_unit="cm^3/s", role="function", meaning="largest flow of the supply; beyond is flagged",
         ),
         Parameter(
             name="rated_load", value=300.0, unit="N", low=100.0, high=300.0, minimum=0.0, maximum=1e6, symbol="F_r",
-            role="function", meaning="largest resisting force; beyond it is flagged",
+            role="function", meaning="largest resisting force; beyond is flagged",
         ),
         Parameter(
             name="stop_stiffness", value=1e8, unit="N/m", low=1e6, high=1e9, minimum=1.0, maximum=1e12,
