@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import pi
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,23 +13,43 @@ from chladni.signals.value import Value
 
 GROUND = "ground"
 
+Motion = Literal["translation", "rotation"]
+
+# A double pole at zero, such as of a free body, comes out as a pair that is apart by the root of the rounding.
+AT_REST = 1e-7
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Body:
-    """A rigid body with one degree of freedom; `mass` in kg, `position` in m for drawing only."""
+    """A rigid body with one degree of freedom.
+
+    Attributes
+    ----------
+    mass
+        In kg; of a body that rotates its moment of inertia in kg m^2.
+    position
+        In m, for drawing only.
+    motion
+        Along an axis, or about one.
+    """
 
     name: str
     mass: float
     position: Vector = (0.0, 0.0, 0.0)
+    motion: Motion = "translation"
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.mass) and self.mass > 0):
-            raise ModelError(f"body {self.name!r}: mass {self.mass} kg must be finite and positive")
+            what, unit = ("mass", "kg") if self.motion == "translation" else ("inertia", "kg m^2")
+            raise ModelError(f"body {self.name!r}: {what} {self.mass} {unit} must be finite and positive")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
-    """A spring (N/m) and a damper (N s/m) in parallel between two bodies, or between ``ground`` and a body."""
+    """A spring and a damper in parallel between two bodies, or between ``ground`` and a body.
+
+    In N/m and N s/m; between bodies that rotate in N m/rad and N m s/rad.
+    """
 
     name: str
     between: tuple[str, str]
@@ -70,7 +91,8 @@ class Structure:
     Raises
     ------
     ModelError
-        When names repeat or a joint names a body that isn't there.
+        When names repeat, a joint names a body that isn't there, has one thing at both ends, or joins a body that
+        moves along the axis to one that rotates about it.
 
     Examples
     --------
@@ -86,13 +108,13 @@ class Structure:
     joints: tuple[Joint, ...]
 
     def __post_init__(self) -> None:
-        names = [body.name for body in self.bodies] + [joint.name for joint in self.joints]
-        for name in names:
-            if names.count(name) > 1 or name == GROUND:
+        taken = {GROUND}
+        for name in [*(body.name for body in self.bodies), *(joint.name for joint in self.joints)]:
+            if name in taken:
                 raise ModelError(f"the name {name!r} is taken; names are unique and {GROUND!r} is reserved")
+            taken.add(name)
         for joint in self.joints:
-            for end in joint.between:
-                self._degree(end, joint.name)
+            self._require_ends(joint)
 
     def mass_matrix(self) -> NDArray[np.float64]:
         """``[body, body]`` in kg."""
@@ -138,7 +160,7 @@ class Structure:
             ]
         )
         poles, vectors = np.linalg.eig(state)
-        oscillating = np.flatnonzero(poles.imag > 0)
+        oscillating = np.flatnonzero(poles.imag > AT_REST * np.abs(poles).max(initial=0.0))
         chosen = oscillating[np.argsort(np.abs(poles[oscillating]))]
         shapes = vectors[:count, chosen].T
         largest = np.argmax(np.abs(shapes), axis=1, keepdims=True)
@@ -180,21 +202,44 @@ class Structure:
                 return row
         raise ModelError(f"no body {name!r}; bodies: {', '.join(body.name for body in self.bodies)}")
 
-    def _degree(self, end: str, joint: str) -> int | None:
-        if end == GROUND:
-            return None
+    def pattern(self, between: tuple[str, str]) -> NDArray[np.float64]:
+        """``[body]``: +1 at the second end, -1 at the first, 0 at the ground.
+
+        The motion between two ends is its product with the motion of all bodies; a force between them acts along it.
+        """
+        pattern = np.zeros(len(self.bodies))
+        for end, sign in zip(between, (-1.0, 1.0), strict=True):
+            if end != GROUND:
+                pattern[self.body_index(end)] += sign
+        return pattern
+
+    def joint_named(self, name: str) -> Joint:
+        """Give the named joint; `ModelError` naming those there are when it's missing."""
+        for joint in self.joints:
+            if joint.name == name:
+                return joint
+        raise ModelError(f"no joint {name!r}; joints: {', '.join(joint.name for joint in self.joints) or 'none'}")
+
+    def motion_of(self, joint: Joint) -> Motion:
+        """Whether a joint is between bodies that translate or that rotate."""
+        moving = next(end for end in joint.between if end != GROUND)
+        return self.bodies[self.body_index(moving)].motion
+
+    def _require_ends(self, joint: Joint) -> None:
+        first, second = joint.between
+        if first == second:
+            raise ModelError(f"joint {joint.name!r}: both ends are {first!r}; a joint joins two different ones")
         try:
-            return self.body_index(end)
+            motions = {self.bodies[self.body_index(end)].motion for end in joint.between if end != GROUND}
         except ModelError as error:
-            raise ModelError(f"joint {joint!r}: {error}") from None
+            raise ModelError(f"joint {joint.name!r}: {error}") from None
+        if len(motions) > 1:
+            raise ModelError(
+                f"joint {joint.name!r}: {first!r} and {second!r} can't be joined, one translates and one rotates"
+            )
 
     def _assemble(self, coefficients: list[float]) -> NDArray[np.float64]:
-        matrix = np.zeros((len(self.bodies), len(self.bodies)))
-        for joint, coefficient in zip(self.joints, coefficients, strict=True):
-            ends = [self._degree(end, joint.name) for end in joint.between]
-            pattern = np.zeros(len(self.bodies))
-            for end, sign in zip(ends, (-1.0, 1.0), strict=True):
-                if end is not None:
-                    pattern[end] = sign
-            matrix += coefficient * np.outer(pattern, pattern)
+        patterns = np.array([self.pattern(joint.between) for joint in self.joints])
+        patterns = patterns.reshape(len(self.joints), len(self.bodies))
+        matrix: NDArray[np.float64] = patterns.T @ (np.asarray(coefficients)[:, None] * patterns)
         return matrix

@@ -1,0 +1,262 @@
+"""The equations of a structure before its loops are closed.
+
+With x the displacement of all bodies relative to the ground, f what acts on them, a the ground's acceleration::
+
+    M x'' + C x' + K x = f - M 1 a
+
+In coordinates that move with the ground a floor that shakes needs no states of its own. A body whose motion is
+prescribed has no state either: its displacement, velocity and acceleration are columns of u.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.port import Port, PortKind, Terminal
+from chladni.models.structures.structure import GROUND, Motion, Structure
+from chladni.models.structures.structure_input import StructureInput
+from chladni.models.structures.structure_output import StructureOutput, measure_unit
+
+Matrix = NDArray[np.float64]
+
+
+def compile_plant(
+    structure: Structure,
+    inputs: Sequence[StructureInput],
+    outputs: Sequence[StructureOutput],
+    *,
+    fed_back: Sequence[str] = (),
+) -> CompiledModel:
+    """Compile a structure with its inputs and outputs, all loops open.
+
+    Parameters
+    ----------
+    inputs
+        Without disturbances of controllers.
+    fed_back
+        Outputs that feed a controller: they have an ``output`` port, since what acts on them acts in the loop.
+
+    Returns
+    -------
+    States are displacement and velocity of each body that is free to move; ports are of kind ``joint``, ``body``,
+    ``ground``, ``actuation`` for each force, and ``output`` for each of `fed_back`.
+    """
+    return _Plant(structure, tuple(inputs), tuple(outputs), tuple(fed_back)).compiled()
+
+
+def force_pattern(structure: Structure, at: str) -> Matrix:
+    """``[body]``: how a unit force at a body, or of an actuator at a joint, acts on the bodies."""
+    if any(body.name == at for body in structure.bodies):
+        return structure.pattern((GROUND, at))
+    return structure.pattern(structure.joint_named(at).between)
+
+
+def motion_at(structure: Structure, at: str) -> Motion:
+    """Whether what a body or joint does is a translation or a rotation."""
+    for body in structure.bodies:
+        if body.name == at:
+            return body.motion
+    return structure.motion_of(structure.joint_named(at))
+
+
+def shaken_motion(structure: Structure) -> Motion:
+    """What the ground does when it shakes: it translates, unless all bodies rotate."""
+    return "translation" if any(body.motion == "translation" for body in structure.bodies) else "rotation"
+
+
+def input_terminal(structure: Structure, one: StructureInput) -> Terminal:
+    """Name, unit and channel of an input that isn't a disturbance."""
+    if one.kind == "base_acceleration":
+        unit = measure_unit("acceleration", shaken_motion(structure))
+    else:
+        unit = measure_unit("force" if one.kind == "force" else "displacement", motion_at(structure, one.at))
+    return Terminal(name=one.name, unit=unit, channel=one.channel, derivatives=2 if one.kind == "displacement" else 0)
+
+
+def output_terminal(structure: Structure, one: StructureOutput) -> Terminal:
+    """Name, unit and channel of an output."""
+    unit = measure_unit(one.measures, motion_at(structure, one.at))
+    return Terminal(name=one.name, unit=unit, channel=one.channel)
+
+
+class _Plant:
+    """Writes every signal as a row over (states, columns of u, what laws add at ports)."""
+
+    def __init__(
+        self,
+        structure: Structure,
+        inputs: tuple[StructureInput, ...],
+        outputs: tuple[StructureOutput, ...],
+        fed_back: tuple[str, ...],
+    ) -> None:
+        self._structure, self._inputs, self._outputs, self._fed_back = structure, inputs, outputs, fed_back
+        self._terminals = tuple(input_terminal(structure, one) for one in inputs)
+        self._output_terminals = tuple(output_terminal(structure, one) for one in outputs)
+        prescribed = {one.at for one in inputs if one.kind == "displacement"}
+        self._free = [row for row, body in enumerate(structure.bodies) if body.name not in prescribed]
+        self._ports = self._all_ports()
+        self._n = 2 * len(self._free)
+        self._m = sum(1 + terminal.derivatives for terminal in self._terminals)
+        self._size = self._n + self._m + len(self._ports)
+        self._ground = self._ground_row()
+        self._displacement, self._velocity, self._acceleration = self._motion()
+
+    def compiled(self) -> CompiledModel:
+        """Give the model."""
+        outputs = self._stack([self._output_row(one) for one in self._outputs])
+        displacement, velocity = self._port_rows(outputs)
+        for name in self._fed_back:
+            outputs[self._output_place(name), self._port(name, "output")] += 1.0
+        rates = np.vstack([self._velocity[self._free], self._acceleration[self._free]])
+        names = [self._structure.bodies[row].name for row in self._free]
+        n, u, f = slice(0, self._n), slice(self._n, self._n + self._m), slice(self._n + self._m, None)
+        return CompiledModel(
+            a=rates[:, n],
+            b=rates[:, u],
+            c=outputs[:, n],
+            d=outputs[:, u],
+            g=rates[:, f],
+            h=outputs[:, f],
+            displacement_state=displacement[:, n],
+            displacement_column=displacement[:, u],
+            displacement_port=displacement[:, f],
+            velocity_state=velocity[:, n],
+            velocity_column=velocity[:, u],
+            velocity_port=velocity[:, f],
+            inputs=self._terminals,
+            outputs=self._output_terminals,
+            states=(*(f"{name}.displacement" for name in names), *(f"{name}.velocity" for name in names)),
+            ports=self._ports,
+        )
+
+    def _all_ports(self) -> tuple[Port, ...]:
+        structure = self._structure
+        ports = []
+        for joint in structure.joints:
+            force, motion = _units(structure.motion_of(joint))
+            ports.append(
+                Port(
+                    name=joint.name,
+                    kind="joint",
+                    unit=force,
+                    displacement_unit=motion,
+                    stiffness=joint.stiffness,
+                    damping=joint.damping,
+                )
+            )
+        for body in structure.bodies:
+            force, motion = _units(body.motion)
+            ports.append(Port(name=body.name, kind="body", unit=force, displacement_unit=motion))
+        shaken = shaken_motion(structure)
+        ports.append(Port(name=GROUND, kind="ground", unit=measure_unit("acceleration", shaken)))
+        for one in self._inputs:
+            if one.kind == "force":
+                force, motion = _units(motion_at(structure, one.at))
+                ports.append(Port(name=one.name, kind="actuation", unit=force, displacement_unit=motion))
+        for name in self._fed_back:
+            unit = self._output_terminals[self._output_place(name)].unit
+            ports.append(Port(name=name, kind="output", unit=unit, displacement_unit=unit))
+        return tuple(ports)
+
+    def _motion(self) -> tuple[Matrix, Matrix, Matrix]:
+        """Displacement, velocity and acceleration of each body, relative to the ground, ``[body, signal]``."""
+        structure, count = self._structure, len(self._structure.bodies)
+        displacement, velocity = np.zeros((2, count, self._size))
+        for place, row in enumerate(self._free):
+            displacement[row, place] = velocity[row, len(self._free) + place] = 1.0
+        prescribed = [(one, self._column(one.name)) for one in self._inputs if one.kind == "displacement"]
+        for one, column in prescribed:
+            row = structure.body_index(one.at)
+            displacement[row, column] = velocity[row, column + 1] = 1.0
+        force = self._applied() - structure.stiffness_matrix() @ displacement - structure.damping_matrix() @ velocity
+        acceleration = force / np.diag(structure.mass_matrix())[:, None] - np.outer(self._shaken(), self._ground)
+        for one, column in prescribed:
+            acceleration[structure.body_index(one.at)] = self._unit(column + 2)
+        return displacement, velocity, acceleration
+
+    def _applied(self) -> Matrix:
+        """Force on each body from inputs and laws, ``[body, signal]``."""
+        structure = self._structure
+        applied = np.zeros((len(structure.bodies), self._size))
+        for one in self._inputs:
+            if one.kind == "force":
+                pattern = force_pattern(structure, one.at)
+                applied[:, self._column(one.name)] = pattern
+                applied[:, self._port(one.name, "actuation")] = pattern
+        for joint in structure.joints:
+            applied[:, self._port(joint.name, "joint")] = -structure.pattern(joint.between)
+        for row, body in enumerate(structure.bodies):
+            applied[row, self._port(body.name, "body")] = 1.0
+        return applied
+
+    def _ground_row(self) -> Matrix:
+        row = self._unit(self._port(GROUND, "ground"))
+        for one in self._inputs:
+            if one.kind == "base_acceleration":
+                row[self._column(one.name)] = 1.0
+        return row
+
+    def _shaken(self) -> Matrix:
+        """``[body]``: 1 for a body that feels the ground's acceleration."""
+        motion = shaken_motion(self._structure)
+        return np.array([float(body.motion == motion) for body in self._structure.bodies])
+
+    def _output_row(self, one: StructureOutput) -> Matrix:
+        pattern = force_pattern(self._structure, one.at)
+        if one.measures == "force":
+            joint = self._structure.joint_named(one.at)
+            linear = joint.stiffness * self._displacement + joint.damping * self._velocity
+            return np.asarray(pattern @ linear + self._unit(self._port(joint.name, "joint")))
+        of_bodies = {
+            "displacement": self._displacement,
+            "velocity": self._velocity,
+            # An accelerometer feels the ground's acceleration too; between the ends of a joint it cancels.
+            "acceleration": self._acceleration + np.outer(self._shaken(), self._ground),
+        }[one.measures]
+        if one.measures == "acceleration" and one.at in [joint.name for joint in self._structure.joints]:
+            of_bodies = self._acceleration
+        return np.asarray(pattern @ of_bodies)
+
+    def _port_rows(self, outputs: Matrix) -> tuple[Matrix, Matrix]:
+        """Displacement and velocity at each port, ``[port, signal]``."""
+        structure = self._structure
+        displacement, velocity = np.zeros((2, len(self._ports), self._size))
+        at = {one.name: one.at for one in self._inputs}
+        for place, port in enumerate(self._ports):
+            if port.kind == "output":
+                displacement[place] = outputs[self._output_place(port.name)]
+            elif port.kind != "ground":
+                pattern = force_pattern(structure, at[port.name] if port.kind == "actuation" else port.name)
+                displacement[place], velocity[place] = pattern @ self._displacement, pattern @ self._velocity
+        return displacement, velocity
+
+    def _column(self, name: str) -> int:
+        """Place of the input's first column among all signals."""
+        place = self._n
+        for terminal in self._terminals:
+            if terminal.name == name:
+                return place
+            place += 1 + terminal.derivatives
+        raise AssertionError(name)
+
+    def _port(self, name: str, kind: PortKind) -> int:
+        """Place of what laws add at a port, among all signals."""
+        found = next(place for place, port in enumerate(self._ports) if (port.name, port.kind) == (name, kind))
+        return self._n + self._m + found
+
+    def _output_place(self, name: str) -> int:
+        return next(place for place, one in enumerate(self._outputs) if one.name == name)
+
+    def _unit(self, place: int) -> Matrix:
+        row = np.zeros(self._size)
+        row[place] = 1.0
+        return row
+
+    def _stack(self, rows: Sequence[Matrix]) -> Matrix:
+        return np.array(rows, dtype=np.float64).reshape(len(rows), self._size)
+
+
+def _units(motion: Motion) -> tuple[str, str]:
+    return measure_unit("force", motion), measure_unit("displacement", motion)
