@@ -1,0 +1,27 @@
+"""Added mass: a body that is heavier than modelled."""
+
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
+from chladni.models.effects.linear_feedback import ground_acceleration, rate, velocity, with_feedback
+
+
+def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
+    """Let the mass resist the body's acceleration: ``f = -mass a``, solved for the acceleration that it lowers."""
+    port = compiled.port_index(site.name, "body")
+    acceleration = rate(compiled, velocity(compiled, port), site.name) + ground_acceleration(compiled, port)
+    return with_feedback(compiled, port, acceleration.scaled(-values["mass"]))[0]
+
+
+ADDED_MASS = EffectKind(
+    name="added_mass",
+    family="attachment",
+    meaning="more mass than modelled: an unmodelled payload, a sensor",
+    sites=("body",),
+    parameters=Parameters(
+        (Parameter(name="mass", value=0.1, unit="kg", low=0.0, high=100.0, minimum=0.0, maximum=1e9),)
+    ),
+    neutral={"mass": 0.0},
+    linear=True,
+    variants=(Variant(name="rigid", attach=attach, formula="f = -mass a"),),
+)

@@ -1,0 +1,61 @@
+"""Base vibration: the floor shakes, and no channel of the log tells."""
+
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.effects.band_noise import BandNoise
+from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
+from chladni.models.effects.generated_signal import with_generated
+from chladni.models.effects.linear_feedback import with_feedback
+
+
+def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
+    """Let a computed acceleration act where the ground's acceleration acts."""
+    port = compiled.port_index(site.name, "ground")
+    noise = BandNoise(
+        level=values["level"], low_hz=values["band_start"], high_hz=values["band"], seed=int(values["seed"])
+    )
+    unit = compiled.ports[port].unit
+    compiled, shaking = with_generated(compiled, name=f"{site.name}.{site.effect}", unit=unit, samples=noise)
+    return with_feedback(compiled, port, shaking)[0]
+
+
+def _check(values: Values) -> str:
+    if values["band_start"] >= values["band"]:
+        return f"band_start = {values['band_start']:g} Hz must be below band = {values['band']:g} Hz"
+    if values["seed"] != int(values["seed"]):
+        return f"seed = {values['seed']:g} must be a whole number"
+    return ""
+
+
+BASE_VIBRATION = EffectKind(
+    name="base_vibration",
+    family="disturbance",
+    meaning="the floor moves: broadband acceleration that is not in the log",
+    sites=("ground",),
+    parameters=Parameters(
+        (
+            Parameter(
+                name="level", value=0.01, unit="m/s^2", low=0.0, high=10.0, minimum=0.0, maximum=1e6,
+                meaning="root mean square of the ground's acceleration",
+            ),
+            Parameter(
+                name="band", value=50.0, unit="Hz", low=1.0, high=1e3, minimum=1e-6, maximum=1e7,
+                meaning="upper end of the band, which is flat",
+            ),
+            Parameter(
+                name="band_start", value=1.0, unit="Hz", low=0.0, high=100.0, minimum=0.0, maximum=1e7,
+                meaning="lower end",
+            ),
+            Parameter(
+                name="seed", value=0.0, unit="1", low=0.0, high=1000.0, minimum=0.0, maximum=4294967295.0,
+                role="function", meaning="which of all such floors; a whole number",
+            ),
+        )
+    ),
+    optional=("band_start", "seed"),
+    neutral={"level": 0.0},
+    check=_check,
+    variants=(
+        Variant(name="flat", attach=attach, formula="a_ground = level sqrt(2/N) sum_k cos(2 pi f_k t + phase_k)"),
+    ),
+)  # fmt: skip

@@ -1,0 +1,72 @@
+"""All words of the vocabulary of unmodelled effects."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from chladni.models.effects.ac_coupling import AC_COUPLING
+from chladni.models.effects.added_mass import ADDED_MASS
+from chladni.models.effects.backlash import BACKLASH
+from chladni.models.effects.base_vibration import BASE_VIBRATION
+from chladni.models.effects.clipping import CLIPPING
+from chladni.models.effects.coulomb_friction import COULOMB_FRICTION
+from chladni.models.effects.cross_axis import CROSS_AXIS
+from chladni.models.effects.dead_zone import DEAD_ZONE
+from chladni.models.effects.delay import DELAY
+from chladni.models.effects.effect_kind import EffectKind
+from chladni.models.effects.extra_mode import EXTRA_MODE
+from chladni.models.effects.gain_error import GAIN_ERROR
+from chladni.models.effects.hardening_stiffness import HARDENING_STIFFNESS
+from chladni.models.effects.hysteresis import HYSTERESIS
+from chladni.models.effects.lag import LAG
+from chladni.models.effects.mounting_resonance import MOUNTING_RESONANCE
+from chladni.models.effects.one_sided_stop import ONE_SIDED_STOP
+from chladni.models.effects.quadratic_damping import QUADRATIC_DAMPING
+from chladni.models.effects.quantization import QUANTIZATION
+from chladni.models.effects.rate_limit import RATE_LIMIT
+from chladni.models.effects.ripple import RIPPLE
+from chladni.models.effects.saturation import SATURATION
+from chladni.models.effects.softening_stiffness import SOFTENING_STIFFNESS
+from chladni.models.effects.stribeck_friction import STRIBECK_FRICTION
+from chladni.models.effects.time_offset import TIME_OFFSET
+from chladni.models.effects.tonal_disturbance import TONAL_DISTURBANCE
+from chladni.models.effects.varying_stiffness import VARYING_STIFFNESS
+
+_KINDS = (
+    COULOMB_FRICTION,
+    STRIBECK_FRICTION,
+    QUADRATIC_DAMPING,
+    HARDENING_STIFFNESS,
+    SOFTENING_STIFFNESS,
+    BACKLASH,
+    ONE_SIDED_STOP,
+    HYSTERESIS,
+    EXTRA_MODE,
+    ADDED_MASS,
+    VARYING_STIFFNESS,
+    DELAY,
+    LAG,
+    SATURATION,
+    DEAD_ZONE,
+    RATE_LIMIT,
+    RIPPLE,
+    GAIN_ERROR,
+    CROSS_AXIS,
+    MOUNTING_RESONANCE,
+    AC_COUPLING,
+    TIME_OFFSET,
+    CLIPPING,
+    QUANTIZATION,
+    BASE_VIBRATION,
+    TONAL_DISTURBANCE,
+)
+
+#: Every effect by its word.
+CATALOGUE: Mapping[str, EffectKind] = MappingProxyType({kind.name: kind for kind in _KINDS})
+
+#: Words that are near misses of each other, by family.
+FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        family: tuple(kind.name for kind in _KINDS if kind.family == family)
+        for family in dict.fromkeys(kind.family for kind in _KINDS)
+    }
+)

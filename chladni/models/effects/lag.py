@@ -1,0 +1,54 @@
+"""Lag: an actuator of limited bandwidth."""
+
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.effects.attaching import pass_through
+from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
+from chladni.models.effects.linear_filter import first_order, second_order
+
+
+def attach_first_order(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
+    """Put ``1/(tau s + 1)`` between the command and its place."""
+    if values["time_constant"] == 0:
+        return compiled
+    return pass_through(compiled, site, first_order(values["time_constant"]))
+
+
+def attach_second_order(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
+    """Put ``1/(tau^2 s^2 + 2 zeta tau s + 1)`` between the command and its place."""
+    if values["time_constant"] == 0:
+        return compiled
+    return pass_through(compiled, site, second_order(1 / values["time_constant"], values["damping_ratio"]))
+
+
+LAG = EffectKind(
+    name="lag",
+    family="actuator",
+    meaning="limited bandwidth of an actuator",
+    sites=("input",),
+    parameters=Parameters(
+        (
+            Parameter(
+                name="time_constant", value=5e-3, unit="s", low=0.0, high=1.0, minimum=0.0, maximum=1e6,
+                meaning="1 over the corner in rad/s; second order: 1 over the natural frequency",
+            ),
+        )
+    ),
+    neutral={"time_constant": 0.0},
+    linear=True,
+    variants=(
+        Variant(name="first_order", attach=attach_first_order, formula="u_acts/u = 1/(time_constant p + 1)"),
+        Variant(
+            name="second_order",
+            attach=attach_second_order,
+            formula="u_acts/u = 1/(time_constant^2 p^2 + 2 damping_ratio time_constant p + 1)",
+            parameters=Parameters(
+                (
+                    Parameter(
+                        name="damping_ratio", value=0.7, unit="1", low=0.2, high=2.0, minimum=1e-6, maximum=1e3
+                    ),
+                )
+            ),
+        ),
+    ),
+)  # fmt: skip

@@ -1,0 +1,83 @@
+"""A linear filter that a signal passes: what lags, mounts and couplings do, in state space."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.value import Value
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LinearFilter(Value):
+    """``z' = A z + b v``, ``w = c z + d v``: v goes in, w comes out, z starts at rest.
+
+    Attributes
+    ----------
+    a, b, c
+        ``[state, state]``, ``[state]``, ``[state]``.
+    d
+        What passes at once.
+    states
+        Short names.
+
+    Examples
+    --------
+    >>> half = gain(0.5)
+    >>> half(np.array([2.0, 4.0]), 10.0)
+    array([1., 2.])
+    """
+
+    a: Matrix
+    b: Matrix
+    c: Matrix
+    d: float
+    states: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+    def __call__(self, samples: Matrix, sample_rate_hz: float) -> Matrix:
+        """Filter samples; exact for the signal that joins them by straight lines."""
+        if not self.states:
+            return np.asarray(self.d * samples, dtype=np.float64)
+        # scipy.signal takes most of a second to import, and few ever filter samples.
+        from scipy.signal import cont2discrete, lfilter, ss2tf
+
+        one = (self.a, self.b[:, None], self.c[None, :], np.array([[self.d]]))
+        a, b, c, d, _ = cont2discrete(one, 1 / sample_rate_hz, method="foh")
+        numerator, denominator = ss2tf(a, b, c, d)
+        return np.asarray(lfilter(numerator[0], denominator, samples), dtype=np.float64)
+
+
+def gain(factor: float) -> LinearFilter:
+    """Give the filter that multiplies."""
+    return LinearFilter(a=np.zeros((0, 0)), b=np.zeros(0), c=np.zeros(0), d=factor, states=())
+
+
+def first_order(time_constant_s: float) -> LinearFilter:
+    """Give ``1/(tau s + 1)``."""
+    rate = 1 / time_constant_s
+    return LinearFilter(a=np.array([[-rate]]), b=np.array([rate]), c=np.ones(1), d=0.0, states=("value",))
+
+
+def second_order(natural_frequency_rad_s: float, damping_ratio: float) -> LinearFilter:
+    """Give ``omega^2/(s^2 + 2 zeta omega s + omega^2)``."""
+    omega = natural_frequency_rad_s
+    # The second state is the rate over omega, so that both are of one size, however high the frequency.
+    return LinearFilter(
+        a=omega * np.array([[0.0, 1.0], [-1.0, -2 * damping_ratio]]),
+        b=omega * np.array([0.0, 1.0]),
+        c=np.array([1.0, 0.0]),
+        d=0.0,
+        states=("value", "rate"),
+    )
+
+
+def high_pass(corner_rad_s: float) -> LinearFilter:
+    """Give ``s/(s + omega_c)``."""
+    return LinearFilter(
+        a=np.array([[-corner_rad_s]]), b=np.array([corner_rad_s]), c=-np.ones(1), d=1.0, states=("mean",)
+    )

@@ -1,0 +1,98 @@
+"""A one-sided stop: a contact that acts beyond one displacement: end stop, rub, crack that opens and closes."""
+
+from typing import Any
+
+from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.core.port import Port
+from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+
+
+def stop(d: float, s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    """Give the force of the contact; parameters stiffness, clearance, side, exponent, depth, dissipation.
+
+    ``side stiffness p (p/depth)^(exponent - 1) max(1 + dissipation p', 0)``, p = side d - clearance > 0.
+    """
+    side = parameters[2]
+    p = side * d - parameters[1]
+    if p <= 0.0:
+        return 0.0
+    force = parameters[0] * p
+    if parameters[3] != 1.0:
+        force *= (p / parameters[4]) ** (parameters[3] - 1.0)
+    # A contact pushes and never pulls, however fast the bodies part.
+    return float(side * force * max(1.0 + parameters[5] * side * s, 0.0))
+
+
+def _spring(values: Values, _port: Port) -> tuple[float, ...]:
+    return values["stiffness"], values["clearance"], values["side"], 1.0, 1.0, values.get("dissipation", 0.0)
+
+
+def _hertz(values: Values, _port: Port) -> tuple[float, ...]:
+    numbers = (values["stiffness"], values["clearance"], values["side"])
+    return (*numbers, 1.5, values["depth"], values.get("dissipation", 0.0))
+
+
+def _check(values: Values) -> str:
+    return "" if abs(values["side"]) == 1 else f"side = {values['side']:g} must be 1 (above) or -1 (below)"
+
+
+_DISSIPATION = Parameter(
+    name="dissipation", value=0.5, unit="s/m", low=0.0, high=10.0, minimum=0.0, maximum=1e6,
+    meaning="share of the force that a contact speed of 1 m/s adds",
+)  # fmt: skip
+_DEPTH = Parameter(
+    name="depth", value=1e-4, unit="m", low=1e-6, high=1e-2, minimum=1e-12, maximum=1e3,
+    meaning="penetration at which the contact's secant stiffness is `stiffness`",
+)  # fmt: skip
+
+ONE_SIDED_STOP = EffectKind(
+    name="one_sided_stop",
+    family="stiffness",
+    meaning="a contact beyond one displacement: end stop, rub, open crack",
+    sites=("joint",),
+    parameters=Parameters(
+        (
+            Parameter(
+                name="stiffness", value=1e6, unit="N/m", low=0.0, high=1e9, minimum=0.0, maximum=1e15,
+                meaning="of the contact",
+            ),
+            Parameter(
+                name="clearance", value=1e-4, unit="m", low=0.0, high=1e-2, minimum=-1e3, maximum=1e3,
+                meaning="free way to the stop; negative when it presses at rest",
+            ),
+            Parameter(
+                name="side", value=1.0, unit="1", low=-1.0, high=1.0, minimum=-1.0, maximum=1.0, role="function",
+                meaning="1: stops d from rising; -1: from falling",
+            ),
+        )
+    ),
+    optional=("side",),
+    neutral={"stiffness": 0.0},
+    check=_check,
+    variants=(
+        Variant(
+            name="spring",
+            attach=LawAtPort(law=stop, numbers=_spring),
+            formula="F = side stiffness p where p = side d - clearance > 0, else 0",
+        ),
+        Variant(
+            name="spring_damper",
+            attach=LawAtPort(law=stop, numbers=_spring),
+            formula="F = side stiffness p max(1 + dissipation p', 0)",
+            parameters=Parameters((_DISSIPATION,)),
+        ),
+        Variant(
+            name="hertz",
+            attach=LawAtPort(law=stop, numbers=_hertz),
+            formula="F = side stiffness p sqrt(p/depth)",
+            parameters=Parameters((_DEPTH,)),
+        ),
+        Variant(
+            name="hertz_damper",
+            attach=LawAtPort(law=stop, numbers=_hertz),
+            formula="F = side stiffness p sqrt(p/depth) max(1 + dissipation p', 0)",
+            parameters=Parameters((_DEPTH, _DISSIPATION)),
+        ),
+    ),
+)  # fmt: skip

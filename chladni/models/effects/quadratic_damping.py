@@ -1,0 +1,37 @@
+"""Quadratic damping: the drag of a turbulent fluid, an orifice, a silencer."""
+
+from typing import Any
+
+from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.core.port import Port
+from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+
+
+def quadratic(_d: float, s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    """Give ``coefficient s abs(s)``."""
+    return float(parameters[0] * s * abs(s))
+
+
+def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
+    return (values["coefficient"],)
+
+
+QUADRATIC_DAMPING = EffectKind(
+    name="quadratic_damping",
+    family="damping",
+    meaning="damping that grows with the square of the speed",
+    sites=("joint",),
+    parameters=Parameters(
+        (Parameter(name="coefficient", value=100.0, unit="N s^2/m^2", low=0.0, high=1e5, minimum=0.0, maximum=1e12),)
+    ),
+    neutral={"coefficient": 0.0},
+    variants=(
+        Variant(
+            name="quadratic",
+            attach=LawAtPort(law=quadratic, numbers=_numbers),
+            formula="F = coefficient s |s|",
+            odd=True,
+        ),
+    ),
+)

@@ -1,0 +1,64 @@
+"""Rate limit: a force that changes no faster than the actuator can."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.core.port import Port
+from chladni.models.effects.attaching import ShapedSignal
+from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+
+Matrix = NDArray[np.float64]
+
+
+def tracker(d: float, _s: float, _t: float, parameters: Any, state: Any, rates: Any) -> float:
+    """Give ``z - d``: z runs after the command at most at the rate; parameters rate, tracking time.
+
+    ``z' = clip((d - z)/tracking_time, -rate, rate)``
+    """
+    rates[0] = min(max((d - state[0]) / parameters[1], -parameters[0]), parameters[0])
+    return float(state[0] - d)
+
+
+def limited_samples(samples: Matrix, sample_rate_hz: float, rate: float, _tracking_time: float) -> Matrix:
+    """Give samples that change by at most the rate, starting from zero one sample before the first."""
+    step = rate / sample_rate_hz
+    followed, now = [], 0.0
+    # Each sample depends on the one before; a plain loop over floats takes 0.1 us a sample.
+    for sample in samples.tolist():
+        now = min(max(sample, now - step), now + step)
+        followed.append(now)
+    return np.array(followed, dtype=np.float64)
+
+
+def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
+    return values["rate"], values["tracking_time"]
+
+
+RATE_LIMIT = EffectKind(
+    name="rate_limit",
+    family="actuator",
+    meaning="the force changes no faster than the actuator can",
+    sites=("input",),
+    parameters=Parameters(
+        (
+            Parameter(name="rate", value=1e3, unit="N/s", low=1.0, high=1e6, minimum=1e-12, maximum=1e18),
+            Parameter(
+                name="tracking_time", value=1e-3, unit="s", low=1e-4, high=1e-2, minimum=1e-9, maximum=1e3,
+                role="function", meaning="inside a loop: time constant of the tracker; outside of loops unused",
+            ),
+        )
+    ),
+    optional=("tracking_time",),
+    neutral={"rate": 1e18},
+    variants=(
+        Variant(
+            name="slew",
+            attach=ShapedSignal(shape=limited_samples, law=tracker, numbers=_numbers, state=(0.0,)),
+            formula="|u_acts'| <= rate; inside a loop u_acts' = clip((u - u_acts)/tracking_time, -rate, rate)",
+            odd=True,
+        ),
+    ),
+)  # fmt: skip

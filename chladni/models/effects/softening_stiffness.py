@@ -1,0 +1,73 @@
+"""Softening stiffness: a spring that gets weaker with displacement, up to where it would give way."""
+
+from math import inf, sqrt
+from typing import Any
+
+import numpy as np
+
+from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.core.port import Port
+from chladni.models.core.simulation import Simulation
+from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.signals.errors import ModelError
+
+
+def cubic(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    """Give ``cubic d^3`` inside the valid range; beyond it the joint's whole force stays what it is at the end.
+
+    Parameters cubic, the joint's stiffness, end of the valid range.
+    """
+    end = parameters[2]
+    inside = min(max(d, -end), end)
+    return float(parameters[0] * inside * inside * inside - parameters[1] * (d - inside))
+
+
+def valid_range(cubic_stiffness: float, stiffness: float) -> float:
+    """Give the largest valid displacement ``sqrt(k/(3 abs(cubic)))``: there the joint's stiffness has fallen to zero.
+
+    Examples
+    --------
+    >>> round(valid_range(-1e10, 3e6), 12)
+    0.01
+    """
+    return sqrt(stiffness / (-3 * cubic_stiffness)) if cubic_stiffness else inf
+
+
+def _numbers(values: Values, port: Port) -> tuple[float, ...]:
+    if port.stiffness <= 0:
+        raise ModelError(f"softening_stiffness at {port.name!r}: the joint has no spring that could get softer")
+    return values["cubic"], port.stiffness, valid_range(values["cubic"], port.stiffness)
+
+
+def _flags(port: Port, values: Values, simulation: Simulation) -> tuple[str, ...]:
+    end = valid_range(values["cubic"], port.stiffness)
+    reached = float(np.max(np.abs(simulation.motion(port.name).displacement), initial=0.0))
+    if reached <= end:
+        return ()
+    sentence = (
+        f"softening_stiffness at {port.name}: displacement {reached:.3g} {port.displacement_unit} leaves the valid "
+        f"range of {end:.3g} {port.displacement_unit}; beyond it the joint's force was kept constant"
+    )
+    return (sentence,)
+
+
+SOFTENING_STIFFNESS = EffectKind(
+    name="softening_stiffness",
+    family="stiffness",
+    meaning="a spring that gets weaker with displacement",
+    sites=("joint",),
+    parameters=Parameters(
+        (Parameter(name="cubic", value=-1e9, unit="N/m^3", low=-1e14, high=0.0, minimum=-1e20, maximum=0.0),)
+    ),
+    neutral={"cubic": 0.0},
+    flags=_flags,
+    variants=(
+        Variant(
+            name="cubic",
+            attach=LawAtPort(law=cubic, numbers=_numbers),
+            formula="F = cubic d^3 up to |d| = sqrt(k/(3 |cubic|)); beyond, k d + F stays constant",
+            odd=True,
+        ),
+    ),
+)

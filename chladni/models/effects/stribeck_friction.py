@@ -1,0 +1,98 @@
+"""Stribeck friction: it sticks with more force than it slides with."""
+
+from math import exp, tanh
+from typing import Any
+
+from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.core.port import Port
+from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.models.effects.friction_parameters import CREEP_SPEED, PRESLIDING
+
+
+def regularised(_d: float, s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    """Give Stribeck's curve times ``tanh(s/creep_speed)``; parameters coulomb, static, speed, creep speed."""
+    ratio = s / parameters[2]
+    # Beyond 30 the exponential is nothing, and the square of an extreme speed would overflow.
+    bump = exp(-ratio * ratio) if abs(ratio) < 30.0 else 0.0
+    return float((parameters[0] + (parameters[1] - parameters[0]) * bump) * tanh(s / parameters[3]))
+
+
+def bristle(_d: float, s: float, _t: float, parameters: Any, state: Any, rates: Any) -> float:
+    """Give LuGre's force; parameters coulomb, static, speed, presliding, bristle damping.
+
+    The state is the bristles' force over the static friction: ``w' = (s - abs(s) w/r(s))/presliding`` with r(s)
+    Stribeck's curve over the static friction.
+    """
+    coulomb, static = parameters[0], parameters[1]
+    ratio = s / parameters[2]
+    bump = exp(-ratio * ratio) if abs(ratio) < 30.0 else 0.0
+    curve = 1.0
+    if static > 0.0:
+        # Without any sliding friction the bristles would spring back infinitely fast at speed.
+        curve = max((coulomb + (static - coulomb) * bump) / static, 1e-3)
+    rates[0] = (s - abs(s) * state[0] / curve) / parameters[3]
+    return float(static * state[0] + parameters[4] * rates[0] * parameters[3])
+
+
+def _regularised_numbers(values: Values, _port: Port) -> tuple[float, ...]:
+    return values["coulomb"], values["static"], values["speed"], values["creep_speed"]
+
+
+def _bristle_numbers(values: Values, _port: Port) -> tuple[float, ...]:
+    return values["coulomb"], values["static"], values["speed"], values["presliding"], values["bristle_damping"]
+
+
+def _check(values: Values) -> str:
+    if values["static"] < values["coulomb"]:
+        return f"static = {values['static']:g} N must be at least coulomb = {values['coulomb']:g} N"
+    return ""
+
+
+STRIBECK_FRICTION = EffectKind(
+    name="stribeck_friction",
+    family="friction",
+    meaning="dry friction that is larger at rest than in motion",
+    sites=("joint",),
+    parameters=Parameters(
+        (
+            Parameter(
+                name="coulomb", value=5.0, unit="N", low=0.0, high=200.0, minimum=0.0, maximum=1e9, meaning="sliding"
+            ),
+            Parameter(
+                name="static", value=8.0, unit="N", low=0.0, high=400.0, minimum=0.0, maximum=1e9,
+                meaning="at the brink of sliding",
+            ),
+            Parameter(
+                name="speed", value=1e-2, unit="m/s", low=1e-4, high=1.0, minimum=1e-9, maximum=1e6,
+                meaning="where the excess has fallen to 37 %",
+            ),
+        )
+    ),
+    neutral={"coulomb": 0.0, "static": 0.0},
+    check=_check,
+    variants=(
+        Variant(
+            name="regularised",
+            attach=LawAtPort(law=regularised, numbers=_regularised_numbers),
+            formula="F = (coulomb + (static - coulomb) exp(-(s/speed)^2)) tanh(s/creep_speed)",
+            parameters=Parameters((CREEP_SPEED,)),
+            odd=True,
+        ),
+        Variant(
+            name="bristle",
+            attach=LawAtPort(law=bristle, numbers=_bristle_numbers, state=(0.0,)),
+            formula="F = static w + bristle_damping presliding w', w' = (s - |s| w static/g(s))/presliding",
+            parameters=Parameters(
+                (
+                    PRESLIDING,
+                    Parameter(
+                        name="bristle_damping", value=0.0, unit="N s/m", low=0.0, high=1e3, minimum=0.0, maximum=1e9,
+                        meaning="damping of the bristles while they bend",
+                    ),
+                )
+            ),
+            odd=True,
+        ),
+    ),
+)  # fmt: skip

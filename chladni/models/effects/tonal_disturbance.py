@@ -1,0 +1,75 @@
+"""A tonal disturbance: a steady tone that is not in the log: unbalance, mains hum."""
+
+from dataclasses import dataclass
+from math import pi, sin
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.core.port import Port
+from chladni.models.effects.attaching import LawAtPort, SampleShape
+from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
+from chladni.models.effects.signal_path import is_in_loop, with_samples_mapped
+
+Matrix = NDArray[np.float64]
+
+
+def tone(_d: float, _s: float, t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    """Give ``amplitude sin(omega t + phase)``; parameters amplitude, omega, phase."""
+    return float(parameters[0] * sin(parameters[1] * t + parameters[2]))
+
+
+def with_tone(samples: Matrix, sample_rate_hz: float, amplitude: float, omega: float, phase: float) -> Matrix:
+    """Add the tone to samples that begin at t = 0."""
+    times_s = np.arange(samples.size) / sample_rate_hz
+    return np.asarray(samples + amplitude * np.sin(omega * times_s + phase), dtype=np.float64)
+
+
+def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
+    return values["amplitude"], 2 * pi * values["frequency"], values["phase"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _AtBodyOrOutput:
+    """A force on a body; at an output the tone is what the sensor's cable picks up."""
+
+    law: LawAtPort
+
+    def __call__(self, compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
+        if site.kind == "body" or is_in_loop(compiled, site):
+            return self.law(compiled, site, values)
+        numbers = _numbers(values, Port(name=site.name, kind=site.kind))
+        return with_samples_mapped(compiled, site, SampleShape(shape=with_tone, numbers=numbers))
+
+
+TONAL_DISTURBANCE = EffectKind(
+    name="tonal_disturbance",
+    family="disturbance",
+    meaning="a steady tone that is not in the log: unbalance, mains hum",
+    sites=("body", "output"),
+    parameters=Parameters(
+        (
+            Parameter(name="frequency", value=50.0, unit="Hz", low=0.1, high=1e3, minimum=0.0, maximum=1e7),
+            Parameter(
+                name="amplitude", value=1.0, unit="N", low=0.0, high=100.0, minimum=0.0, maximum=1e12,
+                meaning="N at a body, the output's unit at an output",
+            ),
+            Parameter(
+                name="phase", value=0.0, unit="rad", low=-pi, high=pi, minimum=-1e3, maximum=1e3,
+                meaning="at the log's start",
+            ),
+        )
+    ),
+    optional=("phase",),
+    neutral={"amplitude": 0.0},
+    variants=(
+        Variant(
+            name="sine",
+            attach=_AtBodyOrOutput(law=LawAtPort(law=tone, numbers=_numbers)),
+            formula="f = amplitude sin(2 pi frequency t + phase)",
+        ),
+    ),
+)  # fmt: skip

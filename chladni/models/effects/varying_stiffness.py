@@ -1,0 +1,80 @@
+"""Varying stiffness: the joint's spring changes during the log."""
+
+from typing import Any
+
+from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.core.port import Port
+from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.signals.errors import ModelError
+
+
+def drift(d: float, _s: float, t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    """Give ``k relative_change min(t/time, 1) d``; parameters k times the change, time."""
+    share = 1.0
+    if t < parameters[1]:
+        share = max(t, 0.0) / parameters[1]
+    return float(parameters[0] * share * d)
+
+
+def step(d: float, _s: float, t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    """Give ``k relative_change d`` from a time on; parameters k times the change, time, rise.
+
+    The change is spread over `rise` by the polynomial of fifth order whose first and second derivative vanish at
+    both ends.
+    """
+    u = min(max((t - parameters[1]) / parameters[2] + 0.5, 0.0), 1.0)
+    return float(parameters[0] * u * u * u * (10.0 + u * (6.0 * u - 15.0)) * d)
+
+
+def _drift_numbers(values: Values, port: Port) -> tuple[float, ...]:
+    if port.stiffness <= 0:
+        raise ModelError(f"varying_stiffness at {port.name!r}: the joint has no spring that could vary")
+    return values["relative_change"] * port.stiffness, values["time"]
+
+
+def _step_numbers(values: Values, port: Port) -> tuple[float, ...]:
+    return (*_drift_numbers(values, port), values["rise"])
+
+
+VARYING_STIFFNESS = EffectKind(
+    name="varying_stiffness",
+    family="stiffness",
+    meaning="the joint's spring changes during the log",
+    sites=("joint",),
+    parameters=Parameters(
+        (
+            Parameter(
+                name="relative_change", value=-0.2, unit="1", low=-0.9, high=1.0, minimum=-1.0, maximum=1e3,
+                meaning="stiffness afterwards over stiffness before, less one",
+            ),
+            Parameter(
+                name="time", value=1.0, unit="s", low=0.0, high=3600.0, minimum=0.0, maximum=1e9,
+                meaning="from the log's start until the change is complete, or its middle for a step",
+            ),
+        )
+    ),
+    neutral={"relative_change": 0.0},
+    variants=(
+        Variant(
+            name="drift",
+            attach=LawAtPort(law=drift, numbers=_drift_numbers),
+            formula="F = k relative_change min(t/time, 1) d",
+            odd=True,
+        ),
+        Variant(
+            name="step",
+            attach=LawAtPort(law=step, numbers=_step_numbers),
+            formula="F = k relative_change S((t - time)/rise + 1/2) d, S(u) = 10 u^3 - 15 u^4 + 6 u^5",
+            parameters=Parameters(
+                (
+                    Parameter(
+                        name="rise", value=0.01, unit="s", low=1e-4, high=10.0, minimum=1e-9, maximum=1e9,
+                        meaning="how long the step takes",
+                    ),
+                )
+            ),
+            odd=True,
+        ),
+    ),
+)  # fmt: skip
