@@ -30,6 +30,19 @@ class DelayLine:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class IdealDerivative:
+    """A derivative that no equations in time can hold, known exactly in frequency.
+
+    A, B, C, D hold ``(s/(T s + 1))^order d`` in its place, T the filter time; in a frequency response the port adds
+    the difference ``f = (s^order - (s/(T s + 1))^order) d``. In time the filter stays.
+    """
+
+    port: int
+    order: int
+    filter_time_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class GeneratedInput:
     """An input that no log holds (a floor that shakes): its samples are computed from the sample times in seconds."""
 
@@ -68,6 +81,8 @@ class CompiledModel(Value):
         Names of rows.
     laws, delays
         At ports; several laws at one port add up.
+    derivatives
+        At ports: what only a frequency response holds exactly.
     input_maps, output_maps
         ``(index, map)``, applied in order to the samples of an input before, of an output after, the integration.
         Only for inputs and outputs outside of every loop: inside a loop a law at the port does it.
@@ -96,6 +111,7 @@ class CompiledModel(Value):
     generated: tuple[GeneratedInput, ...] = ()
     laws: tuple[PortLaw, ...] = ()
     delays: tuple[DelayLine, ...] = ()
+    derivatives: tuple[IdealDerivative, ...] = ()
     input_maps: tuple[tuple[int, SampleMap], ...] = ()
     output_maps: tuple[tuple[int, SampleMap], ...] = ()
     input_delays_s: tuple[float, ...] = ()
@@ -169,13 +185,13 @@ class CompiledModel(Value):
     def frequency_response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Response of each output to each input, ``[output, input, frequency]``, dead times and offsets included.
 
-        Laws and sample maps are left out: it's the response of the linear part. e^{+j omega t}: a dead time tau has
+        Ideal derivatives are included too. Laws and sample maps are left out: it's the response of the linear part. e^{+j omega t}: a dead time tau has
         the phase -omega tau.
         """
         frequency_hz = np.asarray(frequency_hz, dtype=np.float64)
         s = np.asarray(2j * pi * frequency_hz, dtype=np.complex128)
         signals = self._signal_matrix(s)
-        count, delayed = len(self.outputs), sorted({line.port for line in self.delays})
+        count, delayed = len(self.outputs), sorted({line.port for line in (*self.delays, *self.derivatives)})
         rows = np.vstack([self.c, self.displacement_state[delayed]])
         through = np.vstack([self.d, self.displacement_column[delayed]])
         port_through = np.vstack([self.h[:, delayed], self.displacement_port[np.ix_(delayed, delayed)]])
@@ -204,6 +220,9 @@ class CompiledModel(Value):
         factors = np.zeros((s.size, len(ports)), dtype=complex)
         for line in self.delays:
             factors[:, ports.index(line.port)] += np.exp(-s * line.delay_s) - 1
+        for ideal in self.derivatives:
+            filtered = (s / (ideal.filter_time_s * s + 1)) ** ideal.order
+            factors[:, ports.index(ideal.port)] += s**ideal.order - filtered
         return factors
 
     def _require_shapes(self) -> None:
