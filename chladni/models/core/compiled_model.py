@@ -185,13 +185,14 @@ class CompiledModel(Value):
     def frequency_response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Response of each output to each input, ``[output, input, frequency]``, dead times and offsets included.
 
-        Ideal derivatives are included too. Laws and sample maps are left out: it's the response of the linear part. e^{+j omega t}: a dead time tau has
-        the phase -omega tau.
+        Ideal derivatives are included too. Laws and sample maps are left out: it's the response of the linear part.
+        e^{+j omega t}: a dead time tau has the phase -omega tau.
         """
         frequency_hz = np.asarray(frequency_hz, dtype=np.float64)
         s = np.asarray(2j * pi * frequency_hz, dtype=np.complex128)
         signals = self._signal_matrix(s)
-        count, delayed = len(self.outputs), sorted({line.port for line in (*self.delays, *self.derivatives)})
+        delayed = sorted({line.port for line in self.delays} | {ideal.port for ideal in self.derivatives})
+        count = len(self.outputs)
         rows = np.vstack([self.c, self.displacement_state[delayed]])
         through = np.vstack([self.d, self.displacement_column[delayed]])
         port_through = np.vstack([self.h[:, delayed], self.displacement_port[np.ix_(delayed, delayed)]])
