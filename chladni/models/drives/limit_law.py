@@ -1,9 +1,12 @@
 """Dead zone and saturation of a command, in one law at an input port."""
 
-from math import inf
+from sys import float_info
 from typing import Any
 
 from chladni.models.core.port_law import PortLaw
+
+#: Larger than any command; infinite numbers have no place among the parameters of a law.
+UNLIMITED = float_info.max
 
 
 def limited(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -25,6 +28,6 @@ def limited(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates
     return float(left - d)
 
 
-def limit_law(*, half_width: float = 0.0, limit: float = inf) -> PortLaw:
+def limit_law(*, half_width: float = 0.0, limit: float = UNLIMITED) -> PortLaw:
     """Nothing within `half_width`, and never more than `limit`; the port is filled in where the law is placed."""
     return PortLaw(port=0, function=limited, parameters=(half_width, limit))

@@ -1,13 +1,12 @@
 """Servo valve: lag of its spool, dead zone of its overlap, saturation of its opening."""
 
 from collections.abc import Mapping
-from math import inf
 from typing import Final
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.drives.equations import PlacedPort, Sum
-from chladni.models.drives.limit_law import limit_law
+from chladni.models.drives.limit_law import UNLIMITED, limit_law
 
 #: Port between spool and opening, where dead zone and saturation act.
 VALVE = "valve"
@@ -51,7 +50,7 @@ def valve_equations(
         return rates, {"motor_flow": {spool: 1.0}}, ()
     law = limit_law(
         half_width=values["valve_overlap"] * values["rated_flow"] if dead else 0.0,
-        limit=values["rated_flow"] if limited else inf,
+        limit=values["rated_flow"] if limited else UNLIMITED,
     )
     port = Port(name=VALVE, kind="input", unit="m^3/s", displacement_unit="m^3/s")
     placed = PlacedPort(port=port, displacement={spool: 1.0}, velocity={}, laws=(law,))
