@@ -1,0 +1,58 @@
+"""A whole page around an instrument: heading, look, life of the session."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from bokeh.io import curdoc
+from bokeh.themes import Theme as ChartTheme
+
+from chladni.models.core.instrument import Instrument
+from chladni.viewers.bench.instrument_page import InstrumentPage, heading
+from chladni.viewers.bench.parts import column, html, pn
+from chladni.viewers.bench.theme import FONT, Ground, theme
+from chladni.viewers.bench.tools import Tools
+
+_FRAME_CSS = """
+:host {
+  VARIABLES
+  background: var(--c-page); color: var(--c-text); font-family: FONT; font-size: 13px;
+  padding: 10px 12px; box-sizing: border-box; min-height: 100vh;
+}
+"""
+_HEAD_CSS = """
+.head { display: flex; gap: 16px; align-items: baseline; color: var(--c-soft); }
+.head h1 { font-size: 17px; font-weight: 600; color: var(--c-text); margin: 0; }
+.head .grow { flex: 1; }
+"""
+
+
+def page_maker(
+    instrument: Instrument, tools: Tools, *, log: Path | None = None, variants: Path | None = None
+) -> Callable[[], Any]:
+    """Give the function that makes a page for each visitor."""
+
+    def make() -> Any:
+        document = curdoc()
+        ground = wanted_ground(pn.state.session_args.get("theme", []))
+        # Inside the page's function: the look belongs to this document, not to the program.
+        document.theme = ChartTheme(json=theme(ground).of_charts())
+        document.title = f"{instrument.title} · chladni"
+        page = InstrumentPage(instrument, tools, document=document, ground=ground, log=log, variants=variants)
+        document.on_session_destroyed(lambda _context: page.close())
+        return framed(page, instrument, ground)
+
+    return make
+
+
+def wanted_ground(words: list[bytes]) -> Ground:
+    """Ground that the address asks for; light unless it says dark."""
+    return "dark" if words[:1] == [b"dark"] else "light"
+
+
+def framed(page: InstrumentPage, instrument: Instrument, ground: Ground) -> Any:
+    """Put heading and look around a page."""
+    # On the outermost part and not on the document: in a notebook the rest isn't ours.
+    look = _FRAME_CSS.replace("VARIABLES", theme(ground).variables()).replace("FONT", FONT)
+    head = html(heading(instrument, ground), _HEAD_CSS, margin=(0, 0, 8, 0))
+    return column(head, page.view(), sizing_mode="stretch_both", stylesheets=[look])

@@ -1,0 +1,127 @@
+"""Serves the pages on this computer only, to requests that name this computer."""
+
+import asyncio
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from bokeh.server.server import BaseServer
+from bokeh.server.tornado import BokehTornado
+from bokeh.server.util import bind_sockets
+from panel.io.application import build_applications
+from tornado.httpserver import HTTPServer
+from tornado.ioloop import IOLoop
+from tornado.web import RequestHandler
+
+from chladni.signals.errors import SetupError
+
+ADDRESS = "127.0.0.1"
+OWN_NAMES = (ADDRESS, "localhost")
+#: A page that nobody looks at any more is given up after this.
+UNUSED_MS = 15_000
+_MOST_MESSAGE_BYTES = 16_000_000
+
+
+class ForeignHost(RequestHandler):
+    """Refuses a request that names another computer.
+
+    A page of the web may point its own name at 127.0.0.1 (DNS rebinding). Browsers then see one origin, so that
+    checking where a request comes from isn't enough; but they still name that foreign host.
+    """
+
+    def prepare(self) -> None:
+        """Answer 403 before anything else happens."""
+        self.set_status(403)
+        self.finish("chladni answers only to this computer's own name\n")
+
+
+class Index(RequestHandler):
+    """The first page."""
+
+    def initialize(self, content: str) -> None:
+        """Keep what to send."""
+        self.content = content
+
+    def get(self) -> None:
+        """Send it."""
+        self.set_header("Content-Type", "text/html; charset=utf-8")
+        self.finish(self.content)
+
+
+class BenchServer:
+    """A server of pages, on the loopback address.
+
+    Parameters
+    ----------
+    pages
+        Function that makes the page, by name; a page is reached under ``/name``.
+    index
+        HTML of the first page.
+    port
+        0 takes a free one.
+
+    Raises
+    ------
+    SetupError
+        When the port can't be had.
+    """
+
+    def __init__(self, pages: Mapping[str, Callable[[], Any]], *, index: str, port: int = 0) -> None:
+        self._pages, self._index = pages, index
+        try:
+            # Bound at once, so that a taken port is told before anything starts; browsers wait until `run`.
+            self._sockets, self.port = bind_sockets(ADDRESS, port)
+        except (OSError, OverflowError) as error:
+            raise SetupError(
+                f"port {port} of {ADDRESS} can't be had ({error}); give another, or 0 for any"
+            ) from error
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._ended: asyncio.Event | None = None
+
+    @property
+    def address(self) -> str:
+        """Address of the first page."""
+        return f"http://{ADDRESS}:{self.port}/"
+
+    def run(self, ready: Callable[[], None] | None = None) -> None:
+        """Serve until `stop` or Ctrl-C; `ready` is called once pages can be had."""
+        # A loop of its own, made here and closed here: whatever else runs in the process keeps its.
+        asyncio.run(self._serve(ready))
+
+    def stop(self) -> None:
+        """End `run`; may be called from any thread."""
+        if self._loop is not None and self._ended is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._ended.set)
+
+    async def _serve(self, ready: Callable[[], None] | None) -> None:
+        self._loop, self._ended = asyncio.get_running_loop(), asyncio.Event()
+        application = self._application()
+        http = HTTPServer(application)
+        http.add_sockets(self._sockets)
+        server = BaseServer(IOLoop.current(), application, http)
+        server.start()
+        try:
+            if ready is not None:
+                ready()
+            await self._ended.wait()
+        finally:
+            server.stop()
+            await http.close_all_connections()
+
+    def _application(self) -> BokehTornado:
+        application = BokehTornado(
+            build_applications({f"/{name}": make for name, make in self._pages.items()}),
+            extra_websocket_origins=[f"{name}:{self.port}" for name in OWN_NAMES],
+            extra_patterns=[(r"/", Index, {"content": self._index})],
+            use_index=False,
+            websocket_max_message_size_bytes=_MOST_MESSAGE_BYTES,
+            unused_session_lifetime_milliseconds=UNUSED_MS,
+        )
+        application.add_handlers(foreign_hosts(), [(r".*", ForeignHost)])
+        return application
+
+
+def foreign_hosts() -> str:
+    """Regular expression of host names that aren't this computer's own."""
+    own = "|".join(re.escape(name) for name in OWN_NAMES)
+    return rf"(?!(?:{own})$).*"

@@ -1,0 +1,97 @@
+"""What a page can do besides drawing, handed in by the floor above: pages compute nothing."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from chladni.models.core.instrument import Instrument, Options, Values
+from chladni.models.core.model import Model
+from chladni.models.core.port import Terminal
+from chladni.models.core.reading import InfluenceTable, InstrumentReading
+from chladni.signals.channel import Channel
+
+#: Channel of the log by name of the model's input or output; what the log doesn't hold is left out.
+Assignment = Mapping[str, str]
+
+
+class MeasuredLog(Protocol):
+    """A log that is held against the simulation."""
+
+    @property
+    def title(self) -> str:
+        """Its name, for people."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What it holds."""
+
+    @property
+    def duration_s(self) -> float:
+        """Its length."""
+
+    def close(self) -> None:
+        """Let go of the file, and remove it when it was a private copy."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variant:
+    """One setting of an instrument that is kept for comparison."""
+
+    label: str
+    values: Values
+    options: Options
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Export:
+    """Something a page can save.
+
+    Attributes
+    ----------
+    label
+        On the button.
+    file_name
+        ``{name}`` stands for the instrument.
+    build
+        ``build(instrument, model, reading) -> bytes``.
+    """
+
+    label: str
+    file_name: str
+    media_type: str
+    build: Callable[[Instrument, Model, InstrumentReading], bytes]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tools:
+    """What pages call; every one may raise `ChladniError`, which the page shows in one line.
+
+    Attributes
+    ----------
+    read
+        Charts and numbers of one setting; called for each turn of a knob.
+    influence
+        Influence coefficients at one setting.
+    rows
+        Variants from a file of rows, as it is now.
+    open_log
+        Open a log; `private` says that the file is a copy of its own, removed with `close`.
+    terminals
+        Inputs and outputs of a model.
+    assign
+        Which channel is probably which input or output.
+    compare
+        ``compare(model, log, assignment, start_s, seconds)``: the measured beside the simulated.
+    exports
+        What can be saved.
+    """
+
+    read: Callable[[Instrument, Values, Options], InstrumentReading]
+    influence: Callable[[Instrument, Values, Options], InfluenceTable]
+    rows: Callable[[Instrument, Path], Sequence[Variant]]
+    open_log: Callable[[Path, str, bool], MeasuredLog]
+    terminals: Callable[[Model], tuple[tuple[Terminal, ...], tuple[Terminal, ...]]]
+    assign: Callable[[Model, Sequence[Channel]], Assignment]
+    compare: Callable[[Model, MeasuredLog, Assignment, float, float], InstrumentReading]
+    exports: tuple[Export, ...] = ()

@@ -1,0 +1,196 @@
+"""Kept variants: chips above the charts, faded curves in them, a table of their numbers."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bokeh.document import Document
+
+from chladni.models.core.instrument import Instrument
+from chladni.models.core.reading import InstrumentReading
+from chladni.signals.errors import ChladniError
+from chladni.viewers.bench.desk import Desk
+from chladni.viewers.bench.errors import told
+from chladni.viewers.bench.latest import Latest
+from chladni.viewers.bench.parts import button, column, flow, html
+from chladni.viewers.bench.theme import Theme
+from chladni.viewers.bench.tools import Tools, Variant
+from chladni.viewers.bench.words import MESSAGE_CSS, message, quantity_table
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+#: Rows of a file that are drawn; more curves can't be told apart.
+MOST_ROWS = 24
+WATCH_MS = 1000
+
+Stamp = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kept:
+    """A variant with its reading and colour."""
+
+    variant: Variant
+    reading: InstrumentReading
+    colour: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rows:
+    """What a file of rows gave: readings, and what to say about it."""
+
+    stamp: Stamp | None
+    found: tuple[tuple[Variant, InstrumentReading], ...]
+    words: tuple[str, ...]
+
+
+class VariantsView:
+    """Variants kept by hand or read from a file.
+
+    Parameters
+    ----------
+    file
+        CSV or TOML file of rows that is watched while the page is open; None for none.
+    changed
+        Called when the faded curves are others.
+    """
+
+    def __init__(
+        self,
+        desk: Desk,
+        tools: Tools,
+        *,
+        theme: Theme,
+        document: Document | None,
+        file: Path | None,
+        changed: Callable[[Sequence[Kept]], None],
+    ) -> None:
+        self._desk, self._tools, self._theme, self._changed = desk, tools, theme, changed
+        self._hand: list[Kept] = []
+        self._rows: list[Kept] = []
+        self._stamp: Stamp | None = None
+        self._counted = 0
+        self._latest = Latest(document)
+        self.keep = button("Keep this variant", self._keep)
+        self.chips = flow()
+        self._words, self._table = html("", MESSAGE_CSS), html("")
+        self.view = column(self._table, margin=(8, 0), visible=False)
+        self.strip = column(self._words, self.chips)
+        if file is not None:
+            self._watch(file, document)
+
+    @property
+    def kept(self) -> list[Kept]:
+        """All, those from the file last."""
+        return [*self._hand, *self._rows]
+
+    def follow(self) -> None:
+        """Show the numbers of the setting on the page in the table."""
+        if self.view.visible:
+            self._tabulate()
+
+    def show(self, shown: bool) -> None:
+        """Open or close the table."""
+        self.view.visible = shown
+        self.follow()
+
+    def close(self) -> None:
+        """End."""
+        self._latest.close()
+
+    def _keep(self, _event: Any) -> None:
+        if self._desk.reading is not None:
+            self._hand.append(Kept(variant=self._desk.good, reading=self._desk.reading, colour=self._next_colour()))
+            self._redraw()
+
+    def _remove(self, kept: Kept, _event: Any) -> None:
+        self._hand = [one for one in self._hand if one is not kept]
+        self._redraw()
+
+    def _next_colour(self) -> str:
+        # The first colours are those of what moves now.
+        self._counted += 1
+        return self._theme.palette[self._counted % len(self._theme.palette)]
+
+    def _redraw(self) -> None:
+        self.chips.objects = [self._chip(kept) for kept in self.kept]
+        self._changed(self.kept)
+        self.follow()
+
+    def _chip(self, kept: Kept) -> Any:
+        by_hand = kept in self._hand
+        css = f":host .bk-btn {{ border-left: 4px solid {kept.colour}; padding: 2px 8px; }}"
+        return button(
+            f"{kept.variant.label}  ✕" if by_hand else kept.variant.label,
+            partial(self._remove, kept) if by_hand else None,
+            css,
+            description="remove this variant" if by_hand else "a row of the file",
+        )
+
+    def _tabulate(self) -> None:
+        now = self._desk.reading
+        columns = [] if now is None else [(f"now: {self._desk.good.label}", self._theme.palette[0], now.quantities)]
+        columns += [(kept.variant.label, kept.colour, kept.reading.quantities) for kept in self.kept]
+        advice = "<p>Keep variants to see them side by side, here and as faded curves.</p>" if not self.kept else ""
+        self._table.object = quantity_table(columns) + advice
+
+    def _watch(self, file: Path, document: Document | None) -> None:
+        order = partial(self._look, file)
+        order()
+        if document is not None and document.session_context is not None:
+            document.add_periodic_callback(order, WATCH_MS)
+
+    def _look(self, file: Path) -> None:
+        self._latest.submit(partial(read_rows, self._desk.instrument, self._tools, file, self._stamp), self._looked)
+
+    def _looked(self, future: "Future[Rows | None]") -> None:
+        error = future.exception()
+        if error is not None:
+            # The rows that were read before stay.
+            self._words.object = message(told(error), ())
+            return
+        rows = future.result()
+        if rows is None:
+            return
+        self._stamp = rows.stamp
+        self._words.object = message("", rows.words)
+        self._counted = len(self._hand)
+        self._rows = [
+            Kept(variant=variant, reading=reading, colour=self._next_colour()) for variant, reading in rows.found
+        ]
+        self._redraw()
+
+
+def read_rows(instrument: Instrument, tools: Tools, file: Path, known: Stamp | None) -> Rows | None:
+    """Read a file of rows and take a reading of each; None when the file is as it was.
+
+    Raises
+    ------
+    ChladniError
+        When the file can't be read, or a row is wrong.
+    """
+    stamp = _stamp(file)
+    if stamp is not None and stamp == known:
+        return None
+    variants = tools.rows(instrument, file)
+    found: list[tuple[Variant, InstrumentReading]] = []
+    words: list[str] = []
+    for variant in variants[:MOST_ROWS]:
+        try:
+            found.append((variant, tools.read(instrument, variant.values, variant.options)))
+        except ChladniError as error:
+            words.append(f"{file.name}, {variant.label}: {error}")
+    if len(variants) > MOST_ROWS:
+        words.append(f"{file.name}: the first {MOST_ROWS} of {len(variants)} rows are drawn")
+    return Rows(stamp=stamp, found=tuple(found), words=tuple(words))
+
+
+def _stamp(file: Path) -> Stamp | None:
+    try:
+        found = file.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size
