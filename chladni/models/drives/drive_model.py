@@ -11,7 +11,7 @@ from chladni.models.core.simulation import Simulation
 from chladni.models.drives.drive_kind import DriveKind
 from chladni.models.drives.loop import close_loop
 from chladni.models.drives.selection import ChosenSignal, renamed, selected, signal_names
-from chladni.models.drives.signal_ports import with_output_port
+from chladni.models.drives.signal_ports import with_port
 from chladni.models.drives.validity import broken_limits
 from chladni.signals.errors import ModelError
 
@@ -69,7 +69,7 @@ class DriveModel:
         moving = {port.name for port in compiled.ports if port.kind in ("joint", "body", "ground")}
         loops = [loop.renamed(names) for loop in self.drive.loops(values, self.options)]
         for name in (terminal.name for loop in loops for terminal in loop.controller.inputs):
-            compiled = with_output_port(compiled, name) if name in outputs else compiled
+            compiled = with_port(compiled, name, "output") if name in outputs else compiled
         compiled = _attached(compiled, [effect for effect in self.effects if effect.site in moving])
         compiled = _attached(compiled, [effect for effect in self.effects if effect.site in outputs])
         for loop in loops:

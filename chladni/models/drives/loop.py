@@ -10,7 +10,7 @@ from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Terminal
 from chladni.models.core.port_law import PortLaw
 from chladni.models.core.state_space import StateSpace
-from chladni.models.drives.signal_ports import with_input_port
+from chladni.models.drives.signal_ports import with_command_laws, with_port
 from chladni.signals.errors import ModelError
 
 Matrix = NDArray[np.float64]
@@ -66,7 +66,7 @@ def close_loop(plant: CompiledModel, loop: Loop) -> CompiledModel:
         something acts on the samples of a signal inside the loop.
     """
     _require_no_maps(plant, loop)
-    plant = with_input_port(plant, loop.command, loop.laws)
+    plant = with_command_laws(with_port(plant, loop.command, "input"), loop.command, loop.laws)
     command = plant.column_of(loop.command)
     references = _references(plant, loop)
     n, m, k, r = len(plant.states), plant.columns, len(loop.controller.states), len(references)
