@@ -136,4 +136,4 @@ def _unwrapped(response: NDArray[np.complex128], order: int) -> tuple[Matrix, fl
 
 
 def _loop_delay_s(path: LinearPath) -> float:
-    return max((line.delay_s for line in path.looped.delays), default=0.0) if path.looped is not None else 0.0
+    return max((line.delay_s for line in path.exact.delays), default=0.0) if path.exact is not None else 0.0

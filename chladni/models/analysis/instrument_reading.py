@@ -15,7 +15,7 @@ from chladni.models.analysis.charts import (
     response_chart,
     step_charts,
 )
-from chladni.models.analysis.linear_path import linear_path
+from chladni.models.analysis.linear_path import LinearPath, linear_path
 from chladni.models.analysis.precision_stability import precision_stability
 from chladni.models.analysis.root_locus import gain_root_locus
 from chladni.models.analysis.step_response import TransientResponse, impulse_response, step_response
@@ -24,6 +24,8 @@ from chladni.models.core.instrument import Instrument, Options, Values
 from chladni.models.core.model import Model
 from chladni.models.core.reading import Chart, InstrumentReading
 
+#: What the input of a closed loop is called.
+REFERENCE = "reference"
 LINEAR_VIEWS = ("step", "bode", "nyquist", "poles", "root-locus")
 
 
@@ -65,7 +67,8 @@ def read_instrument(
     options
         Options that differ from their defaults.
     output
-        Whose Bode, Nyquist, roots and numbers are told; the instrument's own choice when None.
+        Whose Bode, Nyquist, roots and numbers are told; when None one that follows
+        the command (has its unit), else the instrument's own choice.
     variants
         Settings whose curves are laid over; the numbers are those of the setting itself.
 
@@ -96,8 +99,8 @@ def read_instrument(
 
 def _analysed(instrument: Instrument, model: Model, output: str | None, label: str) -> tuple[Shown, Behaviour]:
     compiled = model.compile()
-    paths = linear_path(compiled, from_input=instrument.step_input)
-    path = paths.to(output or instrument.step_output or paths.outputs[0].name)
+    paths = linear_path(compiled, from_input=_stepped_input(instrument, compiled))
+    path = paths.to(output or _told_output(instrument, paths))
     found = path_behaviour(path, size=instrument.step_size)
     locus = gain_root_locus(path) if "root-locus" in instrument.views else None
     return (
@@ -114,6 +117,22 @@ def _analysed(instrument: Instrument, model: Model, output: str | None, label: s
         ),
         found,
     )
+
+
+def _stepped_input(instrument: Instrument, compiled: CompiledModel) -> str:
+    """Input that steps: the command of a closed loop where there is one, else the instrument's own choice."""
+    return REFERENCE if REFERENCE in (terminal.name for terminal in compiled.inputs) else instrument.step_input
+
+
+def _told_output(instrument: Instrument, paths: LinearPath) -> str:
+    """Output whose behaviour is told: one that follows the command, else the instrument's own choice."""
+    chosen = instrument.step_output or paths.outputs[0].name
+    if paths.source.name != REFERENCE:
+        return chosen
+    units = {terminal.name: terminal.unit for terminal in paths.outputs}
+    followers = [name for name, unit in units.items() if unit == paths.source.unit]
+    # A command is given in the unit of what it's to be followed by.
+    return chosen if chosen in followers or not followers else followers[0]
 
 
 def _load_response(compiled: CompiledModel, load_input: str, output: str) -> TransientResponse | None:

@@ -44,7 +44,9 @@ class LinearPath(Value):
     kept, scale
         Which of the system's states `a` has, and the factor from scaled states to theirs, ``[state]``.
     looped
-        The system, when a dead time acts inside one of its loops: A, b, C, d are then those without it.
+        Whether a dead time acts inside one of the system's loops: A, b, C, d and poles are then those without it.
+    exact
+        The system, when only its own frequency response is exact: dead time inside a loop, ideal derivatives.
     """
 
     a: Matrix
@@ -57,7 +59,8 @@ class LinearPath(Value):
     outputs: tuple[Terminal, ...]
     kept: NDArray[np.intp]
     scale: Matrix
-    looped: CompiledModel | None = None
+    looped: bool = False
+    exact: CompiledModel | None = None
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -78,6 +81,7 @@ class LinearPath(Value):
             kept=self.kept[seen],
             scale=self.scale[seen],
             looped=self.looped,
+            exact=self.exact,
         )
 
     def rate(self) -> Self | None:
@@ -88,7 +92,7 @@ class LinearPath(Value):
         row, size = self.c[0] @ self.a, np.abs(self.c[0]) @ np.abs(self.a)
         row = np.where(np.abs(row) <= ROUNDING * size, 0.0, row)
         terminal = Terminal(name=self.outputs[0].name, unit=rate_unit(self.outputs[0].unit))
-        path = replace(self, c=row[None], d=np.array([self.c[0] @ self.b]), outputs=(terminal,), looped=None)
+        path = replace(self, c=row[None], d=np.array([self.c[0] @ self.b]), outputs=(terminal,), exact=None)
         return path.to(terminal.name)
 
     def final_value(self) -> float:
@@ -140,7 +144,8 @@ def linear_path(system: System, *, from_input: str = "", to_outputs: Sequence[st
         outputs=tuple(state_space.outputs[row] for row in rows),
         kept=kept,
         scale=scale,
-        looped=compiled if isinstance(compiled, CompiledModel) and compiled.delays else None,
+        looped=isinstance(compiled, CompiledModel) and bool(compiled.delays),
+        exact=compiled if isinstance(compiled, CompiledModel) and (compiled.delays or compiled.derivatives) else None,
     )
 
 

@@ -33,17 +33,16 @@ class Resolvent:
         self._diagonal = diagonal
         self._entry = np.asarray(basis.conj().T @ path.b, dtype=np.complex128)
         self._exit = np.asarray(path.c[0] @ basis, dtype=np.complex128)
-        if path.looped is not None:
-            names = [terminal.name for terminal in path.looped.inputs]
-            self._column = names.index(path.source.name)
-            self._row = path.looped.outputs.index(path.outputs[0])
+        if path.exact is not None:
+            self._column = path.exact.inputs.index(path.source)
+            self._row = path.exact.outputs.index(path.outputs[0])
 
     def __call__(self, omega: Matrix) -> ComplexMatrix:
         """Give H at angular frequencies in rad/s, ``[frequency]``, without the dead time outside of loops."""
         omega = np.atleast_1d(np.asarray(omega, dtype=np.float64))
-        if self._path.looped is not None:
-            looped = self._path.looped.frequency_response(omega / (2 * np.pi))[self._row, self._column]
-            return np.asarray(looped * np.exp(1j * omega * self._path.dead_time_s[0]), dtype=np.complex128)
+        if self._path.exact is not None:
+            exact = self._path.exact.frequency_response(omega / (2 * np.pi))[self._row, self._column]
+            return np.asarray(exact * np.exp(1j * omega * self._path.dead_time_s[0]), dtype=np.complex128)
         return self.at(np.asarray(1j * omega, dtype=np.complex128))
 
     def at(self, s: ComplexMatrix) -> ComplexMatrix:
@@ -57,11 +56,22 @@ class Resolvent:
 
     def value_and_slope(self, omega: float) -> tuple[complex, complex]:
         """Give H and dH/d omega at one angular frequency, without the dead time outside of loops."""
-        if self._path.looped is not None:
+        if self._path.exact is not None:
             # No closed form through a loop with dead time: central differences, their error about 1e-10.
             step = 1e-5 * omega
             before, value, after = self(np.array([omega - step, omega, omega + step]))
             return complex(value), complex((after - before) / (2 * step))
-        inverse = np.linalg.inv(1j * omega * np.eye(self._path.b.size) - self._path.a)
-        left, right = self._path.c[0] @ inverse, inverse @ self._path.b
-        return complex(left @ self._path.b + self._path.d[0]), complex(-1j * (left @ right))
+        value, slope, _ = self.derivatives(omega)
+        return value, slope
+
+    def derivatives(self, omega: float) -> tuple[complex, complex, complex]:
+        """Give H and its first and second derivative to omega; not with a dead time inside a loop.
+
+        ::
+
+            H = c R b + d,   H' = -j c R R b,   H'' = -2 c R R R b,   R = (j omega I - A)^-1
+        """
+        path = self._path
+        inverse = np.linalg.inv(1j * omega * np.eye(path.b.size) - path.a)
+        left, right = path.c[0] @ inverse, inverse @ path.b
+        return complex(left @ path.b + path.d[0]), complex(-1j * (left @ right)), complex(-2 * left @ inverse @ right)

@@ -59,7 +59,7 @@ def gain_root_locus(path: LinearPath, *, gains: Sequence[float] | Matrix | None 
     ModelError
         When a gain makes an algebraic loop that has no solution (``1 + k d = 0``), or a dead time acts.
     """
-    if path.looped is not None or path.dead_time_s[0]:
+    if path.looped or path.dead_time_s[0]:
         raise ModelError(
             "with dead time there are infinitely many roots; take the dead time out, or read the margins"
         )
@@ -114,7 +114,7 @@ def default_gains(path: LinearPath) -> Matrix:
 def _branches(roots: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """``[branch, value]`` from unordered ``[value, root]``: each root goes on to the one it can have moved to."""
     ordered = roots.copy()
-    for step in range(1, len(roots)):
+    for step in range(1, len(roots) if roots.shape[1] else 0):
         distance = np.abs(ordered[step - 1][:, None] - roots[step][None, :])
         # Greedy choice is right wherever no two roots want the same; only then the assignment is solved.
         nearest = np.argmin(distance, axis=1)

@@ -14,6 +14,8 @@ from chladni.models.core.reading import Quantity
 Matrix = NDArray[np.float64]
 
 SETTLING_BAND = 0.02
+# A final value this close to the command, or to zero beside the response's size, differs by rounding only.
+EXACT = 1e-9
 # How many rates stand between an output and the acceleration.
 ACCELERATION_RATES = {"m": 2, "rad": 2, "m/s": 1, "rad/s": 1, "m/s^2": 0, "rad/s^2": 0}
 # Settling is looked for through this many periods of a light damping.
@@ -78,8 +80,7 @@ def step_marks(path: LinearPath, *, band: float = SETTLING_BAND) -> StepMarks:
     missing = _why_missing(read)
     if missing:
         return StepMarks(read=read, rates=rates, final=np.nan, motion=motion, missing=missing)
-    final = read.final_value()
-    marks = StepMarks(read=read, rates=rates, final=final, motion=motion)
+    marks = StepMarks(read=read, rates=rates, final=read.final_value(), motion=motion)
     return _marked(marks, band)
 
 
@@ -89,7 +90,7 @@ def _marked(marks: StepMarks, band: float) -> StepMarks:
     acceleration = marks.acceleration_rates()
     fastest = None if acceleration is None else motion.largest(marks.row(acceleration))[0]
     if not _settles_away_from_zero(marks):
-        return StepMarks(read=marks.read, rates=marks.rates, final=final, motion=motion, fastest=fastest)
+        return StepMarks(read=marks.read, rates=marks.rates, final=0.0, motion=motion, fastest=fastest)
     return StepMarks(
         read=marks.read,
         rates=marks.rates,
@@ -197,9 +198,10 @@ def _errors(path: LinearPath, marks: StepMarks, size: float) -> list[Quantity]:
         reason = reason or "the output goes on and on after a step"
     if reason:
         return [none(*text, reason) for text in texts]
-    stays = 1 - marks.final
+    # Without error up to rounding is without error.
+    stays = 1 - marks.final if abs(1 - marks.final) > EXACT else 0.0
     step = Quantity(name=texts[0][0], value=size * stays, unit=unit, definition=texts[0][2])
-    if abs(stays) > 1e-9:
+    if stays:
         return [step, none(*texts[1], "it grows for ever, since a step isn't followed without error")]
     twice = np.linalg.solve(path.a, np.linalg.solve(path.a, path.b)) if path.b.size else path.b
     lag = float(path.c[0] @ twice + path.dead_time_s[0])
@@ -215,6 +217,8 @@ def _settling_reading(path: LinearPath) -> tuple[LinearPath, int]:
 
 
 def _why_missing(read: LinearPath) -> str:
+    if read.looped:
+        return "a dead time acts inside a loop: its response is simulated"
     if not read.stable():
         return "the response grows, or swings for ever"
     return "it integrates and is reached directly" if read.integrators() else ""
@@ -222,7 +226,7 @@ def _why_missing(read: LinearPath) -> str:
 
 def _settles_away_from_zero(marks: StepMarks) -> bool:
     scale = float(np.abs(marks.row() @ marks.motion.states).max())
-    return abs(marks.final) > 1e-9 * scale
+    return abs(marks.final) > EXACT * scale
 
 
 def _constant(row: Matrix, value: float) -> Matrix:

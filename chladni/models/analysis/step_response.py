@@ -109,7 +109,7 @@ def step_trajectory(path: LinearPath, chosen: Horizon, *, size: float = 1.0) -> 
 
 
 def _chosen(path: LinearPath, seconds: float | None) -> Horizon:
-    if path.looped is not None:
+    if path.looped:
         raise ModelError(
             "a dead time acts inside a loop, so that no matrix exponential gives the response; simulate the model"
         )
