@@ -66,3 +66,24 @@ class Element:
     def with_values(self, values: Values) -> Self:
         """Give the element with some values replaced; `ModelError` for an unknown name or impossible value."""
         return replace(self, parameters=self.parameters.with_values(values))
+
+    def with_tolerances(self, tolerances: Values) -> Self:
+        """Give the element with some values believed more or less: one sigma over the value, by parameter."""
+        for name in tolerances:
+            self.parameters.require(name)
+        declared = (
+            replace(item, tolerance=tolerances.get(item.name, item.tolerance)) for item in self.parameters.values()
+        )
+        return replace(self, parameters=Parameters(tuple(declared)))
+
+    def with_usual_value(self, name: str, value: float) -> Self:
+        """Give the element with one value as its user states it: what is usual then reaches at least there.
+
+        The kind's range fits its default; around a value outside it goes a factor of five to both sides.
+        """
+        found = self.parameters.require(name).with_value(value)
+        if not found.usual:
+            low, high = sorted((value / 5, value * 5))
+            found = replace(found, low=max(low, found.minimum), high=min(high, found.maximum))
+        declared = (found if item.name == name else item for item in self.parameters.values())
+        return replace(self, parameters=Parameters(tuple(declared)))

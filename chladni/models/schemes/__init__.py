@@ -1,1 +1,1 @@
-"""Block schemes with any number of loops."""
+"""Block schemes with any number of loops: the signal at every point, in time and in frequency."""

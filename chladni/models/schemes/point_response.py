@@ -1,0 +1,78 @@
+"""Frequency response at every point of a scheme, exact for improper blocks and dead time."""
+
+from collections.abc import Sequence
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.core.port import Terminal
+from chladni.models.elements.element import Element
+from chladni.models.schemes.block import Block
+from chladni.models.schemes.points import Point
+from chladni.models.schemes.wiring import wired
+
+# Numbers of one batch of matrices: 64 MB of complex ones.
+_BATCH = 4_000_000
+
+Complex = NDArray[np.complex128]
+
+
+def point_response(
+    blocks: Sequence[Block], inputs: Sequence[Terminal], points: Sequence[Point], frequency_hz: NDArray[np.float64]
+) -> Complex:
+    """Give ``[point, input, frequency]``.
+
+    With N and D the blocks' numerators and denominators, ``(D - N K) v = N L u`` is solved for every frequency:
+    unlike ``(I - H K) v = H L u`` it stays finite where a block has a pole (an integrator at 0 Hz) and the loop none.
+    """
+    wiring = wired(blocks, inputs)
+    out = np.empty((len(points), len(inputs), frequency_hz.size), dtype=np.complex128)
+    lines = max(1, _BATCH // len(blocks) ** 2)
+    rows = [point.block for point in points]
+    before = np.array([point.before for point in points], dtype=bool)
+    for start in range(0, frequency_hz.size, lines):
+        part = slice(start, start + lines)
+        above, below = _fractions(blocks, frequency_hz[part])
+        matrix = -above[:, :, None] * wiring.blocks
+        diagonal = np.arange(len(blocks))
+        matrix[:, diagonal, diagonal] += below
+        behind = _solved(matrix, above[:, :, None] * wiring.inputs)
+        found = behind[:, rows]
+        if before.any():
+            found[:, before] = (wiring.blocks @ behind + wiring.inputs)[:, np.asarray(rows)[before]]
+        out[:, :, part] = np.moveaxis(found, 0, -1)
+    return out
+
+
+def _fractions(blocks: Sequence[Block], frequency_hz: NDArray[np.float64]) -> tuple[Complex, Complex]:
+    """Numerator and denominator of each block, ``[frequency, block]``, the larger of each pair 1 in size."""
+    s = 2j * pi * frequency_hz
+    above = np.empty((s.size, len(blocks)), dtype=np.complex128)
+    below = np.ones_like(above)
+    for column, block in enumerate(blocks):
+        acting = block.acting
+        if isinstance(acting, Element):
+            transfer = acting.transfer
+            above[:, column] = np.polyval(transfer.num, s) * np.exp(-s * transfer.delay_s)
+            below[:, column] = np.polyval(transfer.den, s)
+        else:
+            above[:, column] = acting.frequency_response(frequency_hz)[0, 0]
+    size = np.maximum(np.abs(above), np.abs(below))
+    size[size == 0] = 1.0
+    return above / size, below / size
+
+
+def _solved(matrix: Complex, right: Complex) -> Complex:
+    """Solve for all frequencies at once; one by one when a frequency is a pole, where the answer is infinite."""
+    try:
+        return np.asarray(np.linalg.solve(matrix, right), dtype=np.complex128)
+    except np.linalg.LinAlgError:
+        return np.stack([_solved_line(one, side) for one, side in zip(matrix, right, strict=True)])
+
+
+def _solved_line(matrix: Complex, right: Complex) -> Complex:
+    try:
+        return np.asarray(np.linalg.solve(matrix, right), dtype=np.complex128)
+    except np.linalg.LinAlgError:
+        return np.full_like(right, complex(np.inf))
