@@ -151,7 +151,7 @@ def precision_chart(field: PrecisionStability) -> Chart:
     }
     return Chart(
         name="precision-stability",
-        title="Precision-stability field: roots against the error that stays, as the loop gain rises",
+        title="Precision-stability field of the loop gain",
         x_label=errors[field.follows],
         y_label="real part of the roots [1/s]",
         curves=tuple(

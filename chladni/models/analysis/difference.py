@@ -39,11 +39,12 @@ def relative_derivative(function: Callable[[float], Matrix], parameter: Paramete
     array([24.])
     """
     value = parameter.value
-    nodes = _nodes(parameter)
+    nodes, nominal = _nodes(parameter), function(value)
     if value == 0 or nodes is None:
-        return np.zeros_like(function(value))
+        return np.zeros_like(nominal)
+    # The weights sum to zero; less the nominal value, what doesn't depend on the parameter gives zero to the bit.
     terms = [
-        weight * function(value * (1 + node * RELATIVE_STEP))
+        weight * (function(value * (1 + node * RELATIVE_STEP)) - nominal)
         for node, weight in zip(nodes, first_derivative_weights(nodes), strict=True)
         if abs(weight) > 1e-12
     ]

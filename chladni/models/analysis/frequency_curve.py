@@ -19,8 +19,8 @@ MOST_DECADES = 10.0
 # The grid goes this far beyond the corners, where magnitude and phase are straight lines.
 BEYOND = 30.0
 # A root damped less than this gets points of its own: the phase turns by half a turn within its bandwidth.
-LIGHT = 0.3
-_TURN = np.tan(np.linspace(-1.5, 1.5, 24))
+LIGHT = 0.7
+_TURN = np.tan(np.linspace(-1.5, 1.5, 40))
 # Radians of dead time between two points, and turns of its phase that are followed.
 DEAD_TIME_STEP = 0.5
 DEAD_TIME_TURNS = 12

@@ -58,7 +58,7 @@ def influence(
     options: Options | None = None,
     *,
     parameters: Sequence[str] = (),
-    behaviour_names: Sequence[str] = BEHAVIOUR,
+    behaviour_names: Sequence[str] = (),
     changes: float | Mapping[str, float] = CHANGE,
     from_input: str = "",
     to_output: str = "",
@@ -82,7 +82,8 @@ def influence(
     parameters
         Which ones change; all that are construction when empty.
     behaviour_names
-        Columns, names of quantities of `chladni.models.analysis.behaviour.behaviour`.
+        Columns, names of quantities of `chladni.models.analysis.behaviour.behaviour`; when empty the paper's four and
+        those of `BEHAVIOUR` that exist here.
     changes
         Relative change, final over initial less one: of each parameter, or by name (others: 0.1). Where it leads out
         of what is possible the change is made to the other side; where that is impossible too there is no finite
@@ -105,7 +106,7 @@ def influence(
     model, source, output, size = _resolved(system, values, options, from_input, to_output)
     nominal = behaviour(model, from_input=source, to_output=output, size=size, band=band)
     rows = [model.parameters.require(name) for name in parameters] or _construction(model)
-    kept = _known(nominal, behaviour_names)
+    kept = _known(nominal, behaviour_names or _existing(nominal))
     study = _Study(model=model, nominal=nominal, names=kept, size=size, band=band)
     applied = [_applied(row, changes) for row in rows]
     initial = study.values(nominal)
@@ -209,6 +210,10 @@ def _construction(model: Model) -> list[Parameter]:
     if not found:
         raise ModelError(f"{model.name}: no parameter is marked as construction; name those that change")
     return found
+
+
+def _existing(nominal: Behaviour) -> list[str]:
+    return [name for name in BEHAVIOUR if name in PAPER_BEHAVIOUR or nominal.value(name) is not None]
 
 
 def _known(nominal: Behaviour, names: Sequence[str]) -> tuple[str, ...]:

@@ -16,8 +16,8 @@ from chladni.signals.value import Value
 
 Matrix = NDArray[np.float64]
 GAINS = 61
-# From where nothing has moved to where the branches lie along their asymptotes.
-GAIN_DECADES = 2.0
+# From where nothing has moved to where the branches turn to their asymptotes.
+GAIN_DECADES = (2.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -108,7 +108,7 @@ def default_gains(path: LinearPath) -> Matrix:
     regular = 1j * omega * np.eye(path.b.size) - path.a + 1e-6 * omega * np.eye(path.b.size)
     size = abs(path.c[0] @ np.linalg.solve(regular, path.b) + path.d[0]) if path.b.size else abs(path.d[0])
     middle = log10(1 / size) if size > 0 else 0.0
-    return np.concatenate([[0.0], np.logspace(middle - GAIN_DECADES, middle + GAIN_DECADES, GAINS - 1)])
+    return np.concatenate([[0.0], np.logspace(middle - GAIN_DECADES[0], middle + GAIN_DECADES[1], GAINS - 1)])
 
 
 def _branches(roots: NDArray[np.complex128]) -> NDArray[np.complex128]:
