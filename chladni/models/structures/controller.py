@@ -6,7 +6,7 @@ from math import isfinite
 from typing import Final, Literal
 
 from chladni.signals.errors import ModelError
-from chladni.signals.units import quotient
+from chladni.signals.units import quotient, si_factor
 
 Law = Literal["p", "pd", "pi", "pid", "p-p", "transfer-function"]
 
@@ -21,6 +21,35 @@ GAINS: Final[Mapping[Law, tuple[str, ...]]] = {
 }
 FILTER: Final = "filter"
 LAWS_WITH_RATE: Final = ("pd", "pid", "p-p")
+
+
+def gains_of(law: Law) -> tuple[str, ...]:
+    """Names of the gains that a law may have."""
+    return (*GAINS[law], FILTER) if law in LAWS_WITH_RATE else GAINS[law]
+
+
+def controller_units(law: Law, gain_unit: str | None, *, driven_unit: str, feedback_unit: str) -> dict[str, str]:
+    """Unit of each number of a controller by its key, and of its command u as ``command``.
+
+    Examples
+    --------
+    >>> units = controller_units("p-p", "N/V", driven_unit="N", feedback_unit="m")
+    >>> units["command"], units["kp"], units["kv"]
+    ('V', '1/s', 'V/(m/s)')
+    """
+    command = driven_unit if gain_unit is None else quotient(driven_unit, gain_unit)
+    per_error = quotient(command, feedback_unit)
+    per_rate = quotient(command, quotient(feedback_unit, "s"))
+    return {
+        "command": command,
+        "kp": "1/s" if law == "p-p" else per_error,
+        "ki": quotient(per_error, "s"),
+        "kd": per_rate,
+        "kv": per_rate,
+        FILTER: "s",
+        "gain": gain_unit or "1",
+        "limit": command,
+    }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +90,7 @@ class Controller:
     gain
         Force for a unit of u.
     gain_unit
-        Such as ``N/V``; None when u is taken in the driven input's own unit.
+        SI unit such as ``N/V``; None when u is taken in the driven input's own unit.
     limit
         Largest magnitude that the command has; None for none.
     limit_unit
@@ -99,23 +128,11 @@ class Controller:
 
     def units(self, *, driven_unit: str, feedback_unit: str) -> dict[str, str]:
         """Unit of each number that the controller may have, by its key, and of u as ``command``."""
-        command = driven_unit if self.gain_unit is None else quotient(driven_unit, self.gain_unit)
-        per_error = quotient(command, feedback_unit)
-        per_rate = quotient(command, quotient(feedback_unit, "s"))
-        return {
-            "command": command,
-            "kp": "1/s" if self.law == "p-p" else per_error,
-            "ki": quotient(per_error, "s"),
-            "kd": per_rate,
-            "kv": per_rate,
-            FILTER: "s",
-            "gain": self.gain_unit or "1",
-            "limit": self.limit_unit or command,
-        }
+        units = controller_units(self.law, self.gain_unit, driven_unit=driven_unit, feedback_unit=feedback_unit)
+        return units | {"limit": self.limit_unit or units["command"]}
 
     def _gain_mistakes(self) -> list[str]:
-        needed = GAINS[self.law]
-        allowed = (*needed, FILTER) if self.law in LAWS_WITH_RATE else needed
+        needed, allowed = GAINS[self.law], gains_of(self.law)
         wish = f"law {self.law} has gains {', '.join(allowed)}" if allowed else f"law {self.law} has no gains"
         found = [f"gain {name} is missing; {wish}" for name in needed if name not in self.gains]
         found += [f"gain {name} is unknown; {wish}" for name in self.gains if name not in allowed]
@@ -140,6 +157,8 @@ class Controller:
 
     def _drive_mistakes(self) -> list[str]:
         found = []
+        if self.gain_unit is not None and si_factor(self.gain_unit)[0] != 1:
+            found.append(f"gain_unit {self.gain_unit!r} is no SI unit; give the gain in SI")
         if self.rate_of == "error" and self.law not in ("pd", "pid"):
             found.append(f"rate_of is for the laws pd and pid, not for {self.law}")
         if not isfinite(self.gain) or self.gain == 0:

@@ -1,6 +1,6 @@
 """A structure with what drives it, what is measured on it and what controls it: a `Model`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, Self
 
@@ -12,6 +12,7 @@ from chladni.models.core.model import Effect, ModelKind
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import Simulation
+from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.structures.closed_loop import close_loop, limit_port
 from chladni.models.structures.controller import Controller
 from chladni.models.structures.motion_modes import motion_modes, ordered_poles, unstable_poles
@@ -25,7 +26,7 @@ from chladni.models.structures.structure_parameters import (
     structure_parameters,
     with_numbers,
 )
-from chladni.models.structures.wiring import Wiring, wiring_mistakes
+from chladni.models.structures.wiring import Wiring, WiringMistake, name_mistakes, wiring_mistakes
 from chladni.signals.errors import ModelError
 from chladni.signals.unit_text import with_unit
 
@@ -89,10 +90,7 @@ class StructureModel:
     declared: Parameters | None = None
 
     def __post_init__(self) -> None:
-        bodies = {body.name: body.motion for body in self.structure.bodies}
-        joints = {joint.name: joint.between for joint in self.structure.joints}
-        wirings = [Wiring(one.name, one.feedback, one.drives, one.reference) for one in self.controllers]
-        for mistake in wiring_mistakes(bodies, joints, self.inputs, self.outputs, wirings):
+        for mistake in (*self._name_mistakes(), *self._wiring_mistakes()):
             raise ModelError(f"model {self.name!r}: {mistake.part} {mistake.name!r}: {mistake.text}")
         for name in self.tolerances:
             self.parameters.require(name)
@@ -159,8 +157,36 @@ class StructureModel:
         return motion_modes(compiled, [body.name for body in self.structure.bodies])
 
     def flags(self, simulation: Simulation) -> tuple[str, ...]:
-        """Sentences on an unstable loop, a limit that was reached, and numbers outside their usual range."""
-        return (*self._instability(), *self._reached(simulation), *self._unusual())
+        """Sentences on an unstable loop, a limit that was reached, laws and numbers that left their range."""
+        compiled = self.compile()
+        of_effects = [
+            sentence
+            for effect in self.effects
+            if isinstance(effect, AttachedEffect)
+            for sentence in effect.flags(compiled, simulation)
+        ]
+        return (*self._instability(compiled), *self._reached(simulation), *of_effects, *self._unusual())
+
+    def _name_mistakes(self) -> Iterator[WiringMistake]:
+        kinds: dict[str, list[str]] = {
+            "body": [body.name for body in self.structure.bodies],
+            "joint": [joint.name for joint in self.structure.joints],
+            "input": [one.name for one in self.inputs],
+            "output": [one.name for one in self.outputs],
+            "controller": [one.name for one in self.controllers],
+        }
+        return name_mistakes(
+            [(kind, place, name) for kind, names in kinds.items() for place, name in enumerate(names)]
+        )
+
+    def _wiring_mistakes(self) -> Iterator[WiringMistake]:
+        return wiring_mistakes(
+            {body.name: body.motion for body in self.structure.bodies},
+            {joint.name: joint.between for joint in self.structure.joints},
+            self.inputs,
+            self.outputs,
+            [Wiring(one.name, one.feedback, one.drives, one.reference) for one in self.controllers],
+        )
 
     def _open_loop(self) -> CompiledModel:
         return compile_plant(
@@ -200,11 +226,9 @@ class StructureModel:
             feedback_unit=output_terminal(self.structure, feedback).unit,
         )
 
-    def _instability(self) -> tuple[str, ...]:
-        if not self.controllers:
-            return ()
-        unstable = unstable_poles(self.compile())
-        if not unstable.size:
+    def _instability(self, compiled: CompiledModel) -> tuple[str, ...]:
+        unstable = unstable_poles(compiled)
+        if not unstable.size or not self.controllers:
             return ()
         listed = ", ".join(f"{pole.real:.4g}{pole.imag:+.4g}j" for pole in unstable[:6])
         names = ", ".join(controller.name for controller in self.controllers)

@@ -58,7 +58,7 @@ def wiring_mistakes(
     outputs: Sequence[StructureOutput],
     controllers: Sequence[Wiring],
 ) -> Iterator[WiringMistake]:
-    """Give every mistake in the names and references of a structure's inputs, outputs and controllers.
+    """Give every mistake in what is referred to by a structure's inputs, outputs and controllers.
 
     Parameters
     ----------
@@ -68,15 +68,6 @@ def wiring_mistakes(
         Ends by name.
     """
     rules = _Rules(bodies, joints, inputs, outputs, controllers)
-    yield from name_mistakes(
-        [
-            *(("body", place, name) for place, name in enumerate(bodies)),
-            *(("joint", place, name) for place, name in enumerate(joints)),
-            *(("input", place, one.name) for place, one in enumerate(inputs)),
-            *(("output", place, one.name) for place, one in enumerate(outputs)),
-            *(("controller", place, one.name) for place, one in enumerate(controllers)),
-        ]
-    )
     for place, one in enumerate(inputs):
         yield from _placed("input", place, one.name, rules.of_input(one))
     for place, output in enumerate(outputs):
@@ -102,14 +93,14 @@ def name_mistakes(parts: Sequence[tuple[str, int, str]]) -> Iterator[WiringMista
         yield WiringMistake(part=part, place=place, name=name, key="name", text=text)
 
 
-def joint_mistakes(between: tuple[str, str], bodies: Mapping[str, Motion | None]) -> list[str]:
-    """Say what is wrong with the ends of a joint; a motion of None is not known yet."""
+def joint_mistakes(between: tuple[str, str], bodies: Mapping[str, Motion]) -> list[str]:
+    """Say what is wrong with the ends of a joint."""
     unknown = [_nothing(end, "body", [*bodies, GROUND]) for end in between if end not in bodies and end != GROUND]
     if unknown:
         return unknown
     if between[0] == between[1]:
         return [f"both ends are {between[0]!r}; a joint joins two different ones"]
-    motions = {bodies[end] for end in between if end != GROUND} - {None}
+    motions = {bodies[end] for end in between if end != GROUND}
     if len(motions) > 1:
         return [f"{between[0]!r} and {between[1]!r} can't be joined: one has a mass, the other an inertia"]
     return []
