@@ -69,7 +69,7 @@ class BandNoise:
 
 
 def _uniform_interval(times_s: Matrix) -> float | None:
-    if times_s.size <= _BLOCK:
+    if times_s.size < 2:
         return None
     interval = float(times_s[-1] - times_s[0]) / (times_s.size - 1)
     steps = np.diff(times_s)

@@ -44,12 +44,11 @@ class LinearFilter(Value):
         if not self.states:
             return np.asarray(self.d * samples, dtype=np.float64)
         # scipy.signal takes most of a second to import, and few ever filter samples.
-        from scipy.signal import cont2discrete, lfilter, ss2tf
+        from scipy.signal import lsim
 
-        one = (self.a, self.b[:, None], self.c[None, :], np.array([[self.d]]))
-        a, b, c, d, _ = cont2discrete(one, 1 / sample_rate_hz, method="foh")
-        numerator, denominator = ss2tf(a, b, c, d)
-        return np.asarray(lfilter(numerator[0], denominator, samples), dtype=np.float64)
+        way = (self.a, self.b[:, None], self.c[None, :], np.array([[self.d]]))
+        _, filtered, _ = lsim(way, samples, np.arange(samples.size) / sample_rate_hz)
+        return np.asarray(filtered, dtype=np.float64)
 
 
 def gain(factor: float) -> LinearFilter:

@@ -1,6 +1,6 @@
 """Softening stiffness: a spring that gets weaker with displacement, up to where it would give way."""
 
-from math import inf, sqrt
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,9 @@ from chladni.models.core.simulation import Simulation
 from chladni.models.effects.attaching import LawAtPort
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.signals.errors import ModelError
+
+# Finite, because laws take finite numbers only.
+_EVERYWHERE = 1e300
 
 
 def cubic(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -31,7 +34,7 @@ def valid_range(cubic_stiffness: float, stiffness: float) -> float:
     >>> round(valid_range(-1e10, 3e6), 12)
     0.01
     """
-    return sqrt(stiffness / (-3 * cubic_stiffness)) if cubic_stiffness else inf
+    return sqrt(stiffness / (-3 * cubic_stiffness)) if cubic_stiffness else _EVERYWHERE
 
 
 def _numbers(values: Values, port: Port) -> tuple[float, ...]:

@@ -1,0 +1,59 @@
+import numpy as np
+import pytest
+
+from chladni.models.effects.attached_effect import attached
+from tests.models.effects.motions import driven, energy, law_of, loop
+from tests.models.effects.small_models import one_body
+
+FORCE, YIELD = 12.0, 1e-4
+
+
+def _law(shape: float = 1.0):  # type: ignore[no-untyped-def]
+    return law_of(attached("hysteresis", "spring", {"force": FORCE, "yield": YIELD, "shape": shape}), one_body())
+
+
+@pytest.mark.parametrize("shape", [1.0, 2.0, 6.0])
+def test_pulled_far_it_comes_to_a_plateau_of_the_force(shape: float) -> None:
+    times_s = np.linspace(0, 1, 21)
+    found = driven(_law(shape), lambda t: 40 * YIELD * t, lambda _t: 40 * YIELD, times_s)
+    assert found[-1] == pytest.approx(FORCE, rel=1e-6)
+
+
+def test_pulled_at_shape_one_it_follows_the_exponential() -> None:
+    times_s = np.linspace(0, 1, 21)
+    found = driven(_law(), lambda t: 3 * YIELD * t, lambda _t: 3 * YIELD, times_s)
+    # yield dw/dd = 1 - w
+    np.testing.assert_allclose(found, FORCE * (1 - np.exp(-3 * times_s)), atol=1e-7 * FORCE)
+
+
+def test_pulled_at_shape_two_it_follows_the_hyperbolic_tangent() -> None:
+    times_s = np.linspace(0, 1, 21)
+    found = driven(_law(2.0), lambda t: 3 * YIELD * t, lambda _t: 3 * YIELD, times_s)
+    # yield dw/dd = 1 - w^2
+    np.testing.assert_allclose(found, FORCE * np.tanh(3 * times_s), atol=1e-7 * FORCE)
+
+
+def test_it_unloads_along_the_initial_stiffness() -> None:
+    law = _law(3.0)
+    rates = [0.0]
+    law.function(0.0, -1.0, 0.0, law.parameters, [0.8], rates)
+    # While w and s have opposite signs dw/dd = 1/yield exactly.
+    assert rates[0] == pytest.approx(-1 / YIELD, rel=1e-14)
+
+
+def test_small_motions_see_a_spring_of_force_over_yield() -> None:
+    d, f = loop(_law(2.0), 1e-3 * YIELD, 5.0)
+    np.testing.assert_allclose(f, FORCE / YIELD * d, atol=1e-5 * FORCE / YIELD * 1e-3 * YIELD)
+
+
+def test_large_cycles_take_what_friction_with_elastic_reversals_takes() -> None:
+    amplitude = 100 * YIELD
+    # At shape 1, per half cycle: w comes from -1 to 0 as a straight line along yield, then 1 - w decays as
+    # exp(-way/yield). Of 1 - w along the way that makes 1.5 yield and then 1 yield.
+    wanted = 2 * FORCE * (2 * amplitude - 2.5 * YIELD)
+    assert energy(*loop(_law(), amplitude, 5.0)) == pytest.approx(wanted, rel=1e-4)
+
+
+def test_turning_the_speed_of_a_cycle_changes_nothing() -> None:
+    slow, fast = energy(*loop(_law(2.0), 3 * YIELD, 0.01)), energy(*loop(_law(2.0), 3 * YIELD, 100.0))
+    assert slow == pytest.approx(fast, rel=1e-6)
