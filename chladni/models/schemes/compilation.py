@@ -166,7 +166,7 @@ def _assembled(
     powers = rows.from_y @ equations.d
     powers[0] += rows.from_w
     full = filtered_derivatives(
-        equations.a, equations.b, rows.from_y @ equations.c, powers, filter_time_s=filter_time_s
+        *_balanced(equations.a, equations.b, rows.from_y @ equations.c), powers, filter_time_s=filter_time_s
     )
     m, p = len(inputs), len(points)
     names = [*(terminal.name for terminal in inputs), *(place.port.name for place in places)]
@@ -199,3 +199,13 @@ def _assembled(
             for number, order in enumerate(full.orders, start=len(places))
         ),
     )
+
+
+def _balanced(a: Matrix, b: Matrix, c: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+    """States in units that make rows and columns of A of like size: gains of 1e9 between them would cost digits."""
+    from scipy.linalg import matrix_balance
+
+    if not a.size:
+        return a, b, c
+    balanced, (scale, _) = matrix_balance(a, permute=False, separate=True)
+    return np.asarray(balanced), b / scale[:, None], c * scale

@@ -5,15 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.models.schemes.structural_inverse import structural_inverse, total
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
 
 Matrix = NDArray[np.float64]
 
-# What is left of a difference of equal numbers, relative to them.
-_ROUNDING = 1e-13
 # Of a row or column of unit size: below, an equation doesn't determine the unknown.
 _RANK = 1e-11
+# How much better an unknown that isn't preferred must be determined to be chosen.
+_NOT_PREFERRED = 1e-4
 # Each halves the logarithm of what sizes differ by.
 _UNIT_ROUNDS = 8
 #: Most derivatives of an input that are carried; nothing in use has more than a few.
@@ -30,6 +31,7 @@ class Descriptor(Value):
         E r' = Rx x + Rr r + sum_k Rw[k] w^(k)          E square, most often singular
 
     w are the inputs and w^(k) their derivatives; Xw and Rw are ``[power, row, input]`` with equally many powers.
+    `preferred` says which of the rest should be eliminated before the others.
     """
 
     x_x: Matrix
@@ -39,6 +41,7 @@ class Descriptor(Value):
     r_x: Matrix
     r_r: Matrix
     r_w: Matrix
+    preferred: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -81,13 +84,13 @@ def reduced(given: Descriptor) -> Reduced:
     )
     current, left = given, list(range(size))
     while current.e.shape[0]:
+        current, recovery = _with_room(current, recovery)
         turned, rank = _rows_with_derivatives_first(current)
         if rank == current.e.shape[0]:
             return _ordinary(turned, recovery, tuple(left))
         solution = _solved(turned, rank)
         recovery = _recovered(recovery, solution)
         current = _inserted(turned, rank, solution)
-        current, recovery = _with_room(current, recovery)
         left = [left[place] for place in solution.free]
     return _ordinary(current, recovery, ())
 
@@ -116,49 +119,67 @@ def _rows_with_derivatives_first(given: Descriptor) -> tuple[Descriptor, int]:
     """Combine the rest's equations so that only the first `rank` have derivatives."""
     moving = np.flatnonzero(given.e.any(axis=1))
     still = np.setdiff1d(np.arange(given.e.shape[0]), moving)
-    e = given.e[moving]
-    row, column = _units(e)
-    turn, sizes, _ = np.linalg.svd(row[:, None] * e * column)
-    rank = int(np.count_nonzero(sizes > _RANK))
+    steps, rank = _elimination(given.e[moving])
     combine = np.zeros((given.e.shape[0],) * 2)
-    combine[: moving.size, moving] = turn.T * row
+    combine[: moving.size, moving] = steps
     combine[np.arange(moving.size, given.e.shape[0]), still] = 1.0
-    e = combine @ given.e
+    e = total((combine, given.e))
     e[rank:] = 0.0
-    turned = Descriptor(
-        x_x=given.x_x, x_r=given.x_r, x_w=given.x_w,
-        e=e, r_x=combine @ given.r_x, r_r=combine @ given.r_r, r_w=combine @ given.r_w,
-    )  # fmt: skip
+    turned = replace(
+        given, e=e, r_x=total((combine, given.r_x)), r_r=total((combine, given.r_r)), r_w=total((combine, given.r_w))
+    )
     return turned, rank
 
 
+def _elimination(e: Matrix) -> tuple[Matrix, int]:
+    """Give the combinations of rows that leave `rank` independent ones first and zeros below, and the rank.
+
+    Gauss's elimination with complete pivoting: unlike rotations it leaves rows alone that need no combining, and with
+    them the zeros that say what has nothing to do with what.
+    """
+    row, column = _units(e)
+    work, steps = row[:, None] * e * column, np.diag(row)
+    for rank in range(e.shape[0]):
+        size = np.abs(work[rank:])
+        best = int(size.argmax())
+        if size.flat[best] <= _RANK:
+            return steps, rank
+        pivot, unknown = rank + best // e.shape[1], best % e.shape[1]
+        work[[rank, pivot]], steps[[rank, pivot]] = work[[pivot, rank]], steps[[pivot, rank]]
+        share = np.where(np.arange(e.shape[0]) > rank, work[:, unknown] / work[rank, unknown], 0.0)[:, None]
+        work, steps = total(work, (-share, work[rank : rank + 1])), total(steps, (-share, steps[rank : rank + 1]))
+        work[rank + 1 :, unknown] = 0.0
+    return steps, e.shape[0]
+
+
 def _solved(given: Descriptor, rank: int) -> _Solution:
-    """Solve the equations without derivatives for as many unknowns, those that they determine best."""
+    """Solve the equations without derivatives for as many unknowns, preferred ones wherever they are determined."""
     from scipy.linalg import qr
 
     rows = given.r_r[rank:]
     row, column = _units(rows)
-    triangle, pivoted = qr(row[:, None] * rows * column, mode="r", pivoting=True)
-    if np.any(np.abs(np.diagonal(triangle)) < _RANK):
+    weight = np.where(given.preferred, 1.0, _NOT_PREFERRED)
+    triangle, pivoted = qr(row[:, None] * rows * (column * weight), mode="r", pivoting=True)
+    if np.any(np.abs(np.diagonal(triangle)) < _RANK * _NOT_PREFERRED):
         raise ModelError("the equations do not determine every signal")
     order = np.asarray(pivoted, dtype=np.int64)
     solved, free = order[: rows.shape[0]], np.sort(order[rows.shape[0] :])
-    pivots = -rows[:, solved]
+    inverse = structural_inverse(-rows[:, solved])
     return _Solution(
         solved=solved,
         free=free,
-        from_x=np.asarray(np.linalg.solve(pivots, given.r_x[rank:]), dtype=np.float64),
-        from_r=np.asarray(np.linalg.solve(pivots, rows[:, free]), dtype=np.float64),
-        from_w=np.asarray(np.linalg.solve(pivots, given.r_w[:, rank:]), dtype=np.float64),
+        from_x=total((inverse, given.r_x[rank:])),
+        from_r=total((inverse, rows[:, free])),
+        from_w=total((inverse, given.r_w[:, rank:])),
     )
 
 
 def _recovered(before: _Recovery, solution: _Solution) -> _Recovery:
     put_in = before.from_r[:, solution.solved]
     return _Recovery(
-        from_x=_total(before.from_x, put_in @ solution.from_x),
-        from_r=_total(before.from_r[:, solution.free], put_in @ solution.from_r),
-        from_w=_total(before.from_w, put_in @ solution.from_w),
+        from_x=total(before.from_x, (put_in, solution.from_x)),
+        from_r=total(before.from_r[:, solution.free], (put_in, solution.from_r)),
+        from_w=total(before.from_w, (put_in, solution.from_w)),
     )
 
 
@@ -166,20 +187,21 @@ def _inserted(given: Descriptor, rank: int, solution: _Solution) -> Descriptor:
     """Put the solution into the equations of x and into those of the rest that have derivatives."""
     solved, free = solution.solved, solution.free
     of_x, moved, still = given.x_r[:, solved], given.e[:rank, solved], given.r_r[:rank, solved]
-    x_x = _total(given.x_x, of_x @ solution.from_x)
-    x_r = _total(given.x_r[:, free], of_x @ solution.from_r)
-    x_w = _total(given.x_w, of_x @ solution.from_w)
+    x_x = total(given.x_x, (of_x, solution.from_x))
+    x_r = total(given.x_r[:, free], (of_x, solution.from_r))
+    x_w = total(given.x_w, (of_x, solution.from_w))
     # The derivative of what was solved for: that of x is known, that of the inputs goes one power up.
-    through_x = moved @ solution.from_x
+    through_x = -total((moved, solution.from_x))
     higher = np.roll(solution.from_w, 1, axis=0)
     return Descriptor(
         x_x=x_x,
         x_r=x_r,
         x_w=x_w,
-        e=_total(given.e[:rank, free], moved @ solution.from_r),
-        r_x=_total(given.r_x[:rank], still @ solution.from_x, -through_x @ x_x),
-        r_r=_total(given.r_r[:rank, free], still @ solution.from_r, -through_x @ x_r),
-        r_w=_total(given.r_w[:, :rank], still @ solution.from_w, -through_x @ x_w, -moved @ higher),
+        e=total(given.e[:rank, free], (moved, solution.from_r)),
+        r_x=total(given.r_x[:rank], (still, solution.from_x), (through_x, x_x)),
+        r_r=total(given.r_r[:rank, free], (still, solution.from_r), (through_x, x_r)),
+        r_w=total(given.r_w[:, :rank], (still, solution.from_w), (through_x, x_w), (-moved, higher)),
+        preferred=given.preferred[free],
     )
 
 
@@ -195,13 +217,13 @@ def _ordinary(given: Descriptor, recovery: _Recovery, kept: tuple[int, ...]) -> 
     raw = np.concatenate([given.x_w, lower_w], axis=1)
     shift = np.zeros_like(raw)
     for power in range(raw.shape[0] - 1, 0, -1):
-        shift[power - 1] = _total(raw[power], a @ shift[power])
+        shift[power - 1] = total(raw[power], (a, shift[power]))
     c = np.hstack([recovery.from_x, recovery.from_r])
     return Reduced(
         a=a,
-        b=_total(raw[0], a @ shift[0]),
+        b=total(raw[0], (a, shift[0])),
         c=c,
-        d=_total(recovery.from_w, c @ shift),
+        d=total(recovery.from_w, (c, shift)),
         kept=kept,
     )
 
@@ -228,10 +250,3 @@ def _units(matrix: Matrix) -> tuple[Matrix, Matrix]:
         for units, largest in ((row, scaled.max(axis=1, initial=0.0)), (column, scaled.max(axis=0, initial=0.0))):
             units /= np.sqrt(np.where(largest > 0, largest, 1.0))
     return row, column
-
-
-def _total(*terms: Matrix) -> Matrix:
-    """Sum; what only rounding leaves of terms that cancel is zero."""
-    total = np.sum(terms, axis=0)
-    size = np.sum(np.abs(terms), axis=0)
-    return np.asarray(np.where(np.abs(total) > _ROUNDING * size, total, 0.0))

@@ -11,6 +11,7 @@ from chladni.models.elements.realization import Realization, realize
 from chladni.models.schemes.block import Block
 from chladni.models.schemes.descriptor import Descriptor, reduced
 from chladni.models.schemes.loops import loops_of, require_well_posed
+from chladni.models.schemes.structural_inverse import total
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
 
@@ -120,7 +121,7 @@ def _descriptor(forms: Sequence[Realization], between: Matrix, columns: Matrix) 
             e[place, place - 1] = 1.0
         r_r[place, place] = 1.0
     r_r[extra + owner, np.arange(extra)] = [q for form in forms for q in form.q[1:]]
-    r_r[extra:, extra:] = direct[:, None] * between - np.eye(count)
+    r_r[extra:, extra:] = total(direct[:, None] * between, -np.eye(count))
     r_w[0, extra:] = direct[:, None] * columns
     a = np.asarray(block_diag(*[form.a for form in forms]))
     x_w = np.zeros((2, b.shape[0], columns.shape[1]))
@@ -133,6 +134,7 @@ def _descriptor(forms: Sequence[Realization], between: Matrix, columns: Matrix) 
         r_x=np.vstack([np.zeros((extra, b.shape[0])), c]),
         r_r=r_r,
         r_w=r_w,
+        preferred=np.arange(extra + count) >= extra,
     )
 
 

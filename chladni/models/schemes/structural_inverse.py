@@ -1,0 +1,49 @@
+"""Matrix algebra that keeps zeros zero: rounding must not link signals that nothing links."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.errors import ModelError
+
+Matrix = NDArray[np.float64]
+
+# What is left of numbers that cancel, relative to them.
+_ROUNDING = 1e-13
+
+
+def total(*terms: Matrix | tuple[Matrix, Matrix]) -> Matrix:
+    """Sum of matrices and of products; what only rounding leaves of numbers that cancel is zero."""
+    parts = [term if isinstance(term, tuple) else (None, term) for term in terms]
+    whole = sum(right if left is None else left @ right for left, right in parts)
+    size = sum(np.abs(right) if left is None else np.abs(left) @ np.abs(right) for left, right in parts)
+    return np.asarray(np.where(np.abs(whole) > _ROUNDING * size, whole, 0.0))
+
+
+def structural_inverse(matrix: Matrix) -> Matrix:
+    """Inverse whose entries are exactly zero wherever the pattern of `matrix` makes them so.
+
+    With rows in an order that puts an entry on each place of the diagonal, entry [i, j] of the inverse can only
+    differ from zero where a chain of entries leads from j to i (Gilbert & Peierls 1988, theorem 1).
+
+    Raises
+    ------
+    ModelError
+        When the matrix is singular.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import maximum_bipartite_matching
+
+    count = matrix.shape[0]
+    # Matched to each column: the row that gives its entry on the diagonal.
+    row = maximum_bipartite_matching(csr_array(matrix != 0), perm_type="row")
+    if np.any(row < 0):
+        raise ModelError("the equations do not determine every signal")
+    links = (matrix[row] != 0) | np.eye(count, dtype=bool)
+    reached = np.zeros_like(links)
+    while not np.array_equal(links, reached):
+        reached = links
+        links = (reached.astype(np.float32) @ reached.astype(np.float32)) > 0
+    inverse = np.linalg.inv(matrix[row])
+    back = np.empty_like(row)
+    back[row] = np.arange(count)
+    return np.asarray(np.where(reached, inverse, 0.0)[:, back], dtype=np.float64)
