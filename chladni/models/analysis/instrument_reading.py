@@ -1,7 +1,6 @@
 """Everything that a virtual instrument shows at one setting of its knobs."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
 
 from chladni.models.analysis.behaviour import Behaviour, path_behaviour
 from chladni.models.analysis.charts import (
@@ -19,6 +18,7 @@ from chladni.models.analysis.linear_path import LinearPath, linear_path
 from chladni.models.analysis.precision_stability import precision_stability
 from chladni.models.analysis.root_locus import gain_root_locus
 from chladni.models.analysis.step_response import TransientResponse, impulse_response, step_response
+from chladni.models.analysis.variants import Variant
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.instrument import Instrument, Options, Values
 from chladni.models.core.model import Model
@@ -27,25 +27,6 @@ from chladni.models.core.reading import Chart, InstrumentReading
 #: What the input of a closed loop is called.
 REFERENCE = "reference"
 LINEAR_VIEWS = ("step", "bode", "nyquist", "poles", "root-locus")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Variant:
-    """A setting that is kept beside others.
-
-    Attributes
-    ----------
-    name
-        Label of its curves.
-    values
-        Parameters that differ from the defaults, SI.
-    options
-        Options that differ from the defaults.
-    """
-
-    name: str
-    values: Mapping[str, float] = field(default_factory=dict)
-    options: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_instrument(
