@@ -23,7 +23,7 @@ from chladni.models.drives.servo_loops import (
     servo_loops,
     tuned_gains,
 )
-from chladni.models.drives.signal_ports import with_command_laws
+from chladni.models.drives.signal_ports import with_limit
 from chladni.models.drives.validity import Limit
 
 #: Joint between housing and rotor, and the rotor with all that turns with it.
@@ -121,7 +121,7 @@ def _build(values: Mapping[str, float], options: Mapping[str, str]) -> CompiledM
     )
     if options["voltage_limiter"] == "off":
         return compiled
-    return with_command_laws(compiled, "voltage", (limit_law(limit=values["voltage_limit"]),))
+    return with_limit(compiled, "voltage", limit_law(limit=values["voltage_limit"]))
 
 
 def _applied(options: Mapping[str, str]) -> str:
@@ -181,6 +181,7 @@ DC_SERVO = DriveKind(
     build=_build,
     loops=servo_loops,
     limits=_limits,
+    law_words={"voltage_limit": "the voltage limit", "current_reference_limit": "the current limit"},
     acts_with=_ACTS_WITH,
 )
 

@@ -48,6 +48,8 @@ class DriveKind:
         ``loops(values, options) -> [Loop, ...]``, the innermost first.
     limits
         ``limits(values, options) -> [Limit, ...]``: what the model is valid for.
+    law_words
+        What acts at a port of the kind's own laws, by the port's name: ``the voltage limit``. Said when it acts.
     acts_with
         Parameters that act with some options only: name to ``(option, words)``. A parameter that isn't named
         always acts.
@@ -62,6 +64,7 @@ class DriveKind:
     options: tuple[Option, ...] = ()
     loops: Callable[[Numbers, Words], Sequence[Loop]] = no_loops
     limits: Callable[[Numbers, Words], Sequence[Limit]] = no_limits
+    law_words: Mapping[str, str] = field(default_factory=dict)
     acts_with: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
 
     def choices(self, options: Words) -> dict[str, str]:

@@ -12,7 +12,7 @@ from chladni.models.drives.drive_kind import DriveKind
 from chladni.models.drives.loop import close_loop
 from chladni.models.drives.selection import ChosenSignal, renamed, selected, signal_names
 from chladni.models.drives.signal_ports import with_port
-from chladni.models.drives.validity import broken_limits
+from chladni.models.drives.validity import acting_laws, broken_limits, unstable_loop
 from chladni.signals.errors import ModelError
 
 
@@ -78,10 +78,14 @@ class DriveModel:
         return selected(compiled, self.inputs, self.outputs)
 
     def flags(self, simulation: Simulation) -> tuple[str, ...]:
-        """Sentences about the limits of the drive that the simulation leaves, with numbers and time."""
-        terminals = dict(zip((choice.signal for choice in self.inputs), self.compile().inputs, strict=True))
-        limits = self.drive.limits(self.parameters.numbers(), self.options)
-        return broken_limits(limits, simulation, tuple(terminals.items()))
+        """Sentences on an unstable loop, limits that the simulation leaves (number, time) and laws that acted."""
+        compiled = self.compile()
+        inputs = tuple(zip((choice.signal for choice in self.inputs), compiled.inputs, strict=True))
+        return (
+            *unstable_loop(compiled),
+            *broken_limits(self.drive.limits(self.parameters.numbers(), self.options), simulation, inputs),
+            *acting_laws(self.drive.law_words, simulation),
+        )
 
 
 def drive_model(

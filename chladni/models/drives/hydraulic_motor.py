@@ -26,7 +26,7 @@ from chladni.models.drives.piston import (
     piston_rates,
     stop_laws,
 )
-from chladni.models.drives.servo_valve import VALVE_ACTS_WITH, VALVE_PARAMETERS, valve_equations
+from chladni.models.drives.servo_valve import VALVE, VALVE_ACTS_WITH, VALVE_PARAMETERS, valve_equations
 from chladni.models.drives.validity import Limit
 
 #: Flow into the motor, behind the valve.
@@ -186,6 +186,7 @@ HYDRAULIC_MOTOR = DriveKind(
     build=_build,
     loops=_loops,
     limits=_limits,
+    law_words={VALVE: "the valve's dead zone or saturation"},
     acts_with={
         **VALVE_ACTS_WITH,
         **dict.fromkeys(PD2_PARAMETERS, ("correction", ("pd2",))),

@@ -10,7 +10,7 @@ from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Terminal
 from chladni.models.core.port_law import PortLaw
 from chladni.models.core.state_space import StateSpace
-from chladni.models.drives.signal_ports import with_command_laws, with_port
+from chladni.models.drives.signal_ports import limit_port, with_limit, with_port
 from chladni.signals.errors import ModelError
 
 Matrix = NDArray[np.float64]
@@ -29,14 +29,15 @@ class Loop:
         Its output has the name of the input that it commands, which then is no input any more. Each of its inputs
         that has the name of an output of the drive is fed back; the others become inputs of the drive.
     tracking
-        One number for each state of the controller: the state's rate for each unit that the laws at the commanded
-        input add. A saturation takes away, so that an integral that tracks it doesn't wind up. Empty for none.
+        One number for each state of the controller: the state's rate for each unit that the limit of the commanded
+        input adds. It takes away, so that an integral that tracks it doesn't wind up. Empty for none.
+    limit
+        Law that limits the command, or None; its ``port`` is filled in. A limit that the drive has already is kept.
     """
 
     controller: StateSpace
     tracking: tuple[float, ...] = ()
-    #: Laws at the commanded input, such as a limit of the command; their ``port`` is filled in.
-    laws: tuple[PortLaw, ...] = ()
+    limit: PortLaw | None = None
 
     @property
     def command(self) -> str:
@@ -66,7 +67,9 @@ def close_loop(plant: CompiledModel, loop: Loop) -> CompiledModel:
         something acts on the samples of a signal inside the loop.
     """
     _require_no_maps(plant, loop)
-    plant = with_command_laws(with_port(plant, loop.command, "input"), loop.command, loop.laws)
+    plant = with_port(plant, loop.command, "input")
+    if loop.limit is not None:
+        plant = with_limit(plant, loop.command, loop.limit)
     command = plant.column_of(loop.command)
     references = _references(plant, loop)
     n, m, k, r = len(plant.states), plant.columns, len(loop.controller.states), len(references)
@@ -135,9 +138,9 @@ def _command_row(loop: Loop, own: Matrix, taken: Matrix, direct: Matrix) -> Matr
 
 def _tracking(plant: CompiledModel, loop: Loop, columns: int) -> Matrix:
     rows = np.zeros((len(loop.controller.states), columns))
-    if loop.tracking:
-        port = plant.port_index(loop.command, "input")
-        rows[:, columns - len(plant.ports) + port] = loop.tracking
+    limits = [place for place, port in enumerate(plant.ports) if port.name == limit_port(loop.command)]
+    if loop.tracking and limits:
+        rows[:, columns - len(plant.ports) + limits[0]] = loop.tracking
     return rows
 
 

@@ -8,6 +8,7 @@ from chladni.models.core.state_space import StateSpace
 from chladni.models.elements.realization import state_space
 from chladni.models.elements.transfer_function import TransferFunction
 
+# Defaults: `best_pd2` for the hydraulic motor as it comes, the flow bounded to twice the step.
 PD2_PARAMETERS: Final = Parameters(
     (
         Parameter(
@@ -15,16 +16,16 @@ PD2_PARAMETERS: Final = Parameters(
             meaning="of the PD2 correction for slow signals",
         ),
         Parameter(
-            name="pd2_derivative", value=1e-3, unit="s", low=0.0, high=2e-2, minimum=-10.0, maximum=10.0,
+            name="pd2_derivative", value=1.53e-3, unit="s", low=0.0, high=2e-2, minimum=-10.0, maximum=10.0,
             symbol="T_1", shown_unit="ms", tolerance=0.0, meaning="weight of the first derivative",
         ),
         Parameter(
-            name="pd2_second_derivative", value=2e-5, unit="s^2", low=0.0, high=4e-4, minimum=-100.0, maximum=100.0,
+            name="pd2_second_derivative", value=2.05e-5, unit="s^2", low=0.0, high=4e-4, minimum=-100.0, maximum=1e2,
             symbol="T_2", shown_unit="ms^2", tolerance=0.0, meaning="weight of the second derivative",
         ),
         Parameter(
-            name="pd2_filter", value=3e-3, unit="s", low=1e-4, high=2e-2, minimum=1e-7, maximum=10.0, symbol="T_f",
-            shown_unit="ms", tolerance=0.0, meaning="time constant of the two lags without which PD2 can't be built",
+            name="pd2_filter", value=3.205e-3, unit="s", low=1e-4, high=2e-2, minimum=1e-7, maximum=10.0,
+            symbol="T_f", shown_unit="ms", tolerance=0.0, meaning="of the two lags that make PD2 buildable",
         ),
     )
 )  # fmt: skip

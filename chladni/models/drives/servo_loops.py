@@ -122,7 +122,7 @@ def _current_loop(values: Mapping[str, float], _options: Mapping[str, str]) -> L
 
 
 def _velocity_loop(values: Mapping[str, float], options: Mapping[str, str]) -> Loop:
-    limiter = (limit_law(limit=values["current_limit"]),) if options["current_limiter"] == "on" else ()
+    limit = limit_law(limit=values["current_limit"]) if options["current_limiter"] == "on" else None
     loop = _pi_loop(
         VELOCITY_REFERENCE,
         VELOCITY,
@@ -131,7 +131,7 @@ def _velocity_loop(values: Mapping[str, float], options: Mapping[str, str]) -> L
         time_s=values["velocity_time"],
         weight=values["velocity_weight"],
     )
-    return replace(loop, laws=limiter)
+    return replace(loop, limit=limit)
 
 
 def _position_loop(values: Mapping[str, float], _options: Mapping[str, str]) -> Loop:

@@ -1,6 +1,5 @@
 """Ports at the signals of a loop, where effects and limits act on what goes round."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from chladni.models.core.compiled_model import CompiledModel
@@ -20,9 +19,20 @@ def with_port(compiled: CompiledModel, name: str, kind: PortKind) -> CompiledMod
     return free_port(compiled, Site(effect="loop", name=name, kind=kind))[0]
 
 
-def with_command_laws(compiled: CompiledModel, name: str, laws: Sequence[PortLaw]) -> CompiledModel:
-    """Give the model with laws at the named input, one behind the other, behind all that acts there."""
-    for law in laws:
-        compiled, port = free_port(compiled, Site(effect="limit", name=name, kind="input"))
-        compiled = replace(compiled, laws=(*compiled.laws, replace(law, port=port)))
-    return compiled
+def limit_port(name: str) -> str:
+    """Name of the port at which an input's own limit acts, in front of all effects at the input."""
+    return f"{name}_limit"
+
+
+def with_limit(compiled: CompiledModel, name: str, law: PortLaw) -> CompiledModel:
+    """Give the model with a limit of the named input, and behind it a port for effects.
+
+    The limit has a port of its own, so that an integral which tracks it doesn't track the effects.
+    """
+    site = Site(effect="limit", name=name, kind="input")
+    compiled, port = free_port(compiled, site)
+    compiled = replace(compiled, laws=(*compiled.laws, replace(law, port=port)))
+    compiled, _ = free_port(compiled, site)
+    ports = list(compiled.ports)
+    ports[port] = replace(ports[port], name=limit_port(name))
+    return replace(compiled, ports=tuple(ports))

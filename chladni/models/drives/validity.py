@@ -1,15 +1,18 @@
 """Where a simulation leaves what a drive's equations are valid for."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import Simulation
 from chladni.signals.units import si_factor
+
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +55,31 @@ def broken_limits(
         if samples is not None and samples.size:
             sentences.extend(_sentences(limit, samples, simulation.inputs.sample_rate_hz))
     return tuple(sentences)
+
+
+def acting_laws(words: Mapping[str, str], simulation: Simulation) -> tuple[str, ...]:
+    """Give a sentence for each named port at which a law acted, with its share of the time.
+
+    `words` says by the port's name what acts there, such as ``the voltage limit``.
+    """
+    sentences = []
+    for name, what in words.items():
+        motion = next((motion for motion in simulation.motions if motion.name == name), None)
+        share = 0.0 if motion is None else float(np.mean(motion.force != 0))
+        if share:
+            sentences.append(f"{what} acts {100 * share:.3g} % of the time; what holds for the linear model doesn't")
+    return tuple(sentences)
+
+
+def unstable_loop(compiled: CompiledModel) -> tuple[str, ...]:
+    """Give a sentence when a pole of the linear equations lies in the right half-plane."""
+    if not compiled.states:
+        return ()
+    poles = np.linalg.eigvals(compiled.a)
+    # An integrator's pole is 0 but for the rounding of the largest.
+    growing = poles[(poles.real > _ROUNDING * np.abs(poles).max()) & (poles.imag >= 0)]
+    listed = ", ".join(f"{pole.real:.4g} + {pole.imag:.4g}j" for pole in growing)
+    return (f"unstable: poles at {listed} rad/s; lower the gain of the loop",) if growing.size else ()
 
 
 def _samples(signal: str, simulation: Simulation, inputs: dict[str, str]) -> NDArray[np.float64] | None:

@@ -113,7 +113,7 @@ def test_voltage_limit_is_a_law_in_front_of_the_power_stage():
     for loop in ("open", "velocity"):
         compiled = drive_model(DC_SERVO, {"voltage_limit": 24.0}, {"loop": loop, "voltage_limiter": "on"}).compile()
         (law,) = compiled.laws
-        assert (compiled.ports[law.port].name, compiled.ports[law.port].kind) == ("voltage", "input")
+        assert (compiled.ports[law.port].name, compiled.ports[law.port].kind) == ("voltage_limit", "input")
         assert law.function(30.0, 0.0, 0.0, law.parameters, (), ()) == -6.0
         assert law.function(-20.0, 0.0, 0.0, law.parameters, (), ()) == 0.0
 
@@ -122,19 +122,29 @@ def test_current_limit_stands_between_velocity_and_current_loop():
     options = {"loop": "velocity", "current_limiter": "on"}
     compiled = drive_model(DC_SERVO, {"current_limit": 5.0}, options).compile()
     (law,) = compiled.laws
-    assert compiled.ports[law.port].name == "current_reference"
+    assert compiled.ports[law.port].name == "current_reference_limit"
     assert law.function(7.0, 0.0, 0.0, law.parameters, (), ()) == -2.0
 
 
 def test_what_a_limit_takes_away_drives_its_integral_back():
     p = DC_SERVO.parameters.numbers()
-    compiled = drive_model(DC_SERVO, {}, {"loop": "velocity"}).compile()
+    options = {"loop": "velocity", "voltage_limiter": "on", "current_limiter": "on"}
+    compiled = drive_model(DC_SERVO, {}, options).compile()
     for command, integral, time in (
         ("voltage", "current_integral", "current_time"),
         ("current_reference", "velocity_integral", "velocity_time"),
     ):
-        column = compiled.g[:, compiled.port_index(command, "input")]
+        column = compiled.g[:, compiled.port_index(f"{command}_limit", "input")]
         assert column[compiled.states.index(integral)] == pytest.approx(1 / p[time])
+        # What an effect adds behind the limit isn't tracked.
+        assert compiled.g[compiled.states.index(integral), compiled.port_index(command, "input")] == 0.0
+
+
+def test_effects_at_a_limited_command_act_behind_the_limit():
+    compiled = drive_model(DC_SERVO, {}, {"loop": "current", "voltage_limiter": "on"}).compile()
+    limit, command = (compiled.port_index(name, "input") for name in ("voltage_limit", "voltage"))
+    assert compiled.displacement_port[command, limit] == 1.0
+    np.testing.assert_array_equal(compiled.displacement_state[command], compiled.displacement_state[limit])
 
 
 def test_default_gains_are_the_rules_for_the_default_motor():
