@@ -69,7 +69,9 @@ def _law(file: FileReading, loc: Loc, table: Content) -> Law | None:
 def _gain(file: FileReading, loc: Loc, found: object) -> _WithUnit | None:
     """Any unit will do: it says in what the controller's own command is measured."""
     value = file.number(loc, found, None)
-    if value is None:
+    if value == 0:
+        file.mistakes.add(loc, f"found {found!r}; a gain of zero drives nothing")
+    if not value:
         return None
     return _WithUnit(value, parse_quantity(found)[1] if isinstance(found, str) else None)
 
@@ -84,6 +86,9 @@ def _limit(
     if isinstance(found, str) and ends is not None and ends.driven != command and _measures(found, ends.driven):
         unit = ends.driven
     value = file.number(loc, found, unit)
+    if value is not None and value <= 0:
+        file.mistakes.add(loc, f"found {found!r}; must be above zero")
+        return None
     return None if value is None else _WithUnit(value, None if unit == command else unit)
 
 

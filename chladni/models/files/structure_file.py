@@ -161,15 +161,20 @@ class _StructureReading:
             self._mistakes.add((part, place), wish)
             return None
         name = self._file.text(table, given[0])
-        if given == ["joint"] and name is not None and name not in self._ends:
-            self._mistakes.add(
-                (part, place, "joint"), f"{name!r:.60} is no joint; {nearest(name, list(self._ends), 'joints')}"
-            )
+        joints = self._names("joint")
+        if given == ["joint"] and name is not None and name not in joints:
+            wish = nearest(name, joints, "joints")
+            self._mistakes.add((part, place, "joint"), f"{name!r:.60} is no joint; {wish}")
             return None
-        if given == ["at"] and name in self._ends:
+        if given == ["at"] and name in joints:
             self._mistakes.add((part, place, "at"), f'{name!r} is a joint; write joint = "{name}"')
             return None
         return name
+
+    def _names(self, part: str) -> list[str]:
+        """Names of one kind of part, also of those that can't be read otherwise."""
+        found = [self._file.text(table, "name") for _, table in self._file.tables(part)]
+        return [name for name in found if name is not None]
 
     def _note_names(self) -> None:
         parts = [
@@ -192,14 +197,19 @@ class _StructureReading:
             for place, table in self._file.tables("controller")
         }
         places = {"input": list(self._inputs), "output": list(self._outputs), "controller": list(wirings)}
+        unread = {
+            *(set(self._names("joint")) - set(self._ends)),
+            *(set(self._names("input")) - {one.name for one in self._inputs.values()}),
+            *(set(self._names("output")) - {one.name for one in self._outputs.values()}),
+        }
         for mistake in wiring_mistakes(
             self._motions, self._ends, [*self._inputs.values()], [*self._outputs.values()], [*wirings.values()]
         ):
             place = places[mistake.part][mistake.place]
             table = self._file.content[mistake.part][place]
             key = "joint" if mistake.key == "at" and "joint" in table else mistake.key
-            # What is missing altogether is the schema's to tell.
-            if key in table or key == "at":
+            # What is missing altogether is the schema's to tell; what can't be read is told where it stands.
+            if (key in table or key == "at") and table.get(key) not in unread:
                 self._mistakes.add((mistake.part, place, key), mistake.text)
 
     def _controller(self, place: int, table: Content) -> Controller | None:

@@ -86,7 +86,9 @@ def name_mistakes(parts: Sequence[tuple[str, int, str]]) -> Iterator[WiringMista
         elif not _NAME.fullmatch(name):
             text = f"found {name[:60]!r}; {NAME_RULE}"
         elif name in taken:
-            text = f"the name {name!r} is taken by a {taken[name]}; each name stands for one thing"
+            text = (
+                f"the name {name!r} is taken by {_article(taken[name])} {taken[name]}; each name stands for one thing"
+            )
         else:
             taken[name] = part
             continue
@@ -194,6 +196,10 @@ def _channel_mistakes(
 def _placed(part: str, place: int, name: str, told: Iterator[Told]) -> Iterator[WiringMistake]:
     for key, text in told:
         yield WiringMistake(part=part, place=place, name=name, key=key, text=text)
+
+
+def _article(word: str) -> str:
+    return "an" if word[0] in "aeiou" else "a"
 
 
 def _nothing(name: str, what: str, known: Mapping[str, object] | Sequence[str]) -> str:

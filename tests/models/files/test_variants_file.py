@@ -33,7 +33,9 @@ def refused(path: Path) -> str:
 
 
 def test_a_csv_row_is_a_variant_with_units_from_the_title_or_the_cell(tmp_path: Path) -> None:
-    path = written(tmp_path, "name,active_area [cm^2],reduced_mass,loop\nsmall,60,,open\n\nbig, 80 ,400 kg,position\n")
+    path = written(
+        tmp_path, "name,active_area [cm^2],reduced_mass,loop\nsmall,60,,open\n\nbig, 80 ,400 kg,position\n"
+    )
 
     small, big = read_variants(path, PARAMETERS, OPTIONS)
 
