@@ -44,5 +44,5 @@ def _about(instrument: Instrument) -> str:
     knobs, options = len(instrument.parameters), len(instrument.options)
     parts = [f"{knobs} knob{'s' if knobs != 1 else ''}"]
     if options:
-        parts.append(", ".join(option.meaning or option.name.replace("_", " ") for option in instrument.options))
+        parts.append(", ".join(option.name.replace("_", " ") for option in instrument.options))
     return "; ".join(parts)

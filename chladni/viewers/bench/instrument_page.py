@@ -1,6 +1,6 @@
 """The page of one instrument, made from its declaration."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from functools import partial
 from html import escape
@@ -11,6 +11,7 @@ from bokeh.document import Document
 
 from chladni.models.core.instrument import Instrument, Option
 from chladni.models.core.reading import InstrumentReading
+from chladni.signals.errors import ModelError
 from chladni.viewers.bench.board import Board
 from chladni.viewers.bench.desk import Desk
 from chladni.viewers.bench.download import Download
@@ -21,7 +22,7 @@ from chladni.viewers.bench.latest import Latest
 from chladni.viewers.bench.log_view import LogView
 from chladni.viewers.bench.parts import WIDE, button, choice, column, flow, html, pn, row, switch, views
 from chladni.viewers.bench.theme import Ground, theme
-from chladni.viewers.bench.tools import Export, Tools, Variant
+from chladni.viewers.bench.tools import Export, Shown, Tools, Variant
 from chladni.viewers.bench.variants_view import Kept, VariantsView
 from chladni.viewers.bench.words import MESSAGE_CSS, STRIP_CSS, message, quantity_strip
 
@@ -74,7 +75,7 @@ class InstrumentPage:
         self._error = ""
         self.words = html("", MESSAGE_CSS)
         self.strip = html("", STRIP_CSS, margin=(0, 0, 6, 0))
-        self.board = Board(look)
+        self.board = Board(look, first=_first_charts(instrument))
         self.knobs = {
             name: Knob(parameter, turned=self._turned, refused=self._refuse)
             for name, parameter in instrument.parameters.items()
@@ -136,14 +137,16 @@ class InstrumentPage:
             failed=lambda error: self._refuse(told(error)),
         )
 
-    def _exporting(self, export: Export) -> Any:
-        good, reading = self.desk.good, self.desk.reading
+    def _exporting(self, export: Export) -> Callable[[], bytes]:
+        """Give the job with what the page shows now, however the knobs turn until it runs."""
+        good, reading, charts = self.desk.good, self.desk.reading, self.board.shown()
         instrument = self.desk.instrument
 
         def build() -> bytes:
             if reading is None:
-                return b""
-            return export.build(instrument, instrument.model(good.values, good.options), reading)
+                raise ModelError(f"{instrument.name}: this setting gave no reading; there is nothing to save")
+            model = instrument.model(good.values, good.options)
+            return export.build(Shown(instrument=instrument, model=model, reading=reading, charts=charts))
 
         return build
 
@@ -177,6 +180,8 @@ class InstrumentPage:
                     self._show_setting()
                 return
             self._error = ""
+            for knob in self.knobs.values():
+                knob.echo()
             self.desk.accept(setting, future.result())
             self._draw(future.result())
 
@@ -214,6 +219,11 @@ class InstrumentPage:
         """Send what changes inside as one message: curves and numbers of one setting arrive together."""
         held: AbstractContextManager[None] = pn.io.hold(self._document)
         return held
+
+
+def _first_charts(instrument: Instrument) -> list[str]:
+    """Give the charts to open with: time, magnitude and loop above; acceleration, phase and roots below."""
+    return [f"step.{instrument.step_output}", "bode.magnitude", "nyquist", "step.acceleration", "bode.phase", "poles"]
 
 
 def heading(instrument: Instrument, ground: Ground, *, query: str = "") -> str:

@@ -8,6 +8,7 @@ from chladni.models.core.parameter import Parameter
 from chladni.signals.errors import ChladniError
 from chladni.viewers.bench.knob_scale import KnobScale
 from chladni.viewers.bench.parts import WIDE, column, entry, html, row, slider
+from chladni.viewers.bench.words import printed, symbol
 
 Turned = Callable[[str, float], None]
 Refused = Callable[[str], None]
@@ -15,7 +16,9 @@ Refused = Callable[[str], None]
 _LABEL_CSS = """
 div.knob { display: flex; gap: 6px; align-items: baseline; white-space: nowrap; overflow: hidden; }
 .knob i { color: var(--c-accent); font-weight: 600; }
+.knob sub { font-size: 75%; line-height: 0; }
 .knob span { overflow: hidden; text-overflow: ellipsis; }
+.knob small { color: var(--c-soft); margin-left: auto; padding-left: 6px; }
 """
 _SLIDER_CSS = """
 .bk-slider-title { display: none; }
@@ -23,7 +26,6 @@ _SLIDER_CSS = """
 .noUi-horizontal .noUi-handle { width: 14px; height: 14px; top: -6px; right: -7px; }
 """
 _ENTRY_CSS = "input { text-align: right; }"
-_UNIT_CSS = ":host { color: var(--c-soft); white-space: nowrap; overflow: hidden; text-overflow: ellipsis; }"
 
 
 class Knob:
@@ -44,15 +46,14 @@ class Knob:
         self._turned, self._refused = turned, refused
         self._showing = False
         self.slider = self._slider()
-        self.entry = entry(self.scale.text(self.value), _ENTRY_CSS, width=74)
+        self.entry = entry(self.scale.text(self.value), _ENTRY_CSS, width=84)
         self.slider.param.watch(self._on_slider, "value")
         self.entry.param.watch(self._on_entry, "value")
 
     def view(self) -> Any:
         """Lay the knob out."""
-        unit = html(escape(self.scale.unit), _UNIT_CSS, sizing_mode=None, width=64, margin=(4, 0, 0, 5))
         return column(
-            html(self._label(), _LABEL_CSS), row(self.slider, self.entry, unit, sizing_mode=WIDE), margin=(0, 0, 6, 0)
+            html(self._label(), _LABEL_CSS), row(self.slider, self.entry, sizing_mode=WIDE), margin=(0, 0, 5, 0)
         )
 
     def show(self, value: float) -> None:
@@ -65,9 +66,15 @@ class Knob:
         finally:
             self._showing = False
 
+    def echo(self) -> None:
+        """Let the entry say what the slider was turned to."""
+        self._showing = True
+        self.entry.value = self.scale.text(self.value)
+        self._showing = False
+
     def _slider(self) -> Any:
         return slider(
-            self.parameter.meaning or self.parameter.name,
+            self.parameter.name,
             _SLIDER_CSS,
             start=self.scale.start,
             end=self.scale.end,
@@ -78,18 +85,18 @@ class Knob:
         )
 
     def _label(self) -> str:
-        words = self.parameter.meaning or self.parameter.name.replace("_", " ")
-        symbol = f"<i>{escape(self.parameter.symbol)}</i>" if self.parameter.symbol else ""
-        told = f"{self.parameter.name}: {words}; {self.scale.usual_range()}"
-        return f'<div class="knob" title="{escape(told)}">{symbol}<span>{escape(words)}</span></div>'
+        name = self.parameter.name.replace("_", " ")
+        letter = f"<i>{symbol(self.parameter.symbol)}</i>" if self.parameter.symbol else ""
+        told = "; ".join(filter(None, (self.parameter.meaning, self.scale.usual_range())))
+        return (
+            f'<div class="knob" title="{escape(told)}">{letter}<span>{escape(name)}</span>'
+            f"<small>{escape(printed(self.scale.unit))}</small></div>"
+        )
 
     def _on_slider(self, event: Any) -> None:
         if not self._showing:
-            value = self.scale.value(event.new)
-            self._showing = True
-            self.entry.value = self.scale.text(value)
-            self._showing = False
-            self._accept(value)
+            # The entry follows with the curves, see `echo`: a message of its own would come before them.
+            self._accept(self.scale.value(event.new))
 
     def _on_entry(self, event: Any) -> None:
         if self._showing:

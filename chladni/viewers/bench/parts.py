@@ -59,10 +59,16 @@ def switch(label: str, on: bool, turned: Callable[[Any], None]) -> Any:
     return made
 
 
-def choice(label: str, words: list[str], chosen: str, changed: Callable[[Any], None], **layout: Any) -> Any:
+def choice(
+    label: str, words: list[str], chosen: str | None, changed: Callable[[Any], None], *, css: str = "", **layout: Any
+) -> Any:
     """Show a list to choose one word of."""
     made = pn.widgets.Select(
-        name=label, options=words, value=chosen, **{"margin": (0, 0, 4, 0), **layout, "stylesheets": [WIDGET_CSS]}
+        name=label,
+        options=words,
+        value=chosen,
+        **{"margin": (0, 0, 4, 0), **layout},
+        stylesheets=[WIDGET_CSS, css],
     )
     made.param.watch(changed, "value")
     return made

@@ -11,6 +11,7 @@ from bokeh.plotting import figure
 
 from chladni.models.core.reading import Chart, Curve
 from chladni.viewers.bench.theme import Theme
+from chladni.viewers.bench.words import printed
 
 Data = dict[str, Any]
 
@@ -20,7 +21,9 @@ TICKS = 5
 # Bokeh writes 8.000e-5 and -1.000e-4, too wide to stand side by side under a small chart.
 _TICK_JS = """
 const size = Math.abs(tick);
-const short = Number(tick.toPrecision(6));
+const step = ticks.length > 1 ? Math.abs(ticks[ticks.length - 1] - ticks[0]) / (ticks.length - 1) : size;
+const digits = step > 0 ? Math.ceil(Math.log10(Math.max(size, step) / step)) + 2 : 6;
+const short = Number(tick.toPrecision(Math.min(Math.max(digits, 2), 12)));
 if (size > 0 && (size < 1e-3 || size >= 1e5)) {
   return short.toExponential().replace("e+", "e").replace(/-/g, "\u2212");
 }
@@ -87,20 +90,19 @@ class Tile:
 
 def key_of(chart: Chart) -> tuple[str, ...]:
     """What a tile can't change while it stands."""
-    return (chart.name, chart.title, chart.x_label, chart.y_label, chart.x_scale, chart.y_scale, str(chart.equal))
+    return (chart.name, chart.x_label, chart.y_label, chart.x_scale, chart.y_scale, str(chart.equal))
 
 
 def _figure(chart: Chart) -> Any:
     made: Any = figure(
-        title=chart.title,
-        x_axis_label=chart.x_label,
-        y_axis_label=chart.y_label,
+        x_axis_label=printed(chart.x_label),
+        y_axis_label=printed(chart.y_label),
         x_axis_type=chart.x_scale,
         y_axis_type=chart.y_scale,
         match_aspect=chart.equal,
         sizing_mode="stretch_both",
-        min_width=240,
-        min_height=170,
+        min_width=160,
+        min_height=150,
         tools="pan,box_zoom,wheel_zoom,reset",
         output_backend="canvas",
     )
@@ -110,11 +112,11 @@ def _figure(chart: Chart) -> Any:
     for axis_range in (made.x_range, made.y_range):
         axis_range.syncable = False
         axis_range.range_padding = 0.04
-    if not chart.equal:
-        made.x_range.range_padding = 0.0
-    elif any(curve.points for curve in chart.curves):
+    if any(curve.points for curve in chart.curves):
         # A cross on the frame could be taken for one that goes on outside.
         made.x_range.range_padding = made.y_range.range_padding = 0.2
+    elif not chart.equal:
+        made.x_range.range_padding = 0.0
     for axis, scale in ((made.xaxis, chart.x_scale), (made.yaxis, chart.y_scale)):
         axis.formatter = CustomJSTickFormatter(code=_TICK_JS)
         axis.major_label_policy = NoOverlap()

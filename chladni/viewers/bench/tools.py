@@ -8,7 +8,7 @@ from typing import Protocol
 from chladni.models.core.instrument import Instrument, Options, Values
 from chladni.models.core.model import Model
 from chladni.models.core.port import Terminal
-from chladni.models.core.reading import InfluenceTable, InstrumentReading
+from chladni.models.core.reading import Chart, InfluenceTable, InstrumentReading
 from chladni.signals.channel import Channel
 
 #: Channel of the log by name of the model's input or output; what the log doesn't hold is left out.
@@ -44,6 +44,34 @@ class Variant:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Rows:
+    """What a file of rows says now: its variants, and the mistake that keeps newer ones out, or nothing."""
+
+    variants: tuple[Variant, ...]
+    mistake: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shown:
+    """What a page shows: the last good setting.
+
+    Attributes
+    ----------
+    model
+        Of that setting.
+    reading
+        All of it.
+    charts
+        Those on the page, with the curves of kept variants.
+    """
+
+    instrument: Instrument
+    model: Model
+    reading: InstrumentReading
+    charts: tuple[Chart, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Export:
     """Something a page can save.
 
@@ -54,13 +82,13 @@ class Export:
     file_name
         ``{name}`` stands for the instrument.
     build
-        ``build(instrument, model, reading) -> bytes``.
+        Gives the bytes.
     """
 
     label: str
     file_name: str
     media_type: str
-    build: Callable[[Instrument, Model, InstrumentReading], bytes]
+    build: Callable[[Shown], bytes]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,8 +101,8 @@ class Tools:
         Charts and numbers of one setting; called for each turn of a knob.
     influence
         Influence coefficients at one setting.
-    rows
-        Variants from a file of rows, as it is now.
+    watch
+        ``watch(instrument, path)`` gives a function that looks at a file of rows.
     open_log
         Open a log; `private` says that the file is a copy of its own, removed with `close`.
     terminals
@@ -89,7 +117,7 @@ class Tools:
 
     read: Callable[[Instrument, Values, Options], InstrumentReading]
     influence: Callable[[Instrument, Values, Options], InfluenceTable]
-    rows: Callable[[Instrument, Path], Sequence[Variant]]
+    watch: Callable[[Instrument, Path], Callable[[], Rows]]
     open_log: Callable[[Path, str, bool], MeasuredLog]
     terminals: Callable[[Model], tuple[tuple[Terminal, ...], tuple[Terminal, ...]]]
     assign: Callable[[Model, Sequence[Channel]], Assignment]

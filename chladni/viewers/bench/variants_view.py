@@ -16,7 +16,7 @@ from chladni.viewers.bench.errors import told
 from chladni.viewers.bench.latest import Latest
 from chladni.viewers.bench.parts import button, column, flow, html
 from chladni.viewers.bench.theme import Theme
-from chladni.viewers.bench.tools import Tools, Variant
+from chladni.viewers.bench.tools import Rows, Tools, Variant
 from chladni.viewers.bench.words import MESSAGE_CSS, message, quantity_table
 
 if TYPE_CHECKING:
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 #: Rows of a file that are drawn; more curves can't be told apart.
 MOST_ROWS = 24
 WATCH_MS = 1000
-
-Stamp = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,10 +37,10 @@ class Kept:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rows:
-    """What a file of rows gave: readings, and what to say about it."""
+class Looked:
+    """What a look at the file of rows gave: readings of its variants, and what to say about them."""
 
-    stamp: Stamp | None
+    rows: Rows
     found: tuple[tuple[Variant, InstrumentReading], ...]
     words: tuple[str, ...]
 
@@ -71,7 +69,7 @@ class VariantsView:
         self._desk, self._tools, self._theme, self._changed = desk, tools, theme, changed
         self._hand: list[Kept] = []
         self._rows: list[Kept] = []
-        self._stamp: Stamp | None = None
+        self._looked_at: Rows | None = None
         self._counted = 0
         self._latest = Latest(document)
         self.keep = button("Keep this variant", self._keep)
@@ -138,59 +136,56 @@ class VariantsView:
         self._table.object = quantity_table(columns) + advice
 
     def _watch(self, file: Path, document: Document | None) -> None:
-        order = partial(self._look, file)
+        look = self._tools.watch(self._desk.instrument, file)
+        order = partial(self._look, look)
         order()
         if document is not None and document.session_context is not None:
             document.add_periodic_callback(order, WATCH_MS)
+        else:
+            # The first look can't know whether the last row is still being written.
+            order()
 
-    def _look(self, file: Path) -> None:
-        self._latest.submit(partial(read_rows, self._desk.instrument, self._tools, file, self._stamp), self._looked)
+    def _look(self, look: Callable[[], Rows]) -> None:
+        self._latest.submit(
+            partial(read_rows, self._desk.instrument, self._tools, look, self._looked_at), self._looked
+        )
 
-    def _looked(self, future: "Future[Rows | None]") -> None:
+    def _looked(self, future: "Future[Looked | None]") -> None:
         error = future.exception()
         if error is not None:
             # The rows that were read before stay.
             self._words.object = message(told(error), ())
             return
-        rows = future.result()
-        if rows is None:
+        looked = future.result()
+        if looked is None:
             return
-        self._stamp = rows.stamp
-        self._words.object = message("", rows.words)
+        self._looked_at = looked.rows
+        self._words.object = message(looked.rows.mistake, looked.words)
         self._counted = len(self._hand)
         self._rows = [
-            Kept(variant=variant, reading=reading, colour=self._next_colour()) for variant, reading in rows.found
+            Kept(variant=variant, reading=reading, colour=self._next_colour()) for variant, reading in looked.found
         ]
         self._redraw()
 
 
-def read_rows(instrument: Instrument, tools: Tools, file: Path, known: Stamp | None) -> Rows | None:
-    """Read a file of rows and take a reading of each; None when the file is as it was.
+def read_rows(instrument: Instrument, tools: Tools, look: Callable[[], Rows], known: Rows | None) -> Looked | None:
+    """Look at a file of rows and take a reading of each; None when the file says what it said.
 
     Raises
     ------
     ChladniError
-        When the file can't be read, or a row is wrong.
+        When the file can't be read.
     """
-    stamp = _stamp(file)
-    if stamp is not None and stamp == known:
+    rows = look()
+    if rows == known:
         return None
-    variants = tools.rows(instrument, file)
     found: list[tuple[Variant, InstrumentReading]] = []
     words: list[str] = []
-    for variant in variants[:MOST_ROWS]:
+    for variant in rows.variants[:MOST_ROWS]:
         try:
             found.append((variant, tools.read(instrument, variant.values, variant.options)))
         except ChladniError as error:
-            words.append(f"{file.name}, {variant.label}: {error}")
-    if len(variants) > MOST_ROWS:
-        words.append(f"{file.name}: the first {MOST_ROWS} of {len(variants)} rows are drawn")
-    return Rows(stamp=stamp, found=tuple(found), words=tuple(words))
-
-
-def _stamp(file: Path) -> Stamp | None:
-    try:
-        found = file.stat()
-    except OSError:
-        return None
-    return found.st_mtime_ns, found.st_size
+            words.append(f"{variant.label}: {error}")
+    if len(rows.variants) > MOST_ROWS:
+        words.append(f"The first {MOST_ROWS} of {len(rows.variants)} rows are drawn.")
+    return Looked(rows=rows, found=tuple(found), words=tuple(words))

@@ -1,5 +1,6 @@
 """Numbers and sentences of a page as markup; whatever comes from a model or a log is escaped."""
 
+import re
 from collections.abc import Sequence
 from html import escape
 from math import isfinite
@@ -11,6 +12,8 @@ from chladni.models.core.reading import InfluenceTable, Quantity
 from chladni.viewers.labels import printed_unit
 
 DASH = "–"
+_EXPONENT = re.compile(r"\^(-?\d+)")
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float | None) -> str:
@@ -32,14 +35,43 @@ def with_unit(quantity: Quantity) -> str:
     return f"{number(quantity.value)}{unit}"
 
 
+def printed(text: str) -> str:
+    """Give a label with raised exponents and words instead of underscores.
+
+    Examples
+    --------
+    >>> printed("peak_acceleration [m/s^2]")
+    'peak acceleration [m/s²]'
+    """
+    return _EXPONENT.sub(lambda found: found[1].translate(_RAISED), text.replace("_", " "))
+
+
+def symbol(letter: str) -> str:
+    """Give the paper's letter as markup, what follows an underscore lowered.
+
+    Examples
+    --------
+    >>> symbol("a_m")
+    'a<sub>m</sub>'
+    """
+    head, _, tail = letter.partition("_")
+    return escape(head) + (f"<sub>{escape(tail)}</sub>" if tail else "")
+
+
 def quantity_strip(quantities: Sequence[Quantity]) -> str:
     """Quantities as a row of small cards; the definition shows when one points at a card, or tabs to it."""
     cards = "".join(
         f'<div class="q" tabindex="0" title="{escape(one.definition)}" aria-label="{escape(_spoken(one))}">'
-        f"<b>{escape(with_unit(one))}</b><span>{escape(one.name)}</span></div>"
+        f"<b>{escape(with_unit(one))}</b><span>{escape(printed(one.name))}</span></div>"
         for one in quantities
+        if one.value is not None
     )
-    return f'<div class="strip">{cards}</div>'
+    missing = ", ".join(
+        f'<span title="{escape(one.definition)}">{escape(printed(one.name))}</span>'
+        for one in quantities
+        if one.value is None
+    )
+    return f'<div class="strip">{cards}{f"<div class=none>none: {missing}</div>" if missing else ""}</div>'
 
 
 def message(error: str, flags: Sequence[str]) -> str:
@@ -60,14 +92,14 @@ def quantity_table(columns: Sequence[tuple[str, str, Sequence[Quantity]]]) -> st
         found = [next((one for one in quantities if one.name == name), None) for _, _, quantities in columns]
         definition = next((one.definition for one in found if one is not None), "")
         cells = "".join(f"<td>{escape(with_unit(one)) if one is not None else DASH}</td>" for one in found)
-        rows.append(f'<tr><td title="{escape(definition)}" tabindex="0">{escape(name)}</td>{cells}</tr>')
+        rows.append(f'<tr><td title="{escape(definition)}" tabindex="0">{escape(printed(name))}</td>{cells}</tr>')
     return f"<table><thead><tr><th></th>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
 
 
 def influence_table(table: InfluenceTable) -> str:
     """Influence coefficients: in each cell the finite one (the paper's C), and the log-derivative beside it."""
     head = "".join(
-        f'<th tabindex="0" title="{escape(definition)}">{escape(name)}</th>'
+        f'<th tabindex="0" title="{escape(definition)}">{escape(printed(name))}</th>'
         for name, definition in zip(table.behaviour, table.definitions, strict=True)
     )
     nominal = "".join(f"<td>{number(float(value))}</td>" for value in table.nominal)
@@ -108,17 +140,15 @@ def _strongest(values: NDArray[np.float64], *, axis: int) -> NDArray[np.bool_]:
 
 def _spoken(quantity: Quantity) -> str:
     told = f"; {quantity.definition}" if quantity.definition else ""
-    return f"{quantity.name} {with_unit(quantity)}{told}"
+    return f"{printed(quantity.name)} {with_unit(quantity)}{told}"
 
 
 STRIP_CSS = """
-.strip { display: flex; flex-wrap: wrap; gap: 6px; }
-.q {
-  background: var(--c-card); border: 1px solid var(--c-line); border-radius: 6px; padding: 3px 10px;
-  line-height: 1.25;
-}
-.q b { display: block; font-size: 14px; font-variant-numeric: tabular-nums; white-space: nowrap; }
-.q span { color: var(--c-soft); font-size: 11.5px; white-space: nowrap; }
+.strip { display: flex; flex-wrap: wrap; gap: 2px 0; align-items: baseline; line-height: 1.2; }
+.q { padding: 0 10px; border-left: 2px solid var(--c-line); }
+.q b { display: block; font-size: 13px; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.q span { color: var(--c-soft); font-size: 11px; white-space: nowrap; }
+.none { color: var(--c-soft); font-size: 11px; padding-left: 10px; }
 """
 MESSAGE_CSS = """
 .m {

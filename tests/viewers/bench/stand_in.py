@@ -14,7 +14,7 @@ from chladni.models.core.port import Terminal
 from chladni.models.core.reading import Chart, Curve, InfluenceTable, InstrumentReading, Quantity
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, ModelError
-from chladni.viewers.bench.tools import Export, Tools, Variant
+from chladni.viewers.bench.tools import Export, Rows, Tools, Variant
 
 PARAMETERS = Parameters(
     (
@@ -106,17 +106,22 @@ def influence(instrument: Instrument, values: Mapping[str, float], options: Mapp
     )  # fmt: skip
 
 
-def rows(instrument: Instrument, path: Path) -> Sequence[Variant]:
+def watch(instrument: Instrument, path: Path) -> Any:
     """One mass a line."""
-    found = []
-    for line in path.read_text().splitlines():
-        try:
-            mass = float(line)
-        except ValueError:
-            raise ModelError(f"{path.name}: {line!r} is no mass; give a number in kg") from None
-        values = {**instrument.parameters.numbers(), "mass": mass}
-        found.append(Variant(label=f"row m {mass:g}", values=values, options={"load": "off", "correction": "none"}))
-    return found
+
+    def look() -> Rows:
+        found = []
+        for line in path.read_text().splitlines():
+            try:
+                mass = float(line)
+            except ValueError:
+                return Rows(variants=tuple(found), mistake=f"{path.name}: {line!r} is no mass; give a number in kg")
+            values = {**instrument.parameters.numbers(), "mass": mass}
+            options = {"load": "off", "correction": "none"}
+            found.append(Variant(label=f"row m {mass:g}", values=values, options=options))
+        return Rows(variants=tuple(found))
+
+    return look
 
 
 @dataclass
@@ -166,16 +171,16 @@ def assign(_model: Any, channels: Sequence[Channel]) -> Mapping[str, str]:
     return {"force": channels[0].name, "position": channels[1].name} if len(channels) > 1 else {}
 
 
-def model_file(_instrument: Instrument, model: Any, _reading: InstrumentReading) -> bytes:
+def model_file(shown: Any) -> bytes:
     """One line."""
-    return f"mass = {model.values['mass']}".encode()
+    return f"mass = {shown.model.values['mass']}".encode()
 
 
 def tools(**changes: Any) -> Tools:
     """All of them, some replaced."""
     export = Export(label="Model file", file_name="{name}.toml", media_type="application/toml", build=model_file)
     made = Tools(
-        read=read, influence=influence, rows=rows, open_log=open_log, terminals=terminals, assign=assign,
+        read=read, influence=influence, watch=watch, open_log=open_log, terminals=terminals, assign=assign,
         compare=compare, exports=(export,),
     )  # fmt: skip
     return replace(made, **changes)

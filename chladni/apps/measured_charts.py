@@ -1,0 +1,156 @@
+"""Measured beside simulated: in time, as spectra, as transfer functions, and as one number."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.apps.spectra import frf, psd
+from chladni.models.core.reading import Chart, Curve, Quantity
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError
+from chladni.signals.time_series import TimeSeries
+from chladni.viewers.drawing import thin
+
+#: Points of a curve: more than a screen has columns.
+MOST_POINTS = 3000
+MEASURED, SIMULATED = "measured", "simulated"
+
+Floats = NDArray[np.float64]
+
+
+def comparison_charts(
+    driving: TimeSeries, measured: TimeSeries, simulated: TimeSeries, *, start_s: float
+) -> tuple[tuple[Chart, ...], tuple[str, ...]]:
+    """Give the charts of each output, and what to say about those that there can't be.
+
+    Parameters
+    ----------
+    driving
+        Inputs; transfer functions are over the first.
+    measured, simulated
+        Outputs, same channels in the same order, on one grid.
+    start_s
+        Where the stretch begins in the log.
+
+    Returns
+    -------
+    charts : tuple of Chart
+        ``log.time.OUTPUT``, ``log.spectrum.OUTPUT``, ``log.transfer.OUTPUT``.
+    words : tuple of str
+        Why there is no spectrum or transfer function.
+    """
+    charts, words = list(_times(measured, simulated, start_s)), []
+    for make in (_spectra, _transfers):
+        try:
+            charts += make(driving, measured, simulated)
+        except EstimateError as error:
+            words.append(str(error))
+    return tuple(charts), tuple(words)
+
+
+def scores(measured: TimeSeries, simulated: TimeSeries) -> tuple[Quantity, ...]:
+    """Give the NRMSE of each output in percent; None where nothing but zero was measured."""
+    found = []
+    for channel, real, made in zip(measured.channels, measured.values, simulated.values, strict=True):
+        size = float(np.sqrt(np.mean(real**2)))
+        gap = float(np.sqrt(np.mean((real - made) ** 2)))
+        found.append(
+            Quantity(
+                name=f"NRMSE {channel.name}",
+                value=100 * gap / size if size > 0 else None,
+                unit="%",
+                definition="RMS of measured less simulated over RMS of measured; simulated from rest",
+            )
+        )
+    return tuple(found)
+
+
+def _times(measured: TimeSeries, simulated: TimeSeries, start_s: float) -> Iterator[Chart]:
+    time_s = start_s + np.arange(measured.samples) / measured.sample_rate_hz
+    for channel, real, made in zip(measured.channels, measured.values, simulated.values, strict=True):
+        curves = tuple(_thinned(label, time_s, values) for label, values in ((MEASURED, real), (SIMULATED, made)))
+        yield Chart(
+            name=f"log.time.{channel.name}",
+            title=f"{channel.name}, time",
+            x_label="time in the log [s]",
+            y_label=_label(channel.name, channel.unit),
+            curves=curves,
+        )
+
+
+def _spectra(_driving: TimeSeries, measured: TimeSeries, simulated: TimeSeries) -> list[Chart]:
+    densities = psd(_joined(measured, simulated))
+    count = len(measured.channels)
+    return [
+        Chart(
+            name=f"log.spectrum.{channel.name}",
+            title=f"{channel.name}, spectrum",
+            x_label="frequency [Hz]",
+            y_label=_label("power spectral density", densities.units[row]),
+            y_scale="log",
+            curves=(
+                _line(MEASURED, densities.frequency_hz, densities.values[row]),
+                _line(SIMULATED, densities.frequency_hz, densities.values[count + row]),
+            ),
+        )
+        for row, channel in enumerate(measured.channels)
+    ]
+
+
+def _transfers(driving: TimeSeries, measured: TimeSeries, simulated: TimeSeries) -> list[Chart]:
+    reference = driving.channels[0].name
+    count = len(measured.channels)
+    series = _joined(measured, simulated, first=driving)
+    names = [channel.name for channel in series.channels[1:]]
+    response = frf(series, reference=_NAMES[0] + reference, response=names)
+    return [
+        Chart(
+            name=f"log.transfer.{channel.name}",
+            title=f"{channel.name} over {reference}",
+            x_label="frequency [Hz]",
+            y_label=_label("magnitude", response.unit(row, 0)),
+            y_scale="log",
+            curves=(
+                _line(MEASURED, response.frequency_hz, np.abs(response.values[row, 0])),
+                _line(SIMULATED, response.frequency_hz, np.abs(response.values[count + row, 0])),
+            ),
+        )
+        for row, channel in enumerate(measured.channels)
+    ]
+
+
+# In front of names in a joined series, where one output stands twice.
+_NAMES = ("input ", "measured ", "simulated ")
+
+
+def _joined(measured: TimeSeries, simulated: TimeSeries, *, first: TimeSeries | None = None) -> TimeSeries:
+    """Give measured and simulated, after the first row of `first`, as one series: one estimate treats all alike."""
+    parts = [(_NAMES[1], measured), (_NAMES[2], simulated)]
+    rows = [
+        (prefix, channel, row)
+        for prefix, part in parts
+        for channel, row in zip(part.channels, part.values, strict=True)
+    ]
+    if first is not None:
+        rows.insert(0, (_NAMES[0], first.channels[0], first.values[0]))
+    return TimeSeries(
+        values=np.stack([values for _, _, values in rows]),
+        sample_rate_hz=measured.sample_rate_hz,
+        channels=tuple(Channel(name=prefix + channel.name, unit=channel.unit) for prefix, channel, _ in rows),
+    )
+
+
+def _thinned(label: str, x: Floats, y: Floats) -> Curve:
+    shown, _ = thin(np.asarray(y, dtype=np.float64), limit=MOST_POINTS)
+    return Curve(label=label, x=x[shown], y=np.asarray(y[shown], dtype=np.float64))
+
+
+def _line(label: str, frequency_hz: Floats, values: Floats) -> Curve:
+    """Leave out what a logarithmic axis can't show: the line at 0 Hz, and zeros."""
+    shown = np.where(values > 0, values, np.nan)
+    return _thinned(label, frequency_hz[1:], shown[1:])
+
+
+def _label(what: str, unit: str) -> str:
+    return what if unit == "1" else f"{what} [{unit}]"

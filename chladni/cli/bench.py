@@ -1,0 +1,52 @@
+"""``chladni bench``: the virtual instruments in the browser."""
+
+import webbrowser
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from chladni.cli.output import Output
+
+
+def bench(
+    instrument: Annotated[
+        str | None,
+        typer.Argument(metavar="INSTRUMENT", help="Open this instrument; all are listed if not given."),
+    ] = None,
+    *,
+    port: Annotated[int, typer.Option(metavar="N", help="Port to serve at; 0 takes a free one.")] = 0,
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="LOG", help="MCAP log to hold beside the simulation.", show_default=False),
+    ] = None,
+    variants: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="CSV or TOML file of rows, each a variant; watched for new rows.", show_default=False
+        ),
+    ] = None,
+    open_page: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
+) -> None:
+    """Turn the knobs of simulated drives, dampers and structures, and watch what happens."""
+    from chladni.apps.bench import open_bench
+    from chladni.models.instruments.catalogue import INSTRUMENTS
+    from chladni.signals.errors import SetupError
+
+    if instrument is not None and instrument not in INSTRUMENTS:
+        raise SetupError(f"no instrument {instrument!r}; there are: {', '.join(INSTRUMENTS)}")
+    if variants is not None and instrument is None:
+        raise SetupError("--variants holds rows of one instrument's parameters; name it: chladni bench INSTRUMENT")
+    # The others' pages stay a click away, unless the file of rows is of this one's parameters.
+    shown = [INSTRUMENTS[instrument]] if instrument is not None and variants is not None else INSTRUMENTS.values()
+    server = open_bench(shown, port=port, log=log, variants=variants)
+    address = server.address + (instrument or "")
+    out = Output()
+
+    def tell() -> None:
+        out.line(address)
+        out.line("Only this computer can reach this address; Ctrl-C ends.")
+        if open_page:
+            webbrowser.open(address)
+
+    server.run(tell)
