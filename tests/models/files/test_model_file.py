@@ -219,7 +219,7 @@ def test_any_structure_survives_its_file(model: StructureModel, tmp_path_factory
 
 def test_an_effect_of_ones_own_is_refused(tmp_path: Path) -> None:
     class Own:
-        effect, site, values = "stickiness", "elbow", {}  # noqa: RUF012
+        effect, site, values = "stickiness", "elbow", {}
 
         def attach(self, compiled: CompiledModel) -> CompiledModel:
             return compiled
@@ -236,7 +236,7 @@ def test_a_model_of_no_kind_is_refused(tmp_path: Path) -> None:
 
     for kind in ("structure", "drive", "scheme", "spell"):
         Other.kind = kind
-        with pytest.raises(ModelError, match="no file can hold it|a file can hold"):
+        with pytest.raises(ModelError, match="file can hold"):
             write_model(Other(), tmp_path / "other.toml")  # type: ignore[arg-type]
 
 
