@@ -42,4 +42,7 @@ def element(kind: str, **values: float) -> Element:
     inf
     """
     found = element_kind(kind)
-    return Element(kind=found, parameters=found.parameters.with_values(values))
+    made = Element(kind=found, parameters=found.parameters)
+    for name, value in values.items():
+        made = made.with_usual_value(name, value)
+    return made

@@ -110,7 +110,9 @@ class Block:
         return replace(self, on=on)
 
 
-def element_block(name: str, kind: str, *inputs: str, when_off: WhenOff = "pass", **values: float) -> Block:
+def element_block(
+    name: str, kind: str, *inputs: str, when_off: WhenOff = "pass", unit: str = "", **values: float
+) -> Block:
     """Give a block with an element of some kind.
 
     Examples
@@ -118,7 +120,7 @@ def element_block(name: str, kind: str, *inputs: str, when_off: WhenOff = "pass"
     >>> element_block("regulator", "pi", "+reference", "-speed", gain=2.97, integral_time=9.9).sources
     (('reference', 1.0), ('speed', -1.0))
     """
-    return Block(name=name, content=element(kind, **values), inputs=inputs, when_off=when_off)
+    return Block(name=name, content=element(kind, **values), inputs=inputs, when_off=when_off, unit=unit)
 
 
 def require_name(name: str, what: str) -> None:

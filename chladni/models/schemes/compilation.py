@@ -1,7 +1,7 @@
 """From a scheme to a compiled model: every point an output, ports where effects may act."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,8 +87,12 @@ def compiled_scheme(
         places = kept
         equations, columns = _closed(blocks, wiring, places)
     points = points_of(blocks, outputs)
+    fed = {place.block for place in places if place.delay_s}
+    # Behind a dead time that feeds nothing the signal is only read later: exact for any signal, and no loop.
+    offsets = [0.0 if point.before or point.block in fed else delay_of(blocks[point.block]) for point in points]
     rows = _stacked(_point_rows(points, wiring, columns), _port_rows(places, wiring, columns, len(inputs)))
-    return _assembled(equations, rows, points, inputs, places, filter_time_s)
+    compiled = _assembled(equations, rows, points, inputs, places, filter_time_s)
+    return replace(compiled, output_offsets_s=tuple(offsets))
 
 
 def _places(blocks: Sequence[Block]) -> list[_Place]:
@@ -115,7 +119,7 @@ def _places(blocks: Sequence[Block]) -> list[_Place]:
             delay_s=delay_of(block),
         )
         for row, block in enumerate(blocks)
-        if delay_of(block)
+        if delay_of(block) and block.name in used
     ]
     return [*entering, *leaving, *late]
 

@@ -79,6 +79,8 @@ def solved_equations(blocks: Sequence[Block], between: Matrix, columns: Matrix) 
     try:
         solution = reduced(_descriptor(forms, between, columns))
     except ModelError as error:
+        # The plain reason, where there is one: a loop inside the others that has gain one at once.
+        require_well_posed(np.array([form.q[0] * (form.q.size == 1) for form in forms]), between, names)
         raise ModelError(f"{_loops_with(improper, between, names)}: {error}; change a gain, or add a lag") from None
     states = [
         f"{name}.x{number + 1}" for name, form in zip(names, forms, strict=True) for number in range(form.b.size)

@@ -10,7 +10,7 @@ from chladni.models.core.port import Terminal
 from chladni.models.elements.element import Element
 from chladni.models.schemes.block import Block
 from chladni.models.schemes.points import Point
-from chladni.models.schemes.wiring import wired
+from chladni.models.schemes.wiring import Wiring, wired
 
 # Numbers of one batch of matrices: 64 MB of complex ones.
 _BATCH = 4_000_000
@@ -29,8 +29,6 @@ def point_response(
     wiring = wired(blocks, inputs)
     out = np.empty((len(points), len(inputs), frequency_hz.size), dtype=np.complex128)
     lines = max(1, _BATCH // len(blocks) ** 2)
-    rows = [point.block for point in points]
-    before = np.array([point.before for point in points], dtype=bool)
     for start in range(0, frequency_hz.size, lines):
         part = slice(start, start + lines)
         above, below = _fractions(blocks, frequency_hz[part])
@@ -38,11 +36,19 @@ def point_response(
         diagonal = np.arange(len(blocks))
         matrix[:, diagonal, diagonal] += below
         behind = _solved(matrix, above[:, :, None] * wiring.inputs)
-        found = behind[:, rows]
-        if before.any():
-            found[:, before] = (wiring.blocks @ behind + wiring.inputs)[:, np.asarray(rows)[before]]
-        out[:, :, part] = np.moveaxis(found, 0, -1)
+        for row, point in enumerate(points):
+            found = _entering(wiring, point.block, behind) if point.before else behind[:, point.block]
+            out[row, :, part] = found.T
     return out
+
+
+def _entering(wiring: Wiring, block: int, behind: Complex) -> Complex:
+    """Sum that enters a block, ``[frequency, input]``, of its own sources only: others may be infinite."""
+    sources = np.flatnonzero(wiring.blocks[block])
+    # Where infinite signals are subtracted nothing is known.
+    with np.errstate(invalid="ignore"):
+        added = np.sum(behind[:, sources] * wiring.blocks[block, sources][:, None], axis=1)
+    return np.asarray(added + wiring.inputs[block], dtype=np.complex128)
 
 
 def _fractions(blocks: Sequence[Block], frequency_hz: NDArray[np.float64]) -> tuple[Complex, Complex]:
@@ -64,7 +70,7 @@ def _fractions(blocks: Sequence[Block], frequency_hz: NDArray[np.float64]) -> tu
 
 
 def _solved(matrix: Complex, right: Complex) -> Complex:
-    """Solve for all frequencies at once; one by one when a frequency is a pole, where the answer is infinite."""
+    """Solve for all frequencies at once; one by one when a frequency is a pole."""
     try:
         return np.asarray(np.linalg.solve(matrix, right), dtype=np.complex128)
     except np.linalg.LinAlgError:
@@ -72,7 +78,30 @@ def _solved(matrix: Complex, right: Complex) -> Complex:
 
 
 def _solved_line(matrix: Complex, right: Complex) -> Complex:
+    """Solve loop by loop along the signals' way: what doesn't come from the pole stays finite."""
     try:
         return np.asarray(np.linalg.solve(matrix, right), dtype=np.complex128)
     except np.linalg.LinAlgError:
-        return np.full_like(right, complex(np.inf))
+        pass
+    found = np.full_like(right, np.nan)
+    for group in _along_the_way(matrix):
+        ahead = np.setdiff1d(np.flatnonzero(matrix[group].any(axis=0)), group)
+        with np.errstate(invalid="ignore"):
+            side = right[group] - np.sum(matrix[np.ix_(group, ahead)][:, :, None] * found[ahead], axis=1)
+        try:
+            found[group] = np.linalg.solve(matrix[np.ix_(group, group)], side)
+        except np.linalg.LinAlgError:
+            found[group] = complex(np.inf)
+    return found
+
+
+def _along_the_way(matrix: Complex) -> list[NDArray[np.intp]]:
+    """Groups of unknowns that depend on each other, each after those that it depends on."""
+    from scipy.sparse.csgraph import connected_components
+
+    count, label = connected_components(matrix != 0, directed=True, connection="strong")
+    needs = [set(label[matrix[label == group].any(axis=0)]) - {group} for group in range(count)]
+    order: list[int] = []
+    while len(order) < count:
+        order += [group for group in range(count) if group not in order and needs[group] <= set(order)]
+    return [np.flatnonzero(label == group) for group in order]
