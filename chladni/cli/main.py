@@ -9,10 +9,12 @@ from typing import Annotated
 import typer
 
 from chladni import __version__
+from chladni.cli.bench import bench
 from chladni.cli.compare import compare
 from chladni.cli.convert import convert
 from chladni.cli.demo import demo
 from chladni.cli.frf import frf
+from chladni.cli.influence import influence
 from chladni.cli.info import info
 from chladni.cli.modes import modes
 from chladni.cli.psd import psd
@@ -29,7 +31,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (info, psd, frf, modes, view, compare, convert, demo):
+for command in (info, psd, frf, modes, view, compare, convert, influence, bench, demo):
     app.command()(command)
 
 
