@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from chladni.models.core.port import Port, PortKind, Terminal
 from chladni.models.core.port_law import PortLaw
+from chladni.models.core.resolvent import resolvent
 from chladni.models.core.state_space import StateSpace
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
@@ -196,7 +197,7 @@ class CompiledModel(Value):
         rows = np.vstack([self.c, self.displacement_state[delayed]])
         through = np.vstack([self.d, self.displacement_column[delayed]])
         port_through = np.vstack([self.h[:, delayed], self.displacement_port[np.ix_(delayed, delayed)]])
-        inverse = np.linalg.inv(s[:, None, None] * np.eye(len(self.states)) - self.a)
+        inverse = resolvent(self.a, s)
         to_u = (rows @ inverse @ self.b + through) @ signals
         if delayed:
             to_f = rows @ inverse @ self.g[:, delayed] + port_through

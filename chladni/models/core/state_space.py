@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.models.core.port import Terminal
+from chladni.models.core.resolvent import resolvent
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
 
@@ -61,11 +62,9 @@ class StateSpace(Value):
 
     def frequency_response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
         """``H(j omega) = C (j omega I - A)^-1 B + D``, ``[output, input, frequency]``; e^{+j omega t}."""
-        s = 2j * pi * np.asarray(frequency_hz, dtype=np.float64)[:, None, None]
-        solved = np.linalg.solve(s * np.eye(len(self.states)) - self.a, np.broadcast_to(
-            self.b.astype(complex), (len(frequency_hz), *self.b.shape)
-        ))  # fmt: skip
-        return np.moveaxis(np.asarray(self.c @ solved + self.d, dtype=np.complex128), 0, -1)
+        s = np.asarray(2j * pi * np.asarray(frequency_hz, dtype=np.float64), dtype=np.complex128)
+        found = self.c @ resolvent(self.a, s) @ self.b + self.d
+        return np.moveaxis(np.asarray(found, dtype=np.complex128), 0, -1)
 
     def input_index(self, name: str) -> int:
         """Column of the named input; `ModelError` naming those there are when it's missing."""
