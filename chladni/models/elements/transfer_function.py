@@ -91,8 +91,13 @@ class TransferFunction:
 
     def polynomial_and_rest(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Split num/den into a polynomial, descending, and what is left over den, as num = q den + r."""
-        quotient, rest = np.polydiv(np.asarray(self.num), np.asarray(self.den))
-        return np.asarray(quotient, dtype=np.float64), np.asarray(rest, dtype=np.float64)
+        # NumPy's polydiv takes small leading coefficients of the rest for zero, which those of fast poles aren't.
+        den, rest = np.asarray(self.den), np.asarray(self.num)
+        quotient = np.zeros(max(1, rest.size - den.size + 1))
+        for place in range(rest.size - den.size + 1):
+            quotient[place] = rest[0] / den[0]
+            rest = rest[1:] - quotient[place] * np.pad(den, (0, rest.size - den.size))[1:]
+        return quotient, rest
 
     def filtered(self, time_constant_s: float) -> Self:
         """Give the proper function with as many lags of `time_constant_s` as the order of num is above that of den.

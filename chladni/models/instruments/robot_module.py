@@ -1,10 +1,10 @@
 """A robot's driving module as a block scheme: the project's own, since the paper prints neither plant nor topology.
 
 From the paper (section 3, equation 4) are the regulator ``H_R(s) = 0.9 (9.9 s + 1)/(3 s)``, which is a PI with the
-gain 2.97 and the integral time 9.9 s, and the correction ``H_c(s) = 1/(0.7 s + 1)``. It's printed so, and called PDT1:
-a PDT1 whose derivative time is zero. Everything else (motor, gear, elastic shaft, arm, tachometer, position loop) is
-chosen so that the printed values are good ones: the regulator's zero at 9.9 s cancels the drive's own lag, and what
-stays is an integrator with the correction's lag of 0.7 s, at a damping ratio near 0.7.
+gain 2.97 and the integral time 9.9 s, and the correction ``H_c(s) = 1/(0.7 s + 1)``. It's printed so, and called
+PDT1: a PDT1 whose derivative time is zero. Everything else (motor, gear, elastic shaft, arm, tachometer, position
+loop) is chosen so that the printed values are good ones: the regulator's zero at 9.9 s cancels the drive's own lag,
+and what stays is an integrator with the correction's lag of 0.7 s, at a damping ratio near 0.7.
 """
 
 from collections.abc import Mapping
