@@ -10,6 +10,8 @@ from chladni.viewers.bench.theme import TEXT_CSS, WIDGET_CSS
 pn: Any = import_module("panel")
 
 WIDE = "stretch_width"
+# What a widget's words are called: Panel renamed it in version 1.9.
+_LABEL = "label" if "label" in pn.widgets.Widget.param else "name"
 
 
 def html(text: str = "", *css: str, **layout: Any) -> Any:
@@ -39,7 +41,7 @@ def drawing(figure: Any, *css: str, **layout: Any) -> Any:
 
 def button(label: str, pressed: Callable[[Any], None] | None, *css: str, **layout: Any) -> Any:
     """Show a button; a label only when nothing happens by pressing it."""
-    made = pn.widgets.Button(name=label, **{"margin": 0, **layout, "stylesheets": [WIDGET_CSS, *css]})
+    made = pn.widgets.Button(**{_LABEL: label, "margin": 0, **layout, "stylesheets": [WIDGET_CSS, *css]})
     if pressed is not None:
         made.on_click(pressed)
     return made
@@ -54,7 +56,7 @@ def views(names: tuple[str, ...], chosen: Callable[[Any], None]) -> Any:
 
 def switch(label: str, on: bool, turned: Callable[[Any], None]) -> Any:
     """Show a box to tick."""
-    made = pn.widgets.Checkbox(name=label, value=on, margin=(0, 0, 4, 0), stylesheets=[WIDGET_CSS])
+    made = pn.widgets.Checkbox(value=on, margin=(0, 0, 4, 0), stylesheets=[WIDGET_CSS], **{_LABEL: label})
     made.param.watch(turned, "value")
     return made
 
@@ -64,10 +66,9 @@ def choice(
 ) -> Any:
     """Show a list to choose one word of."""
     made = pn.widgets.Select(
-        name=label,
         options=words,
         value=chosen,
-        **{"margin": (0, 0, 4, 0), **layout},
+        **{_LABEL: label, "margin": (0, 0, 4, 0), **layout},
         stylesheets=[WIDGET_CSS, css],
     )
     made.param.watch(changed, "value")
@@ -77,7 +78,7 @@ def choice(
 def seconds_entry(label: str, value: float, changed: Callable[[Any], None]) -> Any:
     """Entry of a time that isn't negative."""
     made = pn.widgets.FloatInput(
-        name=label, value=value, step=1.0, start=0.0, width=96, margin=0, stylesheets=[WIDGET_CSS]
+        value=value, step=1.0, start=0.0, width=96, margin=0, stylesheets=[WIDGET_CSS], **{_LABEL: label}
     )
     made.param.watch(changed, "value")
     return made
@@ -86,11 +87,11 @@ def seconds_entry(label: str, value: float, changed: Callable[[Any], None]) -> A
 def slider(label: str, *css: str, start: float, end: float, step: float, value: float, **layout: Any) -> Any:
     """Show a slider without words; the knob around it says them."""
     return pn.widgets.FloatSlider(
-        name=label, start=start, end=end, step=step, value=value, show_value=False, tooltips=False,
-        sizing_mode=WIDE, stylesheets=[WIDGET_CSS, *css], **layout,
+        start=start, end=end, step=step, value=value, show_value=False, tooltips=False,
+        sizing_mode=WIDE, stylesheets=[WIDGET_CSS, *css], **{_LABEL: label, **layout},
     )  # fmt: skip
 
 
 def entry(text: str, *css: str, **layout: Any) -> Any:
     """Show a line of text to type in."""
-    return pn.widgets.TextInput(name="", value=text, margin=0, stylesheets=[WIDGET_CSS, *css], **layout)
+    return pn.widgets.TextInput(value=text, margin=0, stylesheets=[WIDGET_CSS, *css], **{_LABEL: "", **layout})

@@ -2,12 +2,12 @@
 
 import asyncio
 import re
+import socket
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from bokeh.server.server import BaseServer
 from bokeh.server.tornado import BokehTornado
-from bokeh.server.util import bind_sockets
 from panel.io.application import build_applications
 from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
@@ -70,11 +70,13 @@ class BenchServer:
         self._pages, self._index = pages, index
         try:
             # Bound at once, so that a taken port is told before anything starts; browsers wait until `run`.
-            self._sockets, self.port = bind_sockets(ADDRESS, port)
+            self._socket = socket.create_server((ADDRESS, port))
         except (OSError, OverflowError) as error:
             raise SetupError(
                 f"port {port} of {ADDRESS} can't be had ({error}); give another, or 0 for any"
             ) from error
+        self._socket.setblocking(False)
+        self.port: int = self._socket.getsockname()[1]
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ended: asyncio.Event | None = None
 
@@ -89,15 +91,17 @@ class BenchServer:
         asyncio.run(self._serve(ready))
 
     def stop(self) -> None:
-        """End `run`; may be called from any thread."""
-        if self._loop is not None and self._ended is not None and not self._loop.is_closed():
+        """End `run`, or give the port back when it never ran; may be called from any thread."""
+        if self._loop is None:
+            self._socket.close()
+        elif self._ended is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._ended.set)
 
     async def _serve(self, ready: Callable[[], None] | None) -> None:
         self._loop, self._ended = asyncio.get_running_loop(), asyncio.Event()
         application = self._application()
         http = HTTPServer(application)
-        http.add_sockets(self._sockets)
+        http.add_sockets([self._socket])
         server = BaseServer(IOLoop.current(), application, http)
         server.start()
         try:
