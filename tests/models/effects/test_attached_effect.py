@@ -29,7 +29,7 @@ def test_what_is_optional_keeps_its_value() -> None:
         ("xyz", {}, None, r"no effect 'xyz'; effects: coulomb_friction, stribeck_friction, "),
         ("coulomb_friction", {}, None, r"coulomb_friction at 'spring': give force \[N\]"),
         ("stribeck_friction", {"static": 2.0}, None, r"give coulomb \[N\], speed \[m/s\]"),
-        ("coulomb_friction", {"forse": 1.0}, None, r"at 'spring': no parameter 'forse'; did you mean force\?"),
+        ("coulomb_friction", {"force_n": 1.0}, None, r"at 'spring': no parameter 'force_n'; did you mean force\?"),
         ("coulomb_friction", {"force": -1.0}, None, r"at 'spring': force: -1 N is not possible; give a value from 0"),
         ("coulomb_friction", {"force": float("nan")}, None, r"at 'spring': force: nan is not finite"),
         ("coulomb_friction", {"force": 1.0}, "bristel", r"no variant 'bristel'; did you mean bristle\?"),
@@ -77,8 +77,8 @@ def test_a_record_is_made_only_of_parts_that_fit() -> None:
     common = {"name": "x", "family": "friction", "meaning": "x", "parameters": kind.parameters}
     with pytest.raises(ModelError, match=r"effect 'x': it needs at least one kind of site and one variant"):
         EffectKind(**common, sites=(), variants=kind.variants)
-    with pytest.raises(ModelError, match=r"no parameter 'offest'; did you mean offset\?"):
-        EffectKind(**common, sites=("joint",), variants=kind.variants, optional=("offest",))
+    with pytest.raises(ModelError, match=r"no parameter 'offset_n'; did you mean offset\?"):
+        EffectKind(**common, sites=("joint",), variants=kind.variants, optional=("offset_n",))
 
 
 def test_ones_own_effect_attaches_like_those_of_the_catalogue() -> None:
