@@ -94,7 +94,7 @@ STRUCTURE_MISTAKES = [
     ('variant = "share"', '@variant = "shar"', "[[effect]] 2 variant: cross_axis: no variant 'shar'; did you"),
     (', from = "bend"', "", "[[effect]] 2: cross_axis at 'acc_wrist': name the output"),
     ('from = "bend"', 'from = "bnd"', "[[effect]] 2: cross_axis at 'acc_wrist': no output 'bnd'"),
-    ('"elbow.stiffness" = 0.2', '@"elbow.stifness" = 0.2', "'elbow.stifness'; did you mean elbow.stiffness?"),
+    ('"elbow.stiffness" = 0.2', '@"elbow.stiffnss" = 0.2', "'elbow.stiffnss'; did you mean elbow.stiffness?"),
     ('"elbow.stiffness" = 0.2', '@"elbow.stiffness" = -0.2', "found -0.2; must be 0 or more"),
     ('"elbow.stiffness" = 0.2', '@"elbow.stiffness" = inf', "found inf; must be finite"),
     ('"elbow.stiffness" = 0.2', '@"elbow.stiffness" = true', "found True; must be a number: one sigma"),
@@ -128,7 +128,7 @@ DRIVE_MISTAKES = [
     ('"60 cm^2"', "@-1.0", "parameters active_area: active_area: -1 m^2 is not possible"),
     ('signal = "flow"', '@signal = "flw"', "[[input]] 1 signal: no input 'flw'; did you mean flow?"),
     ('signal = "velocity"', '@signal = "speed"', "[[output]] 1 signal: no output 'speed'; outputs: displacement"),
-    ('signal = "velocity"', '@sinal = "velocity"', "[[output]] 1 sinal: unknown key; did you mean signal?"),
+    ('signal = "velocity"', '@sgnal = "velocity"', "[[output]] 1 sgnal: unknown key; did you mean signal?"),
     ('name = "v"', '@name = "flow"', "[[output]] 1 name: the name 'flow' is taken by an input"),
     ('name = "v"', 'name = "v"\n[[output]]\n@signal = "velocity"', "'velocity' is chosen a second time"),
     ('"50 cm/s"', '"50 cm"', "[[effect]] 1 parameters limit: found '50 cm', which is in m; must be a number in m/s"),
@@ -153,12 +153,12 @@ def test_a_mistake_in_a_drive(tmp_path: Path, there: str, instead: str, words: s
 SCHEME_MISTAKES = [
     ('kind = "pi"', '@kind = "pj"', "pj"),
     ('"9900 ms"', '"9900 mm"', "integral_time"),
-    ('input = ["regulator"]', '@input = ["regulater"]', "regulater"),
+    ('input = ["regulator"]', '@input = ["regulatr"]', "regulatr"),
     ('site = "speed"', '@site = "sped"', "[[effect]] 1 site: no site 'sped'; did you mean speed?"),
     ('site = "speed"', 'site = "reference"', "[[effect]] 1: clipping acts at an output, but 'reference' is an input"),
     ("den = [0.7, 1.0]", "den = [0.0]", "den"),
     ('"regulator.gain" = 0.2', '@"regulator.gian" = 0.2', "regulator.gian"),
-    ('name = "loop"', 'name = "loop"\n@blok = 3', "blok: unknown key; did you mean block?"),
+    ('name = "loop"', 'name = "loop"\n@blck = 3', "blck: unknown key; did you mean block?"),
     ('input = ["+reference", "-plant"]\n', 'input = ["+reference", "-plant"]\n@colour = 1\n', "colour"),
 ]
 

@@ -310,7 +310,7 @@ def test_numbers_outside_their_usual_range_are_told() -> None:
         ({"gain": 0.0}, "gain 0.0 must be finite and not zero"),
         ({"gain_unit": "N/mV"}, "gain_unit 'N/mV' is no SI unit"),
         ({"limit": 0.0}, "limit 0.0 must be finite and positive"),
-        ({"feedback": "positon"}, "did you mean 'position'"),
+        ({"feedback": "positn"}, "did you mean 'position'"),
     ],
 )
 def test_impossible_controllers_are_refused(changes: dict[str, Any], words: str) -> None:

@@ -244,7 +244,7 @@ def test_impossible_values_are_refused(values: dict[str, float], words: str) -> 
 
 def test_a_tolerance_of_nothing_is_refused() -> None:
     with pytest.raises(ModelError, match=r"did you mean tie\.stiffness"):
-        replace(tree(), tolerances={"tie.stifness": 0.1})
+        replace(tree(), tolerances={"tie.stiffnss": 0.1})
 
 
 def test_declared_parameters_must_be_those_of_the_parts() -> None:
