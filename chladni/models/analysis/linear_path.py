@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import log2
 from typing import Self
 
 import numpy as np
@@ -132,7 +133,7 @@ def linear_path(system: System, *, from_input: str = "", to_outputs: Sequence[st
     column = state_space.input_index(from_input) if from_input else 0
     rows = [state_space.output_index(name) for name in to_outputs] or list(range(len(state_space.outputs)))
     kept = _reached(state_space.a != 0, state_space.b[:, column] != 0)
-    scaled, scale = _balanced(state_space.a[np.ix_(kept, kept)])
+    scaled, scale = _balanced(state_space.a[np.ix_(kept, kept)], state_space.b[kept, column])
     return LinearPath(
         a=scaled,
         b=state_space.b[kept, column] / scale,
@@ -193,11 +194,14 @@ def _reached(links: NDArray[np.bool_], start: NDArray[np.bool_]) -> NDArray[np.i
     return np.flatnonzero(reached)
 
 
-def _balanced(a: Matrix) -> tuple[Matrix, Matrix]:
+def _balanced(a: Matrix, b: Matrix) -> tuple[Matrix, Matrix]:
     if not a.size:
         return a, np.ones(0)
     scaled, (scale, _) = matrix_balance(a, permute=False, separate=True)
-    return np.asarray(scaled), np.asarray(scale)
+    # The exponential of [A b; 0 0] is exact beside its largest entry, which must not be that of b alone.
+    entry, size = float(np.abs(b / scale).max()), float(np.abs(scaled).max())
+    common = 2.0 ** round(log2(entry / size)) if entry > 0 and size > 0 else 1.0
+    return np.asarray(scaled), np.asarray(scale * common)
 
 
 def _dead_time_s(compiled: CompiledModel | StateSpace, column: int) -> Matrix:

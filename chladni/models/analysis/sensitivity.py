@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from chladni.models.analysis.behaviour import Behaviour
+from chladni.models.analysis.exponential import exponential
 from chladni.models.analysis.frequency_behaviour import FrequencyBehaviour
 from chladni.models.analysis.linear_path import LinearPath
 from chladni.models.analysis.resolvent import Resolvent
@@ -122,7 +122,7 @@ class _StepDerivatives:
         return float(self._marks.row(order) @ self._marks.motion.at(at))
 
     def _change(self, at: float, order: int = 0) -> float:
-        state = expm(self._generator * at)[:, -1]
+        state = exponential(self._generator * at)[:, -1]
         for _ in range(order):
             state = self._generator @ state
         return float(self._row @ state)

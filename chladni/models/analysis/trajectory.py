@@ -5,9 +5,8 @@ from math import ceil, log2
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
-from scipy.optimize import brentq
 
+from chladni.models.analysis.exponential import exponential
 from chladni.signals.value import Value
 
 Matrix = NDArray[np.float64]
@@ -16,6 +15,9 @@ Matrix = NDArray[np.float64]
 STAGE_POINTS = 32
 # Of the shortest time constant: the first step.
 FIRST_STEP = 0.1
+# Of the time, when a crossing is found; bisection alone would need about as many steps as a double has bits.
+ROUNDING = 2e-16
+MOST_STEPS = 60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,7 +44,7 @@ class Trajectory(Value):
     def at(self, time_s: float) -> Matrix:
         """Give the state at one time, exactly."""
         point = max(int(np.searchsorted(self.time_s, time_s, side="right")) - 1, 0)
-        return np.asarray(expm(self.generator * (time_s - self.time_s[point])) @ self.states[:, point])
+        return np.asarray(exponential(self.generator * (time_s - self.time_s[point])) @ self.states[:, point])
 
     def crossings(self, row: Matrix, level: float = 0.0, *, at_most: int = 0) -> list[float]:
         """Times at which ``row . w`` passes `level`, to rounding; the first `at_most` unless that is 0."""
@@ -83,18 +85,22 @@ class Trajectory(Value):
 
     def crossing(self, row: Matrix, level: float, point: int) -> float:
         """Time between a point and the next at which ``row . w`` passes `level`."""
-        start, step = self.states[:, point], float(self.time_s[point + 1] - self.time_s[point])
-
-        def signal(after_s: float) -> float:
-            return float(row @ (expm(self.generator * after_s) @ start)) - level
-
-        # At the ends the grid's own values count: those of the exponential may differ in their last digit.
-        if float(row @ start) == level:
-            return float(self.time_s[point])
-        if (signal(0.0) < 0) == (signal(step) < 0):
-            return float(self.time_s[point + 1])
-        root = brentq(signal, 0.0, step, xtol=4e-16 * max(step, float(self.time_s[point])), rtol=1e-15)
-        return float(self.time_s[point]) + float(root)
+        start, width = self.states[:, point], float(self.time_s[point + 1] - self.time_s[point])
+        before, after = float(row @ start) - level, float(row @ self.states[:, point + 1]) - level
+        rate = row @ self.generator
+        low, high = 0.0, width
+        # Newton's steps, kept inside what is known to hold the crossing.
+        at = width * before / (before - after) if before != after else 0.0
+        for _ in range(MOST_STEPS):
+            state = exponential(self.generator * at) @ start
+            away, slope = float(row @ state) - level, float(rate @ state)
+            low, high = (at, high) if (away < 0) == (before < 0) else (low, at)
+            further = at - away / slope if slope else low
+            further = further if low <= further <= high else 0.5 * (low + high)
+            if abs(further - at) <= ROUNDING * (float(self.time_s[point]) + width):
+                return float(self.time_s[point]) + further
+            at = further
+        return float(self.time_s[point]) + at
 
 
 def trajectory(
@@ -107,7 +113,7 @@ def trajectory(
     first = min(FIRST_STEP * fastest_s, longest_step_s)
     doublings = max(ceil(log2(longest_step_s / first)), 0)
     step_s = longest_step_s / 2**doublings
-    transition = np.asarray(expm(generator * step_s))
+    transition = np.asarray(exponential(generator * step_s))
     times, states = [np.zeros(1)], [start[:, None]]
     for _ in range(doublings):
         _extend(times, states, transition, step_s, STAGE_POINTS)
