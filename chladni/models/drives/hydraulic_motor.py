@@ -35,7 +35,7 @@ MOTOR_FLOW = Terminal(name="motor_flow", unit="m^3/s")
 REFERENCE = Terminal(name="reference", unit="m")
 
 #: Share of the supply pressure that the load may take: above it a valve gives much less flow than at no load
-#: (Merritt, Hydraulic Control Systems, 1967, section 5-3: flow over sqrt(1 - p_L/p_s)).
+#: (Merritt, Hydraulic Control Systems, 1967, chapter 5: flow goes with sqrt(1 - p_L/p_s)).
 LOADED_SHARE = 2.0 / 3.0
 
 _OWN_PARAMETERS = (

@@ -36,10 +36,10 @@ def response(transfer: control.TransferFunction) -> NDArray[np.complex128]:
 def assert_same_response(
     system: StateSpace | CompiledModel, output: str, entry: str, expected: NDArray[np.complex128], rtol: float = 1e-9
 ) -> None:
-    """Relative at every frequency, but for the rounding of terms that cancel: 1e-13 of the largest."""
+    """Relative at every frequency, but for the rounding of terms that cancel: some epsilon of the largest."""
     names = [terminal.name for terminal in system.outputs], [terminal.name for terminal in system.inputs]
     found = system.frequency_response(FREQUENCY_HZ)[names[0].index(output), names[1].index(entry)]
-    np.testing.assert_allclose(found, expected, rtol=rtol, atol=1e-13 * np.abs(expected).max())
+    np.testing.assert_allclose(found, expected, rtol=rtol, atol=1e-15 * np.abs(expected).max())
 
 
 def named(terminals: tuple) -> list[str]:
