@@ -1,0 +1,126 @@
+"""Kernel: motion and outputs between the ends of an accepted step."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.integrator.delay_kernel import History, fill_lagged
+from chladni.models.integrator.explicit_kernel import Stride
+from chladni.models.integrator.machine_code import part_code
+from chladni.models.integrator.port_kernel import Ports, port_forces
+from chladni.models.integrator.radau import LAGRANGE
+from chladni.models.integrator.step_tables import DenseTables
+
+Matrix = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Dense(NamedTuple):
+    """Working memory and results inside steps.
+
+    Attributes
+    ----------
+    row
+        ``[2 port + output]``.
+    power
+        ``[3, channel]``: forces and rates as polynomials of the fraction of the step.
+    place
+        ``[instant]`` where each wanted instant falls, in units of the finest step.
+    force_output
+        ``[output, port]``: what forces add to outputs at once.
+    output
+        ``[instant, output, sample]`` result.
+    """
+
+    row: Matrix
+    power: Matrix
+    place: Integers
+    force_output: Matrix
+    output: Matrix
+
+
+@part_code
+def fill_powers(dense: Dense, ports: Ports, implicit: bool) -> None:
+    """Polynomials through the forces and rates of the stages of the step just made."""
+    q = ports.channels
+    for channel in range(q.shape[1]):
+        if implicit:
+            for power in range(3):
+                total = 0.0
+                for stage in range(3):
+                    total += LAGRANGE[power, stage] * q[1 + stage, channel]
+                dense.power[power, channel] = total
+        else:
+            start, middle, end = q[0, channel], 0.5 * (q[1, channel] + q[2, channel]), q[4, channel]
+            dense.power[0, channel] = start
+            dense.power[1, channel] = 4 * middle - 3 * start - end
+            dense.power[2, channel] = 2 * (start + end) - 4 * middle
+
+
+@part_code
+def fill_row(tables: DenseTables, dense: Dense, ports: Ports, stride: Stride, level: int, instant: int) -> None:
+    """Motion at the ports and outputs at one instant, without what forces add at once."""
+    rows, count = dense.row.size, ports.first.size - 1
+    for row in range(rows):
+        dense.row[row] = 0.0
+    for column in range(stride.start.size):
+        value = stride.start[column]
+        for row in range(rows):
+            dense.row[row] += tables.advance[level, instant, column, row] * value
+    for power in range(3):
+        for port in range(count):
+            value = dense.power[power, port]
+            for row in range(rows):
+                dense.row[row] += tables.couple[level, instant, power, port, row] * value
+
+
+@part_code
+def keep_history(
+    tables: DenseTables, dense: Dense, ports: Ports, stride: Stride, history: History, motion: Matrix,
+    level: int, t: float, step_s: float,
+) -> None:  # fmt: skip
+    """Add the step just made to the history of the delay lines; `motion` is that at its start."""
+    step, count = history.hint[-1], ports.first.size - 1
+    history.begin[step], history.length[step] = t, step_s
+    for delay in range(ports.delay_s.size):
+        history.value[step, delay, 0] = motion[ports.delay_port[delay]]
+        history.value[step, delay, 4] = stride.motion_end[ports.delay_port[delay]]
+    for node in range(3):
+        instant = tables.fraction.shape[1] - 3 + node
+        fill_row(tables, dense, ports, stride, level, instant)
+        x = tables.fraction[level, instant]
+        for delay in range(ports.delay_s.size):
+            port = ports.delay_port[delay]
+            value = dense.row[port]
+            for other in range(count):
+                force = dense.power[0, other] + x * (dense.power[1, other] + x * dense.power[2, other])
+                value += ports.through[0, port, other] * force
+            history.value[step, delay, 1 + node] = value
+    history.hint[-1] = step + 1
+
+
+@part_code
+def keep_outputs(
+    tables: DenseTables, dense: Dense, ports: Ports, stride: Stride, history: History,
+    level: int, instant: int, sample: int, t: float, step_s: float, through: bool,
+) -> None:  # fmt: skip
+    """Outputs at a wanted instant inside the step just made, from the laws at the motion there."""
+    fill_row(tables, dense, ports, stride, level, instant)
+    count = ports.first.size - 1
+    x = tables.fraction[level, instant]
+    for row in range(2 * count):
+        ports.motion[row] = dense.row[row]
+    for place in range(stride.law_start.size):
+        q = dense.power[:, count + place]
+        ports.state[place] = stride.law_start[place] + step_s * x * (q[0] + x * (q[1] / 2 + x * q[2] / 3))
+    fill_lagged(history, ports, np.int64(5), t + x * step_s)
+    if through:
+        port_forces(ports, t + x * step_s, np.int64(5), through)
+    for output in range(dense.force_output.shape[0]):
+        value = dense.row[2 * count + output]
+        for port in range(count):
+            # In a loop of laws no order of evaluation exists: there the polynomial of the step is taken.
+            force = dense.power[0, port] + x * (dense.power[1, port] + x * dense.power[2, port])
+            value += dense.force_output[output, port] * (ports.channels[5, port] if through else force)
+        dense.output[instant, output, sample] = value

@@ -1,0 +1,60 @@
+"""How kernels are compiled, and how they call a law by its address."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba as nb
+from llvmlite import ir  # type: ignore[import-untyped]
+from numba.core import types
+from numba.extending import intrinsic
+
+from chladni.models.integrator.cache_folder import CACHED
+
+FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
+
+# numba declares fewer options than it takes.
+_JIT: Any = nb.njit
+_TYPES: Any = types
+_POINTER = _TYPES.CPointer(types.float64)
+#: Signature of a law in machine code.
+LAW_SIGNATURE = types.float64(types.float64, types.float64, types.float64, _POINTER, _POINTER, _POINTER)
+
+
+_OPTIONS: dict[str, Any] = {"cache": CACHED, "nogil": True, "fastmath": False, "error_model": "numpy", "_nrt": False}
+
+
+def machine_code(function: FunctionT) -> FunctionT:
+    """Compile a kernel when it's first called; the result is kept on disk where that is possible.
+
+    Kernels allocate nothing, so they need no reference counts.
+    """
+    compiled: FunctionT = _JIT(**_OPTIONS)(function)
+    return compiled
+
+
+def part_code(function: FunctionT) -> FunctionT:
+    """Compile a part that only kernels call: without the door for Python, which takes longer than the part itself."""
+    compiled: FunctionT = _JIT(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
+    return compiled
+
+
+def _typed_call(_context: Any, *_arguments: Any) -> tuple[Any, Callable[..., Any]]:
+    integer, number = types.int64, types.float64
+    signature = number(integer, number, number, number, integer, integer, integer)
+    return signature, _generate_call
+
+
+def _generate_call(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+    number = ir.DoubleType()
+    pointer = number.as_pointer()
+    kind = ir.FunctionType(number, [number, number, number, pointer, pointer, pointer])
+    law = builder.inttoptr(arguments[0], kind.as_pointer())
+    return builder.call(law, [*arguments[1:4], *(builder.inttoptr(each, pointer) for each in arguments[4:])])
+
+
+@intrinsic
+def call_law(
+    context: Any, address: Any, d: Any, s: Any, t: Any, parameters: Any, state: Any, rates: Any
+) -> tuple[Any, Callable[..., Any]]:
+    """``call_law(address, d, s, t, parameters, state, rates) -> force``; the last three are addresses too."""
+    return _typed_call(context, address, d, s, t, parameters, state, rates)

@@ -1,0 +1,84 @@
+"""Kernel: forces of the laws and delay lines at given motions of the ports."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.integrator.machine_code import call_law, machine_code, part_code
+
+Matrix = NDArray[np.float64]
+Integers = NDArray[np.int64]
+#: A number that numba must not take as part of the type: it would compile the kernel once for each.
+Stage = int | np.int64
+
+
+# In a kernel it takes no context.
+_CALL: Callable[..., float] = call_law
+
+
+class Ports(NamedTuple):
+    """What acts at the ports, and where kernels put arguments and results of laws.
+
+    Attributes
+    ----------
+    table, first, through
+        See `LawTable` and `PortPlan`.
+    motion
+        ``[2 port]`` displacements, then velocities, at which the laws are asked.
+    state
+        ``[law state]`` at which the laws are asked.
+    channels
+        ``[stage, port + law state]``: forces, then rates of the law states.
+    address
+        Of `state` and of `channels`: laws take addresses.
+    delay_port, delay_s
+        Of each delay line.
+    lagged
+        ``[stage, delay]`` the displacement that a delay line gives.
+    """
+
+    table: Integers
+    first: Integers
+    through: Matrix
+    motion: Matrix
+    state: Matrix
+    channels: Matrix
+    address: Integers
+    delay_port: Integers
+    delay_s: Matrix
+    lagged: Matrix
+
+
+@part_code
+def law_force(ports: Ports, law: int, d: float, s: float, t: float, stage: Stage) -> float:
+    """Force of one law at one motion; writes its rates."""
+    first = ports.table[law, 2]
+    count = ports.first.size - 1
+    rates = ports.address[1] + 8 * (stage * ports.channels.shape[1] + count + first)
+    return _CALL(ports.table[law, 0], d, s, t, ports.table[law, 1], ports.address[0] + 8 * first, rates)
+
+
+@machine_code
+def port_forces(ports: Ports, t: float, stage: Stage, through: bool) -> None:
+    """Forces and rates of one stage from `motion` and `state`; port by port, so that earlier forces move later ports.
+
+    When `through` is false, `motion` already holds what the forces themselves make.
+    """
+    count = ports.first.size - 1
+    for port in range(count):
+        d, s = ports.motion[port], ports.motion[count + port]
+        if through:
+            for earlier in range(port):
+                force = ports.channels[stage, earlier]
+                d += ports.through[0, port, earlier] * force
+                s += ports.through[1, port, earlier] * force
+            ports.motion[port], ports.motion[count + port] = d, s
+        force = 0.0
+        for law in range(ports.first[port], ports.first[port + 1]):
+            force += law_force(ports, law, d, s, t, stage)
+        for delay in range(ports.delay_s.size):
+            if ports.delay_port[delay] == port:
+                force += ports.lagged[stage, delay] - d
+        ports.channels[stage, port] = force
