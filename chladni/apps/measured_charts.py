@@ -46,6 +46,9 @@ def comparison_charts(
             charts += make(driving, measured, simulated)
         except EstimateError as error:
             words.append(str(error))
+    # Output by output, so that time, spectrum and transfer function of one stand side by side.
+    order = [channel.name for channel in measured.channels]
+    charts.sort(key=lambda chart: order.index(chart.name.split(".", 2)[2]))
     return tuple(charts), tuple(words)
 
 

@@ -1,6 +1,7 @@
 """A measured log held against a model: which channel is which signal, and the model driven by the log."""
 
 import re
+import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -30,13 +31,14 @@ class OpenedLog:
 
     def __init__(self, path: Path, title: str, *, private: bool) -> None:
         self.title = title
-        self._path, self._private = path, private
         self._log = open_log(path)
+        # Also when the program ends before the page is closed.
+        self._removal = weakref.finalize(self, _remove, path) if private else None
         try:
             self.channels: tuple[Channel, ...] = self._log.channels
             self.duration_s: float = self._log.info().duration_s
         except BaseException:
-            self._log.close()
+            self.close()
             raise
 
     def read(self, names: Sequence[str], start_s: float, end_s: float) -> TimeSeries:
@@ -46,8 +48,12 @@ class OpenedLog:
     def close(self) -> None:
         """Let go of the file, and remove it when it was a private copy."""
         self._log.close()
-        if self._private:
-            self._path.unlink(missing_ok=True)
+        if self._removal is not None:
+            self._removal()
+
+
+def _remove(path: Path) -> None:
+    path.unlink(missing_ok=True)
 
 
 def terminals(model: Model) -> tuple[tuple[Terminal, ...], tuple[Terminal, ...]]:

@@ -81,6 +81,7 @@ class LogView:
         self._comparer.close()
         if self._log is not None:
             self._log.close()
+        self._log = None
 
     def _taken(self, name: str, content: bytes) -> None:
         self._words.object = f"<p>reading {len(content) / 1e6:.1f} MB …</p>"
@@ -103,25 +104,25 @@ class LogView:
             self._log.close()
         self._log = future.result()
         self._words.object = ""
-        self._offer_choices()
-        self._compare()
+        if self._offer_choices(self._log):
+            self._compare()
 
     def _refuse(self, line: str) -> None:
         self._words.object = message(line, ())
 
-    def _offer_choices(self) -> None:
-        if self._log is None:
-            return
+    def _offer_choices(self, log: MeasuredLog) -> bool:
+        """Offer the log's channels for the model's signals, and say whether there are any."""
         try:
             model = self._desk.instrument.model(self._desk.good.values, self._desk.good.options)
-            terminals, assigned = self._tools.terminals(model), self._tools.assign(model, self._log.channels)
+            terminals, assigned = self._tools.terminals(model), self._tools.assign(model, log.channels)
         except ChladniError as error:
             self._refuse(told(error))
-            return
-        self.span.value = min(FIRST_SPAN_S, round(self._log.duration_s, 3))
-        names = [NOT_MEASURED, *(channel.name for channel in self._log.channels)]
+            return False
+        self.span.value = min(FIRST_SPAN_S, round(log.duration_s, 3))
+        names = [NOT_MEASURED, *(channel.name for channel in log.channels)]
         self.selects = self._selects(terminals, names, assigned)
         self._choices.objects = [*self.selects.values(), self.start, self.span]
+        return True
 
     def _selects(self, terminals: Terminals, names: Sequence[str], assigned: Assignment) -> dict[str, Any]:
         made = {}

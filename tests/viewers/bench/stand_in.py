@@ -137,7 +137,7 @@ class StandInLog:
     def close(self) -> None:
         """Remove a private copy."""
         if self.private:
-            self.path.unlink()
+            self.path.unlink(missing_ok=True)
 
 
 def open_log(path: Path, title: str, private: bool) -> StandInLog:
