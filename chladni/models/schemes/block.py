@@ -14,7 +14,7 @@ from chladni.signals.errors import ModelError
 WhenOff = Literal["pass", "cut"]
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
-_SOURCE = re.compile(r"\s*([+-]?)\s*(\S.*?)\s*", re.DOTALL)
+_SOURCE = re.compile(r"\s*([+-]?)\s*([^\s+-].*?)\s*", re.DOTALL)
 
 _PASS, _CUT = rational((1.0,)), rational((0.0,))
 

@@ -153,7 +153,9 @@ class TableReader:
         if len(whole) < len(blocks) or None in inputs or None in outputs:
             return
         own = [block.name for block in whole]
-        known = own + [terminal.name for terminal in inputs if terminal is not None]
+        entries = [terminal.name for terminal in inputs if terminal is not None]
+        known = own + entries
+        self._unique([("block", own), ("input", entries)])
         for place, block in enumerate(whole):
             for number, (source, _) in enumerate(block.sources):
                 if source not in known:
@@ -161,6 +163,14 @@ class TableReader:
         for place, output in enumerate(outputs):
             if output is not None and output.at not in own:
                 self._tell(("output", place, "at"), f"no block {output.at!r:.80}; {nearest(output.at, own)}")
+
+    def _unique(self, named: Sequence[tuple[str, Sequence[str]]]) -> None:
+        taken: set[str] = set()
+        for kind, names in named:
+            for place, name in enumerate(names):
+                if name in taken:
+                    self._tell((kind, place, "name"), f"the name {name!r} is taken; names are unique")
+                taken.add(name)
 
     def number(self, loc: Loc, value: object, unit: str | None) -> float | None:
         """Give a number in SI."""
@@ -256,8 +266,10 @@ class TableReader:
         name = table.get("name")
         if name is None:
             self._tell((*loc, "name"), "is missing")
-        elif not isinstance(name, str) or not NAME.fullmatch(name):
-            self._tell((*loc, "name"), f"found {name!r:.80}; must be a letter, then letters, digits, _ or -")
+        elif not isinstance(name, str) or not NAME.fullmatch(name) or name == "ground":
+            self._tell(
+                (*loc, "name"), f"found {name!r:.80}; must be a letter, then letters, digits, _ or -, and not ground"
+            )
             return None
         return name
 
