@@ -11,6 +11,7 @@ from chladni.models.effects.linear_filter import high_pass
 
 def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
     """Put ``p/(p + w_c)`` behind the sensor."""
+    # Down to zero nothing is held back; the state would stay at rest and only cost time.
     if values["corner"] == 0:
         return compiled
     return pass_through(compiled, site, high_pass(2 * pi * values["corner"]))

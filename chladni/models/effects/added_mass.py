@@ -9,6 +9,7 @@ from chladni.models.effects.linear_feedback import ground_acceleration, rate, ve
 def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
     """Let the mass resist the body's acceleration: ``f = -mass a``, solved for the acceleration that it lowers."""
     port = compiled.port_index(site.name, "body")
+    # What the ground's shaking does is no part of a motion that is measured from the ground.
     acceleration = rate(compiled, velocity(compiled, port), site.name) + ground_acceleration(compiled, port)
     return with_feedback(compiled, port, acceleration.scaled(-values["mass"]))[0]
 
@@ -21,6 +22,7 @@ ADDED_MASS = EffectKind(
     parameters=Parameters(
         (Parameter(name="mass", value=0.1, unit="kg", low=0.0, high=100.0, minimum=0.0, maximum=1e9),)
     ),
+    # Less mass than modelled is a wrong parameter, not something unmodelled: the bound is zero.
     neutral={"mass": 0.0},
     linear=True,
     variants=(Variant(name="rigid", attach=attach, formula="f = -mass a"),),

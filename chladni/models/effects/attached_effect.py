@@ -51,6 +51,7 @@ class AttachedEffect:
         if missing:
             wish = ", ".join(f"{name} [{parameters[name].unit}]" for name in missing)
             raise ModelError(f"{self.effect} at {self.site!r}: give {wish}")
+        # Complete from here on: what a law reads, what is written to a file, and what a fit starts from are the same.
         object.__setattr__(self, "values", parameters.numbers())
         mistake = self.kind.check(self.values) if self.kind.check else ""
         if mistake:
@@ -156,11 +157,13 @@ def attached(
 def _sites(compiled: CompiledModel, kind: PortKind) -> list[str]:
     """Names of all sites of one kind; inputs and outputs need no port to be one."""
     names = [port.name for port in compiled.ports if port.kind == kind]
+    # Inputs and outputs outside of loops have no port until an effect needs one.
     terminals = {"input": compiled.inputs, "output": compiled.outputs}.get(kind, ())
     return list(dict.fromkeys([*(terminal.name for terminal in terminals), *names]))
 
 
 def _kind_of_site(compiled: CompiledModel, name: str, effect: EffectKind) -> PortKind:
+    # Names are unique over bodies, joints, inputs and outputs, so the first kind that has it is the one.
     for kind in effect.sites:
         if name in _sites(compiled, kind):
             return kind

@@ -103,6 +103,7 @@ class ShapedSignal:
         """Give the model with the shape in the way of the signal."""
         if not has_own_samples(compiled, site):
             return LawAtPort(law=self.law, numbers=self.numbers, state=self.state)(compiled, site, values)
+        # Shapes are about the signal alone: stiffness and damping of a port play no part.
         numbers = self.numbers(values, Port(name=site.name, kind=site.kind))
         return with_samples_mapped(compiled, site, SampleShape(shape=self.shape, numbers=numbers))
 
@@ -113,6 +114,7 @@ def pass_through(compiled: CompiledModel, site: Site, way: LinearFilter) -> Comp
     It becomes part of the linear equations. Only behind a map of samples (a sensor that clips, then a coupling) it
     has to act on samples too; it's then exact for the signal that joins them by straight lines.
     """
+    # Outside of loops an output is a row that nothing else reads: no port is needed.
     if site.kind == "output" and not is_in_loop(compiled, site):
         row = output_row(compiled, site.name)
         if any(place == row for place, _ in compiled.output_maps):
@@ -121,6 +123,7 @@ def pass_through(compiled: CompiledModel, site: Site, way: LinearFilter) -> Comp
         return with_output(compiled, row, signal)
     if site.kind == "input" and _prescribes_motion(compiled, site.name):
         return _with_motion_filtered(compiled, site, way)
+    # The port's own signal becomes the filtered one, so that what attaches next finds it.
     compiled, port = free_port(compiled, site)
     compiled, after = _filtered(compiled, site, displacement(compiled, port), way)
     compiled, added = with_feedback(compiled, port, after + displacement(compiled, port).scaled(-1.0))
@@ -132,6 +135,7 @@ def _filtered(compiled: CompiledModel, site: Site, before: Signal, way: LinearFi
     first = len(compiled.states)
     compiled = with_states(compiled, [f"{site.name}.{site.effect}.{name}" for name in way.states])
     before = before.padded(len(way.states))
+    # Signals of the wider model: the one in front has no share of the filter's states.
     own = [state(compiled, first + place) for place in range(len(way.states))]
     for place in range(len(way.states)):
         rate = before.scaled(float(way.b[place]))

@@ -12,6 +12,7 @@ from chladni.signals.errors import ModelError
 def spring(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
     """Give ``k (deadzone(d) - d)``: what the joint's linear spring gives too much; parameters k, half the gap."""
     half = parameters[1]
+    # The model's own spring stays in the linear equations; the law takes away what it gives inside the gap.
     return float(-parameters[0] * min(max(d, -half), half))
 
 
@@ -23,6 +24,7 @@ def contact_damping(d: float, s: float, _t: float, parameters: Any, _state: Any,
     half = parameters[1]
     inside = min(max(d, -half), half)
     free = 0.0
+    # Without a gap the joint is always in contact, and nothing must be divided by it.
     if half > 0.0:
         depth = min(max((abs(d) - half) / (0.1 * half), 0.0), 1.0)
         free = 1.0 - depth * depth * (3.0 - 2.0 * depth)
@@ -32,6 +34,7 @@ def contact_damping(d: float, s: float, _t: float, parameters: Any, _state: Any,
 def _numbers(values: Values, port: Port) -> tuple[float, ...]:
     if port.stiffness <= 0:
         raise ModelError(f"backlash at {port.name!r}: the joint has no spring that could have play")
+    # One order of numbers for both laws; the first leaves the damping alone.
     return port.stiffness, values["gap"] / 2, port.damping
 
 

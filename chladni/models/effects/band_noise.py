@@ -51,9 +51,11 @@ class BandNoise:
         frequency_hz, phase = self.lines()
         amplitude = self.level * sqrt(2 / _LINES)
         interval = _uniform_interval(times_s)
+        # Any times at all are allowed: cosine by cosine, in blocks that keep memory small.
         if interval is None:
             blocks = np.array_split(times_s, max(1, times_s.size // _BLOCK))
             return np.concatenate([_at(one, frequency_hz, phase) for one in blocks]) * amplitude
+        # An aliased line would be a tone at a frequency that nobody asked for.
         if self.high_hz * interval > 0.5:
             raise ModelError(
                 f"a floor that shakes up to {self.high_hz:g} Hz would alias at {1 / interval:g} Hz: "

@@ -11,6 +11,7 @@ from chladni.models.effects.linear_feedback import with_feedback
 def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
     """Let a computed acceleration act where the ground's acceleration acts."""
     port = compiled.port_index(site.name, "ground")
+    # A record, not a closure: a model goes to other processes.
     noise = BandNoise(
         level=values["level"], low_hz=values["band_start"], high_hz=values["band"], seed=int(values["seed"])
     )
@@ -22,6 +23,7 @@ def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel
 def _check(values: Values) -> str:
     if values["band_start"] >= values["band"]:
         return f"band_start = {values['band_start']:g} Hz must be below band = {values['band']:g} Hz"
+    # Parameters are real numbers; a seed of 1.5 would silently be 1.
     if values["seed"] != int(values["seed"]):
         return f"seed = {values['seed']:g} must be a whole number"
     return ""

@@ -7,6 +7,7 @@ from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.effects.saturation import clipped, clipped_samples
 
 
+# The range of a sensor and the limit of an actuator cut a signal in the same way: one law, two words.
 def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
     return (values["limit"],)
 

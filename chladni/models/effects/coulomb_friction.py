@@ -12,11 +12,14 @@ from chladni.models.effects.friction_parameters import CREEP_SPEED, PRESLIDING
 
 def regularised(_d: float, s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
     """Give ``force tanh(s/creep_speed) + offset``; parameters force, offset, creep speed."""
+    # tanh is smooth everywhere and odd, and unlike exp it can't overflow.
     return float(parameters[0] * tanh(s / parameters[2]) + parameters[1])
 
 
 def bristle(_d: float, s: float, _t: float, parameters: Any, state: Any, rates: Any) -> float:
     """Give Dahl's ``force w + offset``, ``w' = (s - abs(s) w)/presliding``; parameters force, offset, presliding."""
+    # The state is the share of the force, not the bristles' bend: it stays between -1 and 1 whatever the parameters,
+    # and a force of zero divides nothing.
     rates[0] = (s - abs(s) * state[0]) / parameters[2]
     return float(parameters[0] * state[0] + parameters[1])
 
@@ -45,8 +48,10 @@ COULOMB_FRICTION = EffectKind(
             ),
         )
     ),
+    # Most joints resist both ways alike, so the asymmetry need not be given.
     optional=("offset",),
     neutral={"force": 0.0, "offset": 0.0},
+    # The slope first: it has no state to start, so a fit may begin with it.
     variants=(
         Variant(
             name="regularised",

@@ -24,6 +24,7 @@ def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel
             f"{site.effect} at {site.name!r}: a sensor feels another direction before its samples are changed; "
             "list it before clipping, quantization and other effects on samples"
         )
+    # In a loop the share must be a force at the port, so that laws behind it see it too.
     in_loop = is_in_loop(compiled, site)
     if in_loop:
         compiled, port = free_port(compiled, site)

@@ -15,6 +15,7 @@ Matrix = NDArray[np.float64]
 
 def dead_zone(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
     """Give ``-clip(d, -width, width)``: what the zone takes away from the command."""
+    # (d - clip d) - d, without the difference of two large numbers.
     return float(-min(max(d, -parameters[0]), parameters[0]))
 
 

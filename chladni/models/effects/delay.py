@@ -11,8 +11,10 @@ from chladni.models.effects.signal_path import free_port, input_row, takes_own_s
 def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
     """Delay the input's own samples, or the command inside a loop."""
     delay_s = values["delay"]
+    # A line without length would still cost the integrator its bookkeeping.
     if delay_s == 0:
         return compiled
+    # Samples can be delayed exactly and for nothing, a signal inside a loop only by remembering it.
     if takes_own_samples(compiled, site.name) and not site.in_loop:
         delays = list(compiled.input_delays_s)
         delays[input_row(compiled, site.name)] += delay_s

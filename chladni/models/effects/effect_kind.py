@@ -128,6 +128,7 @@ class EffectKind:
     def __post_init__(self) -> None:
         if not self.sites or not self.variants:
             raise ModelError(f"effect {self.name!r}: it needs at least one kind of site and one variant")
+        # A name used twice shows when the parameters are put together: now, not when someone picks the variant.
         for variant in self.variants:
             self.parameters_of(variant.name)
         for name in (*self.optional, *self.neutral):

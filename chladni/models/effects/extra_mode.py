@@ -18,12 +18,14 @@ from chladni.models.effects.linear_feedback import (
 
 def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
     """Add position and velocity of a mass that hangs on the body by a spring and a damper."""
+    # The oscillator's position, not its stretch, is the state: the stretch would need the body's acceleration.
     port, place = compiled.port_index(site.name, "body"), len(compiled.states)
     shaking = ground_acceleration(compiled, port).padded(2)
     names = (f"{site.name}.{site.effect}.displacement", f"{site.name}.{site.effect}.velocity")
     compiled = with_states(compiled, names)
     omega = 2 * pi * values["frequency"]
     position, speed = state(compiled, place), state(compiled, place + 1)
+    # Only now, since rows of the model have become wider by the two states.
     stretch = position + displacement(compiled, port).scaled(-1.0)
     slip = speed + velocity(compiled, port).scaled(-1.0)
     pull = stretch.scaled(omega**2) + slip.scaled(2 * values["damping_ratio"] * omega)

@@ -17,6 +17,7 @@ def with_generated(
     compiled: CompiledModel, *, name: str, unit: str, samples: Callable[[Matrix], Matrix]
 ) -> tuple[CompiledModel, Signal]:
     """Add a computed input that acts nowhere yet; give the model and the input's signal."""
+    # Names of inputs are sites and channels: two floors, or a floor and an input, must not share one.
     taken = [*(one.terminal.name for one in compiled.generated), *(one.name for one in compiled.inputs)]
     number, free = 2, name
     while free in taken:

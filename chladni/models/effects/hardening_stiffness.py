@@ -10,6 +10,7 @@ from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 
 def cubic(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
     """Give ``cubic d^3``."""
+    # Products, since d**3 raises on overflow in Python where compiled code gives infinity.
     return float(parameters[0] * d * d * d)
 
 

@@ -37,9 +37,11 @@ HYSTERESIS = EffectKind(
                 meaning="at which it yields",
             ),
             Parameter(
+                # Force and yield, not force and stiffness: a yield beyond the motion shows that it is a spring.
                 name="yield", value=1e-4, unit="m", low=1e-6, high=1e-2, minimum=1e-12, maximum=1e3,
                 meaning="displacement at which it yields: force over initial stiffness",
             ),
+            # Below 1 the law's slope over w is infinite at w = 0, where every loop passes.
             Parameter(
                 name="shape", value=1.0, unit="1", low=1.0, high=10.0, minimum=1.0, maximum=50.0,
                 meaning="how sharply it yields",

@@ -9,6 +9,7 @@ from chladni.models.effects.linear_filter import first_order, second_order
 
 def attach_first_order(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
     """Put ``1/(tau s + 1)`` between the command and its place."""
+    # Infinitely fast is no filter at all; its pole would be at infinity.
     if values["time_constant"] == 0:
         return compiled
     return pass_through(compiled, site, first_order(values["time_constant"]))
@@ -45,6 +46,7 @@ LAG = EffectKind(
             parameters=Parameters(
                 (
                     Parameter(
+                        # Zero would ring for ever: no actuator does.
                         name="damping_ratio", value=0.7, unit="1", low=0.2, high=2.0, minimum=1e-6, maximum=1e3
                     ),
                 )

@@ -104,6 +104,7 @@ def with_states(compiled: CompiledModel, names: Sequence[str]) -> CompiledModel:
     A name that is taken gets a number, so that an effect may act at one site more than once.
     """
     count = len(names)
+    # One after another: two of the new names may be the same.
     taken = [*compiled.states]
     for name in names:
         taken.append(_free_name(name, taken))
@@ -145,6 +146,7 @@ def with_feedback(compiled: CompiledModel, port: int, force: Signal) -> tuple[Co
     keep = 1 - force.ports[port]
     if abs(keep) < _ILL_POSED:
         raise ModelError(f"{compiled.ports[port].name!r}: an algebraic loop with a gain of one has no solution")
+    # The force changes every row that the port's force reaches, its own included.
     force = force.scaled(1 / keep)
     to_states, to_outputs = compiled.g[:, port], compiled.h[:, port]
     to_displacement, to_velocity = compiled.displacement_port[:, port], compiled.velocity_port[:, port]
@@ -197,6 +199,7 @@ def ground_acceleration(compiled: CompiledModel, port: int) -> Signal:
     if not grounds or not np.isclose(compiled.velocity_state[port] @ compiled.g[:, grounds[0]], -1.0, atol=0.0):
         return rest
     ground = grounds[0]
+    # Compared to rounding: effects attached before have changed both columns in the same way, but not bit by bit.
     shaking = (
         np.all(np.isclose(compiled.b, compiled.g[:, [ground]], atol=0.0), axis=0)
         & np.all(np.isclose(compiled.d, compiled.h[:, [ground]], atol=0.0), axis=0)
@@ -215,6 +218,7 @@ def with_columns_replaced(compiled: CompiledModel, first: int, passed: Sequence[
     columns = np.array([signal.columns for signal in passed])
 
     def through(matrix: Vector) -> tuple[Vector, Vector]:
+        # What the old signals did is taken out, and put back as far as the new ones are made of them.
         kept = matrix.copy()
         kept[:, span] = 0.0
         return matrix[:, span] @ states, kept + matrix[:, span] @ columns

@@ -41,6 +41,7 @@ class LinearFilter(Value):
 
     def __call__(self, samples: Matrix, sample_rate_hz: float) -> Matrix:
         """Filter samples; exact for the signal that joins them by straight lines."""
+        # A plain gain, exact and for nothing.
         if not self.states:
             return np.asarray(self.d * samples, dtype=np.float64)
         # scipy.signal takes most of a second to import, and few ever filter samples.

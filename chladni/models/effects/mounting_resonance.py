@@ -28,6 +28,7 @@ MOUNTING_RESONANCE = EffectKind(
             Parameter(name="damping_ratio", value=0.05, unit="1", low=0.005, high=1.0, minimum=1e-6, maximum=1e3),
         )
     ),
+    # No mount is infinitely stiff; with a damping ratio of 0.05 this one leaves a phase of 1e-7 rad at 1 kHz.
     neutral={"frequency": 1e9},
     linear=True,
     variants=(

@@ -18,6 +18,7 @@ def stop(d: float, s: float, _t: float, parameters: Any, _state: Any, _rates: An
     if p <= 0.0:
         return 0.0
     force = parameters[0] * p
+    # The power costs more than all the rest, and most stops are linear.
     if parameters[3] != 1.0:
         force *= (p / parameters[4]) ** (parameters[3] - 1.0)
     # A contact pushes and never pulls, however fast the bodies part.
@@ -37,10 +38,12 @@ def _check(values: Values) -> str:
     return "" if abs(values["side"]) == 1 else f"side = {values['side']:g} must be 1 (above) or -1 (below)"
 
 
+# Damping in proportion to the force (Hunt & Crossley): a plain damper would make the force jump at contact.
 _DISSIPATION = Parameter(
     name="dissipation", value=0.5, unit="s/m", low=0.0, high=10.0, minimum=0.0, maximum=1e6,
     meaning="share of the force that a contact speed of 1 m/s adds",
 )  # fmt: skip
+# Keeps the stiffness in N/m: the constant of a 3/2 power in N/m^1.5 means nothing to most people.
 _DEPTH = Parameter(
     name="depth", value=1e-4, unit="m", low=1e-6, high=1e-2, minimum=1e-12, maximum=1e3,
     meaning="penetration at which the contact's secant stiffness is `stiffness`",
@@ -68,6 +71,7 @@ ONE_SIDED_STOP = EffectKind(
         )
     ),
     optional=("side",),
+    # A stop that is never reached is none either, but how far is never depends on the motion.
     neutral={"stiffness": 0.0},
     check=_check,
     variants=(

@@ -10,6 +10,7 @@ from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 
 def quadratic(_d: float, s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
     """Give ``coefficient s abs(s)``."""
+    # s abs(s) in place of s^2 sgn(s): one expression, and its slope is continuous at rest.
     return float(parameters[0] * s * abs(s))
 
 

@@ -20,6 +20,7 @@ def staircase(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rat
     A true jump inside a loop would make the integrator chatter on it.
     """
     step = parameters[0]
+    # Beyond that rounding to a step is finer than the numbers themselves.
     if step <= 0.0 or abs(d) > 1e15 * step:
         return 0.0
     steps = d / step

@@ -18,6 +18,7 @@ def tracker(d: float, _s: float, _t: float, parameters: Any, state: Any, rates: 
 
     ``z' = clip((d - z)/tracking_time, -rate, rate)``
     """
+    # The exact limiter has no rate to give between samples: at zero distance it would jump between +rate and -rate.
     rates[0] = min(max((d - state[0]) / parameters[1], -parameters[0]), parameters[0])
     return float(state[0] - d)
 
@@ -51,6 +52,7 @@ RATE_LIMIT = EffectKind(
             ),
         )
     ),
+    # How the limit is computed, not how the actuator is built.
     optional=("tracking_time",),
     neutral={"rate": 1e18},
     variants=(

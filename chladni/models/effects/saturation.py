@@ -16,6 +16,7 @@ Matrix = NDArray[np.float64]
 
 def clipped(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
     """Give ``clip(d, -limit, limit) - d``."""
+    # A law adds to the command, so it gives what the limit takes away.
     return float(min(max(d, -parameters[0]), parameters[0]) - d)
 
 
@@ -46,6 +47,7 @@ SATURATION = EffectKind(
     parameters=Parameters(
         (Parameter(name="limit", value=100.0, unit="N", low=1.0, high=1e4, minimum=1e-12, maximum=1e18),)
     ),
+    # No finite limit is none, but this one no force reaches.
     neutral={"limit": 1e18},
     variants=(
         Variant(

@@ -31,6 +31,7 @@ def free_port(compiled: CompiledModel, site: Site) -> tuple[CompiledModel, int]:
         )
         return compiled, len(compiled.ports) - 1
     if _carries(compiled, port):
+        # Laws at one port add up, all seeing the same signal; effects in a row see what those before them leave.
         compiled = _with_stage(compiled, port)
         return compiled, len(compiled.ports) - 1
     return compiled, port
@@ -95,12 +96,14 @@ def takes_own_samples(compiled: CompiledModel, name: str) -> bool:
     if name not in names or port is None:
         return name in names
     own = compiled.column_of(name)
+    # A port exists behind filters too; then the samples' way must not be joined by any other input's.
     others = np.arange(compiled.columns) != own
     reached = _upstream(compiled, port)
     through = np.any(compiled.b[reached] != 0, axis=0) | (compiled.displacement_column[port] != 0)
     return not np.any(through & others) and not _reaches_itself(compiled, port)
 
 
+# A class and not a closure, because compiled models go to other processes.
 class _Scaled:
     """A map behind a gain: ``map(k x)/k`` in front of the gain k does what the map does behind it."""
 
@@ -149,6 +152,7 @@ def _upstream(compiled: CompiledModel, port: int) -> NDArray[np.bool_]:
 
 
 def _reaches_itself(compiled: CompiledModel, port: int) -> bool:
+    # By structure, not by size: a loop of a gain as small as may be is a loop.
     through_states = np.any(compiled.g[_upstream(compiled, port), port] != 0)
     return bool(through_states or compiled.displacement_port[port, port] != 0)
 
@@ -177,6 +181,7 @@ def _with_input_port(compiled: CompiledModel, name: str) -> CompiledModel:
 def _with_output_port(compiled: CompiledModel, site: Site) -> CompiledModel:
     row = output_row(compiled, site.name)
     terminal, ports = compiled.outputs[row], len(compiled.ports)
+    # Before loops are closed nothing feeds on the output, so its force moves no state yet.
     added = np.zeros(len(compiled.outputs))
     added[row] = 1.0
     return _with_port(
@@ -189,6 +194,7 @@ def _with_output_port(compiled: CompiledModel, site: Site) -> CompiledModel:
 
 def _with_stage(compiled: CompiledModel, port: int) -> CompiledModel:
     """Add a port behind one that carries a law: its signal is the old one and what the law adds to it."""
+    # The old port's force acts at once on what the new one sees, beside what may come around a loop.
     ahead = np.append(compiled.displacement_port[port], compiled.displacement_port[port, port])
     ahead[port] += 1.0
     return _with_port(

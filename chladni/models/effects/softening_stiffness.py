@@ -22,6 +22,7 @@ def cubic(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: 
     Parameters cubic, the joint's stiffness, end of the valid range.
     """
     end = parameters[2]
+    # Beyond the end the cubic would push the bodies apart, faster and faster: no joint does.
     inside = min(max(d, -end), end)
     return float(parameters[0] * inside * inside * inside - parameters[1] * (d - inside))
 
@@ -45,6 +46,7 @@ def _numbers(values: Values, port: Port) -> tuple[float, ...]:
 
 def _flags(port: Port, values: Values, simulation: Simulation) -> tuple[str, ...]:
     end = valid_range(values["cubic"], port.stiffness)
+    # The law keeps going beyond its range, so that a simulation ends; the user must know that it was left.
     reached = float(np.max(np.abs(simulation.motion(port.name).displacement), initial=0.0))
     if reached <= end:
         return ()

@@ -32,6 +32,7 @@ def bristle(_d: float, s: float, _t: float, parameters: Any, state: Any, rates: 
         # Without any sliding friction the bristles would spring back infinitely fast at speed.
         curve = max((coulomb + (static - coulomb) * bump) / static, 1e-3)
     rates[0] = (s - abs(s) * state[0] / curve) / parameters[3]
+    # w' times presliding is how fast the bristles bend, in m/s.
     return float(static * state[0] + parameters[4] * rates[0] * parameters[3])
 
 
@@ -69,7 +70,9 @@ STRIBECK_FRICTION = EffectKind(
             ),
         )
     ),
+    # The speed has no value that switches the law off; both forces have.
     neutral={"coulomb": 0.0, "static": 0.0},
+    # Otherwise the curve would rise with speed: that is viscous damping, which the joint has already.
     check=_check,
     variants=(
         Variant(

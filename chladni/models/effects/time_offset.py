@@ -10,6 +10,7 @@ from chladni.models.effects.signal_path import output_row
 
 def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
     """Shift what is recorded; what a controller sees isn't shifted, since its clock isn't the log's."""
+    # Several effects may shift one channel: its logger and its sensor.
     offsets = list(compiled.output_offsets_s)
     offsets[output_row(compiled, site.name)] += values["offset"]
     return replace(compiled, output_offsets_s=tuple(offsets))

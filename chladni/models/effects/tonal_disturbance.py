@@ -41,6 +41,7 @@ class _AtBodyOrOutput:
     def __call__(self, compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
         if site.kind == "body" or is_in_loop(compiled, site):
             return self.law(compiled, site, values)
+        # A hum in a cable moves nothing: on samples it is exact, and the model keeps its linear path.
         numbers = _numbers(values, Port(name=site.name, kind=site.kind))
         return with_samples_mapped(compiled, site, SampleShape(shape=with_tone, numbers=numbers))
 

@@ -11,6 +11,7 @@ from chladni.signals.errors import ModelError
 
 def drift(d: float, _s: float, t: float, parameters: Any, _state: Any, _rates: Any) -> float:
     """Give ``k relative_change min(t/time, 1) d``; parameters k times the change, time."""
+    # Tested before dividing: a drift of no duration is complete at once.
     share = 1.0
     if t < parameters[1]:
         share = max(t, 0.0) / parameters[1]
@@ -23,6 +24,7 @@ def step(d: float, _s: float, t: float, parameters: Any, _state: Any, _rates: An
     The change is spread over `rise` by the polynomial of fifth order whose first and second derivative vanish at
     both ends.
     """
+    # A jump in time would meet the integrator inside a step wherever it fell.
     u = min(max((t - parameters[1]) / parameters[2] + 0.5, 0.0), 1.0)
     return float(parameters[0] * u * u * u * (10.0 + u * (6.0 * u - 15.0)) * d)
 

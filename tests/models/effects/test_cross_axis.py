@@ -2,6 +2,8 @@ import numpy as np
 import pytest
 
 from chladni.models.effects.attached_effect import attached
+from chladni.models.effects.cross_axis import attach
+from chladni.models.effects.effect_kind import Site
 from chladni.signals.errors import ModelError
 from tests.models.effects.small_models import one_body, with_loop
 
@@ -63,3 +65,9 @@ def test_behind_a_change_of_samples_it_is_refused() -> None:
     clipped = attached("clipping", "acc", {"limit": 1.0}).attach(one_body())
     with pytest.raises(ModelError, match=r"list it before clipping"):
         attached("cross_axis", "acc", {"coefficient": 0.2}, source="speed").attach(clipped)
+
+
+def test_the_way_to_attach_asks_for_a_source_too() -> None:
+    site = Site(effect="cross_axis", name="acc", kind="output")
+    with pytest.raises(ModelError, match=r"cross_axis at 'acc': name another output as its source"):
+        attach(one_body(), site, {"coefficient": 0.1})
