@@ -1,6 +1,5 @@
 """Where a model comes from: a file, or an instrument's name; and a log that drives it."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from chladni.io.log import open_log
@@ -30,21 +29,24 @@ def _of_file(text: str) -> Model:
     raise ModelError(f"{text}: no such file, and no instrument of this name; instruments: {', '.join(INSTRUMENTS)}")
 
 
-def recording_for(model: Model, log: Path | str, *, others: Sequence[str] = ()) -> TimeSeries:
-    """Read the channels of a log that a model's inputs name, and `others`, at one rate.
+def recording_for(model: Model, log: Path | str) -> TimeSeries:
+    """Read the channels that a model's inputs name from a log, and those of its outputs that the log holds too.
 
     Raises
     ------
     ModelError
         When no input of the model names a channel.
     LogError
-        When the log hasn't got one.
+        When the log hasn't got an input's channel, or channels don't share a grid.
     """
-    channels = [terminal.channel for terminal in model.compile().inputs if terminal.channel is not None]
-    if not channels:
+    compiled = model.compile()
+    driving = [terminal.channel for terminal in compiled.inputs if terminal.channel is not None]
+    if not driving:
         raise ModelError(
             f"model {model.name!r}: no input names a channel of a log; give its [[input]] a line such as "
             'channel = "/hammer.wrench.force.x"'
         )
+    measured = {terminal.channel for terminal in compiled.outputs if terminal.channel is not None}
     with open_log(log) as opened:
-        return opened.read([*dict.fromkeys([*channels, *others])])
+        held = [channel.name for channel in opened.channels if channel.name in measured]
+        return opened.read(list(dict.fromkeys([*driving, *held])))

@@ -18,6 +18,7 @@ from chladni.cli.influence import influence
 from chladni.cli.info import info
 from chladni.cli.modes import modes
 from chladni.cli.psd import psd
+from chladni.cli.simulate import simulate
 from chladni.cli.view import view
 from chladni.signals.errors import ChladniError
 
@@ -31,7 +32,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (info, psd, frf, modes, view, compare, convert, influence, bench, demo):
+for command in (info, psd, frf, modes, view, compare, convert, simulate, influence, bench, demo):
     app.command()(command)
 
 

@@ -40,7 +40,7 @@ def effect_of(text: str) -> "Effect":
     ModelError
         When the effect or a parameter is unknown or impossible.
     """
-    from chladni.models.effects.catalogue import attached
+    from chladni.models.effects.attached_effect import attached
 
     head, _, tail = text.partition(":")
     effect, at, site = head.partition("@")

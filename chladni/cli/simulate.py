@@ -1,0 +1,118 @@
+"""``chladni simulate``: a log with known truth."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from chladni.cli import options
+from chladni.cli.output import Output
+from chladni.cli.settings import effect_of, with_settings
+from chladni.cli.words import count, number
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from chladni.signals.time_series import TimeSeries
+
+
+def simulate(
+    model: Annotated[
+        str, typer.Argument(metavar="MODEL", help="A model file, or the name of an instrument.", show_default=False)
+    ],
+    *,
+    out: Annotated[Path, typer.Option("--out", metavar="LOG.mcap", help="The log to write.", show_default=False)],
+    seconds: Annotated[
+        float | None, typer.Option(metavar="S", help="Length; by the slowest decay if not given.", show_default=False)
+    ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Sample rate; twenty times the highest natural frequency if not given."),
+    ] = None,
+    kind: Annotated[
+        Literal["random", "sweep", "multisine", "step", "impact"],
+        typer.Option("--input", help="What drives the model."),
+    ] = "random",
+    at: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Input that is driven; the first if not given.")
+    ] = None,
+    level: Annotated[
+        float | None,
+        typer.Option(metavar="X", help="RMS, amplitude, step or peak, in the input's unit; 1 if not given."),
+    ] = None,
+    band: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="LO HI", help="Excited frequencies in Hz, of random, sweep and multisine."),
+    ] = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="LOG", help="Drive the model with this log's channels instead.", show_default=False),
+    ] = None,
+    noise: Annotated[
+        float, typer.Option(metavar="SHARE", help="Noise of each sensor, as a share of its signal's RMS.")
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of everything random.")] = 0,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Change a parameter; may be repeated.", show_default=False),
+    ] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="EFFECT@SITE:NAME=VALUE,...",
+            help="Add an effect, such as coulomb_friction@elbow:force=8; may be repeated.",
+            show_default=False,
+        ),
+    ] = None,
+    json: options.Json = None,
+) -> None:
+    """Simulate a model and write a log, with its truth beside it and in its metadata."""
+    from chladni.apps.model_sources import named_model, recording_for
+    from chladni.apps.simulated_log import Drive, simulate_log, write_simulated_log
+
+    to = Output(json)
+    chosen = with_settings(named_model(model), settings or ())
+    if effect:
+        chosen = chosen.with_effects((*chosen.effects, *map(effect_of, effect)))
+    recording = None
+    if log is not None:
+        _refuse({"--input": None if kind == "random" else kind, "--at": at, "--level": level, "--band": band,
+                 "--seconds": seconds, "--rate": rate})  # fmt: skip
+        recording = recording_for(chosen, log)
+    drive = Drive(
+        word=kind, level=1.0 if level is None else level, input_name=at, band_hz=band, seed=seed, noise=noise
+    )
+    made = simulate_log(chosen, drive, seconds=seconds, rate_hz=rate, recording=recording)
+    written, truth = write_simulated_log(made, out)
+    series = made.recorded
+    to.line(
+        f"{chosen.name}: {number(series.duration_s, digits=6)} s at {number(series.sample_rate_hz, digits=6)} Hz, "
+        f"{count(series.samples)} samples of {len(series.channels)} channels"
+    )
+    to.table("What the log holds", ["channel", "role", "RMS", "unit"], _rows(series, written.names))
+    for score in made.agreement:
+        told = "not known" if score.value is None else f"{score.value:.3g} {score.unit}"
+        to.line(f"{score.name}: {told} ({score.definition})")
+    to.lines(made.simulation.flags)
+    to.line(f"wrote {written.path}")
+    to.line(f"wrote {truth}")
+    nrmse = {score.name.removeprefix("NRMSE "): score.value for score in made.agreement}
+    to.json({**made.truth, "format": "chladni.simulate/1", "log": str(written.path), "truth_file": str(truth),
+             "nrmse_percent": nrmse})  # fmt: skip
+
+
+def _rows(series: "TimeSeries", names: "Mapping[str, str]") -> list[list[str]]:
+    roles = {"reference": "input", "response": "output"}
+    return [
+        [names[channel.name], roles[channel.role], f"{float((row**2).mean() ** 0.5):.4g}", channel.unit]
+        for channel, row in zip(series.channels, series.values, strict=True)
+    ]
+
+
+def _refuse(given: dict[str, object]) -> None:
+    """Raise `SetupError` for what a log that drives the model decides itself."""
+    from chladni.signals.errors import SetupError
+
+    for name, value in given.items():
+        if value is not None:
+            raise SetupError(f"{name} has no meaning with --log: the log's own signals drive the model")
