@@ -206,8 +206,8 @@ class _Loop:
         plant = self._plant
         if plant.input_maps or any(plant.input_delays_s):
             raise ModelError("loops are closed before effects act on inputs")
-        mapped = {place for place, _ in plant.output_maps}
-        if self._feedback in mapped or plant.output_offsets_s[self._feedback]:
+        # An offset of the recorded channel's clock stays outside: the loop goes on as it is.
+        if self._feedback in {place for place, _ in plant.output_maps}:
             raise ModelError(
                 f"output {self._controller.feedback!r} feeds the controller {self._controller.name!r}; what acts on "
                 "its samples can't act inside the loop"

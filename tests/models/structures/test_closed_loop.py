@@ -256,12 +256,20 @@ def test_dead_time_of_the_motor_acts_inside_the_loop() -> None:
 
 def test_what_acts_on_samples_can_t_act_inside_a_loop() -> None:
     compiled = replace(axis(), controllers=(), inputs=axis().inputs[:1]).compile()
-    late = replace(compiled, output_offsets_s=(0.01, 0.0, 0.0))
+    mapped = replace(compiled, output_maps=((0, lambda samples, _rate_hz: samples),))
     with pytest.raises(ModelError, match=r"can't act inside the loop"):
-        close_loop(late, axis().controllers[0])
+        close_loop(mapped, axis().controllers[0])
     early = replace(compiled, input_delays_s=(0.01,))
     with pytest.raises(ModelError, match="closed before effects act on inputs"):
         close_loop(early, axis().controllers[0])
+
+
+def test_a_late_clock_of_the_recording_leaves_the_loop_alone() -> None:
+    late = axis().with_effects([attached("time_offset", "position", {"offset": 2e-3})]).compile()
+    np.testing.assert_array_equal(late.a, axis().compile().a)
+    found, expected = late.frequency_response(FREQUENCY_HZ), axis().compile().frequency_response(FREQUENCY_HZ)
+    np.testing.assert_allclose(found[0], expected[0] * np.exp(-2e-3 * S), rtol=RTOL)
+    np.testing.assert_array_equal(found[1:], expected[1:])
 
 
 def simulation(motions: tuple[PortMotion, ...] = ()) -> Simulation:
