@@ -1,4 +1,4 @@
-"""A virtual Fourier analyser: acceleration logs to spectra, transfer functions and modes, in rerun.
+"""A virtual Fourier analyser: acceleration logs to spectra, transfer functions and modes; simulated drives beside.
 
 ::
 
@@ -6,6 +6,9 @@
     frf = chladni.frf(log, reference="/hammer.wrench.force.x", resolution_hz=0.5)
     modes = chladni.identify_modes(frf, band_hz=(10, 400))
     chladni.show(log, frf, modes)                               # rerun
+
+    model = chladni.load_model("arm.toml")                      # what the simulation believes
+    run = chladni.simulate(model, log.read())                   # driven by the log's own inputs
 
 The names below are the public surface; each is imported when it is first used, so that ``import chladni`` is cheap.
 """
@@ -35,6 +38,13 @@ _HOME = {
     "FrequencyDomainDecomposition": "chladni.modal.responses.fdd",
     "HalfPower": "chladni.modal.functions.half_power",
     "PolyReferenceLeastSquares": "chladni.modal.functions.polyreference",
+    "attached": "chladni.models.effects.attached_effect",
+    "influence": "chladni.models.analysis.influence",
+    "load_model": "chladni.models.files.model_file",
+    "optimise": "chladni.models.analysis.optimise",
+    "simulate": "chladni.models.integrator.simulate",
+    "write_model": "chladni.models.files.model_file",
+    "Wish": "chladni.models.analysis.wish",
     "load_setup": "chladni.io.setup",
     "open_log": "chladni.io.log",
     "write_mcap": "chladni.io.mcap.writer",
@@ -73,22 +83,29 @@ __all__ = [
     "SetupError",
     "Study",
     "TimeSeries",
+    "Wish",
     "analyse",
+    "attached",
     "coherence",
     "cross_spectra",
     "find_peaks",
     "find_response_peaks",
     "frf",
     "identify_modes",
+    "influence",
+    "load_model",
     "load_setup",
     "mac",
     "open_log",
+    "optimise",
     "psd",
     "relative_motion",
     "show",
+    "simulate",
     "validate",
     "waterfall",
     "write_mcap",
+    "write_model",
 ]
 
 if TYPE_CHECKING:
@@ -108,6 +125,12 @@ if TYPE_CHECKING:
     from chladni.modal.shapes.mac import mac
     from chladni.modal.shapes.relative_motion import relative_motion
     from chladni.modal.shapes.validation import validate
+    from chladni.models.analysis.influence import influence
+    from chladni.models.analysis.optimise import optimise
+    from chladni.models.analysis.wish import Wish
+    from chladni.models.effects.attached_effect import attached
+    from chladni.models.files.model_file import load_model, write_model
+    from chladni.models.integrator.simulate import simulate
     from chladni.signals.channel import Channel
     from chladni.signals.coherence import Coherence
     from chladni.signals.cross_spectra import CrossSpectra

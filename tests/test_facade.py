@@ -10,11 +10,13 @@ SURFACE = {
     "Channel", "ChladniError", "CircleFit", "Coherence", "CovarianceDrivenSubspace", "CrossSpectra",
     "EnhancedFrequencyDomainDecomposition", "EstimateError", "FrequencyDomainDecomposition",
     "FrequencyResponse", "HalfPower", "LogError", "ModeSet", "ModelError", "PolyReferenceLeastSquares",
-    "PowerSpectralDensity", "SetupError", "Study", "TimeSeries", "analyse", "coherence", "cross_spectra",
-    "find_peaks", "find_response_peaks", "frf", "identify_modes", "load_setup", "mac", "open_log", "psd",
-    "relative_motion", "show", "validate", "waterfall", "write_mcap",
+    "PowerSpectralDensity", "SetupError", "Study", "TimeSeries", "Wish", "analyse", "attached",
+    "coherence", "cross_spectra",
+    "find_peaks", "find_response_peaks", "frf", "identify_modes", "influence", "load_model", "load_setup", "mac",
+    "open_log", "optimise", "psd",
+    "relative_motion", "show", "simulate", "validate", "waterfall", "write_mcap", "write_model",
 }  # fmt: skip
-HEAVY = {"numpy", "scipy", "rerun", "matplotlib", "pint", "pydantic", "mcap", "zstandard"}
+HEAVY = {"numpy", "scipy", "rerun", "matplotlib", "pint", "pydantic", "mcap", "zstandard", "numba", "panel", "bokeh"}
 
 
 def modules_after(statement: str) -> set[str]:
