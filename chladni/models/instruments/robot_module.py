@@ -9,14 +9,22 @@ and what stays is an integrator with the correction's lag of 0.7 s, at a damping
 
 from collections.abc import Mapping
 
+import numpy as np
+
+from chladni.models.analysis.linear_path import linear_path
+from chladni.models.analysis.step_response import step_response
 from chladni.models.core.instrument import Instrument, Option
+from chladni.models.core.model import Model
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Terminal
+from chladni.models.core.reading import Chart, Curve
 from chladni.models.elements import declare
 from chladni.models.schemes.block import element_block
 from chladni.models.schemes.scheme_model import SchemeModel
 from chladni.models.schemes.scheme_output import SchemeOutput
 
+#: Step of the reference that the page begins with, in rad/s or rad.
+STEP_SIZE = 0.1
 #: Switches of the page, and the blocks that each one switches.
 SWITCHES: Mapping[str, tuple[str, ...]] = {
     "regulator": ("regulator",),
@@ -102,6 +110,31 @@ def _build(values: Mapping[str, float], options: Mapping[str, str]) -> SchemeMod
     return scheme.switched({block: options[name] == "on" for name, blocks in SWITCHES.items() for block in blocks})
 
 
+def _with_and_without_load(model: Model) -> tuple[Chart, ...]:
+    """Paper's comparison: the answer to the reference alone, and to reference and load stepping together."""
+    compiled = model.compile()
+    # The reference is an angle only while the position loop is closed.
+    output = "position" if compiled.inputs[0].unit == "rad" else "arm"
+    path = linear_path(compiled, from_input="reference", to_outputs=(output,))
+    alone = step_response(path, size=STEP_SIZE)
+    load_path = linear_path(compiled, from_input="load", to_outputs=(output,))
+    load = step_response(load_path, seconds=float(alone.time_s[0, -1]))
+    added = np.interp(alone.time_s[0], load.time_s[0], load.values[0])
+    unit = alone.outputs[0].unit
+    return (
+        Chart(
+            name="step.with-load",
+            title=f"{output} after a step of {STEP_SIZE:g} {path.source.unit} with and without load",
+            x_label="time [s]",
+            y_label=f"{output} [{unit}]",
+            curves=(
+                Curve(label="without load", x=alone.time_s[0], y=alone.values[0]),
+                Curve(label="with load", x=alone.time_s[0], y=alone.values[0] + added),
+            ),
+        ),
+    )
+
+
 INSTRUMENT = Instrument(
     name="robot-module",
     title="Driving module of a robot as a block scheme (the project's own)",
@@ -115,7 +148,8 @@ INSTRUMENT = Instrument(
     ),
     step_input="reference",
     step_output="arm",
-    step_size=0.1,
+    step_size=STEP_SIZE,
+    extra_charts=_with_and_without_load,
     load_input="load",
     views=("step", "bode", "nyquist", "poles", "root-locus", "influence"),
 )
