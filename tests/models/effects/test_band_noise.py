@@ -53,3 +53,9 @@ def test_it_is_normally_distributed() -> None:
 def test_a_rate_too_low_for_the_band_is_refused() -> None:
     with pytest.raises(ModelError, match=r"up to 60 Hz would alias at 100 Hz: simulate at 120 Hz or more"):
         NOISE(np.arange(50) / 100.0)
+
+
+def test_hours_are_summed_in_pieces_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = NOISE(TIMES_S)
+    monkeypatch.setattr("chladni.models.effects.band_noise._BLOCKS", 3)
+    np.testing.assert_allclose(NOISE(TIMES_S), whole, rtol=1e-12, atol=1e-12)
