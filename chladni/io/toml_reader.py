@@ -25,6 +25,9 @@ MAX_BYTES: Final = 1 << 20
 MAX_MISTAKES: Final = 50
 """Mistakes that are told; one wrong habit can repeat in every table."""
 
+# Lines inside of one table's values that begin like a header, before its lines are looked for the long way.
+_MOST_FALSE_HEADERS = 20
+
 _LINE_IN_MESSAGE = re.compile(r"\s*\(at (?:line (\d+), column \d+|end of document)\)$")
 _RULES: dict[str, str] = {
     "string_type": "must be text in quotes",
@@ -81,6 +84,8 @@ class TomlDocument:
     def __init__(self, text: str, *, name: str, kind: type[ChladniError]) -> None:
         self.name = name
         self._lines = text.replace("\r\n", "\n").split("\n")
+        self._kind = kind
+        self._tables: dict[Loc, tuple[int, int]] | None = None
         try:
             self.content: dict[str, Any] = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
@@ -93,15 +98,26 @@ class TomlDocument:
         return f"{self.name}:{self.line_of(loc)}"
 
     def line_of(self, loc: Loc) -> int:
-        """Line, from 1, in which the value at `loc` starts; for a missing value the line of its table.
-
-        The prefixes of a file that end at a whole line are TOML themselves (unless the cut is inside a value), and
-        a value stands in the first prefix that has it: found by bisection.
-        """
+        """Line, from 1, in which the value at `loc` starts; for a missing value the line of its table."""
         while loc and not _holds(self.content, loc):
             loc = loc[:-1]
         if not loc:
             return 1
+        if self._tables is None:
+            self._tables = _table_lines(self._lines, self.content)
+        span = self._tables.get(loc[:2])
+        if span is None:
+            return self._bisected(loc)
+        # A file may have thousands of mistakes: each is looked for in the few lines of its own table.
+        table = TomlDocument("\n".join(self._lines[span[0] : span[1]]), name=self.name, kind=self._kind)
+        return span[0] + table._bisected((loc[0], 0, *loc[2:]))
+
+    def _bisected(self, loc: Loc) -> int:
+        """Line of a value that is there.
+
+        The prefixes of a file that end at a whole line are TOML themselves (unless the cut is inside a value), and
+        a value stands in the first prefix that has it.
+        """
         low, high = 0, len(self._lines)
         while high - low > 1:
             middle = (low + high) // 2
@@ -256,6 +272,41 @@ def _model_in(annotation: Any) -> Any:
         return annotation
     inner: Iterable[Any] = getattr(annotation, "__args__", ())
     return next((model for model in map(_model_in, inner) if model is not None), None)
+
+
+def _table_lines(lines: list[str], content: dict[str, Any]) -> dict[Loc, tuple[int, int]]:
+    """Lines ``[first, last)`` of the tables ``[[name]]``, by name and index.
+
+    Lines that look like a header may stand inside of text or of a list over several lines, and a table may go on
+    under ``[name.key]``. So only names are taken whose tables, each read by itself, are those of the whole file.
+    """
+    headers = [line for line, text in enumerate(lines) if text.lstrip().startswith("[")]
+    spans: dict[Loc, tuple[int, int]] = {}
+    counts: dict[str, int] = {}
+    place = 0
+    while place < len(headers):
+        start, place, read = headers[place], *_one_table(lines, headers, place)
+        for name, table in read.items():
+            index = counts.get(name, 0)
+            counts[name] = index + 1
+            listed = content.get(name)
+            # By their text, because nan is not equal to itself.
+            if isinstance(listed, list) and repr([table]) == repr(listed[index : index + 1]):
+                spans[name, index] = (start, headers[place] if place < len(headers) else len(lines))
+    return {loc: span for loc, span in spans.items() if counts[str(loc[0])] == len(content[str(loc[0])])}
+
+
+def _one_table(lines: list[str], headers: list[int], place: int) -> tuple[int, dict[str, Any]]:
+    """Read the table ``[[name]]`` below a header; give the place of the next header, and the table by its name."""
+    for following in range(place + 1, min(place + 1 + _MOST_FALSE_HEADERS, len(headers)) + 1):
+        last = headers[following] if following < len(headers) else len(lines)
+        try:
+            read = tomllib.loads("\n".join(lines[headers[place] : last]))
+        except tomllib.TOMLDecodeError:
+            # What looked like the next header stands inside of a value.
+            continue
+        return following, {name: listed[0] for name, listed in read.items() if isinstance(listed, list)}
+    return place + 1, {}
 
 
 def _holds(content: Any, loc: Loc) -> bool:

@@ -1,6 +1,8 @@
 """Lines of TOML values, and files that are no TOML."""
 
+import tomllib
 from pathlib import Path
+from unittest import mock
 
 import pytest
 from pydantic import BaseModel, ConfigDict
@@ -76,6 +78,70 @@ def test_every_key_of_a_generated_file_is_found() -> None:
     text = "".join(f"[[part]]\nmass = {n}.0\n\n" for n in range(60))
     lines = [document(text).line_of(("part", n, "mass")) for n in range(60)]
     assert lines == [3 * n + 2 for n in range(60)]
+
+
+MISLEADING = '''# [[part]] in a comment
+kind = """
+[[part]]
+name = 0
+"""
+[[part]]
+mass = 1.0
+text = """
+[[part]]
+mass = 7.0
+"""
+grid = [
+  [1, 2],
+  [3, 4],
+]
+[part.place]
+x = 1.0
+[[ "part" ]]   # quoted
+mass = 2.0
+[[part]]
+mass = nan
+[[other.part]]
+mass = 3.0
+[tolerance]
+x = [
+  [[1]],
+]
+'''
+
+
+@pytest.mark.parametrize(
+    ("loc", "line"),
+    [
+        (("part", 0, "mass"), 7),
+        (("part", 0, "grid", 1), 12),
+        (("part", 0, "place", "x"), 17),
+        (("part", 1), 18),
+        (("part", 1, "mass"), 19),
+        (("part", 2, "mass"), 21),
+        (("other", "part", 0, "mass"), 23),
+        (("tolerance", "x"), 25),
+        (("kind",), 2),
+    ],
+)
+def test_lines_that_only_look_like_headers_mislead_nobody(loc: tuple[str | int, ...], line: int) -> None:
+    assert document(MISLEADING).line_of(loc) == line
+
+
+def test_a_list_with_many_lines_in_brackets_is_no_heap_of_tables() -> None:
+    rows = "".join(f"  [{n}],\n" for n in range(60))
+    text = f"[[part]]\nmass = 1.0\ngrid = [\n{rows}]\n[[part]]\nmass = 2.0\n"
+    assert document(text).line_of(("part", 1, "mass")) == 66
+    assert document(text).line_of(("part", 0, "grid")) == 3
+
+
+def test_a_thousand_mistakes_take_no_longer_than_their_tables() -> None:
+    # Every look-up parses a few lines, not the file: counted, since time depends on the machine.
+    text = "".join(f"[[part]]\nmass = {n}.0\n" for n in range(1000))
+    whole = document(text)
+    with mock.patch("chladni.io.toml_reader.tomllib.loads", wraps=tomllib.loads) as loads:
+        assert [whole.line_of(("part", n, "mass")) for n in range(1000)] == list(range(2, 2001, 2))
+    assert max(len(call.args[0]) for call in loads.call_args_list) < 60
 
 
 def read(tmp_path: Path, content: str | bytes) -> str:
