@@ -9,6 +9,7 @@ from chladni.models.analysis.influence import influence
 from chladni.models.analysis.instrument_reading import read_instrument
 from chladni.models.core.reading import InstrumentReading
 from chladni.models.instruments.catalogue import INSTRUMENTS
+from chladni.signals.errors import ModelError
 
 
 def require_sound(reading: InstrumentReading) -> None:
@@ -19,7 +20,9 @@ def require_sound(reading: InstrumentReading) -> None:
         assert chart.y_label
         assert chart.curves
         for curve in chart.curves:
-            assert np.isfinite(curve.y).any() or curve.y.size == 0, (chart.name, curve.label)
+            assert not np.isinf(curve.y).any(), (chart.name, curve.label)
+            # An element whose gain is turned to nothing has no decibels.
+            assert np.isfinite(curve.y).any() or curve.points or chart.name.startswith("bode"), chart.name
     for quantity in reading.quantities:
         assert quantity.definition
         assert quantity.value is None or math.isfinite(quantity.value), quantity
@@ -31,7 +34,11 @@ def test_an_instrument_reads_at_its_defaults_and_at_both_ends_of_every_knob(name
     require_sound(read_instrument(instrument))
     for parameter in instrument.parameters.items_in_order:
         for end in (parameter.low, parameter.high):
-            require_sound(read_instrument(instrument, {parameter.name: end}))
+            try:
+                require_sound(read_instrument(instrument, {parameter.name: end}))
+            except ModelError as refused:
+                # Two knobs may contradict each other (a start beyond the stroke); the page says which.
+                assert parameter.name in str(refused)  # noqa: PT017  # both outcomes are allowed
 
 
 @pytest.mark.parametrize("name", INSTRUMENTS)
