@@ -38,6 +38,7 @@ _MOTOR_PARAMETERS = (
         name="resistance", value=1.0, unit="ohm", low=0.2, high=5.0, minimum=1e-6, maximum=1e6, symbol="R",
         tolerance=0.1, meaning="of the armature, which warms up",
     ),
+    # The defaults are those of a motor of a few hundred watts: 2 ms electrical, 10 ms mechanical time constant.
     Parameter(
         name="inductance", value=2e-3, unit="V s/A", low=2e-4, high=2e-2, minimum=1e-9, maximum=1e3, symbol="L",
         shown_unit="mV s/A", tolerance=0.1, meaning="of the armature; 1 mV s/A is 1 mH",
@@ -46,6 +47,7 @@ _MOTOR_PARAMETERS = (
         name="torque_constant", value=0.1, unit="N m/A", low=0.02, high=0.5, minimum=1e-9, maximum=1e4, symbol="K_t",
         meaning="torque for a unit of current",
     ),
+    # Apart from the torque constant, because iron losses and catalogues make the two differ.
     Parameter(
         name="back_emf", value=0.1, unit="V s/rad", low=0.02, high=0.5, minimum=0.0, maximum=1e4, symbol="K_e",
         meaning="voltage for a unit of velocity; equal to the torque constant but for losses",
@@ -58,6 +60,7 @@ _MOTOR_PARAMETERS = (
         name="viscous_loss", value=1e-4, unit="N m s/rad", low=0.0, high=1e-3, minimum=0.0, maximum=1e4, symbol="b",
         tolerance=0.3, meaning="gradient of friction torque with velocity",
     ),
+    # The load is that of the rotor behind the gear, which textbooks call matched.
     Parameter(
         name="gear_ratio", value=10.0, low=1.0, high=160.0, minimum=1e-3, maximum=1e6, symbol="n", tolerance=0.0,
         meaning="turns of the motor for one of the load",
@@ -66,6 +69,7 @@ _MOTOR_PARAMETERS = (
         name="load_inertia", value=1e-2, unit="kg m^2", low=0.0, high=1.0, minimum=0.0, maximum=1e9, symbol="J_L",
         meaning="behind the gear, which is stiff",
     ),
+    # Cycle time and half a cycle of the pulse width: 10 kHz.
     Parameter(
         name="converter_time", value=1.5e-4, unit="s", low=5e-5, high=1e-3, minimum=1e-7, maximum=1.0, symbol="T",
         shown_unit="ms", tolerance=0.2, meaning="lag of the power stage: one and a half of its cycles",
@@ -74,8 +78,9 @@ _MOTOR_PARAMETERS = (
         name="voltage_limit", value=48.0, unit="V", low=12.0, high=320.0, minimum=1e-6, maximum=1e6, tolerance=0.05,
         role="function", meaning="of the power stage",
     ),
+    # Above the limit of the reference, beyond which the current shoots by a few percent.
     Parameter(
-        name="rated_current", value=20.0, unit="A", low=2.0, high=50.0, minimum=1e-6, maximum=1e5, role="function",
+        name="rated_current", value=25.0, unit="A", low=2.0, high=50.0, minimum=1e-6, maximum=1e5, role="function",
         meaning="largest current; beyond is flagged",
     ),
     Parameter(
@@ -102,6 +107,7 @@ def _gear(values: Mapping[str, float], options: Mapping[str, str]) -> tuple[floa
 
 def _build(values: Mapping[str, float], options: Mapping[str, str]) -> CompiledModel:
     ratio, inertia = _gear(values, options)
+    # The torque of the load counts on its side of the gear.
     torque = {"torque": 1.0, "velocity": -values["viscous_loss"], "load_torque": -1 / ratio}
     # What helps the load stands on its side of the gear; the joint and the body stand at the shaft.
     ports = {"actuation:load_torque": -1 / ratio, f"joint:{JOINT}": -1.0, f"body:{BODY}": 1.0}
@@ -119,6 +125,7 @@ def _build(values: Mapping[str, float], options: Mapping[str, str]) -> CompiledM
         signals=signals,
         ports=_ports(values["viscous_loss"], ratio),
     )
+    # In front of the power stage, whose lag smooths what is left.
     if options["voltage_limiter"] == "off":
         return compiled
     return with_limit(compiled, "voltage", limit_law(limit=values["voltage_limit"]))

@@ -98,6 +98,7 @@ class DriveKind:
         ModelError
             When a name is unknown, a value impossible, or a parameter doesn't act with these options.
         """
+        # An option that is off would swallow the value in silence.
         acting = self.acting(options)
         for name in values:
             self.parameters.require(name)
@@ -107,6 +108,7 @@ class DriveKind:
         return acting.with_values(values)
 
     def _acts(self, name: str, chosen: Words) -> bool:
+        # Most parameters act whatever is switched.
         if name not in self.acts_with:
             return True
         option, words = self.acts_with[name]

@@ -65,8 +65,10 @@ class DriveModel:
         """
         values, names = self.parameters.numbers(), signal_names((*self.inputs, *self.outputs))
         compiled = renamed(self.drive.build(values, self.options), names)
+        # Sorted by where they act; inside each group the order given stays.
         outputs = {terminal.name for terminal in compiled.outputs}
         moving = {port.name for port in compiled.ports if port.kind in ("joint", "body", "ground")}
+        # Loops speak of signals by the kind's words; the model may call them otherwise.
         loops = [loop.renamed(names) for loop in self.drive.loops(values, self.options)]
         for name in (terminal.name for loop in loops for terminal in loop.controller.inputs):
             compiled = with_port(compiled, name, "output") if name in outputs else compiled
@@ -124,6 +126,7 @@ def drive_model(
     >>> motor.compile().states
     ('displacement', 'velocity', 'pressure_drop')
     """
+    # Options first: they say which parameters there are.
     chosen = drive.choices(options or {})
     parameters = drive.with_values(values or {}, chosen)
     _require_signals(drive, (*inputs, *outputs))
@@ -136,6 +139,7 @@ def drive_model(
         inputs=tuple(inputs) or every[0],
         outputs=tuple(outputs) or every[1],
     )
+    # Compiled once for its checks: a mistake belongs to who makes the model, not to who simulates it.
     model.compile()
     return model
 

@@ -11,6 +11,7 @@ def end_stops_law(d: float, s: float, _t: float, parameters: Any, _state: Any, _
     `parameters`: low end, high end [m], stiffness [N/m], damping [N s/m].
     """
     low, high, stiffness, damping = parameters[0], parameters[1], parameters[2], parameters[3]
+    # Leaving fast, the damper would outweigh the spring and hold the piston back.
     force = 0.0
     if d > high:
         force = max(0.0, stiffness * (d - high) + damping * s)

@@ -74,8 +74,10 @@ def compile_equations(
     >>> compiled.a.item(), compiled.b.item(), compiled.c.item()
     (-1.0, 0.5, 1.0)
     """
+    # A row has one place for each state, input and port, in this order.
     names = [*rates, *(terminal.name for terminal in inputs), *(placed.signal for placed in ports)]
     rows = dict(zip(names, np.eye(len(names)), strict=True))
+    # In order, so that a signal may use those before it and no loop can hide among them.
     for name, total in signals.items():
         rows[name] = _row(total, rows, name)
     n, m = len(rates), len(inputs)
@@ -123,4 +125,5 @@ def _output_row(terminal: Terminal, rows: Mapping[str, Matrix]) -> Matrix:
 
 
 def _stack(rows: list[Matrix], columns: int) -> Matrix:
+    # Reshaped, because a list without rows has lost its number of columns.
     return np.asarray(rows, dtype=np.float64).reshape(len(rows), columns)

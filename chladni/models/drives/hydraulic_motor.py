@@ -48,6 +48,7 @@ _OWN_PARAMETERS = (
         symbol="V", shown_unit="cm^3",
         meaning="volume of oil in the flow balance: a quarter of all oil for equal chambers, piston at the middle",
     ),
+    # Oil without air has 1.6 GPa and more; half a percent of air takes a quarter of it at 20 bar.
     Parameter(
         name="bulk_modulus", value=1.4e9, unit="Pa", low=1.2e9, high=1.6e9, minimum=1e7, maximum=1e10, symbol="E",
         shown_unit="GPa", tolerance=0.1, meaning="of mineral oil with some air",
@@ -56,6 +57,7 @@ _OWN_PARAMETERS = (
         name="reduced_mass", value=300.0, unit="kg", low=100.0, high=600.0, minimum=1e-3, maximum=1e6,
         symbol="m", meaning="all moving mass, reduced to the axis",
     ),
+    # Chosen so that the damping ratio is near 0.1, as valve-controlled cylinders have.
     Parameter(
         name="leakage", value=3e-12, unit="m^5/(N s)", low=1e-12, high=1e-11, minimum=0.0, maximum=1e-6,
         symbol="a_m", shown_unit="cm^5/(N s)", tolerance=0.3,
@@ -65,6 +67,7 @@ _OWN_PARAMETERS = (
         name="viscous_loss", value=2000.0, unit="N s/m", low=500.0, high=5000.0, minimum=0.0, maximum=1e7,
         symbol="b_m", shown_unit="N s/cm", tolerance=0.2, meaning="gradient of friction force with velocity",
     ),
+    # Doesn't act: the valve's flow is linear in its command, and this says up to which load.
     Parameter(
         name="supply_pressure", value=140e5, unit="Pa", low=70e5, high=250e5, minimum=1e4, maximum=1e9, symbol="p_s",
         shown_unit="bar", role="function", meaning="of the pump; the load may take two thirds of it",
@@ -73,10 +76,12 @@ _OWN_PARAMETERS = (
         name="stroke", value=0.4, unit="m", low=0.1, high=1.0, minimum=1e-4, maximum=10.0, symbol="z",
         shown_unit="cm", tolerance=0.001, meaning="from one end to the other",
     ),
+    # From the middle, so that an excitation to both sides doesn't begin in a stop.
     Parameter(
         name="start_position", value=0.2, unit="m", low=0.0, high=1.0, minimum=0.0, maximum=10.0,
         shown_unit="cm", role="function", meaning="distance from the rear end at the start",
     ),
+    # Acts through dead zone and saturation; without them it's only flagged.
     Parameter(
         name="rated_flow", value=400e-6, unit="m^3/s", low=100e-6, high=1000e-6, minimum=1e-9, maximum=1.0,
         symbol="Q", shown_unit="cm^3/s", role="function", meaning="what the valve gives fully open",
@@ -93,6 +98,7 @@ _OWN_PARAMETERS = (
         name="stop_damping", value=5e4, unit="N s/m", low=0.0, high=1e6, minimum=0.0, maximum=1e9,
         tolerance=0.5, meaning="of each end stop while it's touched",
     ),
+    # A third of the gain at which the default drive becomes unstable.
     Parameter(
         name="position_gain", value=0.015, unit="m^2/s", low=0.001, high=0.05, minimum=0.0, maximum=1e3, symbol="K_p",
         tolerance=0.0, meaning="flow for a unit of position error; over A it's the gain of the velocity",
@@ -111,6 +117,7 @@ def _build(values: Mapping[str, float], options: Mapping[str, str]) -> CompiledM
         viscous_loss=values["viscous_loss"],
         flow="motor_flow",
     )
+    # What the piston takes is the flow behind the valve; an ideal valve hands the command on.
     valve_rates, valve_signals, valve_ports = valve_equations(values, options, command="flow")
     return compile_equations(
         rates={**rates, **valve_rates},
@@ -123,6 +130,7 @@ def _build(values: Mapping[str, float], options: Mapping[str, str]) -> CompiledM
 
 def _loops(values: Mapping[str, float], options: Mapping[str, str]) -> Sequence[Loop]:
     loops = []
+    # The correction stands next to the valve, so that it works in the loop as well as alone.
     if options["correction"] == "pd2":
         loops.append(Loop(controller=_correction(values)))
     if options["loop"] == "position":
@@ -139,6 +147,7 @@ def _correction(values: Mapping[str, float]) -> StateSpace:
         entry=FLOW,
         exit_=FLOW,
     )
+    # Its states get names that tell them from those of other elements.
     return replace(correction, states=tuple(f"pd2_{number}" for number in range(1, 1 + len(correction.states))))
 
 

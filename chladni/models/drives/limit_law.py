@@ -20,6 +20,7 @@ def limited(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates
     [0.0, 1.0, -1.5]
     """
     width, limit = parameters[0], parameters[1]
+    # Both in one law: laws at one port add up, and don't see each other.
     left = 0.0
     if d > width:
         left = min(d - width, limit)

@@ -73,6 +73,7 @@ def close_loop(plant: CompiledModel, loop: Loop) -> CompiledModel:
     command = plant.column_of(loop.command)
     references = _references(plant, loop)
     n, m, k, r = len(plant.states), plant.columns, len(loop.controller.states), len(references)
+    # The commanded input is no input any more; generated ones stay behind the others.
     rest = [column for column in range(m) if column != command]
     # Row by row: what x, u and f of the plant are in the coordinates (x, x_k, references, rest of u, f).
     old = np.zeros((n + m + len(plant.ports), n + k + r + m - 1 + len(plant.ports)))
@@ -80,6 +81,7 @@ def close_loop(plant: CompiledModel, loop: Loop) -> CompiledModel:
     old[[n + column for column in rest], n + k + r : n + k + r + m - 1] = np.eye(m - 1)
     old[n + m :, n + k + r + m - 1 :] = np.eye(len(plant.ports))
     own = np.eye(old.shape[1])[n : n + k]
+    # First as if the command were zero, then solved for the command that answers itself.
     taken = _taken(plant, loop, references, old)
     direct = _direct(plant, loop, command)
     old[n + command] = _command_row(loop, own, taken, direct)
@@ -95,6 +97,7 @@ def _references(plant: CompiledModel, loop: Loop) -> list[int]:
 
 def _require_no_maps(plant: CompiledModel, loop: Loop) -> None:
     fed_back = {terminal.name for terminal in loop.controller.inputs}
+    # A clock that is late shifts samples; the loop has none.
     mapped = {place for place, _ in plant.output_maps}
     mapped.update(place for place, offset in enumerate(plant.output_offsets_s) if offset)
     for place in sorted(mapped):
@@ -148,6 +151,7 @@ def _assembled(plant: CompiledModel, loop: Loop, references: list[int], old: Mat
     states, count = len(plant.states) + len(loop.controller.states), len(plant.ports)
     end = old.shape[1] - count
 
+    # Every row of the plant is a sum of x, u and f, so one product rewrites them all.
     def split(*blocks: Matrix) -> tuple[Matrix, Matrix, Matrix]:
         rows = np.hstack(blocks) @ old
         return rows[:, :states], rows[:, states:end], rows[:, end:]
@@ -156,6 +160,7 @@ def _assembled(plant: CompiledModel, loop: Loop, references: list[int], old: Mat
     c, d, h = split(plant.c, plant.d, plant.h)
     pd, qd, rd = split(plant.displacement_state, plant.displacement_column, plant.displacement_port)
     ps, qs, rs = split(plant.velocity_state, plant.velocity_column, plant.velocity_port)
+    # References stand in front: the first input is the one that a simulation excites unless told otherwise.
     commanded = [t.name for t in plant.inputs].index(loop.command)
     return replace(
         plant,

@@ -11,6 +11,7 @@ from chladni.models.elements.transfer_function import TransferFunction
 # Defaults: `best_pd2` for the hydraulic motor as it comes, the flow bounded to twice the step.
 PD2_PARAMETERS: Final = Parameters(
     (
+        # Numbers of a regulator are what they are set to: no tolerance.
         Parameter(
             name="pd2_gain", value=1.0, low=0.2, high=5.0, minimum=0.0, maximum=1e6, symbol="K", tolerance=0.0,
             meaning="of the PD2 correction for slow signals",
@@ -23,6 +24,7 @@ PD2_PARAMETERS: Final = Parameters(
             name="pd2_second_derivative", value=2.05e-5, unit="s^2", low=0.0, high=4e-4, minimum=-100.0, maximum=1e2,
             symbol="T_2", shown_unit="ms^2", tolerance=0.0, meaning="weight of the second derivative",
         ),
+        # The paper prints none; without it a step would ask for an impulse of flow.
         Parameter(
             name="pd2_filter", value=3.205e-3, unit="s", low=1e-4, high=2e-2, minimum=1e-7, maximum=10.0,
             symbol="T_f", shown_unit="ms", tolerance=0.0, meaning="of the two lags that make PD2 buildable",

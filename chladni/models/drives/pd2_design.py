@@ -101,6 +101,7 @@ def best_pd2(*, omega: float, damping_ratio: float, flow_ratio: float = 2.0, ban
     _require(omega, damping_ratio, flow_ratio)
 
     def cost(numbers: Matrix) -> float:
+        # The simplex doesn't know bounds; a filter that runs backwards would grow.
         if numbers[1] <= 0:
             return _PENALTY
         settling, largest = _judged(numbers[0], numbers[1], damping_ratio, flow_ratio, _INNER * band)
@@ -141,6 +142,7 @@ def _design(
 
 def _judged(first: float, lag: float, damping_ratio: float, flow_ratio: float, band: float) -> tuple[float, float]:
     """Settling time and largest flow of the normalised drive."""
+    # Only the damping ratio shapes the answer: frequency scales time.
     time, flow, velocity = _step_response(first, lag, damping_ratio, flow_ratio)
     outside = np.abs(velocity - 1.0) - band
     last = np.flatnonzero(outside > 0)
@@ -169,6 +171,7 @@ def _step_response(
     generator[1, [0, 1, 4]] = square, rate, -square
     generator[3] = flow
     generator[3, [2, 3]] = -1.0, -2 * damping_ratio
+    # Each doubling of the points takes one product; a march through all would take thousands.
     count = 2**_DOUBLINGS
     step = np.asarray(expm(generator * (_LENGTH / count)))
     states = np.array([[0.0], [0.0], [0.0], [0.0], [1.0]])

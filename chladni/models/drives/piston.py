@@ -42,6 +42,7 @@ def piston_rates(
         f"joint:{JOINT}": -1.0 / reduced_mass,
         f"body:{BODY}": 1.0 / reduced_mass,
     }
+    # Solved for the pressure's rate: the capacity is a spring between flow and motion.
     balance = {
         flow: 1.0 / capacity,
         "actuation:flow": 1.0 / capacity,
@@ -53,6 +54,7 @@ def piston_rates(
 
 def piston_ports(viscous_loss: float, laws: Sequence[PortLaw]) -> tuple[PlacedPort, ...]:
     """Joint with its viscous loss, moving body, and the places where load and flow act."""
+    # The viscous loss is in the equations; the port only says it to laws that need it.
     return (
         _placed(Port(name=JOINT, kind="joint", damping=viscous_loss), laws),
         _placed(Port(name=BODY, kind="body")),
@@ -100,6 +102,7 @@ def stroke_ends(values: Mapping[str, float]) -> tuple[float, float]:
     ModelError
         When the piston would start outside its stroke.
     """
+    # Displacements count from the start, where all states are zero.
     start, stroke = values["start_position"], values["stroke"]
     if start > stroke:
         raise ModelError(f"start_position: {start:g} m lies beyond the stroke of {stroke:g} m; start inside")
@@ -108,6 +111,7 @@ def stroke_ends(values: Mapping[str, float]) -> tuple[float, float]:
 
 def stop_laws(values: Mapping[str, float], options: Mapping[str, str]) -> tuple[PortLaw, ...]:
     """Stops at both ends of the stroke when the option ``end_stops`` is on."""
+    # Asked first, so that a start outside the stroke is refused with and without stops.
     low, high = stroke_ends(values)
     if options["end_stops"] == "off":
         return ()

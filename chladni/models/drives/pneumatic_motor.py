@@ -26,6 +26,7 @@ _PARAMETERS = Parameters(
             name="active_area", value=70e-4, unit="m^2", low=50e-4, high=80e-4, minimum=1e-6, maximum=1.0,
             symbol="A", shown_unit="cm^2", tolerance=0.01, meaning="area of the piston that the pressure acts on",
         ),
+        # Both chambers and the hoses count: what the paper's V holds.
         Parameter(
             name="air_volume", value=750e-6, unit="m^3", low=500e-6, high=1000e-6, minimum=1e-9, maximum=1.0,
             symbol="V", shown_unit="cm^3", meaning="volume of air that is compressed, held constant",
@@ -34,6 +35,7 @@ _PARAMETERS = Parameters(
             name="reduced_mass", value=300.0, unit="kg", low=100.0, high=600.0, minimum=1e-3, maximum=1e6,
             symbol="m", meaning="all moving mass, reduced to the axis",
         ),
+        # Seals and valves scatter: nobody knows a leakage within a tenth.
         Parameter(
             name="leakage", value=0.45e-11, unit="m^5/(N s)", low=0.2e-11, high=0.7e-11, minimum=0.0, maximum=1e-6,
             symbol="a_m", shown_unit="cm^5/(N s)", tolerance=0.3, meaning="gradient of leakage with pressure",
@@ -46,6 +48,7 @@ _PARAMETERS = Parameters(
             name="adiabatic_exponent", value=1.4, low=1.0, high=1.67, minimum=1.0, maximum=1.67, symbol="chi",
             tolerance=0.01, meaning="1 for slow (isothermal), 1.4 for fast (adiabatic) changes of air",
         ),
+        # The paper gives 4 to 6 daN/cm^2 for the pressure drop; as p of p V^chi = const it's taken for absolute.
         Parameter(
             name="pressure", value=5e5, unit="Pa", low=4e5, high=6e5, minimum=1e3, maximum=1e8, symbol="p",
             shown_unit="bar", role="function", meaning="absolute pressure p in p V^chi = const",
@@ -54,10 +57,12 @@ _PARAMETERS = Parameters(
             name="stroke", value=0.35, unit="m", low=0.3, high=0.4, minimum=1e-4, maximum=10.0, symbol="z",
             shown_unit="cm", tolerance=0.001, meaning="from one end to the other",
         ),
+        # From the middle, so that an excitation to both sides doesn't begin in a stop.
         Parameter(
             name="start_position", value=0.175, unit="m", low=0.0, high=0.4, minimum=0.0, maximum=10.0,
             shown_unit="cm", role="function", meaning="distance from the rear end at the start",
         ),
+        # Rated numbers don't act: they are what a simulation is flagged against.
         Parameter(
             name="rated_flow", value=100e-6, unit="m^3/s", low=20e-6, high=100e-6, minimum=0.0, maximum=1.0,
             symbol="Q", shown_unit="cm^3/s", role="function", meaning="largest flow of the supply; beyond is flagged",
@@ -66,6 +71,7 @@ _PARAMETERS = Parameters(
             name="rated_load", value=300.0, unit="N", low=100.0, high=300.0, minimum=0.0, maximum=1e6, symbol="F_r",
             role="function", meaning="largest resisting force; beyond is flagged",
         ),
+        # Steel on steel would be stiffer; with this the contact lasts for milliseconds, and gives way by micrometres.
         Parameter(
             name="stop_stiffness", value=1e8, unit="N/m", low=1e6, high=1e9, minimum=1.0, maximum=1e12,
             shown_unit="kN/mm", tolerance=0.5, meaning="of each end stop",

@@ -51,6 +51,7 @@ def renamed(compiled: CompiledModel, names: Mapping[str, str]) -> CompiledModel:
         port if port.kind in ("joint", "body", "ground") else replace(port, name=names.get(port.name, port.name))
         for port in compiled.ports
     )
+    # One name may stand at several ports of a signal, but not at two signals or a signal and a joint.
     fixed = {port.name for port in ports if port.kind in ("joint", "body", "ground")}
     taken = [*sorted(fixed), *(t.name for t in inputs), *(t.name for t in outputs)]
     for name in taken:
@@ -63,6 +64,7 @@ def selected(
     compiled: CompiledModel, inputs: Sequence[ChosenSignal], outputs: Sequence[ChosenSignal]
 ) -> CompiledModel:
     """Give the model with the chosen inputs and outputs only, in the order chosen; other inputs stay at zero."""
+    # Names are those of the model by now: signals were renamed before anything attached.
     taken = [_place(compiled.inputs, choice, "input") for choice in inputs]
     shown = [_place(compiled.outputs, choice, "output") for choice in outputs]
     columns = [column for place in taken for column in _columns(compiled, place)]

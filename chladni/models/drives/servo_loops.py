@@ -42,6 +42,7 @@ LOOP_PARAMETERS: Final = Parameters(
             name="velocity_time", value=1.2e-3, unit="s", low=5e-4, high=1e-1, minimum=1e-7, maximum=1e3,
             symbol="T_v", shown_unit="ms", tolerance=0.0, meaning="integral time of the velocity's PI",
         ),
+        # At 0 the closed loop has no zero, as with the textbook's filter in front: 8 instead of 43 % overshoot.
         Parameter(
             name="velocity_weight", value=0.0, low=0.0, high=1.0, minimum=0.0, maximum=1.0, symbol="b", tolerance=0.0,
             meaning="how much of a jump of the velocity's reference the proportional part sees",
@@ -50,6 +51,7 @@ LOOP_PARAMETERS: Final = Parameters(
             name="position_gain", value=1 / (16 * 3e-4), unit="1/s", low=5.0, high=500.0, minimum=0.0, maximum=1e6,
             symbol="K_p", tolerance=0.0, meaning="velocity for a unit of position error",
         ),
+        # Saves the motor's magnets; the voltage limit saves nothing, it's what there is.
         Parameter(
             name="current_limit", value=20.0, unit="A", low=2.0, high=50.0, minimum=1e-6, maximum=1e5, tolerance=0.0,
             role="function", meaning="largest current that the velocity loop asks for",
@@ -103,6 +105,7 @@ def tuned_gains(values: Mapping[str, float], *, inertia: float) -> dict[str, flo
     >>> round(tuned_gains(motor, inertia=1e-4)["position_gain"], 3)
     208.333
     """
+    # Time constant of the closed current loop, and of the filter that the velocity loop needs.
     current_s = 2 * values["converter_time"]
     velocity_s = 4 * current_s
     return {
@@ -136,6 +139,7 @@ def _velocity_loop(values: Mapping[str, float], options: Mapping[str, str]) -> L
 
 def _position_loop(values: Mapping[str, float], _options: Mapping[str, str]) -> Loop:
     gain = values["position_gain"]
+    # No integral: the way from velocity to position integrates already.
     controller = StateSpace(
         a=np.zeros((0, 0)),
         b=np.zeros((0, 2)),
@@ -156,6 +160,7 @@ def _pi_loop(
     What a limit takes off the command drives the integral back within T_i (Åström and Hägglund, PID Controllers,
     1995, section 3.5: back-calculation).
     """
+    # With the gain in the state's rate, the state is a command: what a limit takes away has its unit.
     rate = gain / time_s
     controller = StateSpace(
         a=np.zeros((1, 1)),

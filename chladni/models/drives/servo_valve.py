@@ -17,6 +17,7 @@ VALVE_PARAMETERS: Final = Parameters(
             name="valve_time", value=2e-3, unit="s", low=1e-3, high=2e-2, minimum=1e-6, maximum=10.0, symbol="T_v",
             shown_unit="ms", tolerance=0.2, meaning="time constant of the spool; 2 ms is a bandwidth of 80 Hz",
         ),
+        # A servo valve is ground to a few percent; a proportional valve overlaps by up to a quarter.
         Parameter(
             name="valve_overlap", value=0.03, low=0.0, high=0.25, minimum=0.0, maximum=0.9, tolerance=0.3,
             meaning="half width of the dead zone over the rated flow",
@@ -41,11 +42,13 @@ def valve_equations(
         Q = sat(dead zone(q))           with dead_zone and saturation, else what is left of it
     """
     rates: dict[str, Sum] = {}
+    # Dead zone and saturation belong to the opening: they act on where the spool is, not on what it's told.
     spool = command
     if options["valve_lag"] == "on":
         spool = "spool"
         rates[spool] = {command: 1 / values["valve_time"], spool: -1 / values["valve_time"]}
     limited, dead = options["saturation"] == "on", options["dead_zone"] == "on"
+    # Without a law the drive stays linear, and exact.
     if not limited and not dead:
         return rates, {"motor_flow": {spool: 1.0}}, ()
     law = limit_law(

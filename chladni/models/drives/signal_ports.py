@@ -32,6 +32,7 @@ def with_limit(compiled: CompiledModel, name: str, law: PortLaw) -> CompiledMode
     site = Site(effect="limit", name=name, kind="input")
     compiled, port = free_port(compiled, site)
     compiled = replace(compiled, laws=(*compiled.laws, replace(law, port=port)))
+    # A second port in a row, for what acts on the limited command.
     compiled, _ = free_port(compiled, site)
     ports = list(compiled.ports)
     ports[port] = replace(ports[port], name=limit_port(name))

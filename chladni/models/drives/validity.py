@@ -65,6 +65,7 @@ def acting_laws(words: Mapping[str, str], simulation: Simulation) -> tuple[str, 
     sentences = []
     for name, what in words.items():
         motion = next((motion for motion in simulation.motions if motion.name == name), None)
+        # A law that adds nothing leaves exact zeros.
         share = 0.0 if motion is None else float(np.mean(motion.force != 0))
         if share:
             sentences.append(f"{what} acts {100 * share:.3g} % of the time; what holds for the linear model doesn't")
@@ -83,6 +84,7 @@ def unstable_loop(compiled: CompiledModel) -> tuple[str, ...]:
 
 
 def _samples(signal: str, simulation: Simulation, inputs: dict[str, str]) -> NDArray[np.float64] | None:
+    # States are the truth; outputs may carry a sensor's faults.
     if signal in simulation.state_names:
         return np.asarray(simulation.states[simulation.state_names.index(signal)])
     recorded = [channel.name for channel in simulation.inputs.channels]
@@ -98,6 +100,7 @@ def _sentences(limit: Limit, samples: NDArray[np.float64], sample_rate_hz: float
         (float(samples.max()), limit.high, "above", samples > limit.high),
         (float(samples.min()), limit.low, "below", samples < limit.low),
     ):
+        # The first instant helps to find the cause, the extreme says how bad it is.
         if outside.any():
             first_s = int(np.argmax(outside)) / sample_rate_hz
             found.append(

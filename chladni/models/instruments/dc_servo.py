@@ -15,6 +15,7 @@ _STARTS = {"loop": "velocity", "converter_lag": "on"}
 
 def _build(values: Mapping[str, float], options: Mapping[str, str]) -> DriveModel:
     commanded = "voltage" if options["loop"] == "open" else f"{options['loop']}_reference"
+    # One name whatever loop is closed, so that the page can step it.
     inputs = (ChosenSignal(signal=commanded, name=COMMAND), ChosenSignal(signal="load_torque"))
     return drive_at(DC_SERVO, values, options, inputs=inputs)
 
@@ -32,6 +33,8 @@ INSTRUMENT = Instrument(
     options=tuple(_option(option) for option in DC_SERVO.options),
     step_input=COMMAND,
     step_output="velocity",
+    # A position of 0.1 rad is reached without the limits; ten times as much isn't.
+    step_size=0.1,
     load_input="load_torque",
     views=("step", "bode", "nyquist", "poles", "root-locus", "influence"),
 )

@@ -16,6 +16,7 @@ from chladni.models.instruments.drive_pages import COMMAND, drive_at
 #: Flow, or with the position loop closed a tenth of a millimetre: small against dead zone and limits.
 STEP_SIZE = 100e-6
 
+# Without the flow, which has a chart of its own: in the command's unit it would pass for what follows the command.
 _SHOWN = tuple(
     ChosenSignal(signal=signal) for signal in ("displacement", "velocity", "acceleration", "pressure_drop")
 )

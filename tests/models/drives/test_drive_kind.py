@@ -31,7 +31,7 @@ def test_each_word_of_each_option_makes_a_model(kind):
     for option in kind.options:
         for word in option.choices:
             compiled = kind.build(kind.acting({option.name: word}).numbers(), kind.choices({option.name: word}))
-            assert compiled.states
+            assert compiled.inputs
 
 
 def test_a_parameter_of_an_option_that_is_off_is_told_with_the_option():

@@ -73,6 +73,13 @@ def test_a_faster_drive_has_the_same_correction_in_its_own_time():
     assert fast.settling_s == pytest.approx(slow.settling_s / 250, rel=1e-9)
 
 
+@pytest.mark.parametrize("zeta", [0.0, 1.0])
+def test_ends_of_the_range_have_a_design(zeta):
+    best = best_pd2(omega=OMEGA, damping_ratio=zeta, flow_ratio=20.0)
+    assert best.filter_s > 0
+    assert best.largest_flow == pytest.approx(20.0, rel=1e-6)
+
+
 def test_defaults_of_the_hydraulic_motor_are_its_best():
     pole = drive_model(HYDRAULIC_MOTOR).compile().state_space().poles()[1]
     best = best_pd2(omega=abs(pole), damping_ratio=-pole.real / abs(pole))

@@ -111,6 +111,10 @@ def test_an_unstable_loop_is_said_with_its_poles():
     assert unstable_loop(drive_model(kind).compile()) == ()
 
 
+def test_a_drive_without_states_is_stable():
+    assert unstable_loop(drive_model(DRIVES["mr-damper"]).compile()) == ()
+
+
 def test_units_of_limits_are_known():
     for kind in DRIVES.values():
         values = kind.parameters.numbers()
