@@ -64,8 +64,9 @@ def fill_row(tables: DenseTables, dense: Dense, ports: Ports, stride: Stride, le
     rows, count = dense.row.size, ports.first.size - 1
     for row in range(rows):
         dense.row[row] = 0.0
-    for column in range(stride.start.size):
-        value = stride.start[column]
+    n = tables.advance.shape[2] - stride.inputs.size
+    for column in range(tables.advance.shape[2]):
+        value = stride.here[column] if column < n else stride.inputs[column - n]
         for row in range(rows):
             dense.row[row] += tables.advance[level, instant, column, row] * value
     for power in range(3):
@@ -77,15 +78,16 @@ def fill_row(tables: DenseTables, dense: Dense, ports: Ports, stride: Stride, le
 
 @part_code
 def keep_history(
-    tables: DenseTables, dense: Dense, ports: Ports, stride: Stride, history: History, motion: Matrix,
+    tables: DenseTables, dense: Dense, ports: Ports, stride: Stride, history: History,
     level: int, t: float, step_s: float,
 ) -> None:  # fmt: skip
-    """Add the step just made to the history of the delay lines; `motion` is that at its start."""
+    """Add the step just made to the history of the delay lines."""
     step, count = history.hint[-1], ports.first.size - 1
+    motion = stride.here.size - 2 * count
     history.begin[step], history.length[step] = t, step_s
     for delay in range(ports.delay_s.size):
-        history.value[step, delay, 0] = motion[ports.delay_port[delay]]
-        history.value[step, delay, 4] = stride.motion_end[ports.delay_port[delay]]
+        history.value[step, delay, 0] = stride.here[motion + ports.delay_port[delay]]
+        history.value[step, delay, 4] = stride.there[motion + ports.delay_port[delay]]
     for node in range(3):
         instant = tables.fraction.shape[1] - 3 + node
         fill_row(tables, dense, ports, stride, level, instant)
@@ -103,7 +105,7 @@ def keep_history(
 @part_code
 def keep_outputs(
     tables: DenseTables, dense: Dense, ports: Ports, stride: Stride, history: History,
-    level: int, instant: int, sample: int, t: float, step_s: float, through: bool,
+    level: int, instant: int, sample: int, t: float, step_s: float,
 ) -> None:  # fmt: skip
     """Outputs at a wanted instant inside the step just made, from the laws at the motion there."""
     fill_row(tables, dense, ports, stride, level, instant)
@@ -111,16 +113,17 @@ def keep_outputs(
     x = tables.fraction[level, instant]
     for row in range(2 * count):
         ports.motion[row] = dense.row[row]
-    for place in range(stride.law_start.size):
+    n = tables.advance.shape[2] - stride.inputs.size
+    for place in range(ports.state.size):
         q = dense.power[:, count + place]
-        ports.state[place] = stride.law_start[place] + step_s * x * (q[0] + x * (q[1] / 2 + x * q[2] / 3))
+        ports.state[place] = stride.here[n + place] + step_s * x * (q[0] + x * (q[1] / 2 + x * q[2] / 3))
     fill_lagged(history, ports, np.int64(5), t + x * step_s)
-    if through:
-        port_forces(ports, t + x * step_s, np.int64(5), through)
+    if not ports.looped[0]:
+        port_forces(ports, t + x * step_s, np.int64(5), True)
     for output in range(dense.force_output.shape[0]):
         value = dense.row[2 * count + output]
         for port in range(count):
             # In a loop of laws no order of evaluation exists: there the polynomial of the step is taken.
             force = dense.power[0, port] + x * (dense.power[1, port] + x * dense.power[2, port])
-            value += dense.force_output[output, port] * (ports.channels[5, port] if through else force)
+            value += dense.force_output[output, port] * (force if ports.looped[0] else ports.channels[5, port])
         dense.output[instant, output, sample] = value

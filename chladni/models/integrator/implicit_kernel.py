@@ -5,7 +5,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.models.integrator.explicit_kernel import Stride, add_forces, advance_linear, place_stage
+from chladni.models.integrator.explicit_kernel import (
+    Stride,
+    add_forces,
+    advance_linear,
+    keep_end,
+    note_scale,
+    place_stage,
+)  # fmt: skip
+from chladni.models.integrator.judge_kernel import Judge
 from chladni.models.integrator.machine_code import part_code
 from chladni.models.integrator.port_kernel import Ports, law_force, port_forces
 from chladni.models.integrator.radau import GAMMA, LAGRANGE, NODES, WEIGHTS
@@ -34,8 +42,6 @@ class Newton(NamedTuple):
         ``[stage * channel, stage * channel]``.
     channel_scale
         ``[2, channel]`` largest magnitude at ends of steps so far, and with the first guess.
-    motion_scale
-        ``[2 port + law state]`` likewise.
     stiffness
         ``[3, channel]``: how strongly a channel acts back on itself within a step: at the start, the least at
         the stages, at the end.
@@ -48,7 +54,6 @@ class Newton(NamedTuple):
     slope: Matrix
     matrix: Matrix
     channel_scale: Matrix
-    motion_scale: Matrix
     stiffness: Matrix
 
 
@@ -57,7 +62,9 @@ def implicit_step(
     tables: SchemeTables, ports: Ports, stride: Stride, newton: Newton, level: int, t: float, step_s: float
 ) -> bool:
     """Step from ``channels[0]`` to ``channels[4]``; the stages are in ``channels[1:4]``. False without a solution."""
-    advance_linear(tables.advance, level, stride)
+    n = tables.gain.shape[3]
+    advance_linear(tables.advance, level, stride.here, stride.inputs, stride.lines)
+    note_scale(stride, n)
     channels = ports.channels.shape[1]
     for stage in range(STAGES):
         for channel in range(channels):
@@ -134,7 +141,7 @@ def _ask_at(
 ) -> None:
     """Put motion and law states of a stage where the laws are asked, as the forces and rates in `value` make them."""
     count = ports.first.size - 1
-    row = stride.scale.size + 2 * count * stage
+    row = tables.gain.shape[3] + 2 * count * stage
     place_stage(tables, ports, stride, value, WEIGHTS, level, stage, row, step_s)
     for moved in range(2 * count):
         for port in range(count):
@@ -180,12 +187,12 @@ def _linearise(
 ) -> None:
     for stage in range(STAGES):
         _ask_at(tables, ports, stride, newton.value, level, stage, step_s)
-        _law_slopes(ports, newton, stage, t + NODES[stage] * step_s)
+        _law_slopes(ports, stride, newton, stage, t + NODES[stage] * step_s)
     _fill_matrix(tables, ports, newton, level, step_s)
 
 
 @part_code
-def _law_slopes(ports: Ports, newton: Newton, stage: int, t: float) -> None:
+def _law_slopes(ports: Ports, stride: Stride, newton: Newton, stage: int, t: float) -> None:
     """Derivatives of forces and rates with respect to displacement, velocity and law states, by differences."""
     count, channels = ports.first.size - 1, ports.channels.shape[1]
     newton.slope[stage] = 0.0
@@ -200,7 +207,7 @@ def _law_slopes(ports: Ports, newton: Newton, stage: int, t: float) -> None:
             for argument in range(2 + end - begin):
                 place = (port, count + port)[argument] if argument < 2 else 2 * count + begin + argument - 2
                 here = ports.motion[place] if argument < 2 else ports.state[place - 2 * count]
-                by = 1e-8 * max(abs(here), newton.motion_scale[place]) + 1e-200
+                by = 1e-8 * max(abs(here), stride.scale[_scale_place(ports, stride, place)]) + 1e-200
                 if argument == 0:
                     moved = law_force(ports, law, d + by, s, t, np.int64(6))
                 elif argument == 1:
@@ -212,6 +219,14 @@ def _law_slopes(ports: Ports, newton: Newton, stage: int, t: float) -> None:
                 newton.slope[stage, port, place] += (moved - force) / by
                 for row in range(count + begin, count + end):
                     newton.slope[stage, row, place] = (ports.channels[6, row] - ports.channels[5, row]) / by
+
+
+@part_code
+def _scale_place(ports: Ports, stride: Stride, place: int) -> int:
+    """Where the scale of an argument of the laws is kept: motions come after law states there."""
+    motions, states = ports.motion.size, ports.state.size
+    first = stride.scale.size - motions - states
+    return first + states + place if place < motions else first + place - motions
 
 
 @part_code
@@ -277,12 +292,9 @@ def _exchange(matrix: Matrix, result: Matrix, step: int) -> bool:
 @part_code
 def _finish(tables: SchemeTables, ports: Ports, stride: Stride, newton: Newton, level: int, step_s: float) -> None:
     """State at the end, and how strongly each channel acted back on itself at the least."""
-    count, channels = ports.first.size - 1, ports.channels.shape[1]
+    channels = ports.channels.shape[1]
     _ask_at(tables, ports, stride, newton.value, level, STAGES - 1, step_s)
-    for row in range(2 * count):
-        stride.motion_end[row] = ports.motion[row]
-    for place in range(channels - count):
-        stride.law_end[place] = ports.state[place]
+    keep_end(ports, stride, tables.gain.shape[3])
     add_forces(tables, ports, stride, newton.value, level)
     for stage in range(STAGES):
         for channel in range(channels):
@@ -312,15 +324,26 @@ def _acts_back(
 
 
 @part_code
-def collocation_difference(ports: Ports, newton: Newton, channel: int) -> float:
-    """Error of a force or rate: what its polynomial misses at the start of the step (Hairer & Wanner 1996, IV.8).
+def implicit_error(judge: Judge, ports: Ports, newton: Newton) -> float:
+    """Relative error: what the polynomials miss at the start of the step (Hairer & Wanner 1996, section IV.8).
 
     Damped as the law itself damps, where it is stiff at the start and at every stage: a transient that has died
     out is no error. Where it's stiff at some of them only, something switched.
     """
-    missed = ports.channels[0, channel]
-    for stage in range(STAGES):
-        missed -= LAGRANGE[0, stage] * ports.channels[1 + stage, channel]
-    least = max(0.0, min(newton.stiffness[0, channel], newton.stiffness[1, channel]))
-    error: float = GAMMA * abs(missed) / (1 + GAMMA * least)
-    return error
+    total = 0.0
+    for channel in range(ports.channels.shape[1]):
+        missed = ports.channels[0, channel]
+        for stage in range(STAGES):
+            missed -= LAGRANGE[0, stage] * ports.channels[1 + stage, channel]
+        least = max(0.0, min(newton.stiffness[0, channel], newton.stiffness[1, channel]))
+        total += judge.weight[channel] * GAMMA * abs(missed) / (1 + GAMMA * least)
+    return total
+
+
+@part_code
+def is_soft(newton: Newton) -> bool:
+    """Whether no channel acts back on itself so strongly that an explicit step would be short."""
+    for channel in range(newton.stiffness.shape[1]):
+        if not abs(newton.stiffness[1, channel]) + abs(newton.stiffness[2, channel]) < 0.2:
+            return False
+    return True

@@ -35,6 +35,8 @@ class Ports(NamedTuple):
         Of `state` and of `channels`: laws take addresses.
     delay_port, delay_s
         Of each delay line.
+    looped
+        ``[1]`` whether no order of evaluation exists, so that only the implicit step can be made.
     lagged
         ``[stage, delay]`` the displacement that a delay line gives.
     """
@@ -48,6 +50,7 @@ class Ports(NamedTuple):
     address: Integers
     delay_port: Integers
     delay_s: Matrix
+    looped: NDArray[np.bool_]
     lagged: Matrix
 
 

@@ -10,27 +10,42 @@ from numpy.typing import NDArray
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.delay_kernel import History, fill_lagged
 from chladni.models.integrator.dense_kernel import Dense
+from chladni.models.integrator.drive_kernel import Drive
 from chladni.models.integrator.explicit_kernel import Stride
 from chladni.models.integrator.hold import Hold
 from chladni.models.integrator.implicit_kernel import STAGES, Newton
+from chladni.models.integrator.judge_kernel import Judge
 from chladni.models.integrator.march import (
+    AUTOMATIC,
+    COARSEST,
     DEEPER,
     DONE,
+    EXPLICIT,
+    HARD,
+    IMPLICIT,
+    LEVEL,
+    LOOKED,
     MORE_HISTORY,
+    POSITION,
+    PREVIOUS,
+    REFINED,
+    SAMPLE,
+    STEPS,
+    STIFF,
     TOO_MANY,
+    TRIED,
     UNIT,
     Course,
-    Drive,
-    Judge,
     march,
 )  # fmt: skip
+from chladni.models.integrator.march_all import march_all
 from chladni.models.integrator.port_kernel import Ports, port_forces
 from chladni.models.integrator.port_plan import LawTable, PortPlan
 from chladni.models.integrator.step_tables import DEEPEST, StepTables
 from chladni.signals.errors import ModelError
 
 Matrix = NDArray[np.float64]
-_SCHEMES = {"automatic": 0, "explicit": 1, "implicit": 2}
+_SCHEMES = {"automatic": AUTOMATIC, "explicit": EXPLICIT, "implicit": IMPLICIT}
 #: Delays below this share of a sample interval are refused: every step would have to be as short.
 _SHORTEST_DELAY = 2.0**-10
 #: Steps, tried ones included, that a run may take for each sample on average.
@@ -70,34 +85,35 @@ class Run:
         self._coarsest = self._coarsest_level()
         self._ports = _ports(plan, laws)
         self._newton = _newton(len(plan.ports), laws.state.size)
+        # Most models need explicit steps alone, whose kernel is small.
+        self._plain = self._scheme != IMPLICIT and not plan.delay_s.size and not tables.instants.size
         self._judge = Judge(
             effect=tables.effect,
-            law_scale=np.abs(laws.state),
             weight=np.zeros(self._ports.channels.shape[1]),
             difference=_difference_weights(),
+            before=np.zeros((2, self._ports.channels.shape[1])),
             tolerance=tolerance,
         )
 
     def march(self, rows: Matrix, start: Matrix) -> RunResult:
         """Run through all rows but the last, which is where the run ends."""
-        plan, count = self._plan, len(rows)
+        plan, n, p = self._plan, start.size, len(self._plan.ports)
         stride = _stride(plan, self._hold, self._laws, start)
-        course = _course(plan, self._laws, count, self._coarsest, implicit=self._scheme == 2)
-        drive = Drive(rows, self._hold.rate, self._hold.straight, self._hold.kinked, self._hold.kink_at)
-        dense = self._dense(count)
-        history = _history(plan, count)
+        course = _course(stride, len(rows), p, self._coarsest, implicit=self._scheme == IMPLICIT)
+        drive = _drive(self._hold, rows)
+        dense = self._dense(len(rows))
+        history = _history(plan, len(rows))
         for first, stop in self._segments(rows):
             self._begin(stride, course, history, rows[first], first)
             history = self._segment(stride, course, drive, dense, history, stop)
-        course.state[-1] = stride.start[: start.size]
-        course.motion[-1], course.force[-1] = course.motion_start, self._ports.channels[0, : len(plan.ports)]
+        course.point[-1], course.force[-1] = stride.here, self._ports.channels[0, :p]
         return RunResult(
-            state=course.state,
-            motion=course.motion,
+            state=course.point[:, :n],
+            motion=course.point[:, course.point.shape[1] - 2 * p :],
             force=course.force,
             dense=dense.output,
-            refined=int(course.cursor[8]),
-            steps=int(course.cursor[5]),
+            refined=int(course.cursor[REFINED]),
+            steps=int(course.cursor[STEPS]),
         )
 
     def _segments(self, rows: Matrix) -> list[tuple[int, int]]:
@@ -118,16 +134,16 @@ class Run:
         """Forces and rates at the start of a segment."""
         plan, ports, n = self._plan, self._ports, self._plan.a.shape[0]
         t = sample / self._rate_hz
-        base = plan.motion_state @ stride.start[:n] + plan.motion_column @ row[: self._hold.columns]
-        ports.state[:] = stride.law_start
+        base = plan.motion_state @ stride.here[:n] + plan.motion_column @ row[: self._hold.columns]
+        ports.state[:] = stride.here[n : n + ports.state.size]
         fill_lagged(history, ports, 0, t + 1e-9 / self._rate_hz)
         if plan.looped:
             self._solve_loop(base, t)
         else:
             ports.motion[:] = base
             port_forces(ports, t, 0, True)
-        course.motion_start[:] = ports.motion
-        course.cursor[4] = -1
+        stride.here[n + ports.state.size :] = ports.motion
+        course.cursor[PREVIOUS] = -1
         self._newton.stiffness[0] = 0.0
         if not np.all(np.isfinite(ports.channels[0])):
             raise ModelError(f"{self._where(ports.channels[0])} gives no number at {t:g} s; check its parameters")
@@ -170,29 +186,38 @@ class Run:
         """March to `stop`, making finer tables and more room when the kernel asks for them."""
         most = 1_000_000 + _STEPS_A_SAMPLE * len(drive.rows)
         while True:
-            tables = self._tables
-            status = march(
-                tables.explicit, tables.implicit, tables.dense, self._ports, stride, self._newton, history, dense,
-                drive, course, self._judge._replace(effect=tables.effect), 1.0 / self._rate_hz, stop, self._scheme,
-                not self._plan.looped, most,
-            )  # fmt: skip
+            status = self._march(stride, course, drive, dense, history, stop, most)
             if status == DONE:
                 return history
             if status == DEEPER:
-                tables.deepen(min(DEEPEST + 1, max(3, 2 * tables.levels)))
+                self._tables.deepen(min(DEEPEST + 1, max(3, 2 * self._tables.levels)))
+            elif status == STIFF:
+                self._plain, course.cursor[HARD] = False, 1
             elif status == MORE_HISTORY:
                 history = _shorter(history, float(self._plan.delay_s.max()))
             else:
                 raise self._failure(course, stride, status)
 
+    def _march(
+        self, stride: Stride, course: Course, drive: Drive, dense: Dense, history: History, stop: int, most: int
+    ) -> int:
+        tables, judge, step_s = self._tables, self._judge._replace(effect=self._tables.effect), 1.0 / self._rate_hz
+        if self._plain:
+            automatic = self._scheme == AUTOMATIC
+            return march(tables.explicit, self._ports, stride, drive, course, judge, step_s, stop, automatic, most)
+        return march_all(
+            tables.explicit, tables.implicit, tables.dense, self._ports, stride, self._newton, history, dense,
+            drive, course, judge, step_s, stop, self._scheme, most,
+        )  # fmt: skip
+
     def _failure(self, course: Course, stride: Stride, status: int) -> ModelError:
-        t = (course.cursor[0] + course.cursor[1] / UNIT) / self._rate_hz
-        largest = np.abs(stride.start[: self._plan.a.shape[0]]).max(initial=0.0)
+        t = (course.cursor[SAMPLE] + course.cursor[POSITION] / UNIT) / self._rate_hz
+        largest = np.abs(stride.here[: self._plan.a.shape[0]]).max(initial=0.0)
         place = self._where(np.abs(self._ports.channels[4] - self._ports.channels[3]) * self._judge.weight)
         if status == TOO_MANY:
             return ModelError(
-                f"{place} switches too fast at {t:g} s: {course.cursor[6]} steps for {course.cursor[0]} samples; "
-                "make its transition wider, or raise the sample rate"
+                f"{place} switches too fast at {t:g} s: {course.cursor[TRIED]} steps for "
+                f"{course.cursor[SAMPLE]} samples; make its transition wider, or raise the sample rate"
             )
         if not largest < 1e100:
             return ModelError(f"the model diverges at {t:g} s at {place}; the loop is unstable, lower its gain")
@@ -253,6 +278,7 @@ def _ports(plan: PortPlan, laws: LawTable) -> Ports:
         address=np.array([state.ctypes.data, channels.ctypes.data], dtype=np.int64),
         delay_port=plan.delay_port,
         delay_s=plan.delay_s,
+        looped=np.array([plan.looped]),
         lagged=np.zeros((6, plan.delay_s.size)),
     )
 
@@ -268,40 +294,36 @@ def _newton(count: int, states: int) -> Newton:
         slope=np.zeros((STAGES, channels, 2 * count + states)),
         matrix=np.zeros((size, size)),
         channel_scale=np.zeros((2, channels)),
-        motion_scale=np.zeros(2 * count + states),
         stiffness=np.zeros((3, channels)),
     )
 
 
 def _stride(plan: PortPlan, hold: Hold, laws: LawTable, start: Matrix) -> Stride:
     n, count = plan.a.shape[0], len(plan.ports)
-    stride = Stride(
-        start=np.zeros(n + hold.width),
-        end=np.zeros(n + 2 * STAGES * count),
-        law_start=laws.state.copy(),
-        law_end=laws.state.copy(),
-        motion_end=np.zeros(2 * count),
-        scale=np.abs(start),
-        ahead=np.zeros(2 * n + hold.width + 4 * count),
+    here = np.concatenate([start, laws.state, np.zeros(2 * count)])
+    return Stride(
+        here=here,
+        there=np.zeros(here.size),
+        scale=np.abs(here),
+        inputs=np.zeros(hold.width),
+        lines=np.zeros(n + 2 * STAGES * count),
+        ahead=np.zeros(n),
         grown=np.zeros(1, dtype=np.int64),
     )
-    stride.start[:n] = start
-    return stride
 
 
-def _course(plan: PortPlan, laws: LawTable, count: int, coarsest: int, *, implicit: bool) -> Course:
-    ports = len(plan.ports)
+def _course(stride: Stride, count: int, ports: int, coarsest: int, *, implicit: bool) -> Course:
     cursor = np.zeros(11, dtype=np.int64)
-    cursor[2] = cursor[9] = coarsest
-    cursor[3], cursor[4], cursor[10] = int(implicit), -1, -1
-    return Course(
-        cursor=cursor,
-        state=np.zeros((count, plan.a.shape[0])),
-        motion=np.zeros((count, 2 * ports)),
-        force=np.zeros((count, ports)),
-        motion_start=np.zeros(2 * ports),
-        before=np.zeros((2, ports + laws.state.size)),
-    )
+    cursor[LEVEL] = cursor[COARSEST] = coarsest
+    cursor[PREVIOUS] = cursor[LOOKED] = -1
+    cursor[HARD] = int(implicit)
+    return Course(cursor=cursor, point=np.zeros((count, stride.here.size)), force=np.zeros((count, ports)))
+
+
+def _drive(hold: Hold, rows: Matrix) -> Drive:
+    line = np.full(hold.columns, -1, dtype=np.int64)
+    line[hold.straight] = np.arange(hold.straight.size)
+    return Drive(rows, hold.rate, line, hold.straight, hold.kinked, hold.kink_at)
 
 
 def _history(plan: PortPlan, count: int) -> History:
