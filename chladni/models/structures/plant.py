@@ -97,6 +97,7 @@ class _Plant:
         prescribed = {one.at for one in inputs if one.kind == "displacement"}
         self._free = [row for row, body in enumerate(structure.bodies) if body.name not in prescribed]
         self._ports = self._all_ports()
+        self._port_places = {(port.name, port.kind): place for place, port in enumerate(self._ports)}
         self._n = 2 * len(self._free)
         self._m = sum(1 + terminal.derivatives for terminal in self._terminals)
         self._size = self._n + self._m + len(self._ports)
@@ -208,7 +209,7 @@ class _Plant:
         if one.measures == "force":
             joint = self._structure.joint_named(one.at)
             linear = joint.stiffness * self._displacement + joint.damping * self._velocity
-            return np.asarray(pattern @ linear + self._unit(self._port(joint.name, "joint")))
+            return np.asarray(_summed(pattern, linear) + self._unit(self._port(joint.name, "joint")))
         of_bodies = {
             "displacement": self._displacement,
             "velocity": self._velocity,
@@ -217,7 +218,7 @@ class _Plant:
         }[one.measures]
         if one.measures == "acceleration" and one.at in [joint.name for joint in self._structure.joints]:
             of_bodies = self._acceleration
-        return np.asarray(pattern @ of_bodies)
+        return _summed(pattern, of_bodies)
 
     def _port_rows(self, outputs: Matrix) -> tuple[Matrix, Matrix]:
         """Displacement and velocity at each port, ``[port, signal]``."""
@@ -229,7 +230,8 @@ class _Plant:
                 displacement[place] = outputs[self._output_place(port.name)]
             elif port.kind != "ground":
                 pattern = force_pattern(structure, at[port.name] if port.kind == "actuation" else port.name)
-                displacement[place], velocity[place] = pattern @ self._displacement, pattern @ self._velocity
+                displacement[place] = _summed(pattern, self._displacement)
+                velocity[place] = _summed(pattern, self._velocity)
         return displacement, velocity
 
     def _column(self, name: str) -> int:
@@ -243,8 +245,7 @@ class _Plant:
 
     def _port(self, name: str, kind: PortKind) -> int:
         """Place of what laws add at a port, among all signals."""
-        found = next(place for place, port in enumerate(self._ports) if (port.name, port.kind) == (name, kind))
-        return self._n + self._m + found
+        return self._n + self._m + self._port_places[name, kind]
 
     def _output_place(self, name: str) -> int:
         return next(place for place, one in enumerate(self._outputs) if one.name == name)
@@ -256,6 +257,12 @@ class _Plant:
 
     def _stack(self, rows: Sequence[Matrix]) -> Matrix:
         return np.array(rows, dtype=np.float64).reshape(len(rows), self._size)
+
+
+def _summed(pattern: Matrix, rows: Matrix) -> Matrix:
+    """``pattern @ rows`` where most of the pattern is zero: one or two bodies of a thousand."""
+    places = np.flatnonzero(pattern)
+    return np.asarray(pattern[places] @ rows[places])
 
 
 def _units(motion: Motion) -> tuple[str, str]:

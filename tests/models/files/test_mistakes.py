@@ -82,6 +82,8 @@ STRUCTURE_MISTAKES = [
     ('gain = "35.15 N/V"', '@gain = "0 N/V"', "[[controller]] 1 gain: found '0 N/V'; a gain of zero drives nothing"),
     ('limit = "10 V"', '@limit = "10 kg"', "[[controller]] 1 limit: found '10 kg', which is in kg; must be"),
     ('limit = "10 V"', '@limit = "-10 V"', "[[controller]] 1 limit: found '-10 V'; must be above zero"),
+    ('limit = "10 V"', '@limit = "10 zz"', "[[controller]] 1 limit: unit 'zz': not known"),
+    ('law = "pd"', 'law = "pd"\n@num = 1', "[[controller]] 1 num: found 1; must be a list in brackets"),
     ('law = "pd"', 'law = "pd"\nnum = [1]', "[[controller]] 1: controller 'axis': law pd has no num and den"),
     ("gains = { kp = \"20 V/mm\", kd = 3.0 }", "gains = 3", "[[controller]] 1 gains: found 3; must be a table"),
     ('effect = "coulomb_friction"', '@effect = "coulomb"', "no effect 'coulomb'; did you mean coulomb_friction?"),
@@ -197,6 +199,25 @@ def test_a_loop_without_solution_is_told_at_its_controller(tmp_path: Path) -> No
     assert len(lines) == 1
     assert lines[0].startswith(f"m.toml:{line_of(STRUCTURE, '[[controller]]')}: [[controller]] 1: ")
     assert "has no rate for the law pd" in lines[0]
+
+
+def test_a_motion_is_prescribed_once(tmp_path: Path) -> None:
+    second = '[[input]]\nname = "{}"\nat = "column"\nkind = "displacement"\n'
+    lines = told(tmp_path, STRUCTURE + second.format("one") + second.format("two"))
+    assert len(lines) == 1
+    assert "[[input]] 6 at: the motion of 'column' is prescribed by 'one' already" in lines[0]
+
+
+def test_options_that_are_no_table(tmp_path: Path) -> None:
+    text = DRIVE.replace('[options]\nend_stops = "on"', "").replace('kind = "drive"', 'kind = "drive"\noptions = 3')
+    assert any("options: found 3; must be a table" in line for line in told(tmp_path, text))
+
+
+def test_a_scheme_whose_loop_has_no_solution(tmp_path: Path) -> None:
+    text = SCHEME.replace("num = [1.0]\nden = [0.7, 1.0]", "num = [-1.0]\nden = [1.0]").replace(
+        'kind = "pi"\nparameters = { gain = 2.97, integral_time = "9900 ms" }', "num = [1.0]\nden = [1.0]"
+    ).replace('"regulator.gain" = 0.2', "default = 0.1")  # fmt: skip
+    assert all(line.startswith("m.toml:") for line in told(tmp_path, text))
 
 
 def test_an_actuator_at_a_body_that_is_driven_twice(tmp_path: Path) -> None:

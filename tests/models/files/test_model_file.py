@@ -107,6 +107,19 @@ def test_a_transfer_function_is_a_law(tmp_path: Path) -> None:
     assert (controller.law, controller.num, controller.den) == ("transfer-function", (2.0, 3.0), (0.1, 1.0))
 
 
+def test_what_a_controller_may_have_beside_gains_survives(tmp_path: Path) -> None:
+    changed = STRUCTURE.replace('law = "pd"', 'law = "pd"\nrate_of = "error"').replace(
+        "kd = 3.0", "kd = 3.0, filter = 0.1"
+    )
+    controller = structure(tmp_path, changed.replace('"10 V"', '"100 N"')).controllers[0]
+    assert (controller.rate_of, controller.gains["filter"]) == ("error", 0.1)
+    assert_round_trip(structure(tmp_path), tmp_path)
+    text = STRUCTURE.replace('law = "pd"\ngains = { kp = "20 V/mm", kd = 3.0 }', "num = [2, 3.0]\nden = [0.1, 1]")
+    for one in (changed, changed.replace('"10 V"', '"100 N"'), text, STRUCTURE.replace('limit = "10 V"', "")):
+        model = structure(tmp_path, one)
+        assert assert_round_trip(model, tmp_path) == model
+
+
 def test_bare_dotted_keys_are_parameters_too(tmp_path: Path) -> None:
     text = STRUCTURE.replace('"elbow.stiffness" = 0.2', 'elbow.stiffness = "30 %"')
     assert structure(tmp_path, text).parameters["elbow.stiffness"].tolerance == 0.3

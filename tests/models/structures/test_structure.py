@@ -27,6 +27,38 @@ def test_chain_frequencies_follow_the_closed_form(count: int) -> None:
     np.testing.assert_allclose(chain(count).natural_modes().frequency_hz, expected, rtol=1e-9)
 
 
+@pytest.mark.parametrize("count", [3, 4, 7])
+def test_ring_frequencies_follow_the_closed_form(count: int) -> None:
+    # Equal masses in a ring of equal springs: omega_r = 2 sqrt(k/m) sin(r pi/n), r = 0 turns as a whole.
+    names = [f"m{number}" for number in range(count)]
+    ring = Structure(
+        bodies=tuple(Body(name=name, mass=2.0) for name in names),
+        joints=tuple(
+            Joint(name=f"j{number}", between=(name, names[(number + 1) % count]), stiffness=3e4, damping=0.0)
+            for number, name in enumerate(names)
+        ),
+    )
+    order = np.arange(1, count)
+    expected = np.sort(2 * sqrt(3e4 / 2.0) * np.sin(order * pi / count) / (2 * pi))
+    np.testing.assert_allclose(ring.natural_modes().frequency_hz, expected, rtol=1e-7)
+
+
+def test_tree_frequencies_follow_the_closed_form() -> None:
+    # A trunk M with n equal branches (k, m): n - 1 modes in which the trunk rests, omega^2 = k/m, and two of the
+    # trunk with all branches together: M m w^4 - ((K + n k) m + k M) w^2 + K k = 0.
+    trunk, mass, stem, twig, count = 5.0, 0.8, 2e5, 3e4, 4
+    tree = Structure(
+        bodies=(Body(name="trunk", mass=trunk), *(Body(name=f"twig{n}", mass=mass) for n in range(count))),
+        joints=(
+            Joint(name="root", between=("ground", "trunk"), stiffness=stem, damping=0.0),
+            *(Joint(name=f"j{n}", between=("trunk", f"twig{n}"), stiffness=twig, damping=0.0) for n in range(count)),
+        ),
+    )
+    polynomial = [trunk * mass, -((stem + count * twig) * mass + twig * trunk), stem * twig]
+    squares = np.sort([*np.roots(polynomial), *([twig / mass] * (count - 1))])
+    np.testing.assert_allclose(tree.natural_modes().frequency_hz, np.sqrt(squares) / (2 * pi), rtol=1e-7)
+
+
 def test_stiffness_proportional_damping_gives_ratios_that_rise_with_frequency() -> None:
     modes = chain(4, damping=6.0).natural_modes()
     # C = beta K with beta = 6/3e4: zeta_r = beta omega_r / 2.
@@ -67,6 +99,17 @@ def test_a_free_structure_accelerates_as_its_total_mass() -> None:
         ),
         ({"bodies": (Body(name="a", mass=1.0),) * 2}, "'a' is taken"),
         ({"bodies": (Body(name="ground", mass=1.0),)}, "'ground' is reserved"),
+        (
+            {"joints": (Joint(name="j", between=("a", "a"), stiffness=1.0, damping=0.0),)},
+            "both ends are 'a'; a joint joins two different ones",
+        ),
+        (
+            {
+                "bodies": (Body(name="a", mass=1.0), Body(name="b", mass=1.0, motion="rotation")),
+                "joints": (Joint(name="j", between=("a", "b"), stiffness=1.0, damping=0.0),),
+            },
+            "'a' and 'b' can't be joined, one translates and one rotates",
+        ),
     ],
 )
 def test_impossible_structures_are_refused(change: dict[str, tuple[Body, ...]], words: str) -> None:
@@ -75,9 +118,17 @@ def test_impossible_structures_are_refused(change: dict[str, tuple[Body, ...]], 
         Structure(**parts)
 
 
+def test_joints_are_found_by_name() -> None:
+    assert chain(2).joint_named("j1").between == ("m0", "m1")
+    with pytest.raises(ModelError, match="no joint 'j2'; joints: j0, j1"):
+        chain(2).joint_named("j2")
+
+
 @pytest.mark.parametrize("number", [-1.0, float("nan"), float("inf")])
 def test_impossible_numbers_are_refused(number: float) -> None:
     with pytest.raises(ModelError, match=r"body 'a': mass .* must be finite and positive"):
         Body(name="a", mass=number)
+    with pytest.raises(ModelError, match=r"body 'a': inertia .* kg m\^2 must be finite and positive"):
+        Body(name="a", mass=number, motion="rotation")
     with pytest.raises(ModelError, match=r"joint 'j': stiffness .* must be finite and not negative"):
         Joint(name="j", between=("ground", "a"), stiffness=number, damping=0.0)
