@@ -43,6 +43,7 @@ def element(kind: str, **values: float) -> Element:
     """
     found = element_kind(kind)
     made = Element(kind=found, parameters=found.parameters)
+    # Stated by whoever builds: what they state is usual for their element.
     for name, value in values.items():
         made = made.with_usual_value(name, value)
     return made

@@ -60,7 +60,7 @@ def _rc_lag(v: Values) -> TransferFunction:
 
 
 def _rc_lead_lag(v: Values) -> TransferFunction:
-    # R_1 parallel to C_1 in the way, R_2 and C_2 in series across the output.
+    # R_1 parallel to C_1 in the way, R_2 and C_2 in series across the output: each loads the other, hence R_1 C_2.
     first_s = v["resistance_1"] * v["capacitance_1"]
     second_s = v["resistance_2"] * v["capacitance_2"]
     above = np.polymul([first_s, 1.0], [second_s, 1.0])

@@ -74,4 +74,5 @@ def _transfer(values: Values) -> TransferFunction:
 
 def _polynomial(prefix: str, values: Values) -> tuple[float, ...]:
     by_power = {int(name.removeprefix(prefix)): value for name, value in values.items() if name.startswith(prefix)}
+    # Powers without a parameter were zero, and stay so.
     return tuple(by_power.get(power, 0.0) for power in range(max(by_power), -1, -1))

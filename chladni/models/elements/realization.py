@@ -54,6 +54,7 @@ def realize(transfer: TransferFunction) -> Realization:
         above = rest[::-1][:order]
         c[: above.size] = above * scale[: above.size] / (ascending[-1] * scale[-1])
     b = np.zeros(order)
+    # A slice, since a constant has no last state.
     b[-1:] = unit
     return Realization(a=unit * a, b=b, c=c, q=quotient[::-1].copy())
 
@@ -104,6 +105,7 @@ def state_space(
 
 def _frequency_unit(ascending: Matrix) -> float:
     """Geometric mean of the poles that aren't zero, in rad/s; 1 when there are none."""
+    # Poles at zero have no size to take part in a mean.
     lowest = int(np.flatnonzero(ascending)[0])
     span = ascending.size - 1 - lowest
     return float(abs(ascending[lowest] / ascending[-1]) ** (1 / span)) if span else 1.0

@@ -25,6 +25,7 @@ def _pidt1(v: Values) -> TransferFunction:
     )
 
 
+# Standard form: one gain before all three parts, so that a knob for time moves one part only.
 _GAIN = declare.gain(meaning="proportional gain")
 _INTEGRAL = declare.time("integral_time", 1.0, "T_I", "integral (reset) time")
 _DERIVATIVE = declare.time("derivative_time", 0.1, "T_D", "derivative (rate) time", may_vanish=True)

@@ -53,6 +53,7 @@ def step_response(transfer: TransferFunction, time_s: NDArray[np.float64]) -> St
     from scipy.linalg import expm
 
     form = realize(transfer)
+    # Time since the jump arrives; before it the state rests at its start.
     since = np.asarray(time_s, dtype=np.float64) - transfer.delay_s
     order = form.b.size
     augmented = np.zeros((order + 1, order + 1))

@@ -69,6 +69,7 @@ class TransferFunction:
         """``H(j omega)``, ``[frequency]``, exact with dead time and improper; infinite at a pole on the axis."""
         s = 2j * pi * np.asarray(frequency_hz, dtype=np.float64)
         above, below = np.polyval(self.num, s) * np.exp(-s * self.delay_s), np.polyval(self.den, s)
+        # Divided by one in its place, so that a pole gives infinity without a warning.
         pole = below == 0
         return np.asarray(np.where(pole, complex(np.inf), above / np.where(pole, 1.0, below)), dtype=np.complex128)
 
@@ -82,6 +83,7 @@ class TransferFunction:
 
     def static_gain(self) -> float:
         """``H(0)``; infinite when the function integrates, by the sign of the gain."""
+        # Powers of s that both have cancel at rest only; the function itself keeps them.
         shared = min(_trailing_zeros(self.num), _trailing_zeros(self.den))
         above, below = self.num[len(self.num) - 1 - shared], self.den[len(self.den) - 1 - shared]
         if below == 0:
@@ -123,6 +125,7 @@ def _coefficients(name: str, given: tuple[float, ...]) -> tuple[float, ...]:
     values = tuple(float(value) for value in given)
     if not values or not all(isfinite(value) for value in values):
         raise ModelError(f"transfer function: {name} = {list(given)!r:.80}; give finite numbers, at least one")
+    # The order is that of the first coefficient that isn't zero: a knob at zero takes a power away.
     first = next((place for place, value in enumerate(values) if value), len(values) - 1)
     if len(values) - first > MAX_ORDER + 1:
         raise ModelError(

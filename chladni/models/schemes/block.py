@@ -13,9 +13,11 @@ from chladni.signals.errors import ModelError
 
 WhenOff = Literal["pass", "cut"]
 
+#: Names of sites in model files.
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 _SOURCE = re.compile(r"\s*([+-]?)\s*([^\s+-].*?)\s*", re.DOTALL)
 
+# What a block that is off does; as elements, so that nothing else has to know about switches.
 _PASS, _CUT = rational((1.0,)), rational((0.0,))
 
 
@@ -63,6 +65,7 @@ class Block:
                 f"block {self.name!r}: its state space has {inputs} inputs and {outputs} outputs; "
                 "a block has one of each"
             )
+        # Twice the same source would be one entry of a sum: -a and +a, or a gain of two that nobody sees.
         sources = [source for source, _ in self.sources]
         for source in sources:
             if sources.count(source) > 1:

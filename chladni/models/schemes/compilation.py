@@ -84,6 +84,7 @@ def compiled_scheme(
         if place.delay_s or place.port.name in sites or not equations.d[1:, :, len(inputs) + number].any()
     ]
     if len(kept) < len(places):
+        # A column less may need a derivative less elsewhere too, so the loops are closed again.
         places = kept
         equations, columns = _closed(blocks, wiring, places)
     points = points_of(blocks, outputs)
@@ -129,6 +130,7 @@ def _closed(blocks: Sequence[Block], wiring: Wiring, places: Sequence[_Place]) -
     behind = np.zeros((count, wiring.inputs.shape[1] + len(places)))
     into = np.hstack([wiring.inputs, np.zeros((count, len(places)))])
     for number, place in enumerate(places, start=wiring.inputs.shape[1]):
+        # What an input port adds enters the block; all else joins behind it, and reaches whom the block feeds.
         (into if place.port.kind == "input" else behind)[place.block, number] = 1.0
     columns = _Columns(into=into + wiring.blocks @ behind, behind=behind)
     return solved_equations(blocks, wiring.blocks, columns.into), columns
@@ -149,7 +151,9 @@ def _port_rows(places: Sequence[_Place], wiring: Wiring, columns: _Columns, inpu
     entering = np.array([place.port.kind == "input" for place in places], dtype=bool)[:, None]
     from_w = np.where(entering, columns.into[block], columns.behind[block])
     own = np.arange(len(places))
+    # By the contract of ports, d is the signal without the port's own f; what comes back round a loop stays in it.
     from_w[own, inputs + own] = np.where(entering[:, 0], from_w[own, inputs + own] - 1.0, 0.0)
+    # A dead time comes first behind its block: it sees what the block gives, without what effects add behind it.
     from_w[[bool(place.delay_s) for place in places]] = 0.0
     return _Rows(from_y=np.where(entering, wiring.blocks[block], np.eye(len(wiring.blocks))[block]), from_w=from_w)
 

@@ -44,6 +44,7 @@ def filtered_derivatives(a: Matrix, b: Matrix, c: Matrix, d: Matrix, *, filter_t
     filter_time_s
         T.
     """
+    # One chain of lags serves all powers of a column; only powers in use get an ideal rest.
     chains = [(int(column), _highest(d[:, :, column])) for column in np.flatnonzero(d[1:].any(axis=(0, 1)))]
     used = [
         (column, order) for column, highest in chains for order in range(1, highest + 1) if d[order, :, column].any()

@@ -87,6 +87,7 @@ def reduced(given: Descriptor) -> Reduced:
         current, recovery = _with_room(current, recovery)
         turned, rank = _rows_with_derivatives_first(current)
         if rank == current.e.shape[0]:
+            # What's left has derivatives of its own: states, like those of a PD around an integrator.
             return _ordinary(turned, recovery, tuple(left))
         solution = _solved(turned, rank)
         recovery = _recovered(recovery, solution)
@@ -175,6 +176,7 @@ def _solved(given: Descriptor, rank: int) -> _Solution:
 
 
 def _recovered(before: _Recovery, solution: _Solution) -> _Recovery:
+    # Unknowns solved earlier may depend on those that are solved now.
     put_in = before.from_r[:, solution.solved]
     return _Recovery(
         from_x=total(before.from_x, (put_in, solution.from_x)),
@@ -215,6 +217,7 @@ def _ordinary(given: Descriptor, recovery: _Recovery, kept: tuple[int, ...]) -> 
     lower_w = np.linalg.solve(given.e, given.r_w) if kept else given.r_w
     a = np.block([[given.x_x, given.x_r], lower])
     raw = np.concatenate([given.x_w, lower_w], axis=1)
+    # From the highest power down: each one taken out leaves a term in the power below.
     shift = np.zeros_like(raw)
     for power in range(raw.shape[0] - 1, 0, -1):
         shift[power - 1] = total(raw[power], (a, shift[power]))

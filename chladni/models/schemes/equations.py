@@ -108,6 +108,7 @@ def _descriptor(forms: Sequence[Realization], between: Matrix, columns: Matrix) 
 
     count, orders = len(forms), [form.q.size - 1 for form in forms]
     extra = sum(orders)
+    # Block that each derivative belongs to.
     owner = np.repeat(np.arange(count), orders)
     first = np.array([place == 0 or owner[place] != owner[place - 1] for place in range(extra)], dtype=bool)
     b = _stacked([form.b for form in forms])
@@ -115,6 +116,7 @@ def _descriptor(forms: Sequence[Realization], between: Matrix, columns: Matrix) 
     direct = np.array([form.q[0] for form in forms])
     e = np.zeros((extra + count,) * 2)
     r_r, r_w = np.zeros_like(e), np.zeros((2, extra + count, columns.shape[1]))
+    # Rows of derivatives: the first of a block's says what it differentiates, the others follow each other.
     for place in range(extra):
         if first[place]:
             e[place, extra:] = between[owner[place]]
@@ -160,6 +162,7 @@ def _rest_names(names: Sequence[str], forms: Sequence[Realization]) -> list[str]
 
 
 def _without_empty_powers(d: Matrix) -> Matrix:
+    # An empty power costs lags and ports further on.
     used = np.flatnonzero(d.reshape(d.shape[0], -1).any(axis=1))
     return d[: max(1, int(used[-1]) + 1 if used.size else 1)]
 

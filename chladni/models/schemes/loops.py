@@ -25,6 +25,7 @@ def loops_of(blocks: Matrix, *, through: NDArray[np.bool_] | None = None) -> lis
     """
     from scipy.sparse.csgraph import connected_components
 
+    # Strongly connected blocks: each reaches every other one, which is what a common loop means.
     links = blocks != 0
     if through is not None:
         links = links & through[:, None] & through[None, :]
@@ -60,5 +61,5 @@ def require_well_posed(direct: Matrix, blocks: Matrix, names: Sequence[str]) -> 
             told = " -> ".join(names[place] for place in group[:20])
             raise ModelError(
                 f"the loop of {told} has gain one and no lag, so that its signals are not determined: "
-                "change a gain or sign, or put a lag such as pt1 into the loop"
+                "change a gain or sign, or put a lag such as pt1 into the loop (a dead time alone is not enough)"
             )

@@ -58,12 +58,14 @@ def _fractions(blocks: Sequence[Block], frequency_hz: NDArray[np.float64]) -> tu
     below = np.ones_like(above)
     for column, block in enumerate(blocks):
         acting = block.acting
+        # A state space stays as it is: its coefficients would lose digits.
         if isinstance(acting, Element):
             transfer = acting.transfer
             above[:, column] = np.polyval(transfer.num, s) * np.exp(-s * transfer.delay_s)
             below[:, column] = np.polyval(transfer.den, s)
         else:
             above[:, column] = acting.frequency_response(frequency_hz)[0, 0]
+    # Rows of like size keep the solution's digits when time constants are of very different size.
     size = np.maximum(np.abs(above), np.abs(below))
     size[size == 0] = 1.0
     return above / size, below / size

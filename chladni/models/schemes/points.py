@@ -48,6 +48,7 @@ def points_of(blocks: Sequence[Block], outputs: Sequence[SchemeOutput]) -> tuple
     sums = [
         Point(terminal=Terminal(name=f"{block.name}.input", unit=block.input_unit), block=row, before=True)
         for row, block in enumerate(blocks)
+        # With one input the sum is that signal itself, with another sign perhaps: no point of its own.
         if len(block.inputs) > 1
     ]
     return (*declared, *behind, *sums)

@@ -38,6 +38,7 @@ def _unconnected(
     for block in blocks:
         if not block.inputs:
             yield f"block {block.name} has no input: its signal is zero"
+        # Without declared outputs every block is looked at, and none is loose.
         elif outputs and block.name not in used | declared:
             yield f"block {block.name} feeds nothing"
     for terminal in inputs:

@@ -57,6 +57,7 @@ def read_scheme(name: str, tables: Mapping[str, object], *, number: Number = pla
     outputs = [reader.output(loc, table) for loc, table in reader.tables(tables, "output")]
     blocks = [reader.block(loc, table) for loc, table in reader.tables(tables, "block")]
     filter_s = reader.number(("derivative_filter",), tables.get("derivative_filter", DERIVATIVE_FILTER_S), "s")
+    # Told here by table and key; the model itself would stop at the first one and know no keys.
     reader.wiring(blocks, inputs, outputs)
     model = reader.tried(
         ("block",),

@@ -40,6 +40,7 @@ def structural_inverse(matrix: Matrix) -> Matrix:
         raise ModelError("the equations do not determine every signal")
     links = (matrix[row] != 0) | np.eye(count, dtype=bool)
     reached = np.zeros_like(links)
+    # Squaring the pattern doubles the length of the chains in it; it's done when nothing new is reached.
     while not np.array_equal(links, reached):
         reached = links
         links = (reached.astype(np.float32) @ reached.astype(np.float32)) > 0

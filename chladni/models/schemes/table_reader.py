@@ -149,6 +149,7 @@ class TableReader:
         outputs: Sequence[SchemeOutput | None],
     ) -> None:
         """Note every source that names nothing; only when all names could be read."""
+        # A block that couldn't be read would make every reference to it look like a second mistake.
         whole = [block for block in blocks if block is not None]
         if len(whole) < len(blocks) or None in inputs or None in outputs:
             return
@@ -197,6 +198,7 @@ class TableReader:
                 self._tell(("tolerance", name), f"found {found:g}; must be 0 or more")
             elif found is not None:
                 read[name] = found
+        # The default is put under the parameters that have one of their own.
         if "default" in read:
             default = read.pop("default")
             read = dict.fromkeys(model.parameters, default) | read
@@ -251,6 +253,7 @@ class TableReader:
         if not isinstance(values, list) or not values:
             self._tell(loc, "must be a list of coefficients, of descending powers of s")
             return None
+        # Coefficients have the units of their block and power, which nobody writes: any unit is taken, in SI.
         found = [self.number((*loc, place), value, None) for place, value in enumerate(values)]
         whole = tuple(value for value in found if value is not None)
         return whole if len(whole) == len(found) else None
@@ -300,6 +303,7 @@ def _si_unit(text: str) -> str:
         factor, unit = si_factor(text)
     except SetupError as error:
         raise ModelError(str(error)) from None
+    # Numbers would have to be converted with the unit, and nothing here knows which ones.
     if factor != 1:
         raise ModelError(f"found {text!r:.60}; signals of a scheme are in SI, here {unit}")
     return unit

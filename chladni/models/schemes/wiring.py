@@ -62,6 +62,7 @@ def require_wiring(blocks: Sequence[Block], inputs: Sequence[Terminal], outputs:
         if terminal.derivatives:
             raise ModelError(f"input {terminal.name!r}: a scheme takes signals without their derivatives")
     names = _source_names(blocks, inputs)
+    # An output may have the name of its own block: it's the same signal, and one site.
     _require_unique(names + [output.name for output in outputs if output.name != output.at])
     _require_unique([output.name for output in outputs])
     known = set(names)

@@ -280,8 +280,8 @@ def test_blocks_are_switched_on_and_off() -> None:
         "block disturbance is off: it gives zero",
     )
     assert off.switched({"regulator": True, "disturbance": True}) == loop()
-    with pytest.raises(ModelError, match="block 'regulater' is unknown; did you mean regulator"):
-        loop().switched({"regulater": False})
+    with pytest.raises(ModelError, match="block 'regulatorr' is unknown; did you mean regulator"):
+        loop().switched({"regulatorr": False})
 
 
 def test_integral_action_rejects_a_load_and_without_it_the_load_stays() -> None:

@@ -1,3 +1,5 @@
+import tomllib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -186,3 +188,14 @@ def test_a_dead_time_alone_is_a_block() -> None:
         "x", {"input": [{"name": "u"}], "block": [{"name": "b", "delay": 0.5, "input": ["u"]}]}
     )
     np.testing.assert_allclose(model.frequency_response(np.array([1.0]))[0, 0], np.exp(-1j * np.pi), atol=1e-15)
+
+
+def test_the_documents_example_is_a_scheme() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "methods" / "schemes.md").read_text(encoding="utf-8")
+    content = tomllib.loads(page.split("```toml")[1].split("```")[0])
+    model = scheme_from_tables(
+        "loop", {key: content[key] for key in content if key not in ("format", "kind", "name")}
+    )
+    assert model.parameters["plant.delay"].value == 0.02
+    assert model.points[0].terminal.name == "speed"
+    assert model.remarks() == ()
