@@ -140,7 +140,7 @@ def _step(
 
 
 def _told_output(instrument: Instrument, paths: LinearPath) -> str:
-    """Output whose behaviour is told: the one that follows the command of a closed loop, else the instrument's own."""
+    """Output whose behaviour is told: what follows the command of a closed loop, else the instrument's own."""
     chosen = instrument.step_output or paths.outputs[0].name
     if paths.source.unit not in COMMANDED:
         return chosen
@@ -161,9 +161,9 @@ def _charts(instrument: Instrument, shown: Sequence[Shown]) -> Iterator[Chart]:
     if "step" in views:
         yield from step_charts(shown)
         impulses = [(one.label, one.impulse) for one in shown if one.impulse is not None]
-        yield response_chart(
-            f"impulse.{output}", f"{output} after a unit impulse of {first.path.source.name}", impulses, output
-        )
+        if impulses:
+            title = f"{output} after a unit impulse of {first.path.source.name}"
+            yield response_chart(f"impulse.{output}", title, impulses, output)
         loads = [(one.label, one.load) for one in shown if one.load is not None]
         if loads:
             source = loads[0][1].source

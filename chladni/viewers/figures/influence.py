@@ -48,7 +48,7 @@ def influence_figure(table: InfluenceTable, *, of: Literal["log_derivative", "fi
 
 def _write(axes: Axes, coefficients: Matrix) -> None:
     for (row, column), value in np.ndenumerate(coefficients):
-        axes.text(column, row, "–" if np.isnan(value) else f"{value:+.3g}", ha="center", va="center", fontsize=7.5)
+        axes.text(column, row, _number(value), ha="center", va="center", fontsize=7.5)
 
 
 def _mark(axes: Axes, coefficients: Matrix) -> None:
@@ -67,3 +67,9 @@ def _name(axes: Axes, table: InfluenceTable) -> None:
     axes.tick_params(length=0)
     axes.grid(visible=False)
     axes.spines[:].set_visible(False)
+
+
+def _number(value: float) -> str:
+    if np.isnan(value):
+        return "–"
+    return f"{value:+.3g}" if value else "0"
