@@ -17,6 +17,7 @@ from chladni.models.drives.piston import (
     piston_plant,
     stop_laws,
 )
+from chladni.models.drives.seal_friction import seal_friction
 from chladni.models.drives.validity import Limit
 
 # The paper's units: 1 daN/cm^2 is 1 bar, 1 daN s^2/cm is 1000 kg, 1 cm^5/(daN s) is 0.1 cm^5/(N s).
@@ -88,8 +89,12 @@ _PARAMETERS = Parameters(
 LINEAR_SHARE = 0.2
 
 
+#: Of the standard atmosphere, Pa: seals feel the pressure above it, the air's spring the absolute one.
+AMBIENT = 101325.0
+
+
 def _build(values: Mapping[str, float], options: Mapping[str, str]) -> CompiledModel:
-    return piston_plant(
+    compiled = piston_plant(
         active_area=values["active_area"],
         capacity=values["air_volume"] / (values["adiabatic_exponent"] * values["pressure"]),
         reduced_mass=values["reduced_mass"],
@@ -97,6 +102,9 @@ def _build(values: Mapping[str, float], options: Mapping[str, str]) -> CompiledM
         viscous_loss=values["viscous_loss"],
         laws=stop_laws(values, options),
     )
+    if options["seal_friction"] == "off":
+        return compiled
+    return seal_friction(values["pressure"] - AMBIENT, active_area=values["active_area"]).attach(compiled)
 
 
 def _limits(values: Mapping[str, float], options: Mapping[str, str]) -> Sequence[Limit]:
@@ -115,7 +123,10 @@ PNEUMATIC_MOTOR = DriveKind(
     parameters=_PARAMETERS,
     inputs=(FLOW, LOAD),
     outputs=(DISPLACEMENT, VELOCITY, ACCELERATION, PRESSURE_DROP),
-    options=(Option(name="end_stops", meaning="stops at both ends of the stroke"),),
+    options=(
+        Option(name="end_stops", meaning="stops at both ends of the stroke"),
+        Option(name="seal_friction", meaning="friction of the seals as measured on a smaller cylinder"),
+    ),
     build=_build,
     limits=_limits,
     acts_with={"stop_stiffness": ("end_stops", ("on",)), "stop_damping": ("end_stops", ("on",))},

@@ -33,7 +33,7 @@ def test_values_are_replaced_and_nothing_else():
     assert other.parameters["active_area"].value == 60e-4
     assert other.parameters["reduced_mass"].value == 200.0
     assert model.parameters["reduced_mass"].value == 300.0
-    assert other.options == {"end_stops": "on"}
+    assert other.options == {"end_stops": "on", "seal_friction": "off"}
     with pytest.raises(ModelError, match="did you mean reduced_mass"):
         model.with_values({"reduced_mas": 1.0})
 
@@ -43,7 +43,7 @@ def test_values_are_replaced_and_nothing_else():
     [
         ({"values": {"active_aera": 1.0}}, "no parameter 'active_aera'; did you mean active_area?"),
         ({"values": {"active_area": -1.0}}, "active_area: -1 m.2 is not possible"),
-        ({"options": {"stops": "on"}}, "pneumatic-motor: no option 'stops'; options: end_stops"),
+        ({"options": {"stops": "on"}}, "pneumatic-motor: no option 'stops'; options: end_stops, seal_friction"),
         ({"options": {"end_stops": "yes"}}, "option end_stops = 'yes'; choose one of off, on"),
         ({"inputs": [ChosenSignal(signal="voltage")]}, "no signal 'voltage'; signals: flow, load, displacement"),
         ({"inputs": [ChosenSignal(signal="velocity")]}, "no input 'velocity'; inputs: flow, load"),

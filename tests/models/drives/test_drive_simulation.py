@@ -136,6 +136,24 @@ def test_inside_its_dead_zone_a_valve_gives_no_flow():
     assert np.abs(flow).max() <= np.finfo(float).eps * 39e-6
 
 
+def test_a_dead_zone_leaves_its_half_width_over_the_gain():
+    model = drive_model(HYDRAULIC, {}, {"dead_zone": "on", "loop": "position"})
+    found = simulate(model, held(model, 2e3, 2.0, reference=0.01))
+    p = model.parameters.numbers()
+    left = p["valve_overlap"] * p["rated_flow"] / p["position_gain"]
+    assert 0.01 - found.states[0, -1] == pytest.approx(left, rel=1e-3)
+
+
+def test_seals_hold_the_piston_against_a_small_load():
+    moved = []
+    for word in ("on", "off"):
+        model = drive_model(PNEUMATIC, {}, {"seal_friction": word})
+        moved.append(np.abs(simulate(model, held(model, 1e3, 3.0, load=10.0)).states[0]).max())
+    # The bristle yields at 0.09 mm; the air alone gives way by 10 N over A^2/c = 46 kN/m, and swings beyond.
+    assert moved[0] < 0.09e-3
+    assert moved[1] > 0.2e-3
+
+
 @pytest.mark.parametrize(
     ("kind", "values", "options", "rate_hz", "seconds", "levels"),
     [

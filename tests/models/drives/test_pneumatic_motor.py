@@ -5,6 +5,7 @@ from scipy import signal
 from chladni.models.drives.catalogue import DRIVES
 from chladni.models.drives.drive_model import drive_model
 from chladni.models.drives.pneumatic_motor import PNEUMATIC_MOTOR
+from chladni.models.drives.seal_friction import seal_friction_force
 from chladni.signals.errors import ModelError
 from chladni.signals.units import si_factor
 from tests.models.drives.oracles import assert_same_response, piston, response
@@ -112,6 +113,21 @@ def test_stops_act_only_when_they_are_on():
 def test_a_start_outside_the_stroke_is_refused():
     with pytest.raises(ModelError, match=r"start_position: 0\.36 m lies beyond the stroke of 0\.35 m"):
         drive_model(PNEUMATIC_MOTOR, {"start_position": 0.36})
+
+
+def test_measured_friction_of_the_seals_acts_at_the_piston_over_the_pressure():
+    compiled = drive_model(PNEUMATIC_MOTOR, {}, {"seal_friction": "on"}).compile()
+    (law,) = compiled.laws
+    assert compiled.ports[law.port].name == "piston"
+    force, _ = seal_friction_force(5e5 - 101325.0, active_area=70e-4)
+    assert force in law.parameters
+    assert 10.0 < force < 40.0
+
+
+def test_seals_at_less_than_ambient_pressure_are_refused():
+    with pytest.raises(ModelError, match="seal friction"):
+        drive_model(PNEUMATIC_MOTOR, {"pressure": 5e4}, {"seal_friction": "on"})
+    drive_model(PNEUMATIC_MOTOR, {"pressure": 5e4})
 
 
 def test_joint_carries_the_viscous_loss_for_laws_that_need_it():
