@@ -8,7 +8,9 @@ from chladni.models.instruments.catalogue import INSTRUMENTS
 def main() -> None:
     """Print the arm's influence coefficients, the best joint for a damper, and the stiffness that raises the mode."""
     arm = INSTRUMENTS["robot-arm"].model()
-    table = chladni.influence(arm, to_output="tool_displacement", behaviour_names=("damping_ratio", "resonance_frequency"))
+    table = chladni.influence(
+        arm, to_output="tool_displacement", behaviour_names=("damping_ratio", "resonance_frequency")
+    )
     print("d ln / d ln                damping ratio       resonance")
     for name, row in zip(table.construction, table.log_derivative, strict=True):
         print(f"{name:24}{row[0]:16.3f}{row[1]:16.3f}")
