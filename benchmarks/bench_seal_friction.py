@@ -21,7 +21,7 @@ from chladni.models.effects.hysteresis import bouc_wen
 Matrix = NDArray[np.float64]
 PRESSURES_BAR = (1, 4, 7)
 YIELDS_M = np.geomspace(5e-5, 2e-3, 25)
-SMOOTHING = 11
+SMOOTHING = 3
 STROKE_M = (5e-3, 30e-3)
 
 
