@@ -14,6 +14,9 @@ from chladni.viewers.drawing import thin
 
 #: Points of a curve: more than a screen has columns.
 MOST_POINTS = 3000
+#: Segments side by side in a stretch, seven with their overlap: lines finer than in a spectrum that is read for its
+#: levels, since here it's enough to see where two curves part.
+SEGMENTS = 4
 MEASURED, SIMULATED = "measured", "simulated"
 
 Floats = NDArray[np.float64]
@@ -83,14 +86,14 @@ def _times(measured: TimeSeries, simulated: TimeSeries, start_s: float) -> Itera
 
 
 def _spectra(_driving: TimeSeries, measured: TimeSeries, simulated: TimeSeries) -> list[Chart]:
-    densities = psd(_joined(measured, simulated))
+    densities = psd(_joined(measured, simulated), resolution_hz=SEGMENTS / measured.duration_s)
     count = len(measured.channels)
     return [
         Chart(
             name=f"log.spectrum.{channel.name}",
             title=f"{channel.name}, spectrum",
             x_label="frequency [Hz]",
-            y_label=_label("power spectral density", densities.units[row]),
+            y_label=_label("PSD", densities.units[row]),
             y_scale="log",
             curves=(
                 _line(MEASURED, densities.frequency_hz, densities.values[row]),
@@ -103,10 +106,14 @@ def _spectra(_driving: TimeSeries, measured: TimeSeries, simulated: TimeSeries) 
 
 def _transfers(driving: TimeSeries, measured: TimeSeries, simulated: TimeSeries) -> list[Chart]:
     reference = driving.channels[0].name
+    if np.ptp(driving.values[0]) == 0:
+        raise EstimateError(f"{reference} is the same all the time in this stretch: there is no transfer function")
     count = len(measured.channels)
     series = _joined(measured, simulated, first=driving)
     names = [channel.name for channel in series.channels[1:]]
-    response = frf(series, reference=_NAMES[0] + reference, response=names)
+    response = frf(
+        series, reference=_NAMES[0] + reference, response=names, resolution_hz=SEGMENTS / series.duration_s
+    )
     return [
         Chart(
             name=f"log.transfer.{channel.name}",
@@ -115,8 +122,8 @@ def _transfers(driving: TimeSeries, measured: TimeSeries, simulated: TimeSeries)
             y_label=_label("magnitude", response.unit(row, 0)),
             y_scale="log",
             curves=(
-                _line(MEASURED, response.frequency_hz, np.abs(response.values[row, 0])),
-                _line(SIMULATED, response.frequency_hz, np.abs(response.values[count + row, 0])),
+                _line(MEASURED, response.frequency_hz, np.abs(response.values[row, 0]), response.excited),
+                _line(SIMULATED, response.frequency_hz, np.abs(response.values[count + row, 0]), response.excited),
             ),
         )
         for row, channel in enumerate(measured.channels)
@@ -149,9 +156,9 @@ def _thinned(label: str, x: Floats, y: Floats) -> Curve:
     return Curve(label=label, x=x[shown], y=np.asarray(y[shown], dtype=np.float64))
 
 
-def _line(label: str, frequency_hz: Floats, values: Floats) -> Curve:
-    """Leave out what a logarithmic axis can't show: the line at 0 Hz, and zeros."""
-    shown = np.where(values > 0, values, np.nan)
+def _line(label: str, frequency_hz: Floats, values: Floats, known: NDArray[np.bool_] | None = None) -> Curve:
+    """Leave out the line at 0 Hz, what isn't known, and zeros, which a logarithmic axis can't show."""
+    shown = np.where((values > 0) & (True if known is None else known), values, np.nan)
     return _thinned(label, frequency_hz[1:], shown[1:])
 
 

@@ -64,10 +64,12 @@ def test_a_saved_log_held_against_its_own_model_agrees(log: Any) -> None:
     assert assignment["flow"] == "/flow.value"
     assert assignment["velocity"] == "/velocity.value"
     found = compare(model, log, assignment, 0.0, 100.0)
+    # A step that is there from the first instant excites nothing that an average could see.
+    assert "flow is the same all the time in this stretch: there is no transfer function" in found.flags
     # The log holds doubles and times in whole nanoseconds: the rate is known to about 1e-9.
     assert all(one.value is not None and one.value < 1e-4 for one in found.quantities)
     first = [chart.name for chart in found.charts[:3]]
-    assert first == ["log.time.displacement", "log.spectrum.displacement", "log.transfer.displacement"]
+    assert first == ["log.time.displacement", "log.spectrum.displacement", "log.time.velocity"]
     assert [curve.label for curve in found.charts[0].curves] == ["measured", "simulated"]
 
 
@@ -120,12 +122,11 @@ def test_a_stretch_outside_the_log_is_told(log: Any) -> None:
 def made_log(
     tmp_path: Path, values: np.ndarray, *, valid: np.ndarray | None = None, rate_hz: float = 1000.0
 ) -> OpenedLog:
-    series = chladni.TimeSeries(
-        values=values, sample_rate_hz=rate_hz, valid=valid,
-        channels=tuple(
-            chladni.Channel(name=name, unit=unit) for name, unit in (("/flow.value", "m^3/s"), ("/velocity.value", "m/s"))
-        ),
-    )  # fmt: skip
+    channels = (
+        chladni.Channel(name="/flow.value", unit="m^3/s"),
+        chladni.Channel(name="/velocity.value", unit="m/s"),
+    )
+    series = chladni.TimeSeries(values=values, sample_rate_hz=rate_hz, valid=valid, channels=channels)
     chladni.write_mcap(series, tmp_path / "made.mcap")
     return OpenedLog(tmp_path / "made.mcap", "made.mcap", private=False)
 
@@ -157,6 +158,29 @@ def test_too_short_a_stretch_has_no_spectrum_and_says_so(tmp_path: Path) -> None
     found = compare(MOTOR.model(), log, BOTH, 0.0, 0.004)
     assert [chart.name for chart in found.charts] == ["log.time.velocity"]
     assert len(found.flags) >= 2
+    log.close()
+
+
+def test_spectra_and_transfer_functions_stand_beside_the_time(tmp_path: Path) -> None:
+    """A log made of the model's own answer to noise: measured and simulated are one curve in every chart."""
+    from chladni.models.integrator.simulate import simulate
+
+    model = MOTOR.model()
+    noise = np.random.default_rng(2).standard_normal((1, 4000)) * 1e-5
+    flow = chladni.TimeSeries(
+        values=noise, sample_rate_hz=1000.0, channels=(chladni.Channel(name="flow", unit="m^3/s"),)
+    )
+    answer = simulate(model, flow).outputs
+    row = [channel.name for channel in answer.channels].index("velocity")
+    log = made_log(tmp_path, np.stack([noise[0], answer.values[row]]))
+    found = compare(model, log, BOTH, 0.0, 4.0)
+    assert [chart.name.split(".")[1] for chart in found.charts] == ["time", "spectrum", "transfer"]
+    assert found.charts[1].y_label == "PSD [(m/s)^2/Hz]"
+    for chart in found.charts:
+        measured, simulated = chart.curves
+        assert measured.x.size > 100
+        # The log keeps every double; only its clock, in whole nanoseconds, differs.
+        np.testing.assert_allclose(measured.y, simulated.y, rtol=1e-4, atol=1e-6 * np.nanmax(np.abs(measured.y)))
     log.close()
 
 

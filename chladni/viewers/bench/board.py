@@ -12,14 +12,23 @@ from chladni.viewers.bench.tile import Ghost, Tile, key_of
 #: Charts at once: two rows of three can be read in a window of 1280 x 800 without scrolling.
 SLOTS, COLUMNS = 6, 3
 
+# The rows share the height that is left; Panel's button for scrolling would take a place in the grid.
 _GRID_CSS = """
 :host {
   display: grid !important; grid-template-columns: repeat(COLUMNS, minmax(0, 1fr)); width: 100%;
-  grid-auto-rows: minmax(230px, calc((100vh - OUTSIDE) / ROWS)); gap: 8px;
+  flex: 1 1 ROOMpx !important; min-height: ROOMpx !important; height: auto !important;
+  grid-auto-rows: minmax(LEASTpx, 1fr); gap: GAPpx;
 }
+.scroll-button { display: none !important; }
 """
+#: Pixels; a lower chart can't be read, and the page scrolls instead.
+LEAST_HEIGHT, GAP = 215, 8
+
 _CARD_CSS = """
-:host { background: var(--c-card); border: 1px solid var(--c-line); border-radius: 6px; padding: 4px 6px 2px; }
+:host {
+  background: var(--c-card); border: 1px solid var(--c-line); border-radius: 6px; padding: 4px 6px 2px;
+  min-height: 0 !important; overflow: hidden;
+}
 """
 _CHOICE_CSS = """
 select { border: 0; font-weight: 600; padding: 0 18px 0 4px; min-height: 22px; text-overflow: ellipsis; }
@@ -79,12 +88,10 @@ class Board:
     ----------
     first
         Charts to show first, the most wanted first; those there aren't are passed over.
-    outside
-        Pixels of the window's height that other things need.
     """
 
-    def __init__(self, theme: Theme, *, first: Sequence[str] = (), outside: int = 172) -> None:
-        self._theme, self._first, self._outside = theme, first, outside
+    def __init__(self, theme: Theme, *, first: Sequence[str] = ()) -> None:
+        self._theme, self._first = theme, first
         self.slots: list[Slot] = []
         self._charts: Sequence[Chart] = ()
         self._kept: Sequence[Kept] = ()
@@ -121,13 +128,14 @@ class Board:
         self.view.objects = [slot.view for slot in self.slots]
 
     def _grid(self) -> str:
-        columns = min(COLUMNS, max(1, len(self.slots))) if len(self.slots) != 2 * COLUMNS - 2 else 2
-        rows = max(1, -(-len(self.slots) // columns))
-        # Rows at least of half a window: a single chart of the whole height would be a poster.
-        words = {"COLUMNS": str(columns), "OUTSIDE": f"{self._outside}px", "ROWS": str(max(2, rows))}
+        columns = min(COLUMNS, max(1, len(self.slots)))
+        # Four in a square, not three and one.
+        columns = 2 if len(self.slots) == 4 else columns
+        rows = -(-len(self.slots) // columns) if self.slots else 1
+        words = {"COLUMNS": columns, "LEAST": LEAST_HEIGHT, "GAP": GAP, "ROOM": rows * (LEAST_HEIGHT + GAP)}
         grid = _GRID_CSS
-        for word, text in words.items():
-            grid = grid.replace(word, text)
+        for word, number in words.items():
+            grid = grid.replace(word, str(number))
         return grid
 
 

@@ -33,7 +33,7 @@ class Dropper(pn.widgets.FileDropper):  # type: ignore[misc]  # panel has no typ
             chunk_size=_CHUNK_BYTES,
             multiple=False,
             previews=[],
-            height=58,
+            height=76,
             margin=0,
             sizing_mode="stretch_width",
             stylesheets=[WIDGET_CSS, _DROPPER_CSS],

@@ -20,7 +20,7 @@ from chladni.viewers.bench.influence_view import InfluenceView
 from chladni.viewers.bench.knob import Knob
 from chladni.viewers.bench.latest import Latest
 from chladni.viewers.bench.log_view import LogView
-from chladni.viewers.bench.parts import WIDE, button, choice, column, flow, html, pn, row, switch, views
+from chladni.viewers.bench.parts import FILLING, WIDE, button, choice, column, flow, html, pn, row, switch, views
 from chladni.viewers.bench.theme import Ground, theme
 from chladni.viewers.bench.tools import Export, Shown, Tools, Variant
 from chladni.viewers.bench.variants_view import Kept, VariantsView
@@ -32,7 +32,10 @@ if TYPE_CHECKING:
 VIEWS = ("Behaviour", "Influence", "Variants", "Measured log")
 KNOBS_WIDTH = 300
 SWITCH = ("off", "on")
+#: A page waits so long for its first charts; what takes longer (a law compiled for the first time) comes after it.
+PATIENCE_S = 0.3
 
+_MAIN_CSS = ":host { min-height: 0 !important; height: 100% !important; }"
 _KNOBS_CSS = """
 :host {
   background: var(--c-card); border: 1px solid var(--c-line); border-radius: 6px; padding: 8px 10px;
@@ -88,8 +91,9 @@ class InstrumentPage:
         self.log = LogView(self.desk, tools, theme=look, document=document, path=log)
         self.views = views(VIEWS, self._look_at)
         self.exports = [self._export(export) for export in tools.exports]
-        self.behaviour = column(self.strip, self.board.view, sizing_mode="stretch_both")
+        self.behaviour = column(self.strip, self.board.view, sizing_mode="stretch_both", stylesheets=[FILLING])
         self._ask()
+        self._reader.settle(PATIENCE_S)
         if log is not None:
             self.views.value = VIEWS[-1]
 
@@ -103,9 +107,9 @@ class InstrumentPage:
         )
         main = column(
             bar, self.words, self.variants.strip, self.behaviour, self.influence.view, self.variants.view,
-            self.log.view, sizing_mode="stretch_both", margin=(0, 0, 0, 10),
+            self.log.view, sizing_mode="stretch_both", margin=(0, 0, 0, 10), stylesheets=[_MAIN_CSS],
         )  # fmt: skip
-        return row(self._side(), main, sizing_mode="stretch_both")
+        return row(self._side(), main, sizing_mode="stretch_both", stylesheets=[FILLING])
 
     def close(self) -> None:
         """End the page's threads and let go of its log."""

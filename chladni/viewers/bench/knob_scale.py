@@ -1,5 +1,6 @@
 """How a knob stands for a parameter: unit shown, place on the slider, text in the entry."""
 
+import re
 from dataclasses import dataclass
 from math import ceil, floor, isfinite, log10
 from typing import Self
@@ -10,6 +11,7 @@ from chladni.signals.units import parse_quantity, si_factor
 from chladni.viewers.labels import printed_unit
 
 STEPS = 100
+_EXPONENT = re.compile(r"e\+?(-?)0*(?=\d)")
 #: A range that spans more than this is a matter of orders of magnitude.
 DECADES_FROM = 100.0
 
@@ -83,7 +85,7 @@ class KnobScale:
 
     def text(self, value: float) -> str:
         """Give the number that the entry shows for a value in SI."""
-        return f"{value / self.factor:.6g}"
+        return _EXPONENT.sub(r"e\1", f"{value / self.factor:.6g}")
 
     def read(self, text: str) -> float:
         """Value in SI of what was typed: a number in the shown unit, or a number with any fitting unit.

@@ -16,7 +16,7 @@ from chladni.viewers.bench.desk import Desk
 from chladni.viewers.bench.dropper import Dropper, private_file
 from chladni.viewers.bench.errors import told
 from chladni.viewers.bench.latest import Latest
-from chladni.viewers.bench.parts import choice, column, flow, html, seconds_entry
+from chladni.viewers.bench.parts import FILLING, choice, column, flow, html, seconds_entry
 from chladni.viewers.bench.pause import Pause
 from chladni.viewers.bench.theme import Theme
 from chladni.viewers.bench.tools import Assignment, MeasuredLog, Tools
@@ -52,10 +52,10 @@ class LogView:
         self._words = html(_INVITATION, MESSAGE_CSS)
         self._scores = html("", STRIP_CSS, margin=(4, 0))
         self._choices = flow(margin=(4, 0), gap="8px")
-        self.board = Board(theme, outside=330)
+        self.board = Board(theme)
         self.view = column(
             self.dropper, self._words, self._choices, self._scores, self.board.view,
-            sizing_mode="stretch_both", margin=(8, 0), visible=False,
+            sizing_mode="stretch_both", margin=(8, 0), visible=False, stylesheets=[FILLING],
         )  # fmt: skip
 
     def show(self, shown: bool) -> None:

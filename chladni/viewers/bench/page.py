@@ -17,7 +17,8 @@ _FRAME_CSS = """
 :host {
   VARIABLES
   background: var(--c-page); color: var(--c-text); font-family: FONT; font-size: 13px;
-  padding: 10px 12px; box-sizing: border-box; min-height: 100vh;
+  padding: 10px 12px; box-sizing: border-box; height: max(100vh, 600px) !important;
+  min-height: 0 !important;
 }
 """
 _HEAD_CSS = """

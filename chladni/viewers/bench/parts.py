@@ -10,6 +10,9 @@ from chladni.viewers.bench.theme import TEXT_CSS, WIDGET_CSS
 pn: Any = import_module("panel")
 
 WIDE = "stretch_width"
+#: For a column whose last part takes the height that is left.
+# Panel would add up the heights of the parts, as if they could not shrink.
+FILLING = ":host { flex: 1 1 auto !important; min-height: 0 !important; height: auto !important; }"
 # What a widget's words are called: Panel renamed it in version 1.9.
 _LABEL = "label" if "label" in pn.widgets.Widget.param else "name"
 

@@ -12,6 +12,7 @@ from panel.io.application import build_applications
 from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
 from tornado.web import RequestHandler
+from tornado.websocket import WebSocketClosedError
 
 from chladni.signals.errors import SetupError
 
@@ -68,10 +69,12 @@ class BenchServer:
 
     def __init__(self, pages: Mapping[str, Callable[[], Any]], *, index: str, port: int = 0) -> None:
         self._pages, self._index = pages, index
+        if not 0 <= port <= 65535:
+            raise SetupError(f"port {port} of {ADDRESS} can't be had (the highest is 65535); give 0 for any")
         try:
             # Bound at once, so that a taken port is told before anything starts; browsers wait until `run`.
             self._socket = socket.create_server((ADDRESS, port))
-        except (OSError, OverflowError) as error:
+        except OSError as error:
             raise SetupError(
                 f"port {port} of {ADDRESS} can't be had ({error}); give another, or 0 for any"
             ) from error
@@ -99,6 +102,7 @@ class BenchServer:
 
     async def _serve(self, ready: Callable[[], None] | None) -> None:
         self._loop, self._ended = asyncio.get_running_loop(), asyncio.Event()
+        self._loop.set_exception_handler(_on_exception)
         application = self._application()
         http = HTTPServer(application)
         http.add_sockets([self._socket])
@@ -123,6 +127,12 @@ class BenchServer:
         )
         application.add_handlers(foreign_hosts(), [(r".*", ForeignHost)])
         return application
+
+
+def _on_exception(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    # A message on its way while a browser leaves the page is nobody's mistake.
+    if not isinstance(context.get("exception"), WebSocketClosedError):
+        loop.default_exception_handler(context)
 
 
 def foreign_hosts() -> str:

@@ -117,7 +117,8 @@ def theme(ground: str) -> Theme:
 #: For every widget, inside its own shadow root.
 WIDGET_CSS = f"""
 :host {{ font-family: {FONT}; font-size: 12.5px; color: var(--c-text); }}
-label, .bk-input-group label, .bk-slider-title {{ color: var(--c-soft); font-size: 12px; margin: 0 0 2px 0; }}
+label, .bk-input-group label, .bk-slider-title {{ color: var(--c-soft); font-size: 12px; margin: 0 0 2px 0;
+  white-space: normal; }}
 .bk-input, input, select {{
   background: var(--c-card); color: var(--c-text); border: 1px solid var(--c-line); border-radius: 4px;
   font-family: inherit; font-size: 12.5px; min-height: 24px; padding: 2px 6px;

@@ -16,7 +16,7 @@ from chladni.viewers.bench.words import printed
 Data = dict[str, Any]
 
 #: More would turn a chart into a carpet, and a legend into a book.
-LEGEND_FROM, LEGEND_TO = 2, 8
+LEGEND_FROM, LEGEND_INSIDE, LEGEND_TO = 2, 3, 8
 TICKS = 5
 # Bokeh writes 8.000e-5 and -1.000e-4, too wide to stand side by side under a small chart.
 _TICK_JS = """
@@ -49,7 +49,7 @@ class Tile:
         self.lines, self.points = ColumnDataSource(_no_lines()), ColumnDataSource(_no_points())
         self.ghost_lines, self.ghost_points = ColumnDataSource(_no_lines()), ColumnDataSource(_no_points())
         self.figure = _figure(chart)
-        self._draw()
+        self._draw(chart)
         self.show(chart)
 
     def show(self, chart: Chart) -> None:
@@ -70,7 +70,7 @@ class Tile:
         _replace(self.ghost_lines, lines)
         _replace(self.ghost_points, points)
 
-    def _draw(self) -> None:
+    def _draw(self, chart: Chart) -> None:
         # Ghosts first: what moves now lies on top.
         self.figure.multi_line(
             "xs", "ys", source=self.ghost_lines, line_color="colour", line_width=1.3, line_alpha=0.55
@@ -83,8 +83,10 @@ class Tile:
             "x", "y", source=self.points, marker="marker", size=9, color="colour", fill_alpha=0.0, line_width=1.8
         )
         items = [LegendItem(label={"field": "label"}, renderers=[one]) for one in (line, point)]
-        self.legend = Legend(items=items, location="top_right")
-        self.figure.add_layout(self.legend)
+        # Many labels would hide what they name: they stand beside the curves.
+        beside = len(chart.curves) > LEGEND_INSIDE
+        self.legend = Legend(items=items, location="top_left" if beside else "top_right")
+        self.figure.add_layout(self.legend, "right" if beside else "center")
         self.figure.add_tools(HoverTool(renderers=[line, point], tooltips=[("", "@label"), ("", "$x, $y")]))
 
 
@@ -115,6 +117,10 @@ def _figure(chart: Chart) -> Any:
     if any(curve.points for curve in chart.curves):
         # A cross on the frame could be taken for one that goes on outside.
         made.x_range.range_padding = made.y_range.range_padding = 0.2
+        # Two poles one above the other differ in their real parts by rounding, which is no reason to magnify it.
+        made.x_range.min_interval = (
+            0.05 * max(float(np.abs(curve.x).max(initial=0)) for curve in chart.curves) or None
+        )
     elif not chart.equal:
         made.x_range.range_padding = 0.0
     for axis, scale in ((made.xaxis, chart.x_scale), (made.yaxis, chart.y_scale)):

@@ -76,7 +76,7 @@ class VariantsView:
         self.chips = flow()
         self._words, self._table = html("", MESSAGE_CSS), html("")
         self.view = column(self._table, margin=(8, 0), visible=False)
-        self.strip = column(self._words, self.chips)
+        self.strip = column(self._words, self.chips, margin=(0, 0, 4, 0))
         if file is not None:
             self._watch(file, document)
 
@@ -120,7 +120,7 @@ class VariantsView:
 
     def _chip(self, kept: Kept) -> Any:
         by_hand = kept in self._hand
-        css = f":host .bk-btn {{ border-left: 4px solid {kept.colour}; padding: 2px 8px; }}"
+        css = f".bk-btn.bk-btn-default {{ border-left: 5px solid {kept.colour} !important; padding: 1px 8px; }}"
         return button(
             f"{kept.variant.label}  ✕" if by_hand else kept.variant.label,
             partial(self._remove, kept) if by_hand else None,

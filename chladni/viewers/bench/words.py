@@ -13,6 +13,11 @@ from chladni.viewers.labels import printed_unit
 
 DASH = "–"
 _EXPONENT = re.compile(r"\^(-?\d+)")
+_GREEK = {
+    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "zeta": "ζ", "eta": "η", "theta": "θ",
+    "kappa": "κ", "lambda": "λ", "mu": "μ", "nu": "ν", "rho": "ρ", "sigma": "σ", "tau": "τ", "phi": "φ", "chi": "χ",
+    "psi": "ψ", "omega": "ω",
+}  # fmt: skip
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -27,6 +32,19 @@ def number(value: float | None) -> str:
     if value is None or not isfinite(value):
         return DASH
     return f"{value:.4g}".replace("-", "\u2212") if "e" not in f"{value:.4g}" else f"{value:.4g}"
+
+
+def coefficient(value: float) -> str:
+    """Give a coefficient with two decimals: what is less than a hundredth doesn't matter beside one.
+
+    Examples
+    --------
+    >>> coefficient(-1.0443), coefficient(4e-5), coefficient(0.0)
+    ('−1.04', '+0.00', '0')
+    """
+    if not isfinite(value):
+        return DASH
+    return "0" if value == 0 else f"{value:+.2f}".replace("-", "\u2212")
 
 
 def with_unit(quantity: Quantity) -> str:
@@ -55,6 +73,7 @@ def symbol(letter: str) -> str:
     'a<sub>m</sub>'
     """
     head, _, tail = letter.partition("_")
+    head, tail = _GREEK.get(head, head), _GREEK.get(tail, tail)
     return escape(head) + (f"<sub>{escape(tail)}</sub>" if tail else "")
 
 
@@ -119,8 +138,8 @@ def influence_table(table: InfluenceTable) -> str:
         for row, (name, change) in enumerate(zip(table.construction, table.change, strict=True))
     )
     return (
-        f'<table class="influence"><thead><tr><th>change of</th>{head}</tr></thead>'
-        f'<tbody><tr class="now"><td>now</td>{nominal}</tr>{rows}</tbody></table>'
+        f'<div class="wide"><table class="influence"><thead><tr><th>change of</th>{head}</tr></thead>'
+        f'<tbody><tr class="now"><td>now</td>{nominal}</tr>{rows}</tbody></table></div>'
         "<p>Each cell: relative change of behaviour over relative change of construction, by the finite change in "
         "the first column, and in grey the exact log-derivative. <b>Bold</b>: strongest of its row; "
         '<span class="column">shaded</span>: strongest of its column.</p>'
@@ -128,9 +147,9 @@ def influence_table(table: InfluenceTable) -> str:
 
 
 def _influence_cell(finite: float, derivative: float, *, strongest: bool, strongest_of_column: bool) -> str:
-    text = f"<b>{number(finite)}</b>" if strongest else number(finite)
+    text = f"<b>{coefficient(finite)}</b>" if strongest else coefficient(finite)
     shaded = ' class="column"' if strongest_of_column else ""
-    return f"<td{shaded}>{text}<small>{number(derivative)}</small></td>"
+    return f"<td{shaded}>{text}<small>{coefficient(derivative)}</small></td>"
 
 
 def _strongest(values: NDArray[np.float64], *, axis: int) -> NDArray[np.bool_]:
@@ -158,6 +177,10 @@ MESSAGE_CSS = """
 .m.error { font-weight: 600; }
 """
 INFLUENCE_CSS = """
+.wide { overflow-x: auto; }
+.influence th { white-space: normal; vertical-align: bottom; }
+.influence td small { display: block; }
+.influence td:first-child small { display: inline; }
 .influence small, td small { color: var(--c-soft); margin-left: 6px; font-size: 11px; }
 .influence .now td { color: var(--c-soft); }
 .column { background: var(--c-warning-ground); border-radius: 3px; padding-left: 4px; }

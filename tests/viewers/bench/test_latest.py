@@ -3,7 +3,9 @@
 import threading
 import time
 from collections.abc import Callable
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import pytest
 
 from chladni.viewers.bench.latest import Latest
 from chladni.viewers.bench.pause import Pause
@@ -103,6 +105,29 @@ def test_without_a_server_the_result_is_there_at_once() -> None:
     got: list[Future[int]] = []
     latest.submit(lambda: 3, got.append)
     assert got[0].result() == 3
+    latest.close()
+
+
+def test_before_the_page_is_loaded_results_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    loads: list[Callable[[], None]] = []
+    monkeypatch.setattr("panel.state.onload", loads.append)
+    document: Any = Document()
+    latest = Latest(document)
+    got: list[int] = []
+    latest.submit(lambda: 1, lambda future: got.append(future.result()))
+    latest.settle(10)
+    # In the page from the beginning.
+    assert got == [1]
+    latest.submit(lambda: 2, lambda future: got.append(future.result()))
+    latest.settle(10)
+    latest.submit(lambda: time.sleep(0.05) or 3, lambda future: got.append(future.result()))
+    latest.settle(0)
+    while latest._held is None:
+        time.sleep(0.005)
+    assert got == [1, 2]
+    assert document.ticks == []
+    loads[0]()
+    assert got == [1, 2, 3]
     latest.close()
 
 

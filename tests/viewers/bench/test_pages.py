@@ -213,7 +213,7 @@ def test_kept_variants_stay_as_faded_curves_with_a_chip(page: Any) -> None:
 @needs_chromium
 def test_influence_is_computed_when_one_looks(page: Any) -> None:
     page.get_by_role("button", name=VIEWS[1], exact=True).click()
-    page.get_by_role("cell", name="1.021").or_(page.get_by_text("1.02", exact=True)).first.wait_for()
+    page.get_by_text("+1.02", exact=True).first.wait_for()
     assert page.get_by_text("strongest of its row").is_visible()
 
 

@@ -56,9 +56,9 @@ def test_the_strongest_of_rows_and_columns_are_marked() -> None:
         definitions=("time", "frequency"),
     )  # fmt: skip
     text = influence_table(table)
-    assert "<td>0.5<small>0.25</small></td>" in text
-    assert '<td class="column"><b>−2</b><small>−1</small></td>' in text
-    assert '<td class="column"><b>1</b><small>0.5</small></td>' in text
+    assert "<td>+0.50<small>+0.25</small></td>" in text
+    assert '<td class="column"><b>−2.00</b><small>−1.00</small></td>' in text
+    assert '<td class="column"><b>+1.00</b><small>+0.50</small></td>' in text
     # R = (initial - final)/initial: a growth of 10 % is -0.1.
     assert "(+10 %)" in text
     assert "(-15 %)" in text
