@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from chladni.io.atomic import atomic_write
 from chladni.io.toml_reader import read_toml
 from chladni.models.core.model import Model
@@ -45,20 +47,9 @@ def load_model(path: Path | str) -> Model:
     {'mass.mass': 2.0, 'spring.stiffness': 1200000.0, 'spring.damping': 0.0}
     """
     path = Path(path)
-    match _kind(path):
-        case "drive":
-            from chladni.models.files.drive_file import read_drive
-
-            return read_drive(path)
-        case "scheme":
-            from chladni.models.files.scheme_file import read_scheme_file
-
-            return read_scheme_file(path)
-        case _:
-            # Without a kind, too: the reader of structures tells that it's missing, and all else with it.
-            from chladni.models.files.structure_file import read_structure
-
-            return read_structure(path)
+    # Numbers far outside of physics overflow in the equations. What comes of it isn't finite, and that is told.
+    with np.errstate(all="ignore"):
+        return _read(path)
 
 
 def write_model(model: Model, path: Path | str, *, overwrite: bool = True) -> None:
@@ -77,6 +68,24 @@ def write_model(model: Model, path: Path | str, *, overwrite: bool = True) -> No
         file.write(text.encode())
 
 
+def _read(path: Path) -> Model:
+    """Give the model; the rooms of the other kinds stay unloaded."""
+    match _kind(path):
+        case "drive":
+            from chladni.models.files.drive_file import read_drive
+
+            return read_drive(path)
+        case "scheme":
+            from chladni.models.files.scheme_file import read_scheme_file
+
+            return read_scheme_file(path)
+        case _:
+            # Without a kind, too: the reader of structures tells that it's missing, and all else with it.
+            from chladni.models.files.structure_file import read_structure
+
+            return read_structure(path)
+
+
 def _kind(path: Path) -> object:
     from chladni.models.files.model_tables import AnyFile
 
@@ -84,7 +93,7 @@ def _kind(path: Path) -> object:
 
 
 def _content(model: Model) -> Mapping[str, Entry]:
-    """Tables of the file, by the kind of model; the rooms of the other kinds stay unloaded."""
+    """Tables of the file, by the kind of model."""
     match model.kind:
         case "structure":
             from chladni.models.files.structure_text import structure_content

@@ -209,7 +209,7 @@ class _StructureReading:
             table = self._file.content[mistake.part][place]
             key = "joint" if mistake.key == "at" and "joint" in table else mistake.key
             # What is missing altogether is the schema's to tell; what can't be read is told where it stands.
-            if (key in table or key == "at") and table.get(key) not in unread:
+            if (key in table or key == "at") and self._file.text(table, key) not in unread:
                 self._mistakes.add((mistake.part, place, key), mistake.text)
 
     def _controller(self, place: int, table: Content) -> Controller | None:

@@ -142,10 +142,12 @@ class StructureModel:
         ModelError
             When an effect doesn't fit its site or a loop has no solution.
         """
-        compiled = self._attached(self._attached(self._open_loop(), "structure"), "output")
-        for controller in self.controllers:
-            compiled = close_loop(compiled, controller, self._disturbances(controller))
-        return self._attached(compiled, "input")
+        # Numbers far outside of physics overflow; that what comes of it isn't finite is an error of its own.
+        with np.errstate(over="ignore", invalid="ignore"):
+            compiled = self._attached(self._attached(self._open_loop(), "structure"), "output")
+            for controller in self.controllers:
+                compiled = close_loop(compiled, controller, self._disturbances(controller))
+            return self._attached(compiled, "input")
 
     def poles(self, loop: Loop = "closed") -> NDArray[np.complex128]:
         """Eigenvalues in rad/s of the linear equations, those of slowest decay first; `loop` open: no controller."""
