@@ -1,7 +1,7 @@
 """The instrument of the magnetorheological damper: its loops over current (figure 8)."""
 
 from collections.abc import Mapping
-from math import pi
+from math import ceil, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +12,16 @@ from chladni.models.core.model import Model
 from chladni.models.core.reading import Chart, Curve
 from chladni.models.drives.drive_model import DriveModel
 from chladni.models.drives.mr_damper import MR_DAMPER
+from chladni.models.drives.mr_shipped import MEASURED_STROKE_M
 from chladni.models.instruments.drive_pages import drive_at
 
 Matrix = NDArray[np.float64]
 #: Currents whose loops are laid beside that of the knob, A.
 _BESIDE = (0.0, 0.25, 0.5, 0.75, 1.0)
-_PERIODS, _SAMPLES = 3, 400
+# After one period from rest the loop has closed to a hundredth of its height.
+_PERIODS, _SAMPLES = 2, 200
+#: Steps a sample up to the measured stroke; the law is the stiffer the further the rod goes in one.
+_STEPS, _MOST_STEPS = 4, 400
 
 
 def _build(values: Mapping[str, float], options: Mapping[str, str]) -> DriveModel:
@@ -25,7 +29,7 @@ def _build(values: Mapping[str, float], options: Mapping[str, str]) -> DriveMode
 
 
 def loop_charts(model: Model) -> tuple[Chart, ...]:
-    """Loops of the last of three periods of a sinus from rest, and what they dissipate, over current.
+    """Loops of the second period of a sinus from rest, and what they dissipate, over current.
 
     The equivalent damping is that of the viscous damper which dissipates as much:
     ``c = W/(pi omega X^2)`` for the energy W of a period (Inman, Engineering Vibration, section 2.7).
@@ -65,7 +69,8 @@ def _loop(compiled: CompiledModel, amplitude: float, omega: float) -> tuple[Matr
 
     times_s = np.linspace(0.0, _PERIODS * 2.0 * pi / omega, _PERIODS * _SAMPLES + 1)
     x, v = amplitude * np.sin(omega * times_s), amplitude * omega * np.cos(omega * times_s)
-    force = np.sum([force_along_motion(law, x, v, times_s) for law in compiled.laws], axis=0)
+    steps = min(_MOST_STEPS, ceil(_STEPS * max(1.0, amplitude / MEASURED_STROKE_M)))
+    force = np.sum([force_along_motion(law, x, v, times_s, substeps=steps) for law in compiled.laws], axis=0)
     last = slice(-_SAMPLES - 1, None)
     return x[last], v[last], force[last]
 

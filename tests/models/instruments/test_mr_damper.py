@@ -40,6 +40,12 @@ def test_equivalent_damping_is_the_energy_of_a_period():
     assert np.all(np.diff(damping.y) > 0)
 
 
+def test_a_stroke_far_beyond_the_measured_still_gives_a_loop():
+    for stroke in (0.2, 1.0):
+        loops = charts({"stroke": stroke}, {"law": "asymmetric"})["loop.displacement"].curves
+        assert all(np.all(np.isfinite(curve.y)) for curve in loops)
+
+
 def test_a_current_outside_of_the_measured_is_flagged():
     flags = read_instrument(INSTRUMENT, {"current": 1.2}).flags
     assert any("current" in flag for flag in flags)
