@@ -58,7 +58,8 @@ def _all_pass(v: Values) -> TransferFunction:
 
 def pair(time_constant_s: float, damping_ratio: float) -> tuple[float, float, float]:
     """Coefficients of T^2 s^2 + 2 zeta T s + 1."""
-    return time_constant_s**2, 2 * damping_ratio * time_constant_s, 1.0
+    # A product overflows to infinity, which is refused in words; a power would raise.
+    return time_constant_s * time_constant_s, 2 * damping_ratio * time_constant_s, 1.0
 
 
 def pair_at(frequency_hz: float, damping_ratio: float) -> tuple[float, float, float]:

@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, Self
 
+import numpy as np
+
 from chladni.models.core.parameter import Parameters
 from chladni.models.elements.transfer_function import TransferFunction
 
@@ -60,8 +62,10 @@ class Element:
 
     @property
     def transfer(self) -> TransferFunction:
-        """Its transfer function."""
-        return self.kind.transfer(self.parameters.numbers())
+        """Its transfer function; `ModelError` when its coefficients are too large for floating point numbers."""
+        # What overflows becomes infinite, and a transfer function refuses that in words.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self.kind.transfer(self.parameters.numbers())
 
     def with_values(self, values: Values) -> Self:
         """Give the element with some values replaced; `ModelError` for an unknown name or impossible value."""

@@ -40,7 +40,23 @@ def realize(transfer: TransferFunction) -> Realization:
 
     s is counted in units of the geometric mean of the poles, which keeps the entries of one size whatever the time
     constants are (Kailath, Linear Systems, 1980, section 2.1, after scaling).
+
+    Raises
+    ------
+    ModelError
+        When the coefficients lie so far apart that the form's entries overflow.
     """
+    with np.errstate(all="ignore"):
+        form = _companion(transfer)
+    if not all(np.all(np.isfinite(part)) for part in (form.a, form.b, form.c, form.q)):
+        raise ModelError(
+            "the coefficients of a transfer function lie too far apart for floating point numbers: "
+            f"num {list(transfer.num)!r:.100}, den {list(transfer.den)!r:.100}"
+        )
+    return form
+
+
+def _companion(transfer: TransferFunction) -> Realization:
     quotient, rest = transfer.polynomial_and_rest()
     order = transfer.order
     ascending = np.asarray(transfer.den)[::-1]

@@ -14,6 +14,7 @@ from chladni.models.schemes.equations import SchemeEquations, delay_of, solved_e
 from chladni.models.schemes.points import Point, points_of
 from chladni.models.schemes.scheme_output import SchemeOutput
 from chladni.models.schemes.wiring import Wiring, wired
+from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
 
 Matrix = NDArray[np.float64]
@@ -75,6 +76,18 @@ def compiled_scheme(
     ModelError
         When the signals of a loop are not determined.
     """
+    # What overflows is found where it's used, and told in words.
+    with np.errstate(all="ignore"):
+        return _compiled(blocks, inputs, outputs, sites, filter_time_s)
+
+
+def _compiled(
+    blocks: Sequence[Block],
+    inputs: Sequence[Terminal],
+    outputs: Sequence[SchemeOutput],
+    sites: frozenset[str],
+    filter_time_s: float,
+) -> CompiledModel:
     wiring = wired(blocks, inputs)
     places = _places(blocks)
     equations, columns = _closed(blocks, wiring, places)
@@ -215,5 +228,7 @@ def _balanced(a: Matrix, b: Matrix, c: Matrix) -> tuple[Matrix, Matrix, Matrix]:
 
     if not a.size:
         return a, b, c
+    if not np.all(np.isfinite(a)):
+        raise ModelError("gains and time constants lie too far apart for floating point numbers")
     balanced, (scale, _) = matrix_balance(a, permute=False, separate=True)
     return np.asarray(balanced), b / scale[:, None], c * scale

@@ -252,4 +252,6 @@ def _units(matrix: Matrix) -> tuple[Matrix, Matrix]:
         scaled = np.abs(row[:, None] * matrix * column)
         for units, largest in ((row, scaled.max(axis=1, initial=0.0)), (column, scaled.max(axis=0, initial=0.0))):
             units /= np.sqrt(np.where(largest > 0, largest, 1.0))
+    if not np.all(np.isfinite(row[:, None] * matrix * column)):
+        raise ModelError("gains and time constants lie too far apart for floating point numbers")
     return row, column

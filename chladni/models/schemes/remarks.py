@@ -1,15 +1,14 @@
 """What a user should know about a scheme before trusting its signals."""
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from chladni.models.core.port import Terminal
 from chladni.models.schemes.block import Block
-from chladni.models.schemes.equations import solved_equations
-from chladni.models.schemes.points import points_of
+from chladni.models.schemes.compilation import compiled_scheme
 from chladni.models.schemes.scheme_output import SchemeOutput
-from chladni.models.schemes.wiring import wired
 
 
 def scheme_remarks(
@@ -49,18 +48,21 @@ def _unconnected(
 def _filtered(
     blocks: Sequence[Block], inputs: Sequence[Terminal], outputs: Sequence[SchemeOutput], filter_time_s: float
 ) -> Iterator[str]:
-    wiring = wired(blocks, inputs)
-    powers = solved_equations(blocks, wiring.blocks, wiring.inputs).d[1:]
-    behind = np.asarray(powers.any(axis=0))
-    before = np.asarray((wiring.blocks @ powers).any(axis=0))
-    for column, terminal in enumerate(inputs):
-        named = [
-            point.terminal.name
-            for point in points_of(blocks, outputs)
-            if (before if point.before else behind)[point.block, column]
-        ]
-        if named:
+    compiled = compiled_scheme(blocks, inputs, outputs, sites=frozenset(), filter_time_s=filter_time_s)
+    names = np.array([terminal.name for terminal in compiled.outputs])
+    touched: dict[str, set[str]] = defaultdict(set)
+    for ideal in compiled.derivatives:
+        source = compiled.ports[ideal.port].name.rpartition(".")[0]
+        touched[source] |= set(names[compiled.h[:, ideal.port] != 0])
+    for source, found in touched.items():
+        if source in {terminal.name for terminal in inputs}:
+            told = ", ".join(name for name in names if name in found)
             yield (
-                f"{', '.join(named)}: a step of {terminal.name} comes through as an impulse; in time it is computed "
+                f"{told}: a step of {source} comes through as an impulse; in time it is computed "
                 f"through a lag of {filter_time_s:g} s, in frequency it is exact"
+            )
+        else:
+            yield (
+                f"what {source.removesuffix('.delay')} delays is differentiated behind it; "
+                f"in time through a lag of {filter_time_s:g} s, which acts in its loops too"
             )

@@ -44,7 +44,10 @@ def structural_inverse(matrix: Matrix) -> Matrix:
     while not np.array_equal(links, reached):
         reached = links
         links = (reached.astype(np.float32) @ reached.astype(np.float32)) > 0
-    inverse = np.linalg.inv(matrix[row])
+    try:
+        inverse = np.linalg.inv(matrix[row])
+    except np.linalg.LinAlgError:
+        raise ModelError("the equations do not determine every signal") from None
     back = np.empty_like(row)
     back[row] = np.arange(count)
     return np.asarray(np.where(reached, inverse, 0.0)[:, back], dtype=np.float64)

@@ -1,3 +1,5 @@
+import copy
+import pickle
 from math import factorial
 
 import control
@@ -214,6 +216,28 @@ def test_dead_time_in_a_loop_is_exact_in_frequency() -> None:
     g = 0.8 / S / (1 + 0.3 * S)
     np.testing.assert_allclose(at(model, "plant"), g / (1 + g * np.exp(-0.4 * S)), rtol=1e-9)
     np.testing.assert_allclose(at(model, "late"), g * np.exp(-0.4 * S) / (1 + g * np.exp(-0.4 * S)), rtol=1e-9)
+
+
+def test_a_derivative_of_what_is_delayed_is_told() -> None:
+    model = scheme(
+        element_block("late", "dead-time", "+lag", delay=0.2),
+        element_block("lag", "pt1", "+r", "-ahead", time_constant=0.3),
+        element_block("ahead", "pd2", "late", gain=0.5, time_constant=0.1, damping_ratio=0.5),
+    )
+    p, late = 0.5 * (0.01 * S**2 + 0.1 * S + 1), np.exp(-0.2 * S)
+    np.testing.assert_allclose(at(model, "lag"), 1 / (1 + 0.3 * S + p * late), rtol=1e-9)
+    assert model.remarks()[-1].startswith(
+        "what late delays is differentiated behind it; in time through a lag of 0.001 s"
+    )
+
+
+def test_a_dead_time_does_not_determine_a_loop_of_gain_one() -> None:
+    model = scheme(element_block("echo", "p", "+r", "+late"), element_block("late", "dead-time", "echo", delay=0.1))
+    with pytest.raises(ModelError, match=r"the loop of echo -> late has gain one.*a dead time alone is not enough"):
+        model.compile()
+    # In frequency nothing is wrong with it.
+    found = model.frequency_response(np.array([3.0]))[0, 0, 0]
+    np.testing.assert_allclose(found, 1 / (1 - np.exp(-0.6j * np.pi)), rtol=1e-12)
 
 
 def test_dead_time_in_a_loop_follows_the_method_of_steps() -> None:
@@ -433,3 +457,10 @@ def test_a_named_block_is_found_or_its_neighbour_named() -> None:
     assert loop().block("plant").unit == "1"
     with pytest.raises(ModelError, match="block 'plan' is unknown; did you mean plant"):
         loop().block("plan")
+
+
+def test_schemes_travel_between_processes() -> None:
+    again = copy.deepcopy(loop())
+    assert pickle.dumps(again)
+    np.testing.assert_array_equal(again.frequency_response(FREQUENCY_HZ), loop().frequency_response(FREQUENCY_HZ))
+    assert again == loop()
