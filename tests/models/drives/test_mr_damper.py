@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chladni.io.log import open_log
 from chladni.models.core.port import Port
 from chladni.models.drives.catalogue import DRIVES
 from chladni.models.drives.drive_model import drive_model
@@ -10,6 +11,7 @@ from chladni.models.drives.known_motion import force_along_motion
 from chladni.models.drives.mr_damper import MR_DAMPER, mr_damper_at, mr_damper_kind
 from chladni.models.drives.mr_shipped import MEASURED_DAMPER, MEASURED_DAMPER_ASYMMETRIC
 from chladni.models.drives.pneumatic_motor import PNEUMATIC_MOTOR
+from chladni.models.files.model_file import load_model
 from chladni.models.integrator.simulate import simulate
 from chladni.signals.channel import Channel
 from chladni.signals.errors import ModelError
@@ -113,3 +115,34 @@ def test_where_it_cannot_act_is_told():
         mr_damper_at("piston", current_a=2.0)
     with pytest.raises(ModelError, match="size 0 is not possible"):
         mr_damper_at("piston", size=0.0)
+
+
+@pytest.mark.parametrize(("coefficients", "limit"), [(MEASURED_DAMPER, 7.0), (MEASURED_DAMPER_ASYMMETRIC, 4.6)])
+def test_a_structure_with_the_damper_follows_a_log_that_a_viscous_damper_misses(shared_data, coefficients, limit):
+    """The model file takes it for a viscous damper; the log's stroke moves the rod."""
+    with open_log(shared_data / "mr_0.5A.mcap") as log:
+        measured = log.read(["/damper.position[0]", "/damper.effort[0]"])
+    viscous = load_model(shared_data / "models" / "mr_damper.toml")
+    damped = viscous.with_values({"damper.stiffness": 0.0, "damper.damping": 0.0}).with_effects(
+        [mr_damper_at("damper", current_a=0.5, coefficients=coefficients)]
+    )
+    force = measured.values[1]
+    errors = []
+    for model in (viscous, damped):
+        simulated = simulate(model, measured.select(["/damper.position[0]"])).outputs.values[0]
+        errors.append(100 * np.sqrt(np.mean((simulated - force) ** 2) / np.mean(force**2)))
+    assert errors[1] < limit
+    assert errors[0] > 4 * errors[1]
+
+
+def test_the_drive_is_loaded_from_a_model_file(tmp_path):
+    path = tmp_path / "damper.toml"
+    path.write_text(
+        'format = "chladni.model/1"\nname = "press"\nkind = "drive"\ndrive = "mr-damper"\n'
+        '[parameters]\ncurrent = "500 mA"\n'
+        '[[input]]\nname = "stroke"\nsignal = "displacement"\nchannel = "/damper.position[0]"\n'
+        '[[output]]\nname = "force"\nsignal = "force"\nchannel = "/damper.effort[0]"\n'
+    )
+    compiled = load_model(path).compile()
+    assert compiled.laws[0].parameters == MEASURED_DAMPER.law(0.5).parameters
+    assert (compiled.inputs[0].channel, compiled.outputs[0].channel) == ("/damper.position[0]", "/damper.effort[0]")
