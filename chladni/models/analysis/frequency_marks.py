@@ -58,8 +58,7 @@ class FrequencyMarks:
 
     def response(self, omega: float) -> complex:
         """Give the response at one angular frequency in rad/s, dead time included."""
-        value = self._resolvent(np.array([omega]))[0]
-        return complex(value * np.exp(-1j * omega * self._dead_time_s))
+        return self._resolvent.value(omega) * complex(np.exp(-1j * omega * self._dead_time_s))
 
     def phase_crossings(self, level_deg: float, *, falling_only: bool = False) -> list[float]:
         """Give angular frequencies at which the unwrapped phase passes a level."""

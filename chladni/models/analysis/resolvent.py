@@ -54,6 +54,15 @@ class Resolvent:
             solved[row] = (self._entry[row] + coupled) / (s - self._diagonal[row])
         return np.asarray(self._exit @ solved + self._path.d[0], dtype=np.complex128)
 
+    def value(self, omega: float) -> complex:
+        """Give H at one angular frequency, without the dead time outside of loops."""
+        path = self._path
+        if path.exact is not None:
+            return complex(self(np.array([omega]))[0])
+        # For one frequency a solution is quicker than a back substitution in Python.
+        solved = np.linalg.solve(1j * omega * np.eye(path.b.size) - path.a, path.b)
+        return complex(path.c[0] @ solved + path.d[0])
+
     def value_and_slope(self, omega: float) -> tuple[complex, complex]:
         """Give H and dH/d omega at one angular frequency, without the dead time outside of loops."""
         if self._path.exact is not None:

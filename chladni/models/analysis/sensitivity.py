@@ -87,7 +87,8 @@ class _StepDerivatives:
         """Give the logarithmic derivatives of all that exist; times begin `dead_time_s` before the response."""
         marks, found, delayed = self._marks, {}, self._moved.dead_time_s
         for name, at in (("answer_time", marks.answer), ("peak_time", marks.top)):
-            if at is not None:
+            # What happens at the step itself has no time that could change.
+            if at:
                 found[name] = (self._time(at, 1, 0.0) + delayed) / (at + dead_time_s)
         if marks.fastest is not None:
             found |= self._acceleration(marks.fastest, dead_time_s)

@@ -111,7 +111,17 @@ def rich_model() -> FunctionModel:
     )
 
 
-@pytest.mark.parametrize("model", [rich_model(), oscillator(damping=0.04), oscillator(damping=3.0)])
+def lead() -> FunctionModel:
+    """``(a s + 1)/(b s + 1)``: the greatest value is at the step itself."""
+
+    def equations(values) -> CompiledModel:
+        a, b = values["a"], values["b"]
+        return compiled(state_space([[-1 / b]], [1.0], [(1 - a / b) / b], a / b, input_unit="1", output_unit="1"))
+
+    return FunctionModel(parameters=Parameters((parameter("a", 2.0), parameter("b", 0.5))), equations=equations)
+
+
+@pytest.mark.parametrize("model", [rich_model(), oscillator(damping=0.04), oscillator(damping=3.0), lead()])
 def test_every_log_derivative_agrees_with_differences_of_the_behaviour(model: FunctionModel) -> None:
     table = influence(model)
 
@@ -222,3 +232,22 @@ def test_derivatives_are_exact_for_products_and_quotients(limits: dict[str, floa
     assert found[3] == 0.0
     stuck = relative_derivative(lambda p: np.array([p]), parameter("p", 2.0, minimum=2.0, maximum=2.0))
     assert stuck.tolist() == [0.0]
+
+
+def test_an_error_that_stays_falls_with_the_gain() -> None:
+    # 1/(1 + k): d ln/d ln k = -k/(1 + k).
+    def equations(values) -> CompiledModel:
+        return compiled(state_space([[-1 - values["g"]]], [values["g"]], [1.0], input_unit="m"))
+
+    model = FunctionModel(parameters=Parameters((parameter("g", 4.0),)), equations=equations)
+    table = influence(model, behaviour_names=("steady_state_error", "final_value"))
+    np.testing.assert_allclose(table.log_derivative, [[-0.8, 0.2]], rtol=1e-11)
+
+
+def test_an_integrating_output_is_followed_through_its_rate() -> None:
+    table = influence(
+        INSTRUMENT, parameters=CONSTRUCTION[:3], behaviour_names=PAPER_BEHAVIOUR, to_output="displacement"
+    )
+    expected = influence(INSTRUMENT, parameters=CONSTRUCTION[:3], behaviour_names=PAPER_BEHAVIOUR)
+    np.testing.assert_allclose(table.nominal, expected.nominal, rtol=1e-11)
+    np.testing.assert_allclose(table.log_derivative, expected.log_derivative, rtol=1e-9, atol=1e-11)

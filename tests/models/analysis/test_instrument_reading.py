@@ -199,7 +199,7 @@ def test_variants_are_checked() -> None:
         (Variant(name="a", values={"q": 2.0}), "no parameter"),
         (Variant(name="a", values={"m": -2.0}), "not possible"),
         (Variant(name="a", options={"load": "maybe"}), "there are: off, on"),
-        (Variant(name="a", options={"lod": "on"}), "there are: load"),
+        (Variant(name="a", options={"lead": "on"}), "there are: load"),
     ):
         with pytest.raises(ModelError, match=said):
             require_possible(variant, parameters, options)

@@ -90,7 +90,7 @@ def test_a_quantity_that_doesn_t_exist_says_so() -> None:
 
 
 def test_the_same_seed_gives_the_same_values() -> None:
-    first, second = (optimise(oscillator(), ["c", "m"], overshoot_at_most(10.0), seed=3) for _ in range(2))
+    first, second = (optimise(oscillator(), ["c", "m"], damping_ratio_at_least(0.5), seed=3) for _ in range(2))
     assert first.values == second.values
 
 
@@ -204,3 +204,14 @@ def test_wrong_dampers_are_refused() -> None:
         place_damper(chain(), least_answer_time(), [viscous], joints=["wrist"])
     with pytest.raises(ModelError, match="nothing to try"):
         place_damper(oscillator(), least_answer_time(), [viscous])
+
+
+def test_values_that_make_no_model_are_passed_over() -> None:
+    def equations(values) -> CompiledModel:
+        if values["m"] < 1:
+            raise ModelError("too light")
+        return oscillator().equations({**values, "c": 0.4, "k": 4.0})
+
+    model = FunctionModel(parameters=Parameters((parameter("m", 2.0),)), equations=equations)
+    best = optimise(model, ["m"], first_resonance_up(), bounds={"m": (0.5, 4.0)})
+    assert best.values["m"] == pytest.approx(1.0, abs=1e-3)

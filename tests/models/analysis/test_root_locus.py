@@ -108,3 +108,8 @@ def test_precision_costs_stability() -> None:
 def test_three_integrators_are_outside_of_the_field() -> None:
     with pytest.raises(ModelError, match="two at most"):
         precision_stability(linear_path(state_space(np.diag([1.0, 1.0], k=1), [0, 0, 1], [1, 0, 0])))
+
+
+def test_a_direct_way_beside_an_integrator_counts_for_nothing_in_the_limit() -> None:
+    # The paper's regulator, 0.9 (9.9 s + 1)/(3 s): K_v = 0.3.
+    assert error_constant(linear_path(of_control(0.9 * (9.9 * S + 1) / (3 * S)))) == pytest.approx(0.3, rel=1e-12)

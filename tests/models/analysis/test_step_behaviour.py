@@ -135,3 +135,8 @@ def test_a_light_damping_is_followed_until_it_settles() -> None:
     found = number(told(pt2(1.0, zeta))["settling_time"])
     # The envelope reaches 2 % at ln(50)/zeta; the last swing out of it is at most half a period before.
     assert np.log(50) / zeta - np.pi <= found <= np.log(50) / zeta + 1
+
+
+def test_what_integrates_and_is_reached_directly_has_no_reading() -> None:
+    found = told(state_space([[0.0]], [1.0], [1.0], 2.0))
+    assert "it integrates and is reached directly" in found["answer_time"].definition
