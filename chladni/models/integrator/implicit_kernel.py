@@ -69,11 +69,13 @@ def implicit_step(
     for stage in range(STAGES):
         for channel in range(channels):
             newton.value[stage, channel] = ports.channels[0, channel]
-    size = _first_residual(tables, ports, stride, newton, level, t, step_s)
+    _first_residual(tables, ports, stride, newton, level, t, step_s)
     for _ in range(_ITERATIONS):
         _linearise(tables, ports, stride, newton, level, t, step_s)
         if not solve_in_place(newton.matrix, newton.residual, newton.change):
             return False
+        _scale_silent(newton)
+        size = _residual_size(newton)
         largest = 0.0
         for place in range(STAGES * channels):
             scale = newton.channel_scale[1, place % channels] + 1e-300
@@ -92,9 +94,20 @@ def implicit_step(
 
 
 @part_code
+def _scale_silent(newton: Newton) -> None:
+    """A channel without any scale (a law state at rest, whose force is 0) takes that of its first correction."""
+    channels = newton.channel_scale.shape[1]
+    for channel in range(channels):
+        if newton.channel_scale[1, channel] == 0.0:
+            for stage in range(STAGES):
+                size = abs(newton.change[stage * channels + channel])
+                newton.channel_scale[1, channel] = max(newton.channel_scale[1, channel], size)
+
+
+@part_code
 def _first_residual(
     tables: SchemeTables, ports: Ports, stride: Stride, newton: Newton, level: int, t: float, step_s: float
-) -> float:
+) -> None:
     """Residual of the first guess, whose forces count for the scale of this step only: they may be far off."""
     channels = ports.channels.shape[1]
     for channel in range(channels):
@@ -103,7 +116,6 @@ def _first_residual(
     for place in range(STAGES * channels):
         found = abs(newton.residual[place] + newton.value[place // channels, place % channels])
         newton.channel_scale[1, place % channels] = max(newton.channel_scale[1, place % channels], found)
-    return _residual_size(newton)
 
 
 @part_code

@@ -94,6 +94,9 @@ def explicit_error(judge: Judge, ports: Ports, level: int, previous: int) -> flo
         error = abs(q[4, channel] - q[3, channel]) / 6
         if previous >= 0:
             error += _curvature_error(judge, q, channel, level - previous + DEEPEST)
+        else:
+            # Without a step before, a bend can't be told from a curve.
+            error += abs(q[0, channel] - q[1, channel] - q[2, channel] + q[4, channel]) / 6
         total += judge.weight[channel] * error
     return total
 

@@ -35,7 +35,7 @@ from chladni.models.integrator.march import (
     record,
 )  # fmt: skip
 from chladni.models.integrator.port_kernel import Ports, port_forces
-from chladni.models.integrator.radau import NODES
+from chladni.models.integrator.radau import LAGRANGE, NODES
 from chladni.models.integrator.step_tables import DEEPEST, DenseTables, SchemeTables
 
 Matrix = NDArray[np.float64]
@@ -70,7 +70,7 @@ def march_all(
             accept(ports, stride, judge)
             move_on(cursor, error, judge.tolerance)
             if hard:
-                cursor[PREVIOUS] = -1
+                _keep_middle(judge, ports)
                 cursor[HARD] = 0 if scheme == AUTOMATIC and is_soft(newton) else 1
             _pass_jump(history, ports, stride, t + length_s, length_s)
         elif level == DEEPEST:
@@ -163,6 +163,17 @@ def _keep(
     for instant in range(dense.place.size):
         if cursor[POSITION] <= dense.place[instant] < cursor[POSITION] + (UNIT >> level):
             keep_outputs(tables, dense, ports, stride, history, level, instant, cursor[SAMPLE], t, length_s)
+
+
+@part_code
+def _keep_middle(judge: Judge, ports: Ports) -> None:
+    """Forces in the middle of an implicit step, for the error estimate of the next."""
+    for channel in range(ports.channels.shape[1]):
+        middle = 0.0
+        for stage in range(3):
+            share = LAGRANGE[0, stage] + 0.5 * LAGRANGE[1, stage] + 0.25 * LAGRANGE[2, stage]
+            middle += share * ports.channels[1 + stage, channel]
+        judge.before[1, channel] = middle
 
 
 @part_code
