@@ -12,11 +12,6 @@ from chladni.signals.errors import ModelError
 from chladni.signals.time_series import TimeSeries
 
 
-def named_model(text: str) -> Model:
-    """Give the model of a file, or of an instrument at its defaults; `ModelError` when `text` is neither."""
-    return named_instrument(text).model() if text in INSTRUMENTS else _of_file(text)
-
-
 def named_instrument(text: str) -> Instrument:
     """Give the instrument of this name, or one made of the model in a file; `ModelError` when `text` is neither."""
     return INSTRUMENTS[text] if text in INSTRUMENTS else instrument_of(_of_file(text))

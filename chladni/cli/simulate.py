@@ -38,7 +38,7 @@ def simulate(
     ] = None,
     level: Annotated[
         float | None,
-        typer.Option(metavar="X", help="RMS, amplitude, step or peak, in the input's unit; 1 if not given."),
+        typer.Option(metavar="X", help="RMS, amplitude, step or peak, in the input's unit; 1, or the instrument's."),
     ] = None,
     band: Annotated[
         tuple[float, float] | None,
@@ -67,11 +67,12 @@ def simulate(
     json: options.Json = None,
 ) -> None:
     """Simulate a model and write a log, with its truth beside it and in its metadata."""
-    from chladni.apps.model_sources import named_model, recording_for
+    from chladni.apps.model_sources import named_instrument, recording_for
     from chladni.apps.simulated_log import Drive, simulate_log, write_simulated_log
 
     to = Output(json)
-    chosen = with_settings(named_model(model), settings or ())
+    instrument = named_instrument(model)
+    chosen = with_settings(instrument.model(), settings or ())
     if effect:
         chosen = chosen.with_effects((*chosen.effects, *map(effect_of, effect)))
     recording = None
@@ -80,7 +81,13 @@ def simulate(
                  "--seconds": seconds, "--rate": rate})  # fmt: skip
         recording = recording_for(chosen, log)
     drive = Drive(
-        word=kind, level=1.0 if level is None else level, input_name=at, band_hz=band, seed=seed, noise=noise
+        word=kind,
+        # What is a step on the bench is a sensible size for any excitation of that input.
+        level=instrument.step_size if level is None else level,
+        input_name=at or instrument.step_input or None,
+        band_hz=band,
+        seed=seed,
+        noise=noise,
     )
     made = simulate_log(chosen, drive, seconds=seconds, rate_hz=rate, recording=recording)
     written, truth = write_simulated_log(made, out)
