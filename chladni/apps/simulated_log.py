@@ -32,6 +32,8 @@ RATE_OVER_HIGHEST = 20.0
 RUN_OVER_DECAY = 30.0
 SHORTEST_RUN_S, MOST_DEFAULT_SAMPLES = 10.0, 200_000
 SLOWEST_RATE_HZ, FASTEST_RATE_HZ = 10.0, 1e5
+# Of a model without states, such as a damper whose motion is prescribed.
+RATE_WITHOUT_POLES_HZ = 1000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,7 +163,8 @@ def default_run(compiled: CompiledModel, *, seconds: float | None = None, rate_h
     moving = poles[np.abs(poles) > 1e-9 * max(float(np.abs(poles).max(initial=0.0)), 1e-300)]
     if rate_hz is None:
         highest_hz = float(np.abs(moving).max(initial=0.0)) / (2 * pi)
-        rate_hz = min(max(_round_up(RATE_OVER_HIGHEST * highest_hz), SLOWEST_RATE_HZ), FASTEST_RATE_HZ)
+        wanted_hz = _round_up(RATE_OVER_HIGHEST * highest_hz) or RATE_WITHOUT_POLES_HZ
+        rate_hz = min(max(wanted_hz, SLOWEST_RATE_HZ), FASTEST_RATE_HZ)
     if seconds is None:
         decaying = -moving.real[moving.real < 0]
         longest_s = 1 / float(decaying.min()) if decaying.size else 0.0
