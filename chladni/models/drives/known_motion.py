@@ -56,6 +56,7 @@ def force_along_motion(
     if substeps < 1 or np.any(np.diff(t) <= 0):
         raise ModelError("known motion: times must rise and every interval needs a step")
     state = np.array(law.state, dtype=np.float64)
+    # The only memory: kernels allocate nothing.
     work = np.zeros((6, state.size))
     force = np.full(d.size, np.nan)
     numbers = np.array(law.parameters, dtype=np.float64)

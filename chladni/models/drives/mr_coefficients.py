@@ -111,6 +111,7 @@ class MrCoefficients:
                 raise ModelError(f"{name}: {len(polynomial)} coefficients; a polynomial in current has 1 to 4")
             _require_finite(polynomial, name)
         _require_finite((self.k1, self.x0, self.beta, self.gamma, self.delta, self.n), "coefficients")
+        # With delta <= 0 z would be pushed against the motion, and without beta + gamma nothing would end its growth.
         if not (self.delta > 0 and self.beta + self.gamma > 0 and self.n >= 1):
             raise ModelError(
                 f"delta {self.delta:g}, beta + gamma {self.beta + self.gamma:g}, n {self.n:g}: "
@@ -124,6 +125,7 @@ class MrCoefficients:
 
     def value(self, name: str, current_a: float) -> float:
         """One of alpha, c0, c1, k0 at a current."""
+        # Horner: no power of a current is taken.
         total = 0.0
         for coefficient in reversed(getattr(self, name)):
             total = total * current_a + coefficient
@@ -145,6 +147,7 @@ class MrCoefficients:
                     f"current: {name}({current_a:g} A) = {value:.4g} is not possible; the coefficients hold "
                     f"from {self.lowest_current_a:g} to {self.highest_current_a:g} A"
                 )
+        # Beside these the law needs to know where a trial has left the loop for good.
         shape = (self.k1, self.x0, self.beta, self.gamma, self.delta, self.n, _Z_MARGIN * self.z_bound)
         if self.asymmetry is None:
             return PortLaw(port=port, function=modified_bouc_wen, parameters=(*values, *shape), state=(0.0, 0.0))
@@ -156,6 +159,7 @@ class MrCoefficients:
 
         `alpha`, `c0` and `c1` change one property beside that.
         """
+        # Sides and moving are ratios; of the asymmetry only the stiffness is a force over a displacement.
         asymmetry = self.asymmetry
         if asymmetry is not None:
             asymmetry = replace(asymmetry, k1_sides=force * asymmetry.k1_sides)

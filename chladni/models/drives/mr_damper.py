@@ -96,6 +96,7 @@ class MrDamper:
             When there's no such joint, or the joint turns.
         """
         port = compiled.port_index(self.site, "joint")
+        # Metres read as radians would give a force of the wrong size without a word.
         if compiled.ports[port].displacement_unit != "m":
             raise ModelError(
                 f"mr_damper at {self.site!r}: the joint turns; the damper is made for a joint that slides"
@@ -132,6 +133,7 @@ def mr_damper_at(
     """
     if not size > 0:
         raise ModelError(f"mr_damper at {joint!r}: size {size:g} is not possible; give a positive number")
+    # Polynomials run away outside of what they were fitted to; a damper to be chosen must not live on that.
     low, high = coefficients.lowest_current_a, coefficients.highest_current_a
     if not low <= current_a <= high:
         raise ModelError(
@@ -139,6 +141,7 @@ def mr_damper_at(
             "fit coefficients at that current"
         )
     damper = MrDamper(site=joint, coefficients=coefficients.scaled(force=size), current=float(current_a))
+    # Asked once here, so that a negative polynomial is told where the damper is made.
     damper.coefficients.law(damper.current)
     return damper
 
@@ -197,6 +200,7 @@ def at_values(coefficients: MrCoefficients, values: Mapping[str, float]) -> MrCo
 
 def _press(coefficients: MrCoefficients, current_a: float) -> CompiledModel:
     """Rod moved as prescribed against the ground: no state but the law's, whose force is the output."""
+    # Columns of u: displacement, velocity, acceleration; d reads the first, s the second.
     none, row = np.zeros((0, 0)), np.array([[1.0, 0.0, 0.0]])
     return CompiledModel(
         a=none, b=np.zeros((0, 3)), c=np.zeros((1, 0)), d=np.zeros((1, 3)), g=np.zeros((0, 1)), h=np.ones((1, 1)),

@@ -113,8 +113,10 @@ def fit_mr_damper(
     """
     order = _order(records, order)
     layout = layout_of(records, order=order, asymmetry=asymmetry, lowest_k1=lowest_k1)
+    # The law is slow beside the rate of a log: half the samples tell as much in half the time.
     thinned = [record.thinned(rate_hz) for record in records]
     found = [_from_start(layout, thinned, start) for start in _starts(layout, thinned, starts, seed)]
+    # The lowest of several: nothing says that least squares of a hysteresis has one minimum.
     best = min(found, key=lambda each: each[1])[0]
     coefficients = layout.coefficients(best, origin)
     return MrFit(
@@ -157,6 +159,7 @@ def _order(records: Sequence[MrRecord], order: int | None) -> int:
             f"order {order}: {len(currents)} currents ({told} A) determine polynomials up to order {highest}; "
             "measure at more currents or lower the order"
         )
+    # Off the coil the damper is another device: everything that current adds is counted from there.
     if order > 0 and currents[0] != 0.0:
         raise EstimateError(f"currents {told} A: without a record at 0 A the constant of each polynomial is a guess")
     return order
@@ -177,6 +180,7 @@ def _from_start(layout: MrLayout, records: Sequence[MrRecord], start: Matrix) ->
     """Vector of least squares, and the pooled error there."""
     from scipy.optimize import least_squares
 
+    # Differences, not sensitivities: fixed steps make the force smooth in the vector.
     def residual(vector: Matrix) -> Matrix:
         coefficients = layout.coefficients(vector, "")
         return np.concatenate([_scaled_error(coefficients, record) for record in records])
@@ -193,5 +197,6 @@ def _from_start(layout: MrLayout, records: Sequence[MrRecord], start: Matrix) ->
 
 def _scaled_error(coefficients: MrCoefficients, record: MrRecord) -> Matrix:
     error = (mr_force(coefficients, record) - record.force) / record.rms_force
+    # Least squares needs finite numbers, large enough to turn back from.
     bounded = np.clip(np.nan_to_num(error, nan=_BEYOND), -_BEYOND, _BEYOND)
     return np.asarray(bounded / np.sqrt(error.size), dtype=np.float64)

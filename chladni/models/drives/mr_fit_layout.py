@@ -108,6 +108,7 @@ class MrLayout:
 
     def inside(self, vector: Matrix) -> Matrix:
         """Move numbers just inside of their bounds."""
+        # Trust-region reflective steps need a start off the bounds.
         slack = 1e-6 * (self.high - self.low)
         return np.asarray(np.clip(vector, self.low + slack, self.high - slack), dtype=np.float64)
 
@@ -121,6 +122,7 @@ class MrLayout:
     def coefficients(self, vector: Matrix, origin: str) -> MrCoefficients:
         """What the vector stands for."""
         count = self.order + 1
+        # Shape and asymmetry are one for all currents, so they are counted from the largest force.
         force, stiffness = max(self.force), max(self.force) / self.displacement
         levels = (1.0, 1.0 / self.velocity, 1.0 / self.velocity, 1.0 / self.displacement)
         polynomials = [
@@ -157,6 +159,7 @@ def layout_of(records: Sequence[MrRecord], *, order: int, asymmetry: bool, lowes
     """Lay out the fit of these records; all levels are multiples of what was measured."""
     currents = [record.current_a for record in records]
     highest = max(currents) if order else (max(currents) or 1.0)
+    # Two logs at one current: either level will do as the unit of a Bernstein coefficient.
     by_current = sorted((record.current_a, record.rms_force) for record in records)
     at = [highest * place / max(order, 1) for place in range(order + 1)]
     levels_at = [level for _, level in by_current]

@@ -57,6 +57,7 @@ class MrRecord(Value):
 
     def thinned(self, rate_hz: float) -> Self:
         """Give every k-th sample, so that no fewer than `rate_hz` a second are left."""
+        # Rates that are whole multiples but for rounding count as such.
         step = max(1, int(self.rate_hz / rate_hz + 1e-6))
         return type(self)(
             name=self.name,
@@ -96,6 +97,7 @@ def mr_record(
     EstimateError
         When a channel isn't there, a sample is missing, nothing moves, or force and velocity have opposite signs.
     """
+    # The velocity comes last, so that the rows of the others don't depend on it.
     names = [position, force, *([velocity] if velocity else [])]
     chosen = series.select(names)
     if not chosen.all_valid() or not np.all(np.isfinite(chosen.values)):
@@ -133,6 +135,7 @@ def _rate(x: Matrix, rate_hz: float) -> Matrix:
 def _require_damper(position: str, force: str, x: Matrix, v: Matrix, f: Matrix) -> None:
     if np.ptp(x) == 0.0 or np.ptp(f) == 0.0:
         raise EstimateError(f"{position}, {force}: nothing changes; a loop needs a motion and a force")
+    # A sign turned around would be fitted by a damper that gives power, and badly.
     power = float(np.mean(f * v))
     if power <= 0.0:
         raise EstimateError(

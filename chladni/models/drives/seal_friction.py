@@ -53,6 +53,7 @@ def seal_friction_force(pressure_pa: float, *, active_area: float | None = None)
             f"seal friction: {pressure_pa / 1e5:g} bar above ambient; it was measured from 1 to 7 bar and is given "
             "from 0 to 10 bar"
         )
+    # Contact width and pressure on the lip stay, so the force goes with the length of the seal.
     around = _longer(_AREA if active_area is None else active_area)
     return around * (_PRELOAD + _GRADIENT * pressure_pa), around * _STD
 
