@@ -17,6 +17,7 @@ MOST_POINTS = 3000
 #: Segments side by side in a stretch, seven with their overlap: lines finer than in a spectrum that is read for its
 #: levels, since here it's enough to see where two curves part.
 SEGMENTS = 4
+FEWEST_SAMPLES = 64
 MEASURED, SIMULATED = "measured", "simulated"
 
 Floats = NDArray[np.float64]
@@ -44,6 +45,8 @@ def comparison_charts(
         Why there is no spectrum or transfer function.
     """
     charts, words = list(_times(measured, simulated, start_s)), []
+    if measured.samples < FEWEST_SAMPLES:
+        return tuple(charts), (f"{measured.samples} samples are too few for a spectrum; take a longer stretch.",)
     for make in (_spectra, _transfers):
         try:
             charts += make(driving, measured, simulated)
