@@ -32,7 +32,8 @@ def seal_friction_force(pressure_pa: float, *, active_area: float | None = None)
     Parameters
     ----------
     pressure_pa
-        Above ambient. From 1 to 7 bar measured, refused outside of 0 to 10 bar.
+        Above ambient. Measured from 1 to 7 bar, where the standard deviation holds (beyond it's twice as large);
+        refused outside of 0 to 10 bar.
     active_area
         m^2, of another cylinder; the force then grows with the circumference of its piston, which is a guess: a seal
         of the same section, longer. None for the measured cylinder of 4.95 cm^2.
