@@ -83,11 +83,11 @@ class Element:
     def with_usual_value(self, name: str, value: float) -> Self:
         """Give the element with one value as its user states it: what is usual then reaches at least there.
 
-        The kind's range fits its default; around a value outside it goes a factor of five to both sides.
+        The kind's range fits its default; around a value outside it goes a decade to both sides.
         """
         found = self.parameters.require(name).with_value(value)
         if not found.usual:
-            low, high = sorted((value / 5, value * 5))
+            low, high = sorted((value / 10, value * 10))
             found = replace(found, low=max(low, found.minimum), high=min(high, found.maximum))
         declared = (found if item.name == name else item for item in self.parameters.values())
         return replace(self, parameters=Parameters(tuple(declared)))

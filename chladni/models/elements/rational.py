@@ -61,8 +61,8 @@ def _declared(name: str, coefficients: tuple[float, ...]) -> list[Parameter]:
 
 
 def _parameter(name: str, value: float, unit: str, minimum: float, meaning: str) -> Parameter:
-    """A number whose meaning isn't known has a usual range of a factor of five to both sides."""
-    low, high = sorted((value / 5, value * 5)) if value else (-1.0, 1.0)
+    """A number whose meaning isn't known has a usual range of a decade to both sides."""
+    low, high = sorted((value / 10, value * 10)) if value else (-1.0, 1.0)
     return Parameter(name=name, value=value, unit=unit, low=low, high=high, minimum=minimum, meaning=meaning)
 
 

@@ -106,7 +106,10 @@ def _gains(shared: Mapping[str, float]) -> dict[str, float]:
 
 def _build(values: Mapping[str, float], options: Mapping[str, str]) -> SchemeModel:
     numbers = {name: value for name, value in values.items() if name not in _SHARED}
-    scheme = robot_scheme(position_loop=options["position_loop"] == "on").with_values(numbers | _gains(values))
+    scheme = robot_scheme(position_loop=options["position_loop"] == "on").with_values(numbers)
+    # What follows from a knob within its range is usual, whatever one gain alone would be.
+    for name, gain in _gains(values).items():
+        scheme = scheme.with_usual_value(name, gain)
     return scheme.switched({block: options[name] == "on" for name, blocks in SWITCHES.items() for block in blocks})
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from chladni.models.core.port import Terminal
+from chladni.models.elements.element import Element
 from chladni.models.schemes.block import Block
 from chladni.models.schemes.compilation import compiled_scheme
 from chladni.models.schemes.scheme_output import SchemeOutput
@@ -48,6 +49,9 @@ def _unconnected(
 def _filtered(
     blocks: Sequence[Block], inputs: Sequence[Terminal], outputs: Sequence[SchemeOutput], filter_time_s: float
 ) -> Iterator[str]:
+    # Most schemes have no block that differentiates, and compiling takes milliseconds of each turn of a knob.
+    if not any(isinstance(block.acting, Element) and not block.acting.transfer.proper for block in blocks):
+        return
     compiled = compiled_scheme(blocks, inputs, outputs, sites=frozenset(), filter_time_s=filter_time_s)
     names = np.array([terminal.name for terminal in compiled.outputs])
     touched: dict[str, set[str]] = defaultdict(set)

@@ -14,6 +14,7 @@ from chladni.models.core.model import Effect, ModelKind
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import Simulation
+from chladni.models.elements.element import Element
 from chladni.models.schemes.block import Block
 from chladni.models.schemes.compilation import compiled_scheme
 from chladni.models.schemes.point_response import point_response
@@ -106,6 +107,20 @@ class SchemeModel:
         """Give the scheme with some parameters replaced; `ModelError` for an unknown name or impossible value."""
         by_block = self._by_block(values)
         return replace(self, blocks=tuple(block.with_values(by_block.get(block.name, {})) for block in self.blocks))
+
+    def with_usual_value(self, name: str, value: float) -> Self:
+        """Give the scheme with one parameter replaced, whose usual range then reaches at least to its value."""
+        self.parameters.require(name)
+        block, _, parameter = name.partition(".")
+        return replace(
+            self,
+            blocks=tuple(
+                replace(one, content=one.content.with_usual_value(parameter, value))
+                if one.name == block and isinstance(one.content, Element)
+                else one
+                for one in self.blocks
+            ),
+        )
 
     def with_tolerances(self, tolerances: Mapping[str, float]) -> Self:
         """Give the scheme with some parameters believed more or less: one sigma over the value, by parameter."""

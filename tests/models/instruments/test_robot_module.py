@@ -129,6 +129,12 @@ def test_the_position_loop_follows_an_angle() -> None:
     assert model.inputs[0].unit == "rad"
 
 
+def test_every_knob_at_its_end_is_usual_for_the_blocks_too() -> None:
+    for name in ("gear_ratio", "torque_constant", "tachometer_constant"):
+        for end in (INSTRUMENT.parameters[name].low, INSTRUMENT.parameters[name].high):
+            assert not INSTRUMENT.model({name: end}).parameters.unusual()
+
+
 def test_every_switch_switches_its_blocks() -> None:
     for option, blocks in SWITCHES.items():
         for word in ("on", "off"):
