@@ -25,6 +25,7 @@ _ITERATIONS = 30
 _HALVINGS = 12
 # Newton ends when its last correction, which the next would square, is this small beside the forces.
 _CLOSE = 1e-9
+_UNFELT = 1e-4
 
 
 class Newton(NamedTuple):
@@ -59,8 +60,9 @@ class Newton(NamedTuple):
 
 @part_code
 def implicit_step(
-    tables: SchemeTables, ports: Ports, stride: Stride, newton: Newton, level: int, t: float, step_s: float
-) -> bool:
+    tables: SchemeTables, ports: Ports, stride: Stride, newton: Newton, judge: Judge,
+    level: int, t: float, step_s: float,
+) -> bool:  # fmt: skip
     """Step from ``channels[0]`` to ``channels[4]``; the stages are in ``channels[1:4]``. False without a solution."""
     n = tables.gain.shape[3]
     advance_linear(tables.advance, level, stride.here, stride.inputs, stride.lines)
@@ -69,7 +71,7 @@ def implicit_step(
     for stage in range(STAGES):
         for channel in range(channels):
             newton.value[stage, channel] = ports.channels[0, channel]
-    _first_residual(tables, ports, stride, newton, level, t, step_s)
+    _first_residual(tables, ports, stride, newton, judge, level, t, step_s)
     for _ in range(_ITERATIONS):
         _linearise(tables, ports, stride, newton, level, t, step_s)
         if not solve_in_place(newton.matrix, newton.residual, newton.change):
@@ -106,12 +108,17 @@ def _scale_silent(newton: Newton) -> None:
 
 @part_code
 def _first_residual(
-    tables: SchemeTables, ports: Ports, stride: Stride, newton: Newton, level: int, t: float, step_s: float
-) -> None:
+    tables: SchemeTables, ports: Ports, stride: Stride, newton: Newton, judge: Judge,
+    level: int, t: float, step_s: float,
+) -> None:  # fmt: skip
     """Residual of the first guess, whose forces count for the scale of this step only: they may be far off."""
     channels = ports.channels.shape[1]
     for channel in range(channels):
-        newton.channel_scale[1, channel] = max(newton.channel_scale[0, channel], abs(ports.channels[0, channel]))
+        scale = max(newton.channel_scale[0, channel], abs(ports.channels[0, channel]))
+        # A force that moves no state by a share of the tolerance worth naming need not be found more closely.
+        if judge.weight[channel] > 0.0:
+            scale = max(scale, _UNFELT * min(judge.tolerance, 1e-7) / (_CLOSE * judge.weight[channel]))
+        newton.channel_scale[1, channel] = scale
     _residual(tables, ports, stride, newton, newton.value, level, t, step_s)
     for place in range(STAGES * channels):
         found = abs(newton.residual[place] + newton.value[place // channels, place % channels])

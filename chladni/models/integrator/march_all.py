@@ -93,7 +93,7 @@ def _attempt(
     length_s = step_s / (1 << level)
     solved = True
     if hard:
-        solved = implicit_step(implicit, ports, stride, newton, level, t, length_s)
+        solved = implicit_step(implicit, ports, stride, newton, judge, level, t, length_s)
     else:
         explicit_step(explicit, ports, stride, level, t, length_s)
     if stride.grown[0] > 0 and cursor[LOOKED] != cursor[SAMPLE]:
