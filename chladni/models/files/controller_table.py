@@ -38,6 +38,7 @@ def read_controller(file: FileReading, place: int, table: Content, ends: Control
     law, gain = _law(file, loc, table), _gain(file, (*loc, "gain"), table.get("gain", 1.0))
     if law is None or gain is None:
         return None
+    # Without the ends, names of gains can still be looked at; what their units must be can't.
     units: dict[str, str | None] = dict.fromkeys((*gains_of(law), "command"))
     if ends is not None:
         known = controller_units(law, gain.unit, driven_unit=ends.driven, feedback_unit=ends.feedback)
@@ -82,6 +83,7 @@ def _limit(
     """A limit of the command, or, by its unit, of the force behind the gain."""
     if found is None:
         return _WithUnit(None)
+    # Where both units agree there's no telling, and no difference but for the gain: the command is meant.
     unit = command
     if isinstance(found, str) and ends is not None and ends.driven != command and _measures(found, ends.driven):
         unit = ends.driven

@@ -105,6 +105,7 @@ class _DriveReading:
         self._note_names(inputs, outputs)
         if values is not None and options is not None:
             self._note_values(kind, values, options)
+        # Which signals a drive has depends on its options, and only the model itself knows.
         if self._mistakes or values is None or options is None:
             return None
         name = str(self._content.get("name"))
@@ -121,6 +122,7 @@ class _DriveReading:
             self._mistakes.add((mistake.part, mistake.place, "name"), mistake.text)
 
     def _note_values(self, kind: DriveKind, values: dict[str, float], options: dict[str, str]) -> None:
+        # One at a time, for the line of each.
         for name, value in values.items():
             self._file.tried(("parameters", name), partial(kind.with_values, {name: value}, options))
 

@@ -22,6 +22,7 @@ def drive_content(model: Model) -> Table:
         "input": [_signal(one) for one in model.inputs],
         "output": [_signal(one) for one in model.outputs],
         "effect": effect_tables(model.effects),
+        # One by one, since kinds declare tolerances of their own that no single default stands for.
         "tolerance": {one.name: one.tolerance for one in model.parameters.values()},
     }
 

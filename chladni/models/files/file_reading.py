@@ -58,6 +58,7 @@ class FileReading:
         """Give numbers by name; unknown names are told with the nearest of those in `units`."""
         if not isinstance(found, dict):
             return {} if found is None else None
+        # Goes on after a mistake, so that the next one is told too.
         read: dict[str, float] = {}
         complete = True
         for name, one in found.items():
@@ -135,6 +136,7 @@ class FileReading:
         self, loc: Loc, found: object, declared: Parameters, site: SiteUnits | None
     ) -> tuple[dict[str, float] | None, str | None]:
         units = {one.name: None if site is None else site.of(one.unit) for one in declared.values()}
+        # The one parameter that is no number: taken out before numbers are read.
         source = None
         if isinstance(found, dict) and SOURCE in found:
             source = self.text(found, SOURCE)

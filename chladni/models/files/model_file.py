@@ -63,6 +63,7 @@ def write_model(model: Model, path: Path | str, *, overwrite: bool = True) -> No
         When the file can't be written.
     """
     content: dict[str, Entry] = {"format": MODEL_FORMAT, "name": model.name, "kind": model.kind, **_content(model)}
+    # Empty lists would be written as keys, between or behind tables.
     text = toml_text({key: entry for key, entry in content.items() if entry != [] and entry != {}})
     with atomic_write(path, overwrite=overwrite) as file:
         file.write(text.encode())

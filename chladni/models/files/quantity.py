@@ -73,6 +73,7 @@ def dimension(unit: str) -> tuple[tuple[str, int], ...]:
     >>> dimension("N/m") == dimension("kg/s^2"), dimension("N m/rad") == dimension("N m")
     (True, True)
     """
+    # m/s^2 comes as one factor, so its seconds are added to the rest.
     powers: dict[str, int] = {}
     for (symbol, per_second), exponent in read(unit, symbol_as_written)[1].items():
         for base, power in _MADE_OF.get(symbol, {symbol: 1}).items():

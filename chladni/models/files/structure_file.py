@@ -34,6 +34,8 @@ def read_structure(path: Path) -> StructureModel:
     """
     from chladni.models.files.model_tables import StructureFile
 
+    # The reader of TOML validates and checks in one pass, so that all mistakes are told at once; the check makes the
+    # model on its way, since it reads every number for that anyway.
     made: list[StructureModel] = []
 
     def check(content: Content, mistakes: TomlMistakes) -> None:
@@ -73,6 +75,7 @@ class _StructureReading:
                 controllers=_made(controllers),
                 effects=tuple(effects),
             ))  # fmt: skip
+        # Tolerances name parameters, so they can only be looked at when there is a model.
         default, by_name = self._file.tolerances(None if model is None else model.parameters)
         if model is None or self._mistakes:
             return []
@@ -115,6 +118,7 @@ class _StructureReading:
     def _joint(self, place: int, table: Content) -> Joint | None:
         name = self._file.text(table, "name")
         motion = self._motion_at(name or "") or "translation"
+        # Not left to `Joint`, which would tell one of two wrong numbers.
         numbers = {
             key: self._file.number(("joint", place, key), table.get(key), unit, at_least=0.0)
             for key, unit in (("stiffness", _STIFFNESS[motion]), ("damping", _DAMPING[motion]))
@@ -197,6 +201,7 @@ class _StructureReading:
             for place, table in self._file.tables("controller")
         }
         places = {"input": list(self._inputs), "output": list(self._outputs), "controller": list(wirings)}
+        # A joint or output whose own table is wrong is told there, not wherever its name is used.
         unread = {
             *(set(self._names("joint")) - set(self._ends)),
             *(set(self._names("input")) - {one.name for one in self._inputs.values()}),
@@ -235,6 +240,7 @@ class _StructureReading:
         return sites
 
     def _units_of(self, part: str, table: Content) -> SiteUnits | None:
+        # An input or output has the units of the motion where it acts.
         at = table.get("name") if part in ("body", "joint") else table.get("joint", table.get("at"))
         motion = self._motion_at(str(at))
         if motion is None or part == "controller":
@@ -249,6 +255,7 @@ class _StructureReading:
 
     def _note_equations(self, model: StructureModel) -> None:
         """Note what only the equations show: a loop without solution, an effect that doesn't fit its site."""
+        # One more at a time, so that the mistake is told at the table that brings it in.
         for count in range(len(model.controllers)):
             closed = {one.name for one in model.controllers[: count + 1]}
             inputs = tuple(one for one in model.inputs if one.kind != "disturbance" or one.at in closed)

@@ -35,6 +35,7 @@ def structure_content(model: Model) -> Table:
 
 def _body(body: Body) -> Table:
     table: Table = {"name": body.name, inertia_key(body): body.mass}
+    # What has its default is left out, as people write such files.
     if body.position != (0.0, 0.0, 0.0):
         table["position"] = list(body.position)
     return table

@@ -40,6 +40,7 @@ def toml_text(content: Mapping[str, Entry]) -> str:
     [tolerance]
     "a.b" = 0.2
     """
+    # Plain keys first: behind a table's header they would belong to the table.
     head, blocks = [], []
     for key, entry in content.items():
         if isinstance(entry, Mapping):

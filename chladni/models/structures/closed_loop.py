@@ -62,6 +62,7 @@ class _Loop:
             channel=controller.reference,
             derivatives=1 if self._law.uses_reference_rate else 0,
         )
+        # Old ports keep their places, since laws name them by index; what is new comes behind them.
         self._n, self._m, self._q = len(plant.states), plant.columns, len(plant.ports)
         self._k, self._r = len(self._law.states), 1 + self._reference.derivatives
         self._first_port = self._n + self._k + self._r + self._m - 1 + len(disturbances)
@@ -76,6 +77,8 @@ class _Loop:
         column = plant.column_of(self._controller.drives)
         direct = feedback[:, self._n + column]
         command = self._command(feedback @ old, direct)
+        # What is behind the limit is what the controller asks for; effects of the motor come after it, at the last
+        # port, and reach the plant but not the record.
         acting = command + (0.0 if self._limit is None else self._unit(self._first_port + self._q))
         old[self._n + column] = acting + self._unit(self._size - 1)
         rates = np.vstack([np.hstack([plant.a, plant.b, plant.g]) @ old, self._controller_rates(feedback @ old)])
@@ -85,6 +88,7 @@ class _Loop:
         displacement = np.hstack([plant.displacement_state, plant.displacement_column, plant.displacement_port]) @ old
         velocity = np.hstack([plant.velocity_state, plant.velocity_column, plant.velocity_port]) @ old
         added = [acting] if self._limit is None else [command, acting]
+        # A command is no motion: its ports have no velocity.
         still = np.zeros((len(added), self._size))
         return self._assembled(rates, outputs, np.vstack([displacement, *added]), np.vstack([velocity, still]))
 
@@ -106,6 +110,7 @@ class _Loop:
         """What is fed back and its rate, ``[2, signal of the plant]``."""
         plant, row = self._plant, self._feedback
         signal = np.concatenate([plant.c[row], plant.d[row], plant.h[row]])
+        # Only asked for where it's used: not every feedback has a rate.
         if not self._law.uses_feedback_rate:
             return np.stack([signal, np.zeros_like(signal)])
         return np.stack([signal, self._rate_row()])
@@ -125,6 +130,7 @@ class _Loop:
                 columns[first + order + 1] += through[first + order]
                 through[first + order] = 0.0
             first += 1 + terminal.derivatives
+        # A law's force jumps when its law does, so what follows it at once has no derivative.
         of_joints = [place for place, port in enumerate(plant.ports) if port.kind != "output"]
         if np.any(through) or np.any(plant.h[row, of_joints]):
             raise ModelError(
@@ -142,6 +148,7 @@ class _Loop:
         row[self._n + self._k : self._n + self._k + self._r] += law.d_reference[: self._r]
         generated = len(self._plant.generated)
         last = self._first_port - generated
+        # Disturbances stand in the command's own unit, before the gain.
         row[last - len(self._disturbances) : last] += 1.0
         around = gain * float(law.d_feedback @ direct)
         if abs(1 - around) < _ILL_POSED * max(1.0, abs(around)):
@@ -186,6 +193,7 @@ class _Loop:
             states=(*plant.states, *self._law.states),
             ports=(*plant.ports, *self._new_ports()),
             laws=(*plant.laws, *self._limiting()),
+            # Nothing acts on inputs yet; the lengths follow the new inputs.
             input_delays_s=(),
             output_offsets_s=(*plant.output_offsets_s, *(0.0 for _ in recorded)),
         )  # fmt: skip

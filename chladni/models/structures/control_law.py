@@ -64,12 +64,14 @@ class _Law:
         self._states: list[tuple[str, float, Matrix, float]] = []  # name, pole, input as `_direct`, gain
 
     def error(self, gain: float) -> None:
+        # Rows are reference and feedback: the error counts one up and the other down.
         self._direct += gain * np.array([[1.0, 0.0], [-1.0, 0.0]])
 
     def integral(self, gain: float) -> None:
         self._states.append(("integral", 0.0, np.array([[1.0, 0.0], [-1.0, 0.0]]), gain))
 
     def rate(self, gain: float, filter_s: float | None, *, of: str) -> None:
+        # Fed back alone, a step of the reference gives no impulse.
         signal = np.array([1.0 if of == "error" else 0.0, -1.0])
         if filter_s is None:
             self._direct[:, 1] += gain * signal
@@ -95,6 +97,7 @@ class _Law:
 
 def _transfer_function(controller: Controller) -> ControlLaw:
     """Controllable canonical form (Ogata, Modern Control Engineering, 5th edition, section 9-2)."""
+    # Scaled so that the highest power of s has the coefficient 1, which the form asks for.
     den = np.asarray(controller.den) / controller.den[0]
     num = np.concatenate([np.zeros(den.size - len(controller.num)), controller.num]) / controller.den[0]
     order = den.size - 1
@@ -103,6 +106,7 @@ def _transfer_function(controller: Controller) -> ControlLaw:
     if order:
         a[-1] = -den[:0:-1]  # lowest power first
         b[-1, 0] = 1.0
+    # With as many zeros as poles a part of the error goes straight through; the states hold the rest.
     direct = np.array([num[0], 0.0])
     return ControlLaw(
         a=a,

@@ -157,6 +157,7 @@ class Controller:
 
     def _drive_mistakes(self) -> list[str]:
         found = []
+        # A scaled unit would change the number when it's written and read back.
         if self.gain_unit is not None and si_factor(self.gain_unit)[0] != 1:
             found.append(f"gain_unit {self.gain_unit!r} is no SI unit; give the gain in SI")
         if self.rate_of == "error" and self.law not in ("pd", "pid"):

@@ -35,6 +35,7 @@ def motion_modes(compiled: CompiledModel, bodies: Sequence[str]) -> NaturalModes
     poles, vectors = np.linalg.eig(compiled.a)
     oscillating = np.flatnonzero(poles.imag > AT_REST * np.abs(poles).max(initial=0.0))
     chosen = oscillating[np.argsort(np.abs(poles[oscillating]), kind="stable")]
+    # Read at the bodies' ports, since effects and controllers add states that no body has.
     rows = compiled.displacement_state[[compiled.port_index(name, "body") for name in bodies]]
     shapes = (rows @ vectors[:, chosen]).T.reshape(chosen.size, len(bodies))
     largest = np.argmax(np.abs(shapes), axis=1, keepdims=True) if len(bodies) else np.zeros((chosen.size, 0), int)

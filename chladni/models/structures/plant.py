@@ -94,6 +94,7 @@ class _Plant:
         self._structure, self._inputs, self._outputs, self._fed_back = structure, inputs, outputs, fed_back
         self._terminals = tuple(input_terminal(structure, one) for one in inputs)
         self._output_terminals = tuple(output_terminal(structure, one) for one in outputs)
+        # A prescribed body keeps its rows of motion, made of columns of u, so that joints see it like any other.
         prescribed = {one.at for one in inputs if one.kind == "displacement"}
         self._free = [row for row, body in enumerate(structure.bodies) if body.name not in prescribed]
         self._ports = self._all_ports()
@@ -106,6 +107,7 @@ class _Plant:
 
     def compiled(self) -> CompiledModel:
         """Give the model."""
+        # Ports of outputs see what the output is before anything is added to it.
         outputs = self._stack([self._output_row(one) for one in self._outputs])
         displacement, velocity = self._port_rows(outputs)
         for name in self._fed_back:
@@ -172,7 +174,9 @@ class _Plant:
             row = structure.body_index(one.at)
             displacement[row, column] = velocity[row, column + 1] = 1.0
         force = self._applied() - structure.stiffness_matrix() @ displacement - structure.damping_matrix() @ velocity
+        # Relative to a ground that accelerates, every body is pulled back by its inertia.
         acceleration = force / np.diag(structure.mass_matrix())[:, None] - np.outer(self._shaken(), self._ground)
+        # Whatever acts on a prescribed body is borne by what prescribes its motion.
         for one, column in prescribed:
             acceleration[structure.body_index(one.at)] = self._unit(column + 2)
         return displacement, velocity, acceleration
@@ -187,6 +191,7 @@ class _Plant:
                 applied[:, self._column(one.name)] = pattern
                 applied[:, self._port(one.name, "actuation")] = pattern
         for joint in structure.joints:
+            # A joint's law resists: it pulls the second body back and the first one after.
             applied[:, self._port(joint.name, "joint")] = -structure.pattern(joint.between)
         for row, body in enumerate(structure.bodies):
             applied[row, self._port(body.name, "body")] = 1.0

@@ -239,6 +239,7 @@ class Structure:
             )
 
     def _assemble(self, coefficients: list[float]) -> NDArray[np.float64]:
+        # K = sum of k p p^T over the joints: symmetric, and without a row for the ground, which doesn't move.
         patterns = np.array([self.pattern(joint.between) for joint in self.joints])
         patterns = patterns.reshape(len(self.joints), len(self.bodies))
         matrix: NDArray[np.float64] = patterns.T @ (np.asarray(coefficients)[:, None] * patterns)

@@ -122,6 +122,7 @@ class StructureModel:
         ModelError
             When a name is unknown or a value not possible.
         """
+        # Ranges stay those of the nominal values: a knob that is turned must not move its own ends.
         declared = self.parameters.with_values(values)
         return replace(
             self,
@@ -205,6 +206,7 @@ class StructureModel:
         return compiled
 
     def _stage(self, effect: Effect) -> Stage:
+        # Names are unique over all parts, so a bare name tells the stage.
         if effect.site in {one.name for one in self.outputs}:
             return "output"
         if effect.site in {one.name for one in self.inputs} | {one.name for one in self.controllers}:
@@ -229,6 +231,7 @@ class StructureModel:
         )
 
     def _instability(self, compiled: CompiledModel) -> tuple[str, ...]:
+        # A structure without a controller can't be unstable, only free.
         unstable = unstable_poles(compiled)
         if not unstable.size or not self.controllers:
             return ()

@@ -79,6 +79,7 @@ def usual_range(value: float, others: Iterable[float] = ()) -> tuple[float, floa
     >>> usual_range(2.0), usual_range(0.0, [3.0]), usual_range(-2.0)
     ((0.5, 8.0), (0.0, 3.0), (-8.0, -0.5))
     """
+    # A free guide may be given a spring as stiff as its neighbours have.
     if value == 0:
         return 0.0, max(others, default=0.0) or 1.0
     ends = value / SPAN, value * SPAN
@@ -119,6 +120,7 @@ def _joints(structure: Structure) -> list[Parameter]:
 
 
 def _controller(controller: Controller, units: Units) -> list[Parameter]:
+    # Coefficients are named by their power of s, which stays when a further one is put in front.
     numbers = {**controller.gains}
     for key, coefficients in (("num", controller.num), ("den", controller.den)):
         numbers.update({f"{key}{len(coefficients) - 1 - place}": one for place, one in enumerate(coefficients)})

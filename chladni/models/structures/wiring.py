@@ -121,6 +121,7 @@ class _Rules:
         self._inputs = {one.name: one for one in inputs}
         self._outputs = [one.name for one in outputs]
         self._controllers = [one.name for one in controllers]
+        # The first that claims a body or an input keeps it; later ones are told who has it.
         self._prescribed: dict[str, str] = {}
         for one in inputs:
             if one.kind == "displacement":
@@ -130,6 +131,7 @@ class _Rules:
             self._drivers.setdefault(controller.drives, controller.name)
 
     def of_input(self, one: StructureInput) -> Iterator[Told]:
+        # Each kind acts at another kind of site, and the message says at which.
         if one.kind == "disturbance":
             if one.at not in self._controllers:
                 yield "at", _nothing(one.at, "controller", self._controllers)
@@ -185,6 +187,7 @@ def _channel_mistakes(
     named += [("output", "channel", place, one.name, one.channel) for place, one in enumerate(outputs)]
     named += [("controller", "reference", place, one.name, one.reference) for place, one in enumerate(controllers)]
     for part, key, place, name, channel in named:
+        # Parts without a channel are simulated only, and any number may be.
         if channel is None:
             continue
         if channel in taken:
@@ -205,6 +208,7 @@ def _article(word: str) -> str:
 def _nothing(name: str, what: str, known: Mapping[str, object] | Sequence[str]) -> str:
     names = list(known)
     near = get_close_matches(name, names, n=1)
+    # A structure may have a thousand bodies; a message holds twenty.
     listed = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
     advice = f"did you mean {near[0]!r}?" if near else f"there are: {listed or 'none'}"
     return f"{name[:60]!r} is no {what}; {advice}"

@@ -254,6 +254,17 @@ def test_dead_time_of_the_motor_acts_inside_the_loop() -> None:
     np.testing.assert_allclose(found[3, 0], GAIN * KV * KP * sensitivity, rtol=1e-8)
 
 
+def test_a_floor_that_shakes_stays_behind_the_inputs_of_a_loop() -> None:
+    shaken = axis().with_effects([attached("base_vibration", "ground", {"level": 0.1, "band": 50.0})]).compile()
+    still = axis().compile()
+    assert shaken.inputs == still.inputs
+    np.testing.assert_array_equal(shaken.b[:, :2], still.b)
+    np.testing.assert_allclose(shaken.b[:, 2], [0.0, -1.0])
+    np.testing.assert_allclose(
+        shaken.frequency_response(FREQUENCY_HZ), still.frequency_response(FREQUENCY_HZ), rtol=1e-12
+    )
+
+
 def test_what_acts_on_samples_can_t_act_inside_a_loop() -> None:
     compiled = replace(axis(), controllers=(), inputs=axis().inputs[:1]).compile()
     mapped = replace(compiled, output_maps=((0, lambda samples, _rate_hz: samples),))
