@@ -10,9 +10,13 @@ from hypothesis import strategies as st
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
-from chladni.models.drives.drive_model import DriveModel
+from chladni.models.core.port import Terminal
+from chladni.models.drives.catalogue import DRIVES
+from chladni.models.drives.drive_model import DriveModel, drive_model
 from chladni.models.effects.attached_effect import attached
+from chladni.models.elements.catalogue import ELEMENTS
 from chladni.models.files.model_file import load_model, write_model
+from chladni.models.schemes.block import element_block
 from chladni.models.schemes.scheme_model import SchemeModel
 from chladni.models.structures.controller import Controller
 from chladni.models.structures.structure import Body, Joint, Structure
@@ -171,6 +175,21 @@ def test_what_is_written_reads_back(tmp_path: Path, text: str) -> None:
     found = assert_round_trip(model, tmp_path)
     if not isinstance(model, DriveModel):
         assert found == model
+
+
+@pytest.mark.parametrize("word", DRIVES)
+def test_every_drive_with_every_option_survives(tmp_path: Path, word: str) -> None:
+    kind = DRIVES[word]
+    assert_round_trip(drive_model(kind), tmp_path)
+    for option in kind.options:
+        for choice in option.choices:
+            assert_round_trip(drive_model(kind, options={option.name: choice}), tmp_path)
+
+
+@pytest.mark.parametrize("word", ELEMENTS)
+def test_every_element_survives_in_a_scheme(tmp_path: Path, word: str) -> None:
+    blocks = (element_block("first", "pt1", "+wish"), element_block("second", word, "-first", "+wish"))
+    assert_round_trip(SchemeModel(name=word, blocks=blocks, inputs=(Terminal(name="wish", unit="1"),)), tmp_path)
 
 
 def test_changed_values_are_what_is_written(tmp_path: Path) -> None:
