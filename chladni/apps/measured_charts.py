@@ -96,6 +96,7 @@ def _spectra(_driving: TimeSeries, measured: TimeSeries, simulated: TimeSeries) 
             name=f"log.spectrum.{channel.name}",
             title=f"{channel.name}, spectrum",
             x_label="frequency [Hz]",
+            x_scale="log",
             y_label=_label("PSD", densities.units[row]),
             y_scale="log",
             curves=(
@@ -122,6 +123,7 @@ def _transfers(driving: TimeSeries, measured: TimeSeries, simulated: TimeSeries)
             name=f"log.transfer.{channel.name}",
             title=f"{channel.name} over {reference}",
             x_label="frequency [Hz]",
+            x_scale="log",
             y_label=_label("magnitude", response.unit(row, 0)),
             y_scale="log",
             curves=(

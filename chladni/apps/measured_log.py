@@ -122,11 +122,7 @@ def compare(
     simulation = simulate(model, driving)
     simulated = _matching(simulation.outputs, outputs)
     charts, words = comparison_charts(driving, measured, simulated, start_s=start_s)
-    unmeasured = [one.name for one in terminals(model)[0] if one.name not in assignment]
-    told = [f"The log holds no {', '.join(unmeasured)}: taken as zero."] if unmeasured else []
-    return InstrumentReading(
-        charts=charts, quantities=scores(measured, simulated), flags=(*told, *simulation.flags, *words)
-    )
+    return InstrumentReading(charts=charts, quantities=scores(measured, simulated), flags=(*simulation.flags, *words))
 
 
 def _by_name(terminal: Terminal, free: Sequence[Channel]) -> str | None:

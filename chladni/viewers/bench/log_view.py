@@ -16,7 +16,7 @@ from chladni.viewers.bench.desk import Desk
 from chladni.viewers.bench.dropper import Dropper, private_file
 from chladni.viewers.bench.errors import told
 from chladni.viewers.bench.latest import Latest
-from chladni.viewers.bench.parts import FILLING, choice, column, flow, html, seconds_entry
+from chladni.viewers.bench.parts import FILLING, choice, column, flow, html, pn, seconds_entry
 from chladni.viewers.bench.pause import Pause
 from chladni.viewers.bench.theme import Theme
 from chladni.viewers.bench.tools import Assignment, MeasuredLog, Tools
@@ -39,7 +39,7 @@ class LogView:
     def __init__(
         self, desk: Desk, tools: Tools, *, theme: Theme, document: Document | None, path: Path | None
     ) -> None:
-        self._desk, self._tools = desk, tools
+        self._desk, self._tools, self._document = desk, tools, document
         self._log: MeasuredLog | None = None
         self._shown = self._filling = False
         self._path = path
@@ -158,9 +158,10 @@ class LogView:
             self._refuse(told(error))
             return
         reading = future.result()
-        self._words.object = message("", reading.flags)
-        self._scores.object = quantity_strip(reading.quantities)
-        self.board.show(reading.charts)
+        with pn.io.hold(self._document):
+            self._words.object = message("", reading.flags)
+            self._scores.object = quantity_strip(reading.quantities)
+            self.board.show(reading.charts)
 
 
 _INVITATION = (
