@@ -259,7 +259,7 @@ class Run:
             row=np.zeros(2 * ports + outputs),
             power=np.zeros((3, self._ports.channels.shape[1])),
             place=np.floor(instants * UNIT).astype(np.int64),
-            force_output=self._plan.h,
+            force_output=np.ascontiguousarray(self._plan.h),
             output=np.zeros((instants.size, outputs, count - 1)),
         )
 
@@ -271,7 +271,7 @@ def _ports(plan: PortPlan, laws: LawTable) -> Ports:
     return Ports(
         table=laws.table,
         first=laws.first,
-        through=plan.through,
+        through=np.ascontiguousarray(plan.through),
         motion=np.zeros(2 * count),
         state=state,
         channels=channels,

@@ -1,5 +1,6 @@
 """Coefficients of the schemes at each step length: the sample interval, its half, its quarter, ..."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -91,10 +92,10 @@ class StepTables:
         """Make the tables for more step lengths."""
         self._made += [self._level(level) for level in range(len(self._made), levels)]
         explicit, implicit, dense, effect = zip(*self._made, strict=True)
-        self.explicit = SchemeTables(*map(np.stack, zip(*explicit, strict=True)))
-        self.implicit = SchemeTables(*map(np.stack, zip(*implicit, strict=True)))
-        self.dense = DenseTables(*map(np.stack, zip(*dense, strict=True)))
-        self.effect = np.stack(effect)
+        self.explicit = SchemeTables(*map(_stack, zip(*explicit, strict=True)))
+        self.implicit = SchemeTables(*map(_stack, zip(*implicit, strict=True)))
+        self.dense = DenseTables(*map(_stack, zip(*dense, strict=True)))
+        self.effect = _stack(effect)
 
     def _level(self, level: int) -> tuple[SchemeTables, SchemeTables, DenseTables, Matrix]:
         local = np.mod(self.instants * 2.0**level, 1.0)
@@ -115,6 +116,11 @@ class StepTables:
             _dense(self.plan, self.hold, found[1 + len(NODES) :], wanted),
             np.abs(nodes[-1].force[0].T) * self._reach,
         )
+
+
+def _stack(arrays: Sequence[Matrix]) -> Matrix:
+    # The order in memory is part of the type that a kernel is compiled for: always the same.
+    return np.ascontiguousarray(np.stack(arrays))
 
 
 def _motion(plan: PortPlan, response: Response) -> Matrix:

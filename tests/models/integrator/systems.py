@@ -173,7 +173,7 @@ def one_sided_stop(d, s, t, parameters, state, rates):
 
 def saturation(d, s, t, parameters, state, rates):
     limit = parameters[0]
-    return (limit if d > limit else (-limit if d < -limit else d)) - d
+    return (limit if d > limit else (max(d, -limit))) - d
 
 
 def law(port, function, *parameters, state=()):

@@ -56,7 +56,14 @@ def test_a_free_body_under_a_ramp_moves_as_the_cube_of_time(with_law):
     # A is singular, and defective.
     laws = (law(0, cubic, 0.0),) if with_law else ()
     compiled = plain_model(
-        [[0, 1], [0, 0]], [[0], [1]], [[1, 0]], [[0]], g=[[0], [-1]], h=[[0]], motion=([[1, 0]], [[0]], [[0]]), laws=laws
+        [[0, 1], [0, 0]],
+        [[0], [1]],
+        [[1, 0]],
+        [[0]],
+        g=[[0], [-1]],
+        h=[[0]],
+        motion=([[1, 0]], [[0]], [[0]]),
+        laws=laws,
     )
     times = np.arange(101) / RATE_HZ
     found = integrate(compiled, 6 * times[None], RATE_HZ)
