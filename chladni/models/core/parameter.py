@@ -1,5 +1,6 @@
 """Named parameters of a model: value, unit, usual and possible range, tolerance."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -92,10 +93,10 @@ class Parameters(Mapping[str, Parameter]):
     items_in_order: tuple[Parameter, ...]
 
     def __post_init__(self) -> None:
-        names = [parameter.name for parameter in self.items_in_order]
-        for name in names:
-            if names.count(name) > 1:
-                raise ModelError(f"parameter {name!r} is declared {names.count(name)} times; names are unique")
+        times = Counter(parameter.name for parameter in self.items_in_order)
+        for name, count in times.items():
+            if count > 1:
+                raise ModelError(f"parameter {name!r} is declared {count} times; names are unique")
 
     def __getitem__(self, name: str) -> Parameter:
         for parameter in self.items_in_order:
