@@ -22,7 +22,10 @@ System = StateSpace | CompiledModel | Model
 # An eigenvalue this much smaller than the largest is the rounding error of an integrator.
 INTEGRATOR = 1e-9
 ROUNDING = 1e-14
+# A response is back at zero when this little is left of the parts that cancel.
+RESTS = 1e-9
 _RATES = {"m": "m/s", "m/s": "m/s^2", "rad": "rad/s", "rad/s": "rad/s^2"}
+_MOTIONS = {rate: motion for motion, rate in _RATES.items()}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -95,6 +98,28 @@ class LinearPath(Value):
         terminal = Terminal(name=self.outputs[0].name, unit=rate_unit(self.outputs[0].unit))
         path = replace(self, c=row[None], d=np.array([self.c[0] @ self.b]), outputs=(terminal,), exact=None)
         return path.to(terminal.name)
+
+    def dies_out(self) -> bool:
+        """Whether the one output is a rate of a motion that is back at zero long after a step."""
+        if self.outputs[0].unit not in _MOTIONS or self.looped or self.integrators() or not self.b.size:
+            return False
+        row = np.linalg.solve(self.a.T, self.c[0])
+        # By norms, since the states are of like size: what is left of a sum of one term has none to be small beside.
+        size = abs(self.d[0]) + np.linalg.norm(row) * np.linalg.norm(self.b)
+        return bool(abs(self.d[0] - row @ self.b) <= RESTS * size)
+
+    def integral(self) -> Self:
+        """Give the way to the motion whose rate the one output is, for an output that dies out.
+
+        ::
+
+            H(s) = c (s I - A)^-1 b + d = s c A^-1 (s I - A)^-1 b + H(0)
+
+        so that for H(0) = 0 the integral is seen by c A^-1, without a further state.
+        """
+        terminal = Terminal(name=self.outputs[0].name, unit=_MOTIONS[self.outputs[0].unit])
+        row = np.linalg.solve(self.a.T, self.c[0])
+        return replace(self, c=row[None], d=np.zeros(1), outputs=(terminal,), exact=None)
 
     def final_value(self) -> float:
         """Value of the one output long after a unit step, without poles at the origin: ``d - c A^-1 b``."""

@@ -11,6 +11,7 @@ from chladni.models.analysis.frequency_behaviour import FrequencyBehaviour
 from chladni.models.analysis.linear_path import LinearPath
 from chladni.models.analysis.resolvent import Resolvent
 from chladni.models.analysis.step_behaviour import SETTLING_BAND, StepMarks
+from chladni.signals.errors import ModelError
 
 Matrix = NDArray[np.float64]
 
@@ -53,11 +54,24 @@ def tangent(nominal: Behaviour, change: Matrix, dead_time_s: float) -> Tangent:
         Likewise.
     """
     doubled = _doubled(nominal.path, change)
+    return Tangent(path=doubled, read=_read(doubled, nominal.step.rates), dead_time_s=dead_time_s)
+
+
+def _read(doubled: LinearPath, rates: int) -> LinearPath:
+    """Go from the output of the doubled system to the reading, by the same steps as for the system itself."""
     read = doubled
-    for _ in range(nominal.step.rates):
-        # The rate of a response is c A x + c b u, for the doubled system too; it sees the integrator no more.
-        read = read.rate() or replace(read, c=read.c @ read.a, d=read.c @ read.b)
-    return Tangent(path=doubled, read=read, dead_time_s=dead_time_s)
+    for _ in range(abs(rates)):
+        # Rates and integrals of a response are linear in it, and so of its derivative to a parameter as well.
+        read = _rate(read) if rates > 0 else read.integral()
+    return read
+
+
+def _rate(read: LinearPath) -> LinearPath:
+    # Without the states that only the output itself saw: an integrator there would leave no final value.
+    further = read.rate()
+    if further is None:
+        raise ModelError("the response jumps for other values of the parameter; it has no derivative here")
+    return further
 
 
 def log_derivatives(nominal: Behaviour, moved: Tangent, *, band: float = SETTLING_BAND) -> dict[str, float]:

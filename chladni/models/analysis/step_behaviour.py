@@ -29,9 +29,10 @@ class StepMarks:
     Attributes
     ----------
     read
-        Path to what is read: the output, or its rate (or the rate of that) where the output integrates.
+        Path to what is read: the output; its rate (or the rate of that) where the output integrates; the motion
+        behind it where an acceleration or a velocity dies out.
     rates
-        How many rates it is from the output.
+        How many rates it is from the output; negative for integrals.
     final
         Value that the reading goes to.
     motion
@@ -66,7 +67,8 @@ class StepMarks:
         """Count the rates from the reading to the acceleration; None when it's no motion or jumps at the step."""
         rates = ACCELERATION_RATES.get(self.read.outputs[0].unit)
         # A jump of the reading, or of its rate, at the step would be an infinite acceleration.
-        jumps = any(self.row(order) @ self.motion.states[:, 0] for order in range(rates or 0))
+        signals = [self.row(order) @ self.motion.states for order in range(rates or 0)]
+        jumps = any(abs(signal[0]) > EXACT * float(np.abs(signal).max()) for signal in signals)
         return None if jumps else rates
 
 
@@ -110,7 +112,7 @@ def step_quantities(
 ) -> list[Quantity]:
     """Tell behaviour after a step of some size in numbers, with the definition of each in words."""
     name, delay = marks.read.outputs[0].name, float(path.dead_time_s[0])
-    what = f"{'rate of ' * marks.rates}{name}"
+    what = f"{'rate of ' * marks.rates}{'integral of ' * -marks.rates}{name}"
     times = {
         "answer_time": (marks.answer, f"first peak of {what} beyond its final value", "it has no such peak"),
         "peak_time": (marks.top, f"greatest value of {what}", "it never exceeds its final value"),
@@ -195,7 +197,7 @@ def _errors(path: LinearPath, marks: StepMarks, size: float) -> list[Quantity]:
     if unit != path.source.unit:
         reason = reason or f"the output ({unit}) can't follow an input of another unit ({path.source.unit})"
     elif marks.rates:
-        reason = reason or "the output goes on and on after a step"
+        reason = reason or "the output doesn't come to rest away from zero after a step"
     if reason:
         return [none(*text, reason) for text in texts]
     # Without error up to rounding is without error.
@@ -209,10 +211,15 @@ def _errors(path: LinearPath, marks: StepMarks, size: float) -> list[Quantity]:
 
 
 def _settling_reading(path: LinearPath) -> tuple[LinearPath, int]:
-    """Go from the output to the first rate that doesn't integrate any more."""
+    """Go from the output to what comes to rest away from zero after a step.
+
+    Of an output that integrates the rate does; of an acceleration or a velocity that dies out, the motion behind it.
+    """
     read, rates = path, 0
     while read.integrators() and (further := read.rate()) is not None and rates < path.b.size:
         read, rates = further, rates + 1
+    while rates <= 0 and read.dies_out():
+        read, rates = read.integral(), rates - 1
     return read, rates
 
 

@@ -251,3 +251,17 @@ def test_an_integrating_output_is_followed_through_its_rate() -> None:
     expected = influence(INSTRUMENT, parameters=CONSTRUCTION[:3], behaviour_names=PAPER_BEHAVIOUR)
     np.testing.assert_allclose(table.nominal, expected.nominal, rtol=1e-11)
     np.testing.assert_allclose(table.log_derivative, expected.log_derivative, rtol=1e-9, atol=1e-11)
+
+
+def test_an_acceleration_is_as_good_as_the_displacement_behind_it() -> None:
+    displacement = oscillator()
+
+    def equations(values) -> CompiledModel:
+        m, c, k = values["m"], values["c"], values["k"]
+        a = [[0, 1], [-k / m, -c / m]]
+        return compiled(state_space(a, [0, 1 / m], a[1], 1 / m, output_unit="m/s^2"))
+
+    accelerated = FunctionModel(parameters=displacement.parameters, equations=equations)
+    names = ("answer_time", "overshoot", "settling_time", "rise_time", "resonance_frequency", "critical_frequency")
+    found, expected = (influence(one, behaviour_names=names) for one in (accelerated, displacement))
+    np.testing.assert_allclose(found.log_derivative, expected.log_derivative, rtol=1e-9, atol=1e-11)

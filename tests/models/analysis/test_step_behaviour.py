@@ -5,11 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from chladni.models.analysis.behaviour import behaviour
 from chladni.models.analysis.linear_path import linear_path
 from chladni.models.analysis.step_behaviour import step_marks, step_quantities
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.reading import Quantity
 from chladni.models.core.state_space import StateSpace
+from chladni.models.instruments import robot_arm as robot_arm_instrument
 from tests.models.analysis.systems import compiled, gain_only, pt2, state_space
 
 
@@ -140,3 +142,27 @@ def test_a_light_damping_is_followed_until_it_settles() -> None:
 def test_what_integrates_and_is_reached_directly_has_no_reading() -> None:
     found = told(state_space([[0.0]], [1.0], [1.0], 2.0))
     assert "it integrates and is reached directly" in found["answer_time"].definition
+
+
+@pytest.mark.parametrize(("row", "direct", "unit"), [([0, 1], 0.0, "m/s"), ([-25, -3], 25.0, "m/s^2")])
+def test_where_a_motion_dies_out_the_displacement_behind_it_is_read(row, direct: float, unit: str) -> None:
+    displacement = told(pt2(5.0, 0.3))
+    behind = told(state_space([[0, 1], [-25, -3]], [0, 25], row, direct, output_unit=unit))
+    for name in ("answer_time", "overshoot", "settling_time", "rise_time", "peak_acceleration", "final_value"):
+        assert number(behind[name]) == pytest.approx(number(displacement[name]), rel=1e-11)
+    assert "integral of y" in behind["answer_time"].definition
+
+
+def test_what_dies_out_but_is_no_motion_is_read_as_it_is() -> None:
+    high_pass = told(state_space([[-4.0]], [-16.0], [1.0], 4.0, output_unit="V"))
+    assert high_pass["answer_time"].value is None
+
+
+def test_an_accelerometer_on_a_structure_tells_the_behaviour_of_its_displacement() -> None:
+    model = robot_arm_instrument.INSTRUMENT.model()
+    displacement, acceleration = (
+        behaviour(model, from_input="push", to_output=name) for name in ("tool_displacement", "acc_tool")
+    )
+    for name in ("answer_time", "overshoot", "settling_time", "rise_time", "peak_acceleration", "final_value"):
+        # Two integrations cost the digits of the stiffest joint over the softest, squared.
+        assert acceleration.value(name) == pytest.approx(displacement.value(name), rel=1e-9), name
