@@ -6,7 +6,7 @@ bodies has its stiffness in N m/rad), so units are checked where the records are
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator
 
 from chladni.models.files.quantity import is_finite
 
@@ -32,8 +32,15 @@ def _number(value: object) -> float | str:
     raise ValueError(_NUMBER)
 
 
+def _printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("must be text without line feeds and control characters")
+    return text
+
+
 Number = Annotated[float | str, PlainValidator(_number)]
-Text = Annotated[str, Field(strict=True, min_length=1, max_length=1000)]
+# Names and channels are printed to terminals, which obey control characters.
+Text = Annotated[str, Field(strict=True, min_length=1, max_length=1000), AfterValidator(_printable)]
 Polynomial = Annotated[list[Number], Field(min_length=1, max_length=MAX_COEFFICIENTS)]
 Channel = Text | None
 

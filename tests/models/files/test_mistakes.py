@@ -26,6 +26,7 @@ def line_of(text: str, part: str) -> int:
 STRUCTURE_MISTAKES = [
     ('format = "chladni.model/1"', '@format = "chladni.model/2"', "format: found 'chladni.model/2'; must be"),
     ('name = "arm"', "", "name: is missing, and is needed"),
+    ('name = "arm"', '@name = "arm\\u001b[2J"', "name: found 'arm\\x1b[2J'; must be text without line feeds"),
     ('kind = "structure"', '@kind = "structures"', "kind: found 'structures'; must be 'structure', 'drive' or"),
     ('kind = "structure"', "", "kind: is missing, and is needed"),
     ('name = "shoulder"', '@name = "column"', "[[joint]] 1 name: the name 'column' is taken by a body"),
