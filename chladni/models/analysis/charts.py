@@ -178,6 +178,7 @@ def _points(label: str, roots: NDArray[np.complex128]) -> Curve:
 
 
 def _finite(values: Matrix) -> Matrix:
+    # A magnitude of zero has no level; a line with an infinite point isn't drawn at all.
     return np.where(np.isfinite(values), values, np.nan)
 
 

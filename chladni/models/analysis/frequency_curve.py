@@ -79,6 +79,7 @@ def frequency_curve(
     omega = frequency_grid(
         np.concatenate([path.poles, found]), float(path.dead_time_s[0]), _loop_delay_s(path), band_hz
     )
+    # Dead time is added to the unwrapped phase: far out it turns too fast for any grid.
     without = resolvent(omega)
     order = path.integrators() - int(np.count_nonzero(found == 0))
     phase, sign = _unwrapped(without, order)
@@ -102,6 +103,7 @@ def frequency_grid(
         corners = np.array([1 / delay if delay > 0 else 1.0])
     low, high = float(corners.min()) / BEYOND, float(corners.max()) * BEYOND
     if delay > 0:
+        # A loop's dead time makes a comb of peaks without end; a few teeth of it are shown.
         high = max(high if loop_delay_s == 0 else 0.0, 2 * pi / delay)
     if log10(high / low) > MOST_DECADES:
         low = high / 10**MOST_DECADES

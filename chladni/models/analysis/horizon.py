@@ -52,6 +52,7 @@ def horizon(poles: NDArray[np.complex128], *, periods: int = PERIODS) -> Horizon
     periods
         Of the slowest decaying oscillation at most.
     """
+    # An integrator has no time of its own.
     moving = poles[poles != 0]
     if not moving.size:
         return Horizon(seconds=1.0, fastest_s=1.0, longest_step_s=1.0 / POINTS)

@@ -105,6 +105,7 @@ def influence(
     """
     model, source, output, size = _resolved(system, values, options, from_input, to_output)
     nominal = behaviour(model, from_input=source, to_output=output, size=size, band=band)
+    # Operating conditions (pressure, flow) are varied only when asked for: the table is about what is built.
     rows = [model.parameters.require(name) for name in parameters] or _construction(model)
     kept = _known(nominal, behaviour_names or _existing(nominal))
     study = _Study(model=model, nominal=nominal, names=kept, size=size, band=band)
@@ -163,6 +164,7 @@ class _Study:
             moved, from_input=path.source.name, to_output=path.outputs[0].name, size=self.size, band=self.band
         )
         initial = self.values(self.nominal)
+        # An overshoot of 0 has no relative change.
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(initial == 0, np.nan, (initial - self.values(found)) / initial)
 
@@ -182,6 +184,7 @@ def _equations(model: Model, path: LinearPath) -> Matrix:
     """``[A b; c d]`` in the states of `path`, and a last column that begins with the dead time."""
     compiled = model.compile()
     state_space = compiled.state_space()
+    # In the states of the nominal path, kept and scaled likewise: only then differences are derivatives.
     column, row = state_space.input_index(path.source.name), state_space.output_index(path.outputs[0].name)
     count, kept, scale = path.b.size, path.kept, path.scale
     matrix = np.zeros((count + 1, count + 2))

@@ -73,6 +73,7 @@ def read_instrument(
     model = instrument.model(values, options)
     own = tuple(instrument.extra_charts(model)) if instrument.extra_charts is not None else ()
     unusual = tuple(_unusual(model))
+    # An instrument that is all law (a damper on a press) has nothing that linear equations could tell.
     if not set(LINEAR_VIEWS) & set(instrument.views):
         return InstrumentReading(charts=own, quantities=(), flags=unusual)
     one = _analysed(instrument, model, output, NOW)

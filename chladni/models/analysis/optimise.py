@@ -107,6 +107,7 @@ def optimise(
     """
     wishes = (wish,) if isinstance(wish, Wish) else tuple(wish)
     search = _Search(model, tuple(parameters), wishes, bounds or {}, from_input, to_output, size)
+    # The model is asked anew for the result: what is told is what the values give, not what the search noted.
     values = search.best(seed)
     return search.told(values)
 
@@ -204,6 +205,7 @@ class _Search:
             return BROKEN * (1 + excess)
         if self._aim is None:
             return float(np.sum(((values - self._initial) / self._spans()) ** 2))
+        # Over the value at the start, so that tolerances of the search mean the same for seconds and for hertz.
         value = numbers[self._wishes.index(self._aim)] / (self._scale or 1.0)
         return value if self._aim.sense == "least" else -value
 

@@ -64,6 +64,7 @@ def gain_root_locus(path: LinearPath, *, gains: Sequence[float] | Matrix | None 
             "with dead time there are infinitely many roots; take the dead time out, or read the margins"
         )
     chosen = np.asarray(default_gains(path) if gains is None else gains, dtype=np.float64)
+    # u = k (r - c x - d u): the direct way closes an algebraic loop of its own.
     loop = 1 + chosen * path.d[0]
     if np.any(np.abs(loop) < 1e-12):
         raise ModelError(f"the loop gain {-1 / path.d[0]:g} makes an algebraic loop that has no solution")

@@ -80,6 +80,7 @@ def log_derivatives(nominal: Behaviour, moved: Tangent, *, band: float = SETTLIN
     Where something happens at a place x (a time, a frequency) at which a condition is zero, implicit differentiation
     gives ``dx = -d(condition)/(d condition/dx)``.
     """
+    # Frequency and poles have derivatives for what never settles, too.
     found = {**_frequency(nominal, moved), **_errors(nominal, moved)}
     if not nominal.step.missing:
         found |= _StepDerivatives(nominal.step, moved, band).all(float(nominal.path.dead_time_s[0]))
@@ -114,6 +115,7 @@ class _StepDerivatives:
             moved = self._time(marks.nearly, 0, 0.9) - self._time(marks.begun, 0, 0.1)
             found["rise_time"] = moved / (marks.nearly - marks.begun)
         if marks.top is not None:
+            # At a peak the shift of its time counts for nothing.
             top = self._signal(marks.top)
             found["overshoot"] = (self._change(marks.top) - top / marks.final * self._final) / (top - marks.final)
         if marks.final:

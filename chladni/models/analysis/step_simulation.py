@@ -75,6 +75,7 @@ def _exact(model: Model, compiled: CompiledModel, path: LinearPath, size: float,
     generator = np.zeros((count + 1, count + 1))
     generator[:count, :count], generator[:count, count] = path.a, path.b
     start = np.append(np.zeros(count), size)
+    # Equidistant, unlike the response that is drawn: limits are told with their time, read off samples.
     moved = powers(exponential(generator * step_s), start, SAMPLES + 1)
     states = np.zeros((len(compiled.states), SAMPLES + 1))
     states[path.kept] = moved[:count] * path.scale[:, None]

@@ -97,6 +97,7 @@ def measured(path: LinearPath, wish: Wish, *, size: float = 1.0) -> Quantity:
         return _band_magnitude(path, wish.band_hz)
     if wish.quantity in _OF_THE_PAIR and not path.looped:
         return _of_the_pair(path, wish.quantity)
+    # A search asks thousands of times: what isn't wished about isn't computed.
     known = [BAND_MAGNITUDE]
     for compute in (_in_time, _in_frequency):
         for one in compute(path, size):

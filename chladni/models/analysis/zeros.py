@@ -31,6 +31,7 @@ def zeros(path: LinearPath) -> NDArray[np.complex128]:
         rows.append(rows[-1] @ path.a)
     # Each row alone counts, whatever its size: lengths grow with the powers of A.
     seen = np.array([row / np.linalg.norm(row) for row in rows[:-1]])
+    # The last right singular vectors span what no row sees.
     basis = np.linalg.svd(seen)[2][degree:].T
     return poles_of(basis.T @ (path.a - np.outer(path.b, rows[-1]) / first) @ basis)
 
