@@ -36,7 +36,7 @@ def test_what_is_not_given_has_its_default() -> None:
     [
         ({"gian": 1.0}, {}, "did you mean gain"),
         ({"gain": -1.0}, {}, "not possible"),
-        ({}, {"lod": "on"}, "lod = 'on' is not known; there are: load, loop"),
+        ({}, {"lode": "on"}, "lode = .on. is not known; there are: load, loop"),
         ({}, {"loop": "ajar"}, "loop = 'ajar' is not known; there are: open, closed"),
     ],
 )
