@@ -1,6 +1,5 @@
 """``chladni bench``: the virtual instruments in the browser."""
 
-import webbrowser
 from pathlib import Path
 from typing import Annotated
 
@@ -47,6 +46,8 @@ def bench(
         out.line(address)
         out.line("Only this computer can reach this address; Ctrl-C ends.")
         if open_page:
+            import webbrowser
+
             webbrowser.open(address)
 
     server.run(tell)

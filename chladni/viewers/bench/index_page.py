@@ -1,6 +1,7 @@
 """The first page: all instruments."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from html import escape
 
 from chladni.models.core.instrument import Instrument
@@ -23,21 +24,47 @@ a {{ display: block; height: 100%; box-sizing: border-box; padding: 16px 18px; b
 a:hover {{ border-color: var(--c-accent); }}
 a:focus-visible {{ outline: 2px solid var(--c-accent); outline-offset: 2px; }}
 b {{ display: block; font-size: 16px; font-weight: 600; margin-bottom: 4px; }}
+h2 {{ font-size: 17px; font-weight: 600; margin: 36px 0 12px; }}
+.many {{ grid-template-columns: repeat(auto-fill, minmax(220px, 1fr)); gap: 8px; }}
+.many a {{ padding: 10px 12px; }}
+.many b {{ font-size: 14px; margin: 0; }}
 span {{ color: var(--c-soft); font-size: 13px; line-height: 1.45; }}
 </style></head>
 <body><main><h1>chladni bench</h1>
 <p>Virtual instruments: turn a knob and watch. Only this computer can reach these pages.</p>
-<ul>{items}</ul></main></body></html>
+{groups}</main></body></html>
 """
+
+
+#: From so many on, instruments of one kind (the word before the dash) stand apart, in smaller cards.
+MANY = 5
 
 
 def index_page(instruments: Iterable[Instrument]) -> str:
     """Give the page as HTML, without scripts."""
-    items = "".join(
-        f'<li><a href="/{escape(one.name)}"><b>{escape(one.title)}</b><span>{escape(_about(one))}</span></a></li>'
-        for one in instruments
+    kinds: dict[str, list[Instrument]] = {}
+    for one in instruments:
+        kinds.setdefault(one.name.partition("-")[0], []).append(one)
+    single = [one for kind in kinds.values() if len(kind) < MANY for one in kind]
+    groups = f"<ul>{''.join(_card(one, _about(one)) for one in single)}</ul>" if single else ""
+    for kind, members in kinds.items():
+        if len(members) >= MANY:
+            groups += (
+                f"<h2>{escape(kind.capitalize())}s</h2><ul class=many>{''.join(_small(one) for one in members)}</ul>"
+            )
+    return _PAGE.format(light=LIGHT.variables(), dark=DARK.variables(), font=FONT, groups=groups)
+
+
+def _small(instrument: Instrument) -> str:
+    title, _, rest = instrument.title.partition(", ")
+    return _card(replace(instrument, title=title), rest)
+
+
+def _card(instrument: Instrument, words: str) -> str:
+    return (
+        f'<li><a href="/{escape(instrument.name)}"><b>{escape(instrument.title)}</b>'
+        f"<span>{escape(words)}</span></a></li>"
     )
-    return _PAGE.format(light=LIGHT.variables(), dark=DARK.variables(), font=FONT, items=items)
 
 
 def _about(instrument: Instrument) -> str:
