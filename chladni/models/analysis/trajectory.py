@@ -6,7 +6,7 @@ from math import ceil, log2
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.models.analysis.exponential import exponential
+from chladni.models.analysis.exponential import exponential, moved
 from chladni.signals.value import Value
 
 Matrix = NDArray[np.float64]
@@ -44,7 +44,7 @@ class Trajectory(Value):
     def at(self, time_s: float) -> Matrix:
         """Give the state at one time, exactly."""
         point = max(int(np.searchsorted(self.time_s, time_s, side="right")) - 1, 0)
-        return np.asarray(exponential(self.generator * (time_s - self.time_s[point])) @ self.states[:, point])
+        return moved(self.generator * (time_s - self.time_s[point]), self.states[:, point])
 
     def crossings(self, row: Matrix, level: float = 0.0, *, at_most: int = 0) -> list[float]:
         """Times at which ``row . w`` passes `level`, to rounding; the first `at_most` unless that is 0."""
@@ -92,7 +92,7 @@ class Trajectory(Value):
         # Newton's steps, kept inside what is known to hold the crossing.
         at = width * before / (before - after) if before != after else 0.0
         for _ in range(MOST_STEPS):
-            state = exponential(self.generator * at) @ start
+            state = moved(self.generator * at, start)
             away, slope = float(row @ state) - level, float(rate @ state)
             low, high = (at, high) if (away < 0) == (before < 0) else (low, at)
             further = at - away / slope if slope else low

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from chladni.models.analysis.exponential import exponential
+from chladni.models.analysis.exponential import exponential, moved
 
 
 @pytest.mark.parametrize("size", [1e-6, 1e-2, 1.0, 30.0, 1000.0])
@@ -33,3 +33,13 @@ def test_an_empty_matrix_and_zero() -> None:
 def test_nilpotent_matrices_are_exact() -> None:
     found = exponential(np.diag([2.0, 3.0], k=1))
     np.testing.assert_allclose(found, [[1, 2, 3], [0, 1, 3], [0, 0, 1]], rtol=4e-16)
+
+
+@pytest.mark.parametrize("norm", [0.0, 1e-9, 0.1, 0.999, 1.001, 40.0])
+def test_a_moved_state_is_the_exponential_times_it(norm: float) -> None:
+    rng = np.random.default_rng(5)
+    matrix = rng.standard_normal((5, 5))
+    matrix *= norm / np.linalg.norm(matrix, 1)
+    state = rng.standard_normal(5)
+    expected = exponential(matrix) @ state
+    np.testing.assert_allclose(moved(matrix, state), expected, atol=1e-15 * max(norm, 1) * np.abs(expected).max())
