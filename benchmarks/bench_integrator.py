@@ -1,4 +1,4 @@
-"""The integrator against SciPy on five bodies with a Bouc-Wen joint: accuracy first, then time, then the first call."""
+"""The integrator against SciPy on five bodies with a Bouc-Wen joint: accuracy, time, and the first call."""
 
 import argparse
 import os

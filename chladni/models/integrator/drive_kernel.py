@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.models.integrator.machine_code import part_code
+from chladni.models.integrator.machine_code import inlined_code
 
 Matrix = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -25,7 +25,7 @@ class Drive(NamedTuple):
     kink_at: Matrix
 
 
-@part_code
+@inlined_code
 def fill_inputs(drive: Drive, inputs: Matrix, sample: int, part: float, share: float, step_s: float) -> None:
     """Row of the step that begins at `part` of the interval after `sample` and takes a `share` of it."""
     for place in range(inputs.size):
@@ -47,7 +47,7 @@ def fill_inputs(drive: Drive, inputs: Matrix, sample: int, part: float, share: f
     _fill_kinks(drive, inputs, sample, part, share)
 
 
-@part_code
+@inlined_code
 def _fill_kinks(drive: Drive, inputs: Matrix, sample: int, part: float, share: float) -> None:
     m, kinks = drive.rate.size, drive.kinked.size
     first = m + drive.straight.size

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.models.integrator.machine_code import part_code
+from chladni.models.integrator.machine_code import inlined_code
 from chladni.models.integrator.port_kernel import Ports, port_forces
 from chladni.models.integrator.step_tables import SchemeTables
 
@@ -42,7 +42,7 @@ class Stride(NamedTuple):
     grown: NDArray[np.int64]
 
 
-@part_code
+@inlined_code
 def advance_linear(advance: Matrix, level: int, state: Matrix, inputs: Matrix, lines: Matrix) -> None:
     """``lines = [state, inputs] @ advance[level]``: everything but the forces of this step."""
     rows, n = advance.shape[2], advance.shape[1] - inputs.size
@@ -55,7 +55,7 @@ def advance_linear(advance: Matrix, level: int, state: Matrix, inputs: Matrix, l
             lines[row] += advance[level, column, row] * value
 
 
-@part_code
+@inlined_code
 def note_scale(stride: Stride, n: int) -> None:
     """What a state would do without the forces counts too: where friction holds a body, its rest is no scale."""
     stride.grown[0] = 0
@@ -67,7 +67,7 @@ def note_scale(stride: Stride, n: int) -> None:
             stride.scale[row] = size
 
 
-@part_code
+@inlined_code
 def place_stage(
     tables: SchemeTables, ports: Ports, stride: Stride, value: Matrix, weights: Matrix,
     level: int, stage: int, row: int, step_s: float,
@@ -91,7 +91,7 @@ def place_stage(
             ports.state[place] += step_s * weights[stage, other] * value[other, count + place]
 
 
-@part_code
+@inlined_code
 def add_forces(tables: SchemeTables, ports: Ports, stride: Stride, value: Matrix, level: int) -> None:
     """State at the end, with what the forces ``value [stage, channel]`` make of it."""
     n = tables.gain.shape[3]
@@ -104,7 +104,7 @@ def add_forces(tables: SchemeTables, ports: Ports, stride: Stride, value: Matrix
                 stride.there[row] += tables.gain[level, stage, port, row] * force
 
 
-@part_code
+@inlined_code
 def explicit_step(tables: SchemeTables, ports: Ports, stride: Stride, level: int, t: float, step_s: float) -> None:
     """Step from ``channels[0]``, the forces and rates at the start, to ``channels[4]``, those at the end."""
     count, n = ports.first.size - 1, tables.gain.shape[3]
@@ -119,7 +119,7 @@ def explicit_step(tables: SchemeTables, ports: Ports, stride: Stride, level: int
     keep_end(ports, stride, n)
 
 
-@part_code
+@inlined_code
 def keep_end(ports: Ports, stride: Stride, n: int) -> None:
     """Law states and motion at the end are those at which the laws were asked last."""
     states = ports.state.size

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from chladni.models.integrator.drive_kernel import Drive
 from chladni.models.integrator.explicit_kernel import Stride, advance_linear
-from chladni.models.integrator.machine_code import part_code
+from chladni.models.integrator.machine_code import inlined_code, part_code
 from chladni.models.integrator.port_kernel import Ports, port_forces
 from chladni.models.integrator.step_tables import DEEPEST
 
@@ -40,7 +40,7 @@ class Judge(NamedTuple):
     tolerance: float
 
 
-@part_code
+@inlined_code
 def weigh(judge: Judge, stride: Stride, ports: Ports, level: int, step_s: float) -> None:
     """Renew the weight of each channel."""
     count, n = ports.first.size - 1, judge.effect.shape[2]
@@ -84,7 +84,7 @@ def look_ahead(advance: Matrix, drive: Drive, ports: Ports, stride: Stride, samp
                 stride.scale[n + place] = moved
 
 
-@part_code
+@inlined_code
 def explicit_error(judge: Judge, ports: Ports, level: int, previous: int) -> float:
     """Relative error of the explicit step just made."""
     total, q = 0.0, ports.channels
@@ -101,7 +101,7 @@ def explicit_error(judge: Judge, ports: Ports, level: int, previous: int) -> flo
     return total
 
 
-@part_code
+@inlined_code
 def _curvature_error(judge: Judge, q: Matrix, channel: int, change: int) -> float:
     """Error of the integral of a force over the step, by its fourth difference over this step and the one before.
 

@@ -1,6 +1,7 @@
 """How kernels are compiled, and how they call a law by its address."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba as nb
@@ -23,19 +24,40 @@ LAW_SIGNATURE = types.float64(types.float64, types.float64, types.float64, _POIN
 _OPTIONS: dict[str, Any] = {"cache": CACHED, "nogil": True, "fastmath": False, "error_model": "numpy", "_nrt": False}
 
 
+def _stamp() -> tuple[float, int]:
+    """Newest time and total size of the sources of all kernels."""
+    found = [path.stat() for path in Path(__file__).parent.glob("*.py")]
+    return max(each.st_mtime for each in found), sum(each.st_size for each in found)
+
+
+_STAMP = _stamp()
+
+
+def _compile(function: FunctionT, **options: bool) -> FunctionT:
+    compiled: FunctionT = _JIT(**options, **_OPTIONS)(function)
+    # numba looks at the file of a kernel only: a part that changed in another file would go on running as it was.
+    kept = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    if kept is not None:
+        vars(kept)["_source_stamp"] = _STAMP
+    return compiled
+
+
 def machine_code(function: FunctionT) -> FunctionT:
     """Compile a kernel when it's first called; the result is kept on disk where that is possible.
 
     Kernels allocate nothing, so they need no reference counts.
     """
-    compiled: FunctionT = _JIT(**_OPTIONS)(function)
-    return compiled
+    return _compile(function)
 
 
 def part_code(function: FunctionT) -> FunctionT:
     """Compile a part that only kernels call: without the door for Python, which takes longer than the part itself."""
-    compiled: FunctionT = _JIT(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
-    return compiled
+    return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def inlined_code(function: FunctionT) -> FunctionT:
+    """Compile a part into each kernel that calls it: for what is done in every step, where a call takes its time."""
+    return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
 
 
 def _typed_call(_context: Any, *_arguments: Any) -> tuple[Any, Callable[..., Any]]:

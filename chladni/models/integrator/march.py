@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from chladni.models.integrator.drive_kernel import Drive, fill_inputs
 from chladni.models.integrator.explicit_kernel import Stride, explicit_step
 from chladni.models.integrator.judge_kernel import Judge, explicit_error, is_stiff, look_ahead, weigh
-from chladni.models.integrator.machine_code import machine_code, part_code
+from chladni.models.integrator.machine_code import inlined_code, machine_code
 from chladni.models.integrator.port_kernel import Ports
 from chladni.models.integrator.step_tables import DEEPEST, SchemeTables
 
@@ -47,7 +47,7 @@ class Course(NamedTuple):
     force: Matrix
 
 
-@part_code
+@inlined_code
 def record(course: Course, ports: Ports, stride: Stride) -> None:
     """Keep what is at a sample."""
     sample = course.cursor[SAMPLE]
@@ -57,7 +57,7 @@ def record(course: Course, ports: Ports, stride: Stride) -> None:
         course.force[sample, port] = ports.channels[0, port]
 
 
-@part_code
+@inlined_code
 def accept(ports: Ports, stride: Stride, judge: Judge) -> None:
     """Make the end of the step the start of the next."""
     for row in range(stride.here.size):
@@ -70,7 +70,7 @@ def accept(ports: Ports, stride: Stride, judge: Judge) -> None:
         q[0, channel] = q[4, channel]
 
 
-@part_code
+@inlined_code
 def move_on(cursor: Integers, error: float, tolerance: float) -> None:
     """Go to the end of an accepted step; the next is longer when this was much better than asked for."""
     level = cursor[LEVEL]

@@ -136,7 +136,8 @@ class Run:
         t = sample / self._rate_hz
         base = plan.motion_state @ stride.here[:n] + plan.motion_column @ row[: self._hold.columns]
         ports.state[:] = stride.here[n : n + ports.state.size]
-        fill_lagged(history, ports, 0, t + 1e-9 / self._rate_hz)
+        if plan.delay_s.size:
+            fill_lagged(history, ports, 0, t + 1e-9 / self._rate_hz)
         if plan.looped:
             self._solve_loop(base, t)
         else:

@@ -18,6 +18,14 @@ from tests.models.integrator.systems import compiled_structure, cubic, law, osci
 RATE_HZ = 1000.0
 
 
+def clipped(samples, sample_rate_hz):
+    return np.clip(samples, -1, 1)
+
+
+def doubled(samples, sample_rate_hz):
+    return 2 * samples
+
+
 def noise(rows, count, seed=1):
     return np.random.default_rng(seed).standard_normal((rows, count))
 
@@ -166,7 +174,7 @@ def test_a_generated_input_is_asked_for_its_samples():
 def test_maps_act_on_samples_before_and_after():
     compiled = plain_model(
         [[0.0]], [[1.0]], [[1.0]], [[0.0]],
-        input_maps=((0, lambda u, rate: np.clip(u, -1, 1)),), output_maps=((0, lambda y, rate: 2 * y),),
+        input_maps=((0, clipped),), output_maps=((0, doubled),),
     )  # fmt: skip
     signals = np.full((1, 20), 7.0)
     found = integrate(compiled, signals, RATE_HZ)
