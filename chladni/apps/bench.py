@@ -103,7 +103,9 @@ def _influence(instrument: Instrument, values: Values, options: Options) -> Infl
 def _watch(instrument: Instrument, path: Path) -> Callable[[], Rows]:
     from chladni.models.files.variants_file import VariantsWatch
 
+    # The watch remembers the last right state, so that it lives as long as the page.
     watch = VariantsWatch(path, instrument.parameters, instrument.options)
+    # A row says only what differs.
     numbers = instrument.parameters.numbers()
     words = {option.name: option.default for option in instrument.options}
 

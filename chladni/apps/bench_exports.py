@@ -65,6 +65,7 @@ def step_log(shown: Shown) -> bytes:
 
 def step_seconds(reading: InstrumentReading) -> float:
     """Give the length of the step responses that are drawn."""
+    # The charts chose a length in which the motion settles.
     lengths = [
         float(curve.x[-1])
         for chart in reading.charts
@@ -84,6 +85,7 @@ def picture(kind: str, shown: Shown) -> bytes:
 
 
 def _written(name: str, write: Callable[[Path], object]) -> bytes:
+    # Writers write files, whole or not at all; the browser wants bytes.
     with tempfile.TemporaryDirectory(prefix="chladni-") as folder:
         path = Path(folder) / name
         write(path)

@@ -47,6 +47,7 @@ def comparison_charts(
     charts, words = list(_times(measured, simulated, start_s)), []
     if measured.samples < FEWEST_SAMPLES:
         return tuple(charts), (f"{measured.samples} samples are too few for a spectrum; take a longer stretch.",)
+    # Each on its own: a record may do for one and not for the other.
     for make in (_spectra, _transfers):
         try:
             charts += make(driving, measured, simulated)
@@ -76,6 +77,7 @@ def scores(measured: TimeSeries, simulated: TimeSeries) -> tuple[Quantity, ...]:
 
 
 def _times(measured: TimeSeries, simulated: TimeSeries, start_s: float) -> Iterator[Chart]:
+    # As the log counts, so that a place found here is found there.
     time_s = start_s + np.arange(measured.samples) / measured.sample_rate_hz
     for channel, real, made in zip(measured.channels, measured.values, simulated.values, strict=True):
         curves = tuple(_thinned(label, time_s, values) for label, values in ((MEASURED, real), (SIMULATED, made)))
@@ -113,6 +115,7 @@ def _transfers(driving: TimeSeries, measured: TimeSeries, simulated: TimeSeries)
     if np.ptp(driving.values[0]) == 0:
         raise EstimateError(f"{reference} is the same all the time in this stretch: there is no transfer function")
     count = len(measured.channels)
+    # Measured and simulated in one estimate: same segments, same window, same reference.
     series = _joined(measured, simulated, first=driving)
     names = [channel.name for channel in series.channels[1:]]
     response = frf(

@@ -73,6 +73,7 @@ def assign(model: Model, channels: Sequence[Channel]) -> dict[str, str]:
     wanted = [*inputs, *outputs]
     known = {channel.name for channel in channels}
     found = {one.name: one.channel for one in wanted if one.channel in known and one.channel is not None}
+    # Names for all signals first: the only channel of a unit may be another signal's by name.
     for rule in (_by_name, _by_unit):
         for terminal in wanted:
             if terminal.name not in found:
@@ -115,7 +116,9 @@ def compare(
     if not isinstance(log, OpenedLog):
         raise TypeError(f"{type(log).__name__} is no OpenedLog")
     inputs, outputs = ([one for one in group if one.name in assignment] for group in terminals(model))
+    # Before reading: a wrong choice should not wait for a large log.
     _require_choice(inputs, outputs, log, assignment)
+    # Once each: two signals may be the same channel.
     series = log.read(list(dict.fromkeys(assignment.values())), start_s, start_s + seconds)
     _require_whole(series, log)
     driving, measured = (_renamed(series, group, assignment) for group in (inputs, outputs))
@@ -186,6 +189,7 @@ def _matching(simulated: TimeSeries, group: Sequence[Terminal]) -> TimeSeries:
     rows: Mapping[str, int] = {channel.name: row for row, channel in enumerate(simulated.channels)}
     chosen = []
     for terminal in group:
+        # A simulation names its outputs by the channels of the model file where it has any.
         row = rows.get(terminal.channel or terminal.name, rows.get(terminal.name))
         if row is None:
             raise ModelError(f"the simulation gave no {terminal.name}; it gave {', '.join(rows)}")

@@ -53,9 +53,11 @@ class Slot:
 
     def show(self, charts: Sequence[Chart], kept: Sequence[Kept]) -> None:
         """Show the chosen chart; the first one when there is no such chart any more."""
+        # A chart may vanish with an option that was switched.
         chart = next((one for one in charts if one.name == self.name), charts[0])
         self.name = chart.name
         self._offer(charts)
+        # A figure is dear; another set of curves on the same axes is cheap.
         if self.tile is None or self.tile.key != key_of(chart):
             self.tile = Tile(chart, self._theme)
             self.tile.show_ghosts(_ghosts(chart.name, kept))
@@ -71,6 +73,7 @@ class Slot:
     def _offer(self, charts: Sequence[Chart]) -> None:
         names = {chart.title: chart.name for chart in charts}
         if self.select.options != names or self.select.value != self.name:
+            # Offering is no choice of the user.
             self._filling = True
             self.select.param.update(options=names, value=self.name)
             self._filling = False
@@ -100,6 +103,7 @@ class Board:
     def show(self, charts: Sequence[Chart]) -> None:
         """Show these charts."""
         self._charts = charts
+        # Only then: slots keep what the reader chose.
         if len(self.slots) != min(SLOTS, len(charts)):
             self._rebuild()
         else:

@@ -57,6 +57,7 @@ class Desk:
         changes = [
             f"{parameter.symbol or parameter.name} {scale.text(values[parameter.name])} {scale.unit}".rstrip()
             for parameter, scale in ((one, KnobScale.of(one)) for one in self.instrument.parameters.values())
+            # Turned away and back again is no change, whatever rounding left.
             if not isclose(values[parameter.name], parameter.value, rel_tol=1e-9)
         ]
         changes += [

@@ -59,6 +59,7 @@ class Download:
         self.view = row(self.button, drawing(self._carrier))
 
     def _pressed(self, _event: Any) -> None:
+        # Pressed twice, it would only wait twice.
         self.button.disabled = True
         self._latest.submit(self._build(), self._built)
 

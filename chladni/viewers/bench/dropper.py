@@ -53,6 +53,7 @@ class Dropper(pn.widgets.FileDropper):  # type: ignore[misc]  # panel has no typ
         self._bytes += len(content)
         if self._bytes > MOST_BYTES:
             self._received = []
+            # Said once, at the piece that crosses the bound.
             if self._bytes - len(content) <= MOST_BYTES:
                 self._refused(
                     f"{piece['name']}: larger than {MOST_BYTES // 1_000_000} MB, all that can be dropped here; "

@@ -45,6 +45,7 @@ def index_page(instruments: Iterable[Instrument]) -> str:
     kinds: dict[str, list[Instrument]] = {}
     for one in instruments:
         kinds.setdefault(one.name.partition("-")[0], []).append(one)
+    # Forty elements would bury six drives.
     single = [one for kind in kinds.values() if len(kind) < MANY for one in kind]
     groups = f"<ul>{''.join(_card(one, _about(one)) for one in single)}</ul>" if single else ""
     for kind, members in kinds.items():

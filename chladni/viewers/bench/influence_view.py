@@ -43,6 +43,7 @@ class InfluenceView:
 
     def follow(self) -> None:
         """Compute again after a rest, when somebody looks."""
+        # Tens of readings for a table that nobody looks at would slow down the knobs.
         if self._shown:
             self._pause.touch()
 

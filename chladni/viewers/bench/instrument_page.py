@@ -74,6 +74,7 @@ class InstrumentPage:
         look = theme(ground)
         self.desk = Desk(instrument)
         self._tools, self._document = tools, document
+        # Two threads: a picture that is being drawn must not hold up the next turn of a knob.
         self._reader, self._exporter = Latest(document), Latest(document)
         self._error = ""
         self.words = html("", MESSAGE_CSS)
@@ -94,6 +95,7 @@ class InstrumentPage:
         self.behaviour = column(self.strip, self.board.view, sizing_mode="stretch_both", stylesheets=[FILLING])
         self._ask()
         self._reader.settle(PATIENCE_S)
+        # Who names a log wants to see it first.
         if log is not None:
             self.views.value = VIEWS[-1]
 
@@ -143,6 +145,7 @@ class InstrumentPage:
 
     def _exporting(self, export: Export) -> Callable[[], bytes]:
         """Give the job with what the page shows now, however the knobs turn until it runs."""
+        # Taken now, on the page's thread: the job runs later.
         good, reading, charts = self.desk.good, self.desk.reading, self.board.shown()
         instrument = self.desk.instrument
 
@@ -160,11 +163,13 @@ class InstrumentPage:
 
     def _switched(self, option: Option, event: Any) -> None:
         word = ("on" if event.new else "off") if option.choices == SWITCH else event.new
+        # Putting a switch back after a refusal is no wish of the user.
         if self.desk.asked.options[option.name] != word:
             self.desk.switch(option.name, word)
             self._ask()
 
     def _reset(self, _event: Any) -> None:
+        # A fresh desk says what is declared.
         self.desk.load(Desk(self.desk.instrument).good)
         self._show_setting()
         self._ask()
@@ -179,6 +184,7 @@ class InstrumentPage:
         with self._one_patch():
             if error is not None:
                 self._refuse(told(error))
+                # Where a newer setting waits already, it may be a good one: nothing is put back.
                 if self.desk.asked is setting:
                     self.desk.give_up()
                     self._show_setting()
@@ -193,6 +199,7 @@ class InstrumentPage:
         self.board.show(reading.charts)
         self.strip.object = quantity_strip(reading.quantities)
         self.words.object = message(self._error, reading.flags)
+        # Last, since each only notes that there is something to follow.
         for follower in (self.influence, self.variants, self.log):
             follower.follow()
 
@@ -214,6 +221,7 @@ class InstrumentPage:
 
     def _look_at(self, event: Any) -> None:
         with self._one_patch():
+            # Views are hidden, not removed: a figure that is made anew takes as long as the whole page.
             self.behaviour.visible = event.new == VIEWS[0]
             self.influence.show(event.new == VIEWS[1])
             self.variants.show(event.new == VIEWS[2])

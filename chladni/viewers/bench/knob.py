@@ -45,6 +45,7 @@ class Knob:
         self.value = parameter.value
         self._turned, self._refused = turned, refused
         self._showing = False
+        # Both widgets stand for one value, and each follows the other; `_showing` tells our changes from the user's.
         self.slider = self._slider()
         self.entry = entry(self.scale.text(self.value), _ENTRY_CSS, width=84)
         self.slider.param.watch(self._on_slider, "value")
@@ -87,6 +88,7 @@ class Knob:
     def _label(self) -> str:
         name = self.parameter.name.replace("_", " ")
         letter = f"<i>{symbol(self.parameter.symbol)}</i>" if self.parameter.symbol else ""
+        # A tooltip rather than a line of its own: twenty knobs have to fit.
         told = "; ".join(filter(None, (self.parameter.meaning, self.scale.usual_range())))
         return (
             f'<div class="knob" title="{escape(told)}">{letter}<span>{escape(name)}</span>'
@@ -103,6 +105,7 @@ class Knob:
             return
         try:
             value = self.scale.read(event.new)
+        # What was typed is gone, so that the page never shows a value that isn't in its curves.
         except ChladniError as error:
             self._refused(str(error))
             self.show(self.value)

@@ -54,6 +54,7 @@ class KnobScale:
         factor = si_factor(shown)[0]
         low, high = parameter.low / factor, parameter.high / factor
         logarithmic = low > 0 and high / low > DECADES_FROM
+        # The slider itself is linear in the browser, so that its place is the logarithm.
         if logarithmic:
             low, high = log10(low), log10(high)
         low, high = _clean(low), _clean(high)
@@ -75,6 +76,7 @@ class KnobScale:
         shown = value / self.factor
         if self.logarithmic:
             shown = log10(shown) if shown > 0 else self.start
+        # A slider can't stand outside itself; the entry says the value.
         return min(max(shown, self.start), self.end)
 
     def value(self, place: float) -> float:
@@ -110,6 +112,7 @@ class KnobScale:
 
     def _number(self, text: str) -> float:
         try:
+            # Plain numbers first: "65" means 65 of what is shown, though it would also be a quantity without unit.
             number = float(text)
         except ValueError:
             value, unit = parse_quantity(text)

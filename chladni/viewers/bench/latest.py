@@ -41,6 +41,7 @@ class Latest:
     def submit(self, job: Job, deliver: Deliver) -> None:
         """Run `job` when the thread is free, then ``deliver(future)`` on the page's thread."""
         if self._document is None:
+            # On the thread all the same: one way for exceptions, served or not.
             future = self._pool.submit(job)
             wait([future])
             deliver(future)
@@ -83,6 +84,7 @@ class Latest:
 
     def _finish(self, deliver: Deliver, future: "Future[Any]") -> None:
         with self._changed:
+            # Nobody is there to see it.
             if self._closed or self._document is None:
                 return
             if not self._loaded:

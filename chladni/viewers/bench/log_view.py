@@ -64,6 +64,7 @@ class LogView:
         self.view.visible = shown
         if not shown:
             return
+        # Not before: a large log takes seconds to survey, and most visits are for the charts.
         if self._path is not None:
             path, self._path = self._path, None
             self._opener.submit(partial(self._tools.open_log, path, path.name, False), self._opened)
@@ -80,6 +81,7 @@ class LogView:
         self._opener.close()
         self._comparer.close()
         if self._log is not None:
+            # One log at a time: a dropped one would otherwise lie on the disk until the page is closed.
             self._log.close()
         self._log = None
 
@@ -88,6 +90,7 @@ class LogView:
         self._opener.submit(partial(self._open_dropped, name, content), self._opened)
 
     def _open_dropped(self, name: str, content: bytes) -> MeasuredLog:
+        # On the thread, where waiting for a disk harms nobody.
         path = private_file(content)
         try:
             return self._tools.open_log(path, name, True)
@@ -118,6 +121,7 @@ class LogView:
         except ChladniError as error:
             self._refuse(told(error))
             return False
+        # An hour of log is no start; the user may ask for more.
         self.span.value = min(FIRST_SPAN_S, round(log.duration_s, 3))
         names = [NOT_MEASURED, *(channel.name for channel in log.channels)]
         self.selects = self._selects(terminals, names, assigned)
@@ -142,6 +146,7 @@ class LogView:
         if self._log is None:
             return
         assignment = {name: select.value for name, select in self.selects.items() if select.value != NOT_MEASURED}
+        # The last good setting: what the other view shows.
         setting = self._desk.good
         self._comparer.submit(
             partial(self._job, setting.values, setting.options, self._log, assignment), self._compared

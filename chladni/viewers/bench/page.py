@@ -35,11 +35,13 @@ def page_maker(
 
     def make() -> Any:
         document = curdoc()
+        # In the address, so that a reload and a bookmark keep it.
         ground = wanted_ground(pn.state.session_args.get("theme", []))
         # Inside the page's function: the look belongs to this document, not to the program.
         document.theme = ChartTheme(json=theme(ground).of_charts())
         document.title = f"{instrument.title} · chladni"
         page = InstrumentPage(instrument, tools, document=document, ground=ground, log=log, variants=variants)
+        # Threads and private files end with the page.
         document.on_session_destroyed(lambda _context: page.close())
         return framed(page, instrument, ground)
 

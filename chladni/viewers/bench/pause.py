@@ -20,6 +20,7 @@ class Pause:
         if self._document is None:
             self._action()
             return
+        # Counted instead of taken back: a callback that has left can't be recalled.
         self._touches += 1
         touch = self._touches
 

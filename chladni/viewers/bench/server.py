@@ -114,17 +114,20 @@ class BenchServer:
             await self._ended.wait()
         finally:
             server.stop()
+            # Browsers keep their connections open, and would keep the port.
             await http.close_all_connections()
 
     def _application(self) -> BokehTornado:
         application = BokehTornado(
             build_applications({f"/{name}": make for name, make in self._pages.items()}),
+            # Without these Bokeh would let in pages of localhost only, and the address that is printed is a number.
             extra_websocket_origins=[f"{name}:{self.port}" for name in OWN_NAMES],
             extra_patterns=[(r"/", Index, {"content": self._index})],
             use_index=False,
             websocket_max_message_size_bytes=_MOST_MESSAGE_BYTES,
             unused_session_lifetime_milliseconds=UNUSED_MS,
         )
+        # Handlers for some hosts come before those for all, whatever the path.
         application.add_handlers(foreign_hosts(), [(r".*", ForeignHost)])
         return application
 

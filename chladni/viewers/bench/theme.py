@@ -31,6 +31,7 @@ class Theme:
 
     def variables(self) -> str:
         """Give the colours as CSS custom properties, which reach into every component of the page."""
+        # One set of names for both grounds: every stylesheet is written once.
         names = ("page", "card", "line", "grid", "text", "soft", "accent", "warning")
         colours = "".join(f"--c-{name}:{getattr(self, name)};" for name in names)
         return f"{colours}--c-warning-ground:{self.warning_ground};color-scheme:{self.ground};"

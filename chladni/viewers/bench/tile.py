@@ -54,11 +54,13 @@ class Tile:
 
     def show(self, chart: Chart) -> None:
         """Replace the curves."""
+        # By place, so that a curve keeps its colour while a knob turns.
         colours = [self._theme.palette[place % len(self._theme.palette)] for place in range(len(chart.curves))]
         labels = [curve.label for curve in chart.curves]
         lines, points = _data(chart.curves, labels, colours)
         _replace(self.lines, lines)
         _replace(self.points, points)
+        # A single curve is named by the chart.
         drawn = len({label for label in labels if label})
         self.legend.visible = LEGEND_FROM <= drawn <= LEGEND_TO
 

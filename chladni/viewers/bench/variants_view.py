@@ -101,10 +101,12 @@ class VariantsView:
 
     def _keep(self, _event: Any) -> None:
         if self._desk.reading is not None:
+            # The reading is kept with the setting: ghosts must not change when a model does.
             self._hand.append(Kept(variant=self._desk.good, reading=self._desk.reading, colour=self._next_colour()))
             self._redraw()
 
     def _remove(self, kept: Kept, _event: Any) -> None:
+        # By identity: two variants may be alike.
         self._hand = [one for one in self._hand if one is not kept]
         self._redraw()
 
@@ -119,6 +121,7 @@ class VariantsView:
         self.follow()
 
     def _chip(self, kept: Kept) -> Any:
+        # What a file says is removed in the file.
         by_hand = kept in self._hand
         css = f".bk-btn.bk-btn-default {{ border-left: 5px solid {kept.colour} !important; padding: 1px 8px; }}"
         return button(
@@ -177,10 +180,12 @@ def read_rows(instrument: Instrument, tools: Tools, look: Callable[[], Rows], kn
         When the file can't be read.
     """
     rows = look()
+    # Most looks find nothing new, and readings are dear.
     if rows == known:
         return None
     found: list[tuple[Variant, InstrumentReading]] = []
     words: list[str] = []
+    # One bad row doesn't take the others away.
     for variant in rows.variants[:MOST_ROWS]:
         try:
             found.append((variant, tools.read(instrument, variant.values, variant.options)))

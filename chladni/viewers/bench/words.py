@@ -79,12 +79,14 @@ def symbol(letter: str) -> str:
 
 def quantity_strip(quantities: Sequence[Quantity]) -> str:
     """Quantities as a row of small cards; the definition shows when one points at a card, or tabs to it."""
+    # Focusable, so that a definition can be read without a mouse.
     cards = "".join(
         f'<div class="q" tabindex="0" title="{escape(one.definition)}" aria-label="{escape(_spoken(one))}">'
         f"<b>{escape(with_unit(one))}</b><span>{escape(printed(one.name))}</span></div>"
         for one in quantities
         if one.value is not None
     )
+    # Not as empty cards: half of the numbers don't exist for an open loop, and dashes would push charts down.
     missing = ", ".join(
         f'<span title="{escape(one.definition)}">{escape(printed(one.name))}</span>'
         for one in quantities
@@ -108,6 +110,7 @@ def quantity_table(columns: Sequence[tuple[str, str, Sequence[Quantity]]]) -> st
     )
     rows = []
     for name in names:
+        # Variants may have other quantities, as with another option.
         found = [next((one for one in quantities if one.name == name), None) for _, _, quantities in columns]
         definition = next((one.definition for one in found if one is not None), "")
         cells = "".join(f"<td>{escape(with_unit(one)) if one is not None else DASH}</td>" for one in found)
@@ -122,6 +125,7 @@ def influence_table(table: InfluenceTable) -> str:
         for name, definition in zip(table.behaviour, table.definitions, strict=True)
     )
     nominal = "".join(f"<td>{number(float(value))}</td>" for value in table.nominal)
+    # By size: the strongest may well be the one that lowers.
     by_row, by_column = _strongest(table.finite, axis=1), _strongest(table.finite, axis=0)
     rows = "".join(
         f"<tr><td>{escape(name.replace('_', ' '))} <small>({100 * -float(change):+.3g} %)</small></td>"
@@ -153,6 +157,7 @@ def _influence_cell(finite: float, derivative: float, *, strongest: bool, strong
 
 
 def _strongest(values: NDArray[np.float64], *, axis: int) -> NDArray[np.bool_]:
+    # NaN is no influence; it must not win.
     size = np.nan_to_num(np.abs(values), nan=-1.0)
     return np.asarray((size == size.max(axis=axis, keepdims=True, initial=-1.0)) & (size > 0))
 
