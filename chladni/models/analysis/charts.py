@@ -193,4 +193,8 @@ def _words(name: str) -> str:
 def _ratio(over: str, under: str) -> str:
     if over == under:
         return "1"
-    return over if under == "1" else f"({over})/({under})"
+    if under == "1":
+        return over
+    # Brackets only where a unit is itself a quotient or a product.
+    top, bottom = (unit if unit.isalnum() else f"({unit})" for unit in (over, under))
+    return f"{top}/{bottom}"
