@@ -149,8 +149,8 @@ def test_seals_hold_the_piston_against_a_small_load():
     for word in ("on", "off"):
         model = drive_model(PNEUMATIC, {}, {"seal_friction": word})
         moved.append(np.abs(simulate(model, held(model, 1e3, 3.0, load=10.0)).states[0]).max())
-    # The bristle yields at 0.09 mm; the air alone gives way by 10 N over A^2/c = 46 kN/m, and swings beyond.
-    assert moved[0] < 0.09e-3
+    # The bristle yields at 0.13 mm; the air alone gives way by 10 N over A^2/c = 46 kN/m, and swings beyond.
+    assert moved[0] < 0.13e-3
     assert moved[1] > 0.2e-3
 
 
