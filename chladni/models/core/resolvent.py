@@ -22,7 +22,9 @@ def resolvent(a: NDArray[np.float64], s: NDArray[np.complex128]) -> NDArray[np.c
 
     if not a.size:
         return np.zeros((s.size, 0, 0), dtype=np.complex128)
-    found, (scale, _) = matrix_balance(a, permute=False, separate=True)
+    # SciPy casts the scales to integers too, for a permutation that wasn't asked for: beyond 2^63 that warns.
+    with np.errstate(invalid="ignore"):
+        found, (scale, _) = matrix_balance(a, permute=False, separate=True)
     balanced = np.asarray(found, dtype=np.float64)
     try:
         inverse = np.linalg.inv(s[:, None, None] * np.eye(len(a)) - balanced)

@@ -32,3 +32,12 @@ def test_no_states_have_an_empty_one():
 def test_an_eigenvalue_has_none():
     with pytest.raises(ModelError, match="a pole at 0 Hz"):
         resolvent(np.zeros((1, 1)), np.zeros(1, complex))
+
+
+def test_units_may_differ_by_more_than_integers_hold():
+    # Balanced by 2^67; a warning would be an error here.
+    a = np.array([[-1.0, 1e40], [-1e-40, -1.0]])
+    s = np.array([0.5j])
+    determinant = (s[0] + 1) ** 2 + 1
+    expected = np.array([[s[0] + 1, 1e40], [-1e-40, s[0] + 1]]) / determinant
+    np.testing.assert_allclose(resolvent(a, s)[0], expected, rtol=1e-14)
