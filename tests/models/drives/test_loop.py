@@ -118,11 +118,25 @@ def test_maps_and_dead_times_stay_with_their_inputs():
     assert closed.input_delays_s == (0.0, 0.5)
 
 
-@pytest.mark.parametrize("change", [{"output_maps": ((0, abs),)}, {"output_offsets_s": (0.1, 0.0)}])
-def test_what_acts_on_samples_is_refused_inside(change):
+def test_what_acts_on_samples_is_refused_inside():
+    mapped = replace(plant(), output_maps=((0, abs),))
     with pytest.raises(ModelError, match="output 'y' feeds a loop"):
-        close_loop(replace(plant(), **change), Loop(controller=controller()))
-    close_loop(replace(plant(), **change), Loop(controller=controller(Z)))
+        close_loop(mapped, Loop(controller=controller()))
+    close_loop(mapped, Loop(controller=controller(Z)))
+
+
+def test_a_late_clock_of_the_log_stays_outside_of_the_loop():
+    late, on_time = (
+        close_loop(replace(plant(), output_offsets_s=offsets), Loop(controller=controller()))
+        for offsets in ((0.1, 0.0), (0.0, 0.0))
+    )
+    assert late.output_offsets_s == (0.1, 0.0)
+    np.testing.assert_array_equal(late.a, on_time.a)
+    frequency_hz = np.array([0.3, 2.0])
+    shift = np.exp(-2j * np.pi * frequency_hz * 0.1)
+    found, expected = (one.frequency_response(frequency_hz) for one in (late, on_time))
+    np.testing.assert_allclose(found[0], expected[0] * shift, rtol=1e-12)
+    np.testing.assert_array_equal(found[1], expected[1])
 
 
 def test_names_change_everywhere_in_a_loop():
