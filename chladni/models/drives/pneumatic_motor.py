@@ -19,6 +19,7 @@ from chladni.models.drives.piston import (
 )
 from chladni.models.drives.seal_friction import seal_friction
 from chladni.models.drives.validity import Limit
+from chladni.signals.errors import ModelError
 
 # The paper's units: 1 daN/cm^2 is 1 bar, 1 daN s^2/cm is 1000 kg, 1 cm^5/(daN s) is 0.1 cm^5/(N s).
 _PARAMETERS = Parameters(
@@ -104,7 +105,12 @@ def _build(values: Mapping[str, float], options: Mapping[str, str]) -> CompiledM
     )
     if options["seal_friction"] == "off":
         return compiled
-    return seal_friction(values["pressure"] - AMBIENT, active_area=values["active_area"]).attach(compiled)
+    try:
+        friction = seal_friction(values["pressure"] - AMBIENT, active_area=values["active_area"])
+    except ModelError as error:
+        # The motor's pressure is absolute; whoever gave 5 bar must not wonder why 4 are spoken of.
+        raise ModelError(f"pressure = {values['pressure'] / 1e5:g} bar absolute: {error}") from error
+    return friction.attach(compiled)
 
 
 def _limits(values: Mapping[str, float], options: Mapping[str, str]) -> Sequence[Limit]:
