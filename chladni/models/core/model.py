@@ -1,7 +1,7 @@
 """What every simulated system can do, whatever it is made of."""
 
 from collections.abc import Mapping, Sequence
-from typing import Literal, Protocol, Self
+from typing import Literal, Protocol, Self, runtime_checkable
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameters
@@ -27,6 +27,24 @@ class Effect(Protocol):
 
     def attach(self, compiled: CompiledModel) -> CompiledModel:
         """Give the model with the effect in it; `ModelError` when the site can't carry it."""
+
+
+@runtime_checkable
+class FlaggingEffect(Protocol):
+    """An effect whose law isn't valid everywhere, and which says where a simulation left that."""
+
+    def flags(self, compiled: CompiledModel, simulation: Simulation) -> tuple[str, ...]:
+        """Sentences; none while the law is valid."""
+
+
+def flags_of_effects(effects: Sequence[Effect], compiled: CompiledModel, simulation: Simulation) -> tuple[str, ...]:
+    """Sentences of those effects that have any to say, in order; what `Model.flags` adds to its own."""
+    return tuple(
+        sentence
+        for effect in effects
+        if isinstance(effect, FlaggingEffect)
+        for sentence in effect.flags(compiled, simulation)
+    )
 
 
 class Model(Protocol):

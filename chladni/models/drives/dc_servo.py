@@ -171,6 +171,13 @@ def _limits(values: Mapping[str, float], _options: Mapping[str, str]) -> Sequenc
     )
 
 
+def _remarks(_values: Mapping[str, float], options: Mapping[str, str]) -> Sequence[str]:
+    # Not refused: on a page the loop is switched apart from the limiter.
+    if options["current_limiter"] == "on" and options["loop"] not in ("velocity", "position"):
+        return ("current_limiter is on, but limits nothing: it acts with loop velocity or position",)
+    return ()
+
+
 #: omega/U = K_t / (L J s^2 + (L b + R J) s + R b + K_t K_e) without converter lag, gear and loops.
 DC_SERVO = DriveKind(
     name="dc-servo",
@@ -188,6 +195,7 @@ DC_SERVO = DriveKind(
     build=_build,
     loops=servo_loops,
     limits=_limits,
+    remarks=_remarks,
     law_words={"voltage_limit": "the voltage limit", "current_reference_limit": "the current limit"},
     acts_with=_ACTS_WITH,
 )

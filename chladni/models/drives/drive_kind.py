@@ -25,6 +25,11 @@ def no_limits(_values: Numbers, _options: Words) -> Sequence[Limit]:
     return ()
 
 
+def no_remarks(_values: Numbers, _options: Words) -> Sequence[str]:
+    """Remarks on a drive whose settings are all what they seem to be."""
+    return ()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveKind:
     """Declares one kind of drive; `DriveModel` is made of it.
@@ -48,6 +53,8 @@ class DriveKind:
         ``loops(values, options) -> [Loop, ...]``, the innermost first.
     limits
         ``limits(values, options) -> [Limit, ...]``: what the model is valid for.
+    remarks
+        ``remarks(values, options) -> sentences`` on a setting that can be simulated, but isn't what it seems to be.
     law_words
         What acts at a port of the kind's own laws, by the port's name: ``the voltage limit``. Said when it acts.
     acts_with
@@ -64,6 +71,7 @@ class DriveKind:
     options: tuple[Option, ...] = ()
     loops: Callable[[Numbers, Words], Sequence[Loop]] = no_loops
     limits: Callable[[Numbers, Words], Sequence[Limit]] = no_limits
+    remarks: Callable[[Numbers, Words], Sequence[str]] = no_remarks
     law_words: Mapping[str, str] = field(default_factory=dict)
     acts_with: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
 

@@ -5,9 +5,10 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 from chladni.models.core.compiled_model import CompiledModel
-from chladni.models.core.model import Effect, ModelKind
+from chladni.models.core.model import Effect, ModelKind, flags_of_effects
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.simulation import Simulation
+from chladni.models.drives.computed_output import computed_output
 from chladni.models.drives.drive_kind import DriveKind
 from chladni.models.drives.loop import close_loop
 from chladni.models.drives.selection import ChosenSignal, renamed, selected, signal_names
@@ -63,6 +64,31 @@ class DriveModel:
         Effects at joints and bodies attach first, then those at outputs, so that the loops feed back what the
         sensors see; then loops are closed, then effects at inputs attach.
         """
+        return selected(self._closed(), self.inputs, self.outputs)
+
+    def flags(self, simulation: Simulation) -> tuple[str, ...]:
+        """Sentences on the setting, an unstable loop, limits left (number, time), laws that acted, and of effects."""
+        # Before signals are chosen: what isn't shown has its limits too.
+        closed, values = self._closed(), self.parameters.numbers()
+        shown = selected(closed, self.inputs, self.outputs)
+        inputs = tuple(zip((choice.signal for choice in self.inputs), shown.inputs, strict=True))
+        limits, names = self.drive.limits(values, self.options), signal_names(self.outputs)
+        computed = {
+            limit.signal: computed_output(
+                closed, simulation, names.get(limit.signal, limit.signal), driven=shown.inputs
+            )
+            for limit in limits
+        }
+        return (
+            *self.drive.remarks(values, self.options),
+            *unstable_loop(closed),
+            *broken_limits(limits, simulation, inputs, computed),
+            *acting_laws(self.drive.law_words, simulation),
+            *flags_of_effects(self.effects, closed, simulation),
+        )
+
+    def _closed(self) -> CompiledModel:
+        """Equations with all loops closed and all effects attached, every signal still there."""
         values, names = self.parameters.numbers(), signal_names((*self.inputs, *self.outputs))
         compiled = renamed(self.drive.build(values, self.options), names)
         # Sorted by where they act; inside each group the order given stays.
@@ -76,18 +102,7 @@ class DriveModel:
         compiled = _attached(compiled, [effect for effect in self.effects if effect.site in outputs])
         for loop in loops:
             compiled = close_loop(compiled, loop)
-        compiled = _attached(compiled, [e for e in self.effects if e.site not in moving | outputs])
-        return selected(compiled, self.inputs, self.outputs)
-
-    def flags(self, simulation: Simulation) -> tuple[str, ...]:
-        """Sentences on an unstable loop, limits that the simulation leaves (number, time) and laws that acted."""
-        compiled = self.compile()
-        inputs = tuple(zip((choice.signal for choice in self.inputs), compiled.inputs, strict=True))
-        return (
-            *unstable_loop(compiled),
-            *broken_limits(self.drive.limits(self.parameters.numbers(), self.options), simulation, inputs),
-            *acting_laws(self.drive.law_words, simulation),
-        )
+        return _attached(compiled, [e for e in self.effects if e.site not in moving | outputs])
 
 
 def drive_model(

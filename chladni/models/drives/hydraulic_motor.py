@@ -174,7 +174,18 @@ def _limits(values: Mapping[str, float], options: Mapping[str, str]) -> Sequence
         what="pressure drop",
         why="above two thirds of the supply pressure the valve gives less flow than the model's",
     )
-    return (*motion_limits(values, options), pressure)
+    rated = values["rated_flow"]
+    flow = Limit(
+        signal="motor_flow",
+        low=-rated,
+        high=rated,
+        unit="cm^3/s",
+        what="flow through the valve",
+        why="beyond the rated flow, which the valve gives fully open",
+    )
+    # The command may be more: a correction or a loop makes another flow of it.
+    moving = [limit for limit in motion_limits(values, options) if limit.signal != "flow"]
+    return (*moving, pressure, flow)
 
 
 #: z/Q = A / (s [V m/E s^2 + (V b_m/E + m a_m) s + (A^2 + a_m b_m)]).

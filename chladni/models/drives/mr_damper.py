@@ -173,6 +173,7 @@ def mr_damper_kind(
         ),
         build=_Build(paper=paper, asymmetric=asymmetric),
         limits=_limits,
+        remarks=_Remarks(paper=paper, asymmetric=asymmetric),
     )
 
 
@@ -186,6 +187,21 @@ class _Build:
     def __call__(self, values: Mapping[str, float], options: Mapping[str, str]) -> CompiledModel:
         coefficients = self.paper if options["law"] == _PAPER else self.asymmetric
         return _press(at_values(coefficients, values), values["current"])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Remarks:
+    """Says when the current lies outside of what the coefficients were fitted for."""
+
+    paper: MrCoefficients
+    asymmetric: MrCoefficients
+
+    def __call__(self, values: Mapping[str, float], options: Mapping[str, str]) -> Sequence[str]:
+        coefficients = self.paper if options["law"] == _PAPER else self.asymmetric
+        low, high, current = coefficients.lowest_current_a, coefficients.highest_current_a, values["current"]
+        if low <= current <= high:
+            return ()
+        return (f"current = {current:g} A lies outside of the fitted {low:g} to {high:g} A: its polynomials guess",)
 
 
 def at_values(coefficients: MrCoefficients, values: Mapping[str, float]) -> MrCoefficients:

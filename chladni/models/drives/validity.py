@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ class Limit:
     Attributes
     ----------
     signal
-        Name of a state, or of an input as the kind calls it.
+        Name of a state, or of an input or output as the kind calls it.
     low, high
         SI; the ends belong to the range.
     unit
@@ -42,16 +43,21 @@ class Limit:
 
 
 def broken_limits(
-    limits: Sequence[Limit], simulation: Simulation, inputs: Sequence[tuple[str, Terminal]]
+    limits: Sequence[Limit],
+    simulation: Simulation,
+    inputs: Sequence[tuple[str, Terminal]],
+    computed: Mapping[str, NDArray[np.float64] | None] = MappingProxyType({}),
 ) -> tuple[str, ...]:
     """Give a sentence for each limit that the simulation breaks, with the numbers and the time.
 
-    `inputs` pairs the kind's word for each input with the model's terminal.
+    `inputs` pairs the kind's word for each input with the model's terminal; `computed` holds samples of signals that
+    are neither states nor inputs.
     """
     names = {signal: terminal.channel or terminal.name for signal, terminal in inputs}
     sentences = []
     for limit in limits:
         samples = _samples(limit.signal, simulation, names)
+        samples = computed.get(limit.signal) if samples is None else samples
         if samples is not None and samples.size:
             sentences.extend(_sentences(limit, samples, simulation.inputs.sample_rate_hz))
     return tuple(sentences)
@@ -95,10 +101,12 @@ def _samples(signal: str, simulation: Simulation, inputs: dict[str, str]) -> NDA
 
 def _sentences(limit: Limit, samples: NDArray[np.float64], sample_rate_hz: float) -> list[str]:
     factor, _ = si_factor(limit.unit)
+    # What a law holds at its limit lies there but for rounding; so does a piston that rests at an end of its stroke.
+    slack = _ROUNDING * max((abs(end) for end in (limit.low, limit.high) if isfinite(end)), default=0.0)
     found = []
     for extreme, end, side, outside in (
-        (float(samples.max()), limit.high, "above", samples > limit.high),
-        (float(samples.min()), limit.low, "below", samples < limit.low),
+        (float(samples.max()), limit.high, "above", samples > limit.high + slack),
+        (float(samples.min()), limit.low, "below", samples < limit.low - slack),
     ):
         # The first instant helps to find the cause, the extreme says how bad it is.
         if outside.any():

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameters
-from chladni.models.core.port import PortKind
+from chladni.models.core.port import Port, PortKind
 from chladni.models.core.simulation import Simulation
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.effects.effect_kind import EffectKind, Site
+from chladni.models.effects.signal_path import last_port
 from chladni.models.effects.wording import nearest, spoken
 from chladni.signals.errors import ModelError
 
@@ -98,7 +99,10 @@ class AttachedEffect:
         """Sentences about where a simulation of `compiled` left what the law is valid for."""
         if self.kind.flags is None:
             return ()
-        port = compiled.ports[compiled.port_index(self.site)]
+        kind = _kind_of_site(compiled, self.site, self.kind)
+        place = last_port(compiled, self.site, kind)
+        # Inputs and outputs outside of loops carry effects on their samples, and need no port for it.
+        port = Port(name=self.site, kind=kind) if place is None else compiled.ports[place]
         return self.kind.flags(port, self.values, simulation)
 
     def _require_source(self) -> None:

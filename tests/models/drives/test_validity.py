@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,10 @@ from chladni.models.drives.catalogue import DRIVES
 from chladni.models.drives.drive_model import drive_model
 from chladni.models.drives.selection import ChosenSignal
 from chladni.models.drives.validity import Limit, acting_laws, broken_limits, unstable_loop
+from chladni.models.effects.attached_effect import attached
+from chladni.models.effects.catalogue import CATALOGUE
+from chladni.models.excitations.step import Step
+from chladni.models.integrator.simulate import simulate
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 
@@ -52,6 +58,12 @@ def test_nothing_is_said_inside_the_limits():
 def test_what_leaves_its_limit_is_said_with_numbers_and_time(states, inputs, words):
     (sentence,) = MOTOR.flags(simulation(at_rest(**states), {"flow": np.zeros(5), **inputs}))
     assert sentence.startswith(words)
+
+
+def test_rounding_at_an_end_of_the_stroke_is_no_leaving_of_it():
+    rear = drive_model(DRIVES["pneumatic-motor"], {"start_position": 0.0})
+    assert rear.flags(simulation(at_rest(displacement=[0, -1e-17, 0, 0, 0]), {"flow": np.zeros(5)})) == ()
+    assert rear.flags(simulation(at_rest(displacement=[0, -1e-6, 0, 0, 0]), {"flow": np.zeros(5)})) != ()
 
 
 def test_both_ends_are_told():
@@ -121,3 +133,78 @@ def test_units_of_limits_are_known():
         for limit in kind.limits(values, kind.choices({})):
             run = simulation({limit.signal: np.array([-1e30, 1e30])}, {"x": np.zeros(2)})
             assert len(broken_limits([limit], run, [(limit.signal, Terminal(name="x", unit="1"))])) == 2
+
+
+def step(model, name, size, seconds=0.1, rate_hz=5e3):
+    return simulate(model, {name: Step(size=size)}, seconds=seconds, rate_hz=rate_hz)
+
+
+@pytest.mark.parametrize("shown", [(), (ChosenSignal(signal="displacement"),)], ids=["all", "without the flow"])
+@pytest.mark.parametrize(("name", "size"), [("reference", 0.03), ("flow", 450e-6)])
+def test_the_flow_through_the_valve_is_told_whatever_asks_for_it(shown, name, size):
+    # 0.015 m^2/s times 0.03 m of error is 450 cm^3/s; the valve is rated for 400.
+    model = drive_model(DRIVES["hydraulic-motor"], {}, {"loop": "position"}, outputs=shown)
+    words = "flow through the valve reaches 450 cm^3/s, above 400 cm^3/s from 0 s on: beyond the rated flow"
+    assert any(flag.startswith(words) for flag in step(model, name, size).flags)
+    assert not any("flow through" in flag for flag in step(model, name, size / 2).flags)
+
+
+def test_a_correction_that_asks_for_twice_the_flow_is_told():
+    model = drive_model(DRIVES["hydraulic-motor"], {}, {"correction": "pd2"})
+    assert any("flow through the valve reaches 498.9 cm^3/s" in flag for flag in step(model, "flow", 250e-6).flags)
+
+
+def test_a_saturated_valve_gives_no_more_than_it_is_rated_for():
+    options = {"loop": "position", "saturation": "on"}
+    model = drive_model(DRIVES["hydraulic-motor"], {}, options, outputs=[ChosenSignal(signal="displacement")])
+    flags = step(model, "reference", 0.03).flags
+    assert not any("flow through" in flag for flag in flags)
+    assert any("the valve's dead zone or saturation acts" in flag for flag in flags)
+
+
+def test_nothing_is_guessed_of_a_signal_behind_dead_time():
+    model = drive_model(DRIVES["hydraulic-motor"], {}, {"loop": "position"})
+    run = step(model, "reference", 0.03)
+    late = model.with_effects([attached("delay", "flow", {"delay": 2e-3})])
+    # The same states mean another flow there, which nothing recorded.
+    assert any("flow through" in flag for flag in model.flags(run))
+    assert not any("flow through" in flag for flag in late.flags(run))
+
+
+@pytest.mark.parametrize(
+    ("loop", "told"), [("open", True), ("current", True), ("velocity", False), ("position", False)]
+)
+def test_a_limiter_without_anything_to_limit_is_told(loop, told):
+    model = drive_model(DRIVES["dc-servo"], {}, {"loop": loop, "current_limiter": "on"})
+    name = "voltage" if loop == "open" else f"{loop}_reference"
+    assert any("current_limiter is on, but limits nothing" in flag for flag in step(model, name, 0.1).flags) == told
+
+
+@pytest.mark.parametrize("law", ["paper", "asymmetric"])
+def test_a_current_that_no_log_had_is_told(law):
+    for current, told in ((1.0, False), (1.5, True)):
+        model = drive_model(DRIVES["mr-damper"], {"current": current}, {"law": law})
+        still = simulation({}, {"displacement": np.zeros(5)})
+        assert any("current = 1.5 A lies outside of the fitted 0 to 1 A" in one for one in model.flags(still)) == told
+
+
+def _far(port, values, _simulation):
+    return (f"far at {port.name} ({port.kind}) with {values['gain']:g}",)
+
+
+FLAGGING = replace(CATALOGUE["gain_error"], name="own", sites=("joint", "input", "output"), flags=_far)
+
+
+@pytest.mark.parametrize(
+    ("site", "kind", "shown"),
+    [
+        ("supply", "input", ()),
+        ("pressure_drop", "output", ()),
+        ("pressure_drop", "output", (ChosenSignal(signal="velocity"),)),
+    ],
+)
+def test_what_effects_say_is_said(site, kind, shown):
+    model = drive_model(
+        DRIVES["pneumatic-motor"], inputs=[ChosenSignal(signal="flow", name="supply")], outputs=shown
+    ).with_effects([attached(FLAGGING, site, {"gain": 2.0})])
+    assert model.flags(simulation(at_rest(), {"supply": np.zeros(5)})) == (f"far at {site} ({kind}) with 2",)
