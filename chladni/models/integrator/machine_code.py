@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba as nb
-from llvmlite import ir  # type: ignore[import-untyped]
+from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 
