@@ -1,11 +1,11 @@
 """How parameters of elements are declared: the few shapes that come again and again."""
 
-from sys import float_info
-
 from chladni.models.core.parameter import Parameter
 
-# Times and physical constants must be above zero, else the element loses its order.
-_ABOVE_ZERO = float_info.min
+# Times and physical constants must be above zero, else the element loses its order; and far enough above it that
+# products of a few of them are numbers still. Nothing built is faster or smaller.
+_SHORTEST_S = 1e-15
+_SMALLEST = 1e-30
 
 
 def gain(value: float = 1.0, *, unit: str = "1", meaning: str = "gain") -> Parameter:
@@ -21,7 +21,7 @@ def time(name: str, value: float, symbol: str, meaning: str, *, may_vanish: bool
         unit="s",
         low=0.0 if may_vanish else value / 100,
         high=value * 10,
-        minimum=0.0 if may_vanish else _ABOVE_ZERO,
+        minimum=0.0 if may_vanish else _SHORTEST_S,
         symbol=symbol,
         meaning=meaning,
     )
@@ -49,7 +49,7 @@ def constant(
         unit=unit,
         low=0.0 if may_vanish else value / 10,
         high=value * 10,
-        minimum=0.0 if may_vanish else _ABOVE_ZERO,
+        minimum=0.0 if may_vanish else _SMALLEST,
         symbol=symbol,
         shown_unit=shown_unit,
         meaning=meaning,

@@ -232,3 +232,25 @@ def test_unknown_words_are_named_with_the_nearest() -> None:
         element("pt1", gian=2.0)
     with pytest.raises(ModelError, match=r"time_constant: 0 s is not possible"):
         element("pt1", time_constant=0.0)
+
+
+@pytest.mark.parametrize("name", ELEMENTS)
+@pytest.mark.parametrize("place", range(4))
+def test_the_least_that_a_parameter_may_be_still_gives_numbers(name, place):
+    parameters = ELEMENTS[name].parameters
+    if place >= len(parameters):
+        return
+    least = parameters.items_in_order[place]
+    smallest = element(name, **{least.name: max(least.minimum, -1e3)})
+    # An overflow would warn, and a warning is an error here.
+    transfer = smallest.transfer
+    response = transfer.frequency_response(np.array([0.1, 1e3]))
+    assert not np.isnan(response).any()
+    if not transfer.delay_s:
+        found = state_space(transfer, filter_time_s=1e-3)
+        assert np.isfinite(found.frequency_response(np.array([0.1, 1e3]))).all()
+
+
+def test_a_time_that_nothing_built_has_is_refused():
+    with pytest.raises(ModelError, match="time_constant: 1e-20 s is not possible; give a value from 1e-15"):
+        element("pt1", time_constant=1e-20)
