@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import Simulation
+from chladni.models.core.stability import growing_poles
 from chladni.signals.units import si_factor
 
 _ROUNDING = 1e-9
@@ -79,12 +80,8 @@ def acting_laws(words: Mapping[str, str], simulation: Simulation) -> tuple[str, 
 
 
 def unstable_loop(compiled: CompiledModel) -> tuple[str, ...]:
-    """Give a sentence when a pole of the linear equations lies in the right half-plane."""
-    if not compiled.states:
-        return ()
-    poles = np.linalg.eigvals(compiled.a)
-    # An integrator's pole is 0 but for the rounding of the largest.
-    growing = poles[(poles.real > _ROUNDING * np.abs(poles).max()) & (poles.imag >= 0)]
+    """Give a sentence when a pole of the linear equations, dead time included, lies in the right half-plane."""
+    growing = growing_poles(compiled)
     listed = ", ".join(f"{pole.real:.4g} + {pole.imag:.4g}j" for pole in growing)
     return (f"unstable: poles at {listed} rad/s; lower the gain of the loop",) if growing.size else ()
 

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
-from chladni.models.core.model import Effect, ModelKind
+from chladni.models.core.model import Effect, ModelKind, flags_of_effects
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import Simulation
+from chladni.models.core.stability import growing_poles
 from chladni.models.elements.element import Element
 from chladni.models.schemes.block import Block
 from chladni.models.schemes.compilation import compiled_scheme
@@ -186,9 +187,12 @@ class SchemeModel:
         return point_response(self.blocks, self.inputs, self.points, np.asarray(frequency_hz, dtype=np.float64))
 
     def flags(self, simulation: Simulation) -> tuple[str, ...]:
-        """Sentences: what is off, unconnected, or computed through a filter in time."""
-        del simulation
-        return self.remarks()
+        """Sentences: an unstable scheme, what `remarks` says, and what effects say."""
+        compiled = self.compile()
+        growing = growing_poles(compiled)
+        listed = ", ".join(f"{pole.real:.4g} + {pole.imag:.4g}j" for pole in growing)
+        unstable = (f"unstable: poles at {listed} rad/s; lower the gain of a loop",) if growing.size else ()
+        return (*unstable, *self.remarks(), *flags_of_effects(self.effects, compiled, simulation))
 
     def remarks(self) -> tuple[str, ...]:
         """Sentences about the scheme itself: what is off, unconnected, or computed through a filter in time."""

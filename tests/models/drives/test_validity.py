@@ -123,6 +123,15 @@ def test_an_unstable_loop_is_said_with_its_poles():
     assert unstable_loop(drive_model(kind).compile()) == ()
 
 
+def test_a_loop_that_dead_time_makes_unstable_is_said():
+    # The current loop crosses over at K_i/L = 3333 rad/s; half pi over that is 0.47 ms.
+    servo = drive_model(DRIVES["dc-servo"], {}, {"loop": "current"})
+    for delay_s, told in ((0.4e-3, False), (0.55e-3, True)):
+        late = servo.with_effects([attached("delay", "voltage", {"delay": delay_s})])
+        flags = step(late, "current_reference", 0.1, seconds=5e-3, rate_hz=2e4).flags
+        assert any(flag.startswith("unstable: poles at ") for flag in flags) == told
+
+
 def test_a_drive_without_states_is_stable():
     assert unstable_loop(drive_model(DRIVES["mr-damper"]).compile()) == ()
 

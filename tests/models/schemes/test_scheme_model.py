@@ -1,5 +1,6 @@
 import copy
 import pickle
+from dataclasses import replace
 from math import factorial
 
 import control
@@ -9,6 +10,7 @@ import pytest
 from chladni.models.core.port import Terminal
 from chladni.models.core.state_space import StateSpace
 from chladni.models.effects.attached_effect import attached
+from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.elements.rational import rational
 from chladni.models.excitations.step import Step
 from chladni.models.integrator.simulate import simulate
@@ -464,3 +466,23 @@ def test_schemes_travel_between_processes() -> None:
     assert pickle.dumps(again)
     np.testing.assert_array_equal(again.frequency_response(FREQUENCY_HZ), loop().frequency_response(FREQUENCY_HZ))
     assert again == loop()
+
+
+def test_a_loop_that_grows_is_told_with_its_dead_time() -> None:
+    # x' = -k x(t - 0.1 s) is stable below k = half pi over 0.1 s = 15.7.
+    for gain, told in ((15.0, False), (16.5, True)):
+        model = scheme(
+            element_block("plant", "i", "+r", "-late", gain=gain),
+            element_block("late", "dead-time", "plant", delay=0.1),
+        )
+        flags = simulate(model, Step(), seconds=0.5, rate_hz=100.0).flags
+        assert any(flag.startswith("unstable: poles at ") for flag in flags) == told
+
+
+def test_what_effects_say_is_said() -> None:
+    def far(port, values, _simulation):
+        return (f"far at {port.name} with {values['gain']:g}",)
+
+    own = replace(CATALOGUE["gain_error"], name="own", flags=far)
+    model = loop().with_effects([attached(own, "plant", {"gain": 2.0}), attached("delay", "r", {"delay": 0.1})])
+    assert simulate(model, {"r": Step(), "load": Step()}, seconds=0.1, rate_hz=10.0).flags == ("far at plant with 2",)
