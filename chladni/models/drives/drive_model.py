@@ -7,6 +7,7 @@ from typing import Self
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Effect, ModelKind, flags_of_effects
 from chladni.models.core.parameter import Parameters
+from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import Simulation
 from chladni.models.drives.computed_output import computed_output
 from chladni.models.drives.drive_kind import DriveKind
@@ -32,7 +33,8 @@ class DriveModel:
     options
         Word of every option.
     inputs, outputs
-        Signals that the model shows, in order. An input that isn't shown stays at zero.
+        Signals that the model shows, in order; all that the drive has when none is given. An input that isn't shown
+        stays at zero.
     effects
         In the order they attach.
     """
@@ -44,6 +46,14 @@ class DriveModel:
     inputs: tuple[ChosenSignal, ...]
     outputs: tuple[ChosenSignal, ...]
     effects: tuple[Effect, ...] = field(default=())
+    # Nothing of a drive changes, so its equations are made once: for its checks, its response and its flags.
+    _kept: list[CompiledModel] = field(default_factory=list, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if not self.inputs:
+            object.__setattr__(self, "inputs", _signals(self._closed().inputs))
+        if not self.outputs:
+            object.__setattr__(self, "outputs", _signals(self._closed().outputs))
 
     @property
     def kind(self) -> ModelKind:
@@ -89,6 +99,11 @@ class DriveModel:
 
     def _closed(self) -> CompiledModel:
         """Equations with all loops closed and all effects attached, every signal still there."""
+        if not self._kept:
+            self._kept.append(self._made())
+        return self._kept[0]
+
+    def _made(self) -> CompiledModel:
         values, names = self.parameters.numbers(), signal_names((*self.inputs, *self.outputs))
         compiled = renamed(self.drive.build(values, self.options), names)
         # Sorted by where they act; inside each group the order given stays.
@@ -145,30 +160,21 @@ def drive_model(
     chosen = drive.choices(options or {})
     parameters = drive.with_values(values or {}, chosen)
     _require_signals(drive, (*inputs, *outputs))
-    every = _signals(drive, parameters, chosen)
     model = DriveModel(
         name=name or drive.name,
         drive=drive,
         parameters=parameters,
         options=chosen,
-        inputs=tuple(inputs) or every[0],
-        outputs=tuple(outputs) or every[1],
+        inputs=tuple(inputs),
+        outputs=tuple(outputs),
     )
-    # Compiled once for its checks: a mistake belongs to who makes the model, not to who simulates it.
+    # Compiled here for its checks: a mistake belongs to who makes the model, not to who simulates it.
     model.compile()
     return model
 
 
-def _signals(
-    drive: DriveKind, parameters: Parameters, options: Mapping[str, str]
-) -> tuple[tuple[ChosenSignal, ...], tuple[ChosenSignal, ...]]:
-    compiled = drive.build(parameters.numbers(), options)
-    for loop in drive.loops(parameters.numbers(), options):
-        compiled = close_loop(compiled, loop)
-    return (
-        tuple(ChosenSignal(signal=terminal.name) for terminal in compiled.inputs),
-        tuple(ChosenSignal(signal=terminal.name) for terminal in compiled.outputs),
-    )
+def _signals(terminals: Sequence[Terminal]) -> tuple[ChosenSignal, ...]:
+    return tuple(ChosenSignal(signal=terminal.name) for terminal in terminals)
 
 
 def _require_signals(drive: DriveKind, chosen: Sequence[ChosenSignal]) -> None:

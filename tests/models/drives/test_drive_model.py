@@ -1,9 +1,12 @@
 import copy
+from collections.abc import Mapping
+from dataclasses import replace
 from multiprocessing.reduction import ForkingPickler
 
 import numpy as np
 import pytest
 
+from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.drives.catalogue import DRIVES
 from chladni.models.drives.drive_model import drive_model
 from chladni.models.drives.selection import ChosenSignal
@@ -134,3 +137,21 @@ def test_an_unknown_site_is_told():
     model = drive_model(PNEUMATIC).with_effects([attached("coulomb_friction", "elbow", {"force": 1.0})])
     with pytest.raises(ModelError, match="elbow"):
         model.compile()
+
+
+def test_equations_are_made_once_for_checks_response_and_flags() -> None:
+    asked: list[float] = []
+    kind = DRIVES["hydraulic-motor"]
+
+    def counted(values: Mapping[str, float], options: Mapping[str, str]) -> CompiledModel:
+        asked.append(values["active_area"])
+        return kind.build(values, options)
+
+    model = drive_model(replace(kind, build=counted))
+    model.compile()
+    assert len(asked) == 1
+    # Another setting has equations of its own.
+    area = 2 * asked[0]
+    changed = model.with_values({"active_area": area}).compile()
+    assert asked[1:] == [area]
+    assert not np.array_equal(changed.a, model.compile().a)
