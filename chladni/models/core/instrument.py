@@ -48,6 +48,8 @@ class Instrument:
         Size of the step, in the input's unit.
     load_input
         Input that carries the load, or empty.
+    load_size
+        Size of the load's step, in the load's unit; a load that the drive is built for shows what one unit hides.
     extra_charts
         Charts of its own (the loops of a damper), from the model; None when it needs none.
     views
@@ -63,6 +65,7 @@ class Instrument:
     step_output: str = ""
     step_size: float = 1.0
     load_input: str = ""
+    load_size: float = 1.0
     extra_charts: Callable[[Model], tuple[Chart, ...]] | None = None
     views: tuple[str, ...] = ("step", "bode", "nyquist", "poles", "influence")
 

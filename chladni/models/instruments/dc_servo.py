@@ -36,5 +36,7 @@ INSTRUMENT = Instrument(
     # A position of 0.1 rad is reached without the limits; ten times as much isn't.
     step_size=0.1,
     load_input="load_torque",
+    # A tenth of the torque that the rated current gives.
+    load_size=0.25,
     views=("step", "bode", "nyquist", "poles", "root-locus", "influence"),
 )

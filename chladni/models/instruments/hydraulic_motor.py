@@ -61,6 +61,8 @@ INSTRUMENT = Instrument(
     step_output="velocity",
     step_size=STEP_SIZE,
     load_input="load",
+    # A fifth of what is rated.
+    load_size=1000.0,
     extra_charts=_flow_chart,
     views=("step", "bode", "nyquist", "poles", "root-locus", "influence"),
 )

@@ -23,4 +23,6 @@ INSTRUMENT = Instrument(
     step_output="velocity",
     step_size=50e-6,
     load_input="load",
+    # The least resisting force of the paper's range, a third of what is rated.
+    load_size=100.0,
 )

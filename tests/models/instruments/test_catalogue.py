@@ -1,6 +1,7 @@
 """What holds for every instrument, whoever wrote it."""
 
 import math
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pytest
@@ -8,7 +9,9 @@ import pytest
 from chladni.models.analysis.influence import influence
 from chladni.models.analysis.instrument_reading import read_instrument
 from chladni.models.core.reading import InstrumentReading
+from chladni.models.excitations.step import Step
 from chladni.models.instruments.catalogue import INSTRUMENTS
+from chladni.models.integrator.simulate import simulate
 from chladni.signals.errors import ModelError
 
 
@@ -70,3 +73,26 @@ def test_names_units_and_ranges_of_knobs_are_what_a_page_needs(name: str) -> Non
     assert not instrument.views or instrument.step_input in {terminal.name for terminal in compiled.inputs}
     if instrument.load_input:
         assert instrument.load_input in {terminal.name for terminal in compiled.inputs}
+
+
+@pytest.mark.parametrize(
+    ("name", "rated"),
+    [
+        ("pneumatic-motor", lambda p: p["rated_load"]),
+        ("hydraulic-motor", lambda p: p["rated_load"]),
+        ("dc-servo", lambda p: p["torque_constant"] * p["rated_current"]),
+    ],
+)
+def test_the_load_of_a_drive_is_one_that_it_is_built_for(
+    name: str, rated: Callable[[Mapping[str, float]], float]
+) -> None:
+    instrument = INSTRUMENTS[name]
+    share = instrument.load_size / rated(instrument.parameters.numbers())
+    assert 0.05 < share < 0.5
+    compiled = instrument.model().compile()
+    # Small enough, too, that no flag goes up.
+    flags = simulate(
+        instrument.model(), {instrument.load_input: Step(size=instrument.load_size)}, seconds=0.1, rate_hz=1e4
+    ).flags
+    idle = ", ".join(one.name for one in compiled.inputs if one.name != instrument.load_input)
+    assert flags == (f"not driven, taken as zero: {idle}",)
