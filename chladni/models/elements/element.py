@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal, Self
 
 import numpy as np
@@ -63,9 +64,7 @@ class Element:
     @property
     def transfer(self) -> TransferFunction:
         """Its transfer function; `ModelError` when its coefficients are too large for floating point numbers."""
-        # What overflows becomes infinite, and a transfer function refuses that in words.
-        with np.errstate(over="ignore", invalid="ignore"):
-            return self.kind.transfer(self.parameters.numbers())
+        return _transfer(self.kind.transfer, tuple(self.parameters.numbers().items()))
 
     def with_values(self, values: Values) -> Self:
         """Give the element with some values replaced; `ModelError` for an unknown name or impossible value."""
@@ -91,3 +90,11 @@ class Element:
             found = replace(found, low=max(low, found.minimum), high=min(high, found.maximum))
         declared = (found if item.name == name else item for item in self.parameters.values())
         return replace(self, parameters=Parameters(tuple(declared)))
+
+
+# A scheme asks each of its elements several times, and while one knob turns all others stay what they are.
+@lru_cache(maxsize=4096)
+def _transfer(make: Transfer, numbers: tuple[tuple[str, float], ...]) -> TransferFunction:
+    # What overflows becomes infinite, and a transfer function refuses that in words.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return make(dict(numbers))

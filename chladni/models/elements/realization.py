@@ -1,6 +1,7 @@
 """State space of a transfer function."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,8 @@ class Realization(Value):
         self._freeze()
 
 
+# While one knob of a scheme turns, all other blocks stay what they are.
+@lru_cache(maxsize=1024)
 def realize(transfer: TransferFunction) -> Realization:
     """Give the controllable canonical form of num/den; the dead time is left out.
 

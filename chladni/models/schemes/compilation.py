@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,12 +77,25 @@ def compiled_scheme(
     ModelError
         When the signals of a loop are not determined.
     """
+    return _compiled(tuple(blocks), tuple(inputs), tuple(outputs), sites, filter_time_s)
+
+
+# One setting is compiled for its charts, for its own chart and for its flags; the matrices of a large scheme are too
+# big to keep more.
+@lru_cache(maxsize=2)
+def _compiled(
+    blocks: tuple[Block, ...],
+    inputs: tuple[Terminal, ...],
+    outputs: tuple[SchemeOutput, ...],
+    sites: frozenset[str],
+    filter_time_s: float,
+) -> CompiledModel:
     # What overflows is found where it's used, and told in words.
     with np.errstate(all="ignore"):
-        return _compiled(blocks, inputs, outputs, sites, filter_time_s)
+        return _equations(blocks, inputs, outputs, sites, filter_time_s)
 
 
-def _compiled(
+def _equations(
     blocks: Sequence[Block],
     inputs: Sequence[Terminal],
     outputs: Sequence[SchemeOutput],
