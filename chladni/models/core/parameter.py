@@ -59,11 +59,13 @@ class Parameter:
     meaning: str = ""
 
     def __post_init__(self) -> None:
+        # Nobody says "0.5 1".
+        unit = "" if self.unit == "1" else f" {self.unit}"
         if not isfinite(self.value):
-            raise ModelError(f"{self.name}: {self.value} is not finite; give a number in {self.unit}")
+            raise ModelError(f"{self.name}: {self.value} is not finite; give a number{unit and f' in{unit}'}")
         if not self.minimum <= self.value <= self.maximum:
             raise ModelError(
-                f"{self.name}: {self.value:g} {self.unit} is not possible; "
+                f"{self.name}: {self.value:g}{unit} is not possible; "
                 f"give a value from {self.minimum:g} to {self.maximum:g}"
             )
 

@@ -106,7 +106,8 @@ class SchemeModel:
 
     def with_values(self, values: Mapping[str, float]) -> Self:
         """Give the scheme with some parameters replaced; `ModelError` for an unknown name or impossible value."""
-        by_block = self._by_block(values)
+        # Asked of the scheme first: a block would tell a mistake by its own short name.
+        by_block = self._by_block(self._possible(values))
         return replace(self, blocks=tuple(block.with_values(by_block.get(block.name, {})) for block in self.blocks))
 
     def with_usual_value(self, name: str, value: float) -> Self:
@@ -197,6 +198,13 @@ class SchemeModel:
     def remarks(self) -> tuple[str, ...]:
         """Sentences about the scheme itself: what is off, unconnected, or computed through a filter in time."""
         return scheme_remarks(self.blocks, self.inputs, self.outputs, self.derivative_filter_s)
+
+    def _possible(self, values: Mapping[str, float]) -> Mapping[str, float]:
+        """Give the values back; `ModelError` for an unknown name or impossible value."""
+        declared = self.parameters
+        for name, value in values.items():
+            declared.require(name).with_value(value)
+        return values
 
     def _by_block(self, numbers: Mapping[str, float]) -> dict[str, dict[str, float]]:
         """Sort numbers by the block that their parameter belongs to; unknown names are refused."""

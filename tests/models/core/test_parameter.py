@@ -49,3 +49,11 @@ def test_an_unknown_name_is_answered_with_the_nearest() -> None:
 def test_names_are_unique() -> None:
     with pytest.raises(ModelError, match="'mass' is declared 2 times"):
         Parameters((mass(), mass()))
+
+
+def test_a_number_without_a_unit_is_told_without_one() -> None:
+    shape = Parameter(name="shape", value=1.0, low=1.0, high=10.0, minimum=1.0, maximum=50.0)
+    with pytest.raises(ModelError, match=r"^shape: 0\.5 is not possible; give a value from 1 to 50$"):
+        shape.with_value(0.5)
+    with pytest.raises(ModelError, match=r"^shape: nan is not finite; give a number$"):
+        shape.with_value(float("nan"))

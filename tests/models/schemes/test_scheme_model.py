@@ -343,7 +343,7 @@ def test_parameters_are_those_of_the_blocks() -> None:
     np.testing.assert_allclose(at(changed, "plant"), loop_response(5.0, 0.1), rtol=1e-9)
     with pytest.raises(ModelError, match=r"no parameter 'plant.gian'; did you mean plant.gain\?"):
         model.with_values({"plant.gian": 1.0})
-    with pytest.raises(ModelError, match=r"time_constant: -1 s is not possible"):
+    with pytest.raises(ModelError, match=r"^plant\.time_constant: -1 s is not possible"):
         model.with_values({"plant.time_constant": -1.0})
     assert model.with_tolerances({"plant.gain": 0.3}).parameters["plant.gain"].tolerance == 0.3
 
