@@ -64,7 +64,7 @@ def cancelling_pd2(*, omega: float, damping_ratio: float, flow_ratio: float = 2.
     The velocity then follows two lags of T_f and can't swing; the flow is largest at once, T_2/T_f^2 steps.
     Arguments and errors as of `best_pd2`.
     """
-    _require(omega, damping_ratio, flow_ratio)
+    _require(omega, damping_ratio, flow_ratio, band)
     return _design((2 * damping_ratio, 1 / sqrt(flow_ratio)), omega, damping_ratio, flow_ratio, band)
 
 
@@ -98,7 +98,7 @@ def best_pd2(*, omega: float, damping_ratio: float, flow_ratio: float = 2.0, ban
     >>> best.settling_s < cancelling_pd2(omega=200.0, damping_ratio=0.1).settling_s
     True
     """
-    _require(omega, damping_ratio, flow_ratio)
+    _require(omega, damping_ratio, flow_ratio, band)
 
     def cost(numbers: Matrix) -> float:
         # The simplex doesn't know bounds; a filter that runs backwards would grow.
@@ -117,13 +117,16 @@ def best_pd2(*, omega: float, damping_ratio: float, flow_ratio: float = 2.0, ban
     return _design((float(best.x[0]), float(best.x[1])), omega, damping_ratio, flow_ratio, band)
 
 
-def _require(omega: float, damping_ratio: float, flow_ratio: float) -> None:
+def _require(omega: float, damping_ratio: float, flow_ratio: float, band: float) -> None:
     if not (isfinite(omega) and omega > 0):
         raise ModelError(f"omega = {omega} rad/s must be finite and positive")
     if not 0 <= damping_ratio <= 1:
         raise ModelError(f"damping_ratio = {damping_ratio}: a pair that oscillates has one from 0 to 1")
     if not (isfinite(flow_ratio) and flow_ratio > 1):
         raise ModelError(f"flow_ratio = {flow_ratio} must be above 1: a correction needs more flow than the step")
+    # Exponentials never end: a band of nothing is never reached, and the whole step is no band.
+    if not 0 < band < 1:
+        raise ModelError(f"band = {band} must lie between 0 and 1, a share of the final velocity")
 
 
 def _design(

@@ -94,6 +94,9 @@ def test_defaults_of_the_hydraulic_motor_are_its_best():
         ({"omega": 0.0}, r"omega = 0\.0 rad/s must be finite and positive"),
         ({"damping_ratio": 1.2}, r"damping_ratio = 1\.2: a pair that oscillates has one from 0 to 1"),
         ({"flow_ratio": 1.0}, r"flow_ratio = 1\.0 must be above 1"),
+        ({"band": 0.0}, r"band = 0\.0 must lie between 0 and 1"),
+        ({"band": 1.0}, r"band = 1\.0 must lie between 0 and 1"),
+        ({"band": float("nan")}, "band = nan must lie between 0 and 1"),
     ],
 )
 def test_impossible_numbers_are_refused(changes, message):
