@@ -8,7 +8,6 @@ from chladni.models.excitations.impact import Impact
 from chladni.models.excitations.multisine import Multisine
 from chladni.models.excitations.random_noise import RandomNoise
 from chladni.models.excitations.step import Step
-from chladni.models.excitations.swept_sine import SweptSine
 from chladni.signals.errors import SetupError
 
 ExcitationWord = Literal["random", "sweep", "multisine", "step", "impact"]
@@ -67,6 +66,9 @@ def excitation(word: str, run: Run, *, level: float, band_hz: tuple[float, float
             period_s = max(run.samples // PERIODS, 4) / run.sample_rate_hz
             return Multisine(rms=level, period_s=period_s, band_hz=band_hz or (1 / period_s, high_hz))
         case "sweep":
+            # SciPy's chirp comes with all of scipy.signal, most of a second to import.
+            from chladni.models.excitations.swept_sine import SweptSine
+
             low_hz, high_hz = band_hz or (high_hz / 1000, high_hz)
             return SweptSine(amplitude=level, start_hz=low_hz, end_hz=high_hz, law="logarithmic")
     if band_hz is not None:

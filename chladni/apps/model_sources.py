@@ -1,10 +1,13 @@
 """Where a model comes from: a file, or an instrument's name; and a log that drives it."""
 
+from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 
 from chladni.io.log import open_log
 from chladni.models.core.instrument import Instrument
 from chladni.models.core.model import Model
+from chladni.models.drives.drive_model import DriveModel
 from chladni.models.files.model_file import load_model
 from chladni.models.instruments.catalogue import INSTRUMENTS
 from chladni.models.instruments.of_model import instrument_of
@@ -14,14 +17,30 @@ from chladni.signals.time_series import TimeSeries
 
 def named_instrument(text: str) -> Instrument:
     """Give the instrument of this name, or one made of the model in a file; `ModelError` when `text` is neither."""
-    return INSTRUMENTS[text] if text in INSTRUMENTS else instrument_of(_of_file(text))
+    return INSTRUMENTS[text] if text in INSTRUMENTS else _with_usual_step(_of_file(text))
 
 
 def _of_file(text: str) -> Model:
     path = Path(text)
     if path.suffix or path.exists():
         return load_model(path)
-    raise ModelError(f"{text}: no such file, and no instrument of this name; instruments: {', '.join(INSTRUMENTS)}")
+    near = get_close_matches(text, INSTRUMENTS, n=1)
+    told = f"did you mean {near[0]}?" if near else f"instruments: {', '.join(INSTRUMENTS)}"
+    raise ModelError(f"{text}: no such file, and no instrument of this name; {told}")
+
+
+def _with_usual_step(model: Model) -> Instrument:
+    """Make an instrument; a drive steps by as much as on its own page, since one m^3/s would burst any valve."""
+    made = instrument_of(model)
+    usual = INSTRUMENTS.get(model.drive.name) if isinstance(model, DriveModel) else None
+    if usual is None:
+        return made
+    same_unit = _unit(model, made.step_input) == _unit(usual.model(), usual.step_input)
+    return replace(made, step_size=usual.step_size) if same_unit else made
+
+
+def _unit(model: Model, name: str) -> str | None:
+    return next((terminal.unit for terminal in model.compile().inputs if terminal.name == name), None)
 
 
 def recording_for(model: Model, log: Path | str) -> TimeSeries:

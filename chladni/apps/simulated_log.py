@@ -3,8 +3,9 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import floor, log10, pi
+from math import floor, inf, log10, pi
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from chladni.models.core.reading import Quantity
 from chladni.models.core.simulation import Simulation
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.simulate import simulate
-from chladni.signals.errors import SetupError
+from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
 
 TRUTH_FORMAT = "chladni.truth/1"
@@ -34,6 +35,8 @@ SHORTEST_RUN_S, MOST_DEFAULT_SAMPLES = 10.0, 200_000
 SLOWEST_RATE_HZ, FASTEST_RATE_HZ = 10.0, 1e5
 # Of a model without states, such as a damper whose motion is prescribed.
 RATE_WITHOUT_POLES_HZ = 1000.0
+# Stamps of a log count nanoseconds: at this rate rounding moves a sample by a twentieth of its interval at most.
+FASTEST_LOGGED_HZ = 1e8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,14 +146,33 @@ def write_simulated_log(log: SimulatedLog, path: Path) -> tuple[WrittenLog, Path
     log, truth
         What was written, and the path of the truth.
     """
-    if path.suffix != ".mcap":
-        raise SetupError(f"{path}: a simulated log is written as MCAP; give a name that ends with .mcap")
+    require_place(path)
     text = json.dumps(log.truth, indent=1, allow_nan=False, ensure_ascii=False)
     written = write_mcap(log.recorded, path, metadata={METADATA_NAME: {"format": TRUTH_FORMAT, "truth": text}})
     beside = path.with_suffix(".truth.json")
     with atomic_write(beside) as file:
         file.write(f"{text}\n".encode())
     return written, beside
+
+
+def require_place(path: Path) -> None:
+    """Refuse a path at which no log can be written, before anything is simulated.
+
+    Raises
+    ------
+    SetupError
+        When the name doesn't end with ``.mcap``.
+    LogError
+        When the path is a folder, or its folder isn't there or can't be written to.
+    """
+    if path.suffix != ".mcap":
+        raise SetupError(f"{path}: a simulated log is written as MCAP; give a name that ends with .mcap")
+    if path.is_dir():
+        raise LogError(f"{path}: is a folder; name a file in it")
+    try:
+        TemporaryFile(dir=path.parent).close()
+    except OSError as error:
+        raise LogError(f"{path}: can't be written to {path.parent}: {error.strerror or error}") from error
 
 
 def default_run(compiled: CompiledModel, *, seconds: float | None = None, rate_hz: float | None = None) -> Run:
@@ -168,10 +190,13 @@ def default_run(compiled: CompiledModel, *, seconds: float | None = None, rate_h
     if seconds is None:
         decaying = -moving.real[moving.real < 0]
         longest_s = 1 / float(decaying.min()) if decaying.size else 0.0
-        longest_run_s = MOST_DEFAULT_SAMPLES / rate_hz if rate_hz > 0 else SHORTEST_RUN_S
+        longest_run_s = MOST_DEFAULT_SAMPLES / rate_hz if 0 < rate_hz < inf else SHORTEST_RUN_S
         seconds = min(max(_round_up(RUN_OVER_DECAY * longest_s), SHORTEST_RUN_S), longest_run_s)
     # Refuses an impossible rate with its own number.
-    return Run(seconds=seconds, sample_rate_hz=rate_hz)
+    run = Run(seconds=seconds, sample_rate_hz=rate_hz)
+    if rate_hz > FASTEST_LOGGED_HZ:
+        raise SetupError(f"rate {rate_hz:g} Hz: a log's stamps count nanoseconds; at most {FASTEST_LOGGED_HZ:g} Hz")
+    return run
 
 
 def _round_up(number: float) -> float:

@@ -28,15 +28,16 @@ def with_settings(model: "Model", settings: Sequence[str]) -> "Model":
     return model.with_values(values) if values else model
 
 
-def effect_of(text: str) -> "Effect":
-    """Read an effect such as ``coulomb_friction@elbow:force=8.1,offset=0.2``.
+def effect_of(text: str, model: "Model") -> "Effect":
+    """Read an effect such as ``coulomb_friction@elbow:force=8.1,offset=0.2``, meant for a site of `model`.
 
-    ``variant=WORD`` chooses a variant of the law, ``from=OUTPUT`` names the source of cross-axis sensitivity.
+    ``variant=WORD`` chooses a variant of the law, ``from=OUTPUT`` names the source of cross-axis sensitivity. Units
+    are those of the site: the force of friction is in N m at a joint that rotates.
 
     Raises
     ------
     SetupError
-        When the text isn't of that form.
+        When the text isn't of that form, a number is given twice or its unit isn't the parameter's.
     ModelError
         When the effect or a parameter is unknown or impossible.
     """
@@ -46,15 +47,34 @@ def effect_of(text: str) -> "Effect":
     effect, at, site = head.partition("@")
     if not (effect and at and site):
         raise SetupError(f"--effect {text!r} is not of the form EFFECT@SITE:NAME=VALUE,NAME=VALUE")
-    words: dict[str, str] = {}
-    values: dict[str, float] = {}
+    given: dict[str, str] = {}
     for part in filter(None, tail.split(",")):
         name, value = _pair(part, "--effect")
-        if name in ("variant", "from"):
-            words[name] = value
-        else:
-            values[name] = _number(value, None, f"--effect {text}")
-    return attached(effect, site, values, variant=words.get("variant"), source=words.get("from"))
+        if name in given:
+            raise SetupError(f"--effect {text}: {name} is given twice")
+        given[name] = value
+    variant, source = given.pop("variant", None), given.pop("from", None)
+    units = _units(effect, site, variant, model)
+    values = {name: _number(value, units.get(name), f"--effect {text}") for name, value in given.items()}
+    return attached(effect, site, values, variant=variant, source=source)
+
+
+def _units(effect: str, site: str, variant: str | None, model: "Model") -> dict[str, str]:
+    """Units of an effect's parameters at a site; none for words and sites that will be refused anyway."""
+    from chladni.models.effects.catalogue import CATALOGUE
+    from chladni.models.files.site_units import compiled_site_units
+
+    kind = CATALOGUE.get(effect)
+    if kind is None:
+        return {}
+    compiled = model.compile()
+    units = dict(compiled_site_units(compiled))
+    if model.kind == "scheme":
+        # At a block an effect may sit before it or behind it, with another unit each.
+        units = {terminal.name: units[terminal.name] for terminal in compiled.inputs}
+    if site not in units:
+        return {}
+    return {one.name: units[site].of(one.unit) for one in kind.parameters_of(kind.variant(variant).name).values()}
 
 
 def _pair(text: str, flag: str) -> tuple[str, str]:
@@ -71,7 +91,10 @@ def _number(text: str, unit: str | None, where: str) -> float:
     try:
         return float(text)
     except ValueError:
-        value, found = parse_quantity(text)
+        try:
+            value, found = parse_quantity(text)
+        except SetupError as error:
+            raise SetupError(f"{where}: {error}") from error
     if unit is not None and found != unit:
         raise SetupError(f"{where}: {text!r} is in {found}, the parameter in {unit}")
     return value

@@ -13,6 +13,7 @@ from chladni.cli.words import count, number
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from chladni.models.core.instrument import Instrument
     from chladni.signals.time_series import TimeSeries
 
 
@@ -68,13 +69,15 @@ def simulate(
 ) -> None:
     """Simulate a model and write a log, with its truth beside it and in its metadata."""
     from chladni.apps.model_sources import named_instrument, recording_for
-    from chladni.apps.simulated_log import Drive, simulate_log, write_simulated_log
+    from chladni.apps.simulated_log import Drive, require_place, simulate_log, write_simulated_log
 
     to = Output(json)
+    # A simulation may take minutes: it shouldn't be lost to a misspelt folder.
+    require_place(out)
     instrument = named_instrument(model)
     chosen = with_settings(instrument.model(), settings or ())
     if effect:
-        chosen = chosen.with_effects((*chosen.effects, *map(effect_of, effect)))
+        chosen = chosen.with_effects((*chosen.effects, *(effect_of(one, chosen) for one in effect)))
     recording = None
     if log is not None:
         _refuse({"--input": None if kind == "random" else kind, "--at": at, "--level": level, "--band": band,
@@ -82,8 +85,7 @@ def simulate(
         recording = recording_for(chosen, log)
     drive = Drive(
         word=kind,
-        # What is a step on the bench is a sensible size for any excitation of that input.
-        level=instrument.step_size if level is None else level,
+        level=_usual_level(instrument, at) if level is None else level,
         input_name=at or instrument.step_input or None,
         band_hz=band,
         seed=seed,
@@ -106,6 +108,11 @@ def simulate(
     nrmse = {score.name.removeprefix("NRMSE "): score.value for score in made.agreement}
     to.json({**made.truth, "format": "chladni.simulate/1", "log": str(written.path), "truth_file": str(truth),
              "nrmse_percent": nrmse})  # fmt: skip
+
+
+def _usual_level(instrument: "Instrument", at: str | None) -> float:
+    """What is a step on the bench is a sensible size for any excitation of that input; of others nothing is known."""
+    return instrument.step_size if at in (None, instrument.step_input) else 1.0
 
 
 def _rows(series: "TimeSeries", names: "Mapping[str, str]") -> list[list[str]]:

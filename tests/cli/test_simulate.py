@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from chladni.io.log import open_log
+from chladni.models.instruments.catalogue import INSTRUMENTS
 from tests.cli.conftest import Run
 
 MODEL = """format = "chladni.model/1"
@@ -26,6 +27,19 @@ name = "acc"
 measures = "acceleration"
 at = "mass"
 channel = "/mass.accel.linear.x"
+"""
+
+SCHEME = """format = "chladni.model/1"
+name = "loop"
+kind = "scheme"
+[[input]]
+name = "reference"
+unit = "V"
+[[block]]
+name = "plant"
+num = [2.0]
+den = [0.7, 1.0]
+input = ["reference"]
 """
 
 
@@ -88,6 +102,13 @@ def test_the_same_seed_gives_the_same_bytes(run: Run, model: Path, tmp_path: Pat
         (["--log", "x.mcap", "--rate", "100"], "--rate has no meaning with --log"),
         (["--noise", "-1"], "must not be negative"),
         (["--rate", "-1"], "rate -1.0 must be finite and positive"),
+        (["--rate", "inf"], "rate inf must be finite and positive"),
+        (["--rate", "1e12"], "rate 1e+12 Hz: a log's stamps count nanoseconds"),
+        (["--effect", "coulomb_friction@spring:force=3 m"], "'3 m' is in m, the parameter in N"),
+        (["--effect", "clipping@acc:limit=3 N"], "'3 N' is in N, the parameter in m/s^2"),
+        (["--effect", "coulomb_friction@spring:force=much"], "force=much: quantity 'much'"),
+        (["--effect", "coulomb_friction@spring:force=1,force=2"], "force is given twice"),
+        (["--set", "mass.mass=heavy"], "--set mass.mass=heavy: quantity 'heavy'"),
     ],
 )
 def test_mistakes_are_told_in_one_line_and_nothing_is_written(
@@ -99,3 +120,49 @@ def test_mistakes_are_told_in_one_line_and_nothing_is_written(
     assert outcome.err.count("\n") == 1
     assert words in outcome.err
     assert not out.exists()
+
+
+def test_an_effects_numbers_take_units_of_its_site(run: Run, model: Path, tmp_path: Path) -> None:
+    effects = ("--effect", "coulomb_friction@spring:force=0.005 kN", "--effect", "clipping@acc:limit=2 g")
+    outcome = run("simulate", model, "--out", tmp_path / "a.mcap", "--seconds", 1, "--json", "-", *effects)
+    assert outcome.code == 0, outcome.err
+    friction, clipping = (effect["parameters"] for effect in outcome.document["effects"])
+    assert (friction["force"], clipping["limit"]) == pytest.approx((5.0, 19.6133), rel=1e-12)
+
+
+def test_units_at_a_schemes_block_are_taken_as_they_come(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "loop.toml"
+    path.write_text(SCHEME)
+    arguments = ("--seconds", 1, "--json", "-", "--effect", "saturation@plant:limit=20 mV")
+    document = run("simulate", path, "--out", tmp_path / "a.mcap", *arguments).document
+    assert document["effects"][0]["parameters"]["limit"] == 0.02
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("log.csv", "ends with .mcap"), ("none/log.mcap", "No such file or directory"), ("folder.mcap", "is a folder")],
+)
+def test_a_place_that_cant_hold_the_log_is_told_before_the_simulation(
+    run: Run, model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: str
+) -> None:
+    (tmp_path / "folder.mcap").mkdir()
+    monkeypatch.setattr("chladni.apps.simulated_log.simulate_log", lambda *_, **__: pytest.fail("it was simulated"))
+    outcome = run("simulate", model, "--out", tmp_path / name)
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert words in outcome.err
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["folder.mcap", "one.toml"]
+
+
+def test_a_drive_from_a_file_is_driven_as_on_its_page(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "press.toml"
+    path.write_text('format = "chladni.model/1"\nname = "press"\nkind = "drive"\ndrive = "pneumatic-motor"\n')
+    out = tmp_path / "press.mcap"
+
+    def level(*arguments: str) -> float:
+        document = run("simulate", path, "--out", out, "--seconds", 1, "--json", "-", *arguments).document
+        return float(document["excitation"]["level"])
+
+    assert level() == INSTRUMENTS["pneumatic-motor"].step_size
+    # Of other inputs no usual size is known.
+    assert level("--at", "load") == 1.0
+    assert level("--level", "3e-5") == 3e-5
