@@ -1,5 +1,6 @@
 """``chladni influence``: how much each behaviour parameter changes with each construction parameter."""
 
+from itertools import pairwise
 from math import isnan
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 IN_ROW, IN_COLUMN = "*", "†"
 # Coefficients are printed with three decimals; below this they read as zero.
 HALF_LAST_DIGIT = 5e-4
+# "+10.118*†", and what the table puts between two columns.
+CELL_WIDTH, BETWEEN_COLUMNS = 9, 2
 
 
 def influence(
@@ -78,14 +81,21 @@ def _print(to: Output, table: "InfluenceTable", change: float) -> None:
 
     acts = np.abs(np.nan_to_num(table.log_derivative)) >= HALF_LAST_DIGIT
     rows, columns = np.flatnonzero(acts.any(axis=1)), np.flatnonzero(acts.any(axis=0))
-    heads = ["", *(_words(table.behaviour[column]) for column in columns)]
+    # Broken between words, or the table would rather cut names in two than wrap a heading.
+    heads = [_words(table.behaviour[column]).replace(" ", "\n") for column in columns]
     names = [table.construction[row] for row in rows]
     for title, coefficients in (
         (f"Influence by a finite change of {change:+.0%} (C = R_PCD/R_PCF)", table.finite),
         ("Influence for small changes (d ln behaviour / d ln construction)", table.log_derivative),
     ):
-        to.table(title, heads, _rows(names, coefficients[np.ix_(rows, columns)]))
-        to.line()
+        cells = _rows(names, coefficients[np.ix_(rows, columns)])
+        for part in _parts(heads, max(map(len, names), default=0), to.console.width):
+            to.table(
+                title,
+                ["", *(heads[one] for one in part)],
+                [[row[0], *(row[1 + one] for one in part)] for row in cells],
+            )
+            to.line()
     to.line(f"{IN_ROW} strongest of its row, {IN_COLUMN} strongest of its column; - where there is none")
     to.lines([f"{_words(table.behaviour[column])}: {table.definitions[column]}" for column in columns])
     idle = [table.construction[row] for row in range(len(table.construction)) if row not in rows]
@@ -94,6 +104,19 @@ def _print(to: Output, table: "InfluenceTable", change: float) -> None:
         to.lines([f"Acts on none of these: {', '.join(idle)}"])
     if unmoved:
         to.lines([f"No parameter changes, or there is none: {', '.join(unmoved)}"])
+
+
+def _parts(heads: list[str], name_width: int, width: int) -> list[range]:
+    """Columns that stand side by side in a terminal, so that neither a name nor a number is cut in two."""
+    ends = [0]
+    used = name_width
+    for place, head in enumerate(heads):
+        needed = BETWEEN_COLUMNS + max(CELL_WIDTH, *map(len, head.split()))
+        if place > ends[-1] and used + needed > width:
+            ends.append(place)
+            used = name_width
+        used += needed
+    return [range(first, last) for first, last in pairwise([*ends, len(heads)])]
 
 
 def _rows(names: list[str], coefficients: "NDArray[np.float64]") -> list[list[str]]:

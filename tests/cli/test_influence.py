@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chladni.cli.output import Output
 from tests.cli.conftest import Run
 
 MODEL = """format = "chladni.model/1"
@@ -94,3 +95,19 @@ def test_mistakes_are_told_in_one_line(run: Run, arguments: list[str], words: st
     assert outcome.code == 2
     assert outcome.err.count("\n") == 1
     assert words in outcome.err
+
+
+def test_names_and_numbers_stay_whole_in_a_terminal_of_80_columns(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("chladni.cli.influence.Output", Narrow)
+    lines = run("influence", "robot-arm", "--parameter", "shoulder.stiffness").out.splitlines()
+    assert max(map(len, lines)) <= 80
+    # Each of the two tables in parts, the name again in each.
+    assert sum(line.startswith("shoulder.stiffness ") for line in lines) == 4
+
+
+class Narrow(Output):
+    """A terminal of 80 columns."""
+
+    def __init__(self, json_target: str | None = None) -> None:
+        super().__init__(json_target)
+        self.console.width = 80
