@@ -11,7 +11,9 @@ from chladni.cli.output import Output
 def bench(
     instrument: Annotated[
         str | None,
-        typer.Argument(metavar="INSTRUMENT", help="Open this instrument; all are listed if not given."),
+        typer.Argument(
+            metavar="INSTRUMENT", help="Open this instrument, or this model file; all are listed if not given."
+        ),
     ] = None,
     *,
     port: Annotated[int, typer.Option(metavar="N", help="Port to serve at; 0 takes a free one.")] = 0,
@@ -29,17 +31,18 @@ def bench(
 ) -> None:
     """Turn the knobs of simulated drives, dampers and structures, and watch what happens."""
     from chladni.apps.bench import open_bench
+    from chladni.apps.model_sources import named_instrument
     from chladni.models.instruments.catalogue import INSTRUMENTS
     from chladni.signals.errors import SetupError
 
-    if instrument is not None and instrument not in INSTRUMENTS:
-        raise SetupError(f"no instrument {instrument!r}; there are: {', '.join(INSTRUMENTS)}")
+    chosen = None if instrument is None else named_instrument(instrument)
     if variants is not None and instrument is None:
         raise SetupError("--variants holds rows of one instrument's parameters; name it: chladni bench INSTRUMENT")
     # The others' pages stay a click away, unless the file of rows is of this one's parameters.
-    shown = [INSTRUMENTS[instrument]] if instrument is not None and variants is not None else INSTRUMENTS.values()
-    server = open_bench(shown, port=port, log=log, variants=variants)
-    address = server.address + (instrument or "")
+    others = INSTRUMENTS if variants is None else {}
+    named = {} if chosen is None else {chosen.name: chosen}
+    server = open_bench({**named, **others, **named}.values(), port=port, log=log, variants=variants)
+    address = server.address + ("" if chosen is None else chosen.name)
     out = Output()
 
     def tell() -> None:

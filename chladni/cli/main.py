@@ -27,7 +27,8 @@ MOST_MISTAKES = 3
 
 app = typer.Typer(
     name="chladni",
-    help="A virtual Fourier analyser: acceleration logs to spectra, transfer functions and coherence, in rerun.",
+    help="A virtual Fourier analyser: acceleration logs to spectra, transfer functions and modes, in rerun, "
+    "with simulated machines beside them.",
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,

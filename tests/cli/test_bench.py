@@ -5,14 +5,17 @@ import socket
 import subprocess
 import sys
 import urllib.request
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
 
 from chladni.cli.bench import bench
+from chladni.models.files.model_file import write_model
 from chladni.models.instruments.catalogue import INSTRUMENTS
-from chladni.signals.errors import SetupError
+from chladni.signals.errors import ModelError, SetupError
 
 PROGRAM = "import typer; from chladni.cli.bench import bench; typer.run(bench)"
 
@@ -34,8 +37,13 @@ def test_serves_this_computer_only_says_so_and_ends_with_ctrl_c() -> None:
 
 
 def test_an_unknown_instrument_names_those_there_are() -> None:
-    with pytest.raises(SetupError, match=r"^no instrument 'piano'; there are: pneumatic-motor, "):
+    with pytest.raises(ModelError, match=r"^piano: no such file, and no instrument .*: pneumatic-motor, "):
         bench("piano")
+
+
+def test_a_misspelt_instrument_is_recognised() -> None:
+    with pytest.raises(ModelError, match=r"did you mean pneumatic-motor\?$"):
+        bench("pneumatic-motr")
 
 
 def test_rows_need_an_instrument() -> None:
@@ -50,7 +58,7 @@ def test_a_taken_port_is_told() -> None:
             bench("pneumatic-motor", port=port, open_page=False)
 
 
-def test_opens_the_page_when_it_can_be_had(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_opens_the_page_when_it_can_be_had(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     opened: list[str] = []
 
     class Server:
@@ -60,15 +68,26 @@ def test_opens_the_page_when_it_can_be_had(monkeypatch: pytest.MonkeyPatch) -> N
             assert callable(ready)
             ready()
 
-    asked: list[object] = []
+    asked: list[list[Any]] = []
     monkeypatch.setattr("webbrowser.open", opened.append)
-    monkeypatch.setattr("chladni.apps.bench.open_bench", lambda shown, **_: asked.append(list(shown)) or Server())
+
+    def open_bench(shown: Iterable[Any], **_: object) -> Server:
+        asked.append(list(shown))
+        return Server()
+
+    monkeypatch.setattr("chladni.apps.bench.open_bench", open_bench)
     bench("dc-servo", variants=Path("rows.csv"))
     bench()
-    assert opened == ["http://127.0.0.1:1/dc-servo", "http://127.0.0.1:1/"]
+    file = tmp_path / "arm.toml"
+    write_model(INSTRUMENTS["dc-servo"].model().with_values({"inertia": 3e-4}), file)
+    bench(str(file))
+    assert opened[:2] == ["http://127.0.0.1:1/dc-servo", "http://127.0.0.1:1/"]
     # A file of rows is of one instrument: the others get no page.
     assert asked[0] == [INSTRUMENTS["dc-servo"]]
     assert asked[1] == list(INSTRUMENTS.values())
+    # A model from a file has a page of its own.
+    assert asked[2][0].parameters["inertia"].value == 3e-4
+    assert opened[2] == f"http://127.0.0.1:1/{asked[2][0].name}"
 
 
 def test_help_lists_what_there_is() -> None:
