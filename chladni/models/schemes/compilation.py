@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from chladni.models.core.compiled_model import CompiledModel, DelayLine, IdealDerivative
 from chladni.models.core.port import Port, Terminal
 from chladni.models.schemes.block import Block
-from chladni.models.schemes.derivative_filter import filtered_derivatives, lag_names
+from chladni.models.schemes.derivative_filter import FilteredEquations, filtered_derivatives, lag_names
 from chladni.models.schemes.equations import SchemeEquations, delay_of, solved_equations
 from chladni.models.schemes.points import Point, points_of
 from chladni.models.schemes.scheme_output import SchemeOutput
@@ -205,17 +205,10 @@ def _assembled(
     )
     m, p = len(inputs), len(points)
     names = [*(terminal.name for terminal in inputs), *(place.port.name for place in places)]
-    ports = [place.port for place in places] + [
-        Port(name=f"{names[source]}.derivative{order}", kind="input", unit="1", displacement_unit="1")
-        for source, order in zip(full.sources, full.orders, strict=True)
-    ]
+    ports = [*(place.port for place in places), *_derivative_ports(full, names)]
     return CompiledModel(
-        a=full.a,
-        b=full.b[:, :m],
-        c=full.c[:p],
-        d=full.d[:p, :m],
-        g=full.b[:, m:],
-        h=full.d[:p, m:],
+        # Behind the inputs' columns come those of the ports, behind the points' rows those of what ports see.
+        a=full.a, b=full.b[:, :m], c=full.c[:p], d=full.d[:p, :m], g=full.b[:, m:], h=full.d[:p, m:],
         displacement_state=full.c[p:],
         displacement_column=full.d[p:, :m],
         displacement_port=full.d[p:, m:],
@@ -233,7 +226,15 @@ def _assembled(
             IdealDerivative(port=number, order=order, filter_time_s=filter_time_s)
             for number, order in enumerate(full.orders, start=len(places))
         ),
-    )
+    )  # fmt: skip
+
+
+def _derivative_ports(full: FilteredEquations, names: Sequence[str]) -> list[Port]:
+    """Ports at which a frequency response adds what the lags take away; `names` are those of the columns of w."""
+    return [
+        Port(name=f"{names[source]}.derivative{order}", kind="input", unit="1", displacement_unit="1")
+        for source, order in zip(full.sources, full.orders, strict=True)
+    ]
 
 
 def _balanced(a: Matrix, b: Matrix, c: Matrix) -> tuple[Matrix, Matrix, Matrix]:
