@@ -26,68 +26,45 @@ class Shown:
 
     label: str
     step: TransientResponse
-    impulse: TransientResponse | None
     curve: FrequencyCurve
     path: LinearPath
-    size: float
-    load: TransientResponse | None = None
-    locus: RootLocus | None = None
-    field: PrecisionStability | None = None
-
-
-def step_charts(shown: Sequence[Shown]) -> list[Chart]:
-    """One chart for each output; each setting is a curve."""
-    first = shown[0].step
-    what = f"step of {first.source.name}, {shown[0].size:g} {first.source.unit}"
-    return [
-        Chart(
-            name=f"step.{output.name}",
-            title=f"{_words(output.name)} after a {what}",
-            x_label="time [s]",
-            y_label=_axis(output),
-            curves=_time_curves([(one.label, one.step) for one in shown], output.name),
-        )
-        for output in first.outputs
-    ]
 
 
 def response_chart(name: str, title: str, responses: Sequence[tuple[str, TransientResponse]], output: str) -> Chart:
-    """One output of several labelled responses."""
+    """One output of several labelled responses; each setting is a curve."""
     terminal = next(terminal for terminal in responses[0][1].outputs if terminal.name == output)
     return Chart(
         name=name, title=title, x_label="time [s]", y_label=_axis(terminal), curves=_time_curves(responses, output)
     )
 
 
-def bode_charts(shown: Sequence[Shown]) -> list[Chart]:
-    """Magnitude and phase against frequency."""
+def magnitude_chart(title: str, shown: Sequence[Shown]) -> Chart:
+    """Magnitude against frequency."""
     path = shown[0].path
-    output, source = path.outputs[0], path.source
-    way = f"{_words(output.name)} over {_words(source.name)}"
-    common = {"x_label": "frequency [Hz]", "x_scale": "log"}
-    return [
-        Chart(
-            name="bode.magnitude",
-            title=f"Magnitude of {way}",
-            y_label=f"magnitude [dB re 1 {_ratio(output.unit, source.unit)}]",
-            curves=tuple(
-                _curve(one.label, one.curve.frequency_hz, _finite(one.curve.magnitude_db())) for one in shown
-            ),
-            x_label=common["x_label"],
-            x_scale="log",
-        ),
-        Chart(
-            name="bode.phase",
-            title=f"Phase of {way}",
-            y_label="phase [deg]",
-            curves=tuple(_curve(one.label, one.curve.frequency_hz, one.curve.phase_deg) for one in shown),
-            x_label=common["x_label"],
-            x_scale="log",
-        ),
-    ]
+    unit = _ratio(path.outputs[0].unit, path.source.unit)
+    return Chart(
+        name="bode.magnitude",
+        title=title,
+        x_label="frequency [Hz]",
+        y_label="magnitude [dB]" if unit == "1" else f"magnitude [dB re 1 {unit}]",
+        curves=tuple(_curve(one.label, one.curve.frequency_hz, _finite(one.curve.magnitude_db())) for one in shown),
+        x_scale="log",
+    )
 
 
-def nyquist_chart(shown: Sequence[Shown]) -> Chart:
+def phase_chart(title: str, shown: Sequence[Shown]) -> Chart:
+    """Phase against frequency."""
+    return Chart(
+        name="bode.phase",
+        title=title,
+        x_label="frequency [Hz]",
+        y_label="phase [deg]",
+        curves=tuple(_curve(one.label, one.curve.frequency_hz, one.curve.phase_deg) for one in shown),
+        x_scale="log",
+    )
+
+
+def nyquist_chart(title: str, shown: Sequence[Shown]) -> Chart:
     """Locus of the frequency response in the complex plane, for positive frequencies, and the point -1."""
     path = shown[0].path
     unit = _ratio(path.outputs[0].unit, path.source.unit)
@@ -101,38 +78,36 @@ def nyquist_chart(shown: Sequence[Shown]) -> Chart:
     curves.append(Curve(label="-1", x=np.array([-1.0]), y=np.zeros(1), points=True))
     return Chart(
         name="nyquist",
-        title=f"Nyquist plot of {_words(path.outputs[0].name)} over {_words(path.source.name)}",
-        x_label=f"real part [{unit}]",
-        y_label=f"imaginary part [{unit}]",
+        title=title,
+        x_label=with_unit("real part", unit),
+        y_label=with_unit("imaginary part", unit),
         curves=tuple(curves),
         equal=True,
     )
 
 
-def pole_chart(shown: Sequence[Shown]) -> Chart:
+def pole_chart(title: str, shown: Sequence[Shown]) -> Chart:
     """Poles and zeros in the complex plane."""
     curves = []
     for one in shown:
         curves.append(_points(f"poles {one.label}" if len(shown) > 1 else "poles", one.path.poles))
         if one.curve.zeros.size:
             curves.append(_points(f"zeros {one.label}" if len(shown) > 1 else "zeros", one.curve.zeros))
-    name = _words(shown[0].path.outputs[0].name)
     return Chart(
         name="poles",
-        title=f"Poles and zeros of {name} over {_words(shown[0].path.source.name)}",
+        title=title,
         x_label="real part [rad/s]",
         y_label="imaginary part [rad/s]",
         curves=tuple(curves),
     )
 
 
-def locus_chart(locus: RootLocus) -> Chart:
+def locus_chart(title: str, locus: RootLocus) -> Chart:
     """Branches of a root locus, with where they begin and end."""
     marks = [(label, roots) for label, roots in (("poles", locus.start), ("zeros", locus.end)) if roots.size]
-    unit = "" if locus.unit == "1" else f" {locus.unit}"
     return Chart(
         name="root-locus",
-        title=f"Root locus against {locus.name}, {locus.values[0]:.3g} to {locus.values[-1]:.3g}{unit}",
+        title=title,
         x_label="real part [rad/s]",
         y_label="imaginary part [rad/s]",
         curves=(
@@ -142,16 +117,16 @@ def locus_chart(locus: RootLocus) -> Chart:
     )
 
 
-def precision_chart(field: PrecisionStability) -> Chart:
+def precision_chart(title: str, field: PrecisionStability) -> Chart:
     """Real part of each root against the error that stays."""
     errors = {
-        "step": "share of a step that is not followed [1]",
+        "step": "share of a step that is not followed",
         "ramp": "lag behind a ramp [s]",
         "parabola": "lag behind a parabola [s^2]",
     }
     return Chart(
         name="precision-stability",
-        title="Precision-stability field of the loop gain",
+        title=title,
         x_label=errors[field.follows],
         y_label="real part of the roots [1/s]",
         curves=tuple(
@@ -182,12 +157,19 @@ def _finite(values: Matrix) -> Matrix:
     return np.where(np.isfinite(values), values, np.nan)
 
 
+def with_unit(words: str, unit: str) -> str:
+    """Give the label of an axis; a plain number has no unit to tell.
+
+    Examples
+    --------
+    >>> with_unit("velocity", "m/s"), with_unit("gain", "1")
+    ('velocity [m/s]', 'gain')
+    """
+    return words if unit == "1" else f"{words} [{unit}]"
+
+
 def _axis(terminal: Terminal) -> str:
-    return f"{_words(terminal.name)} [{terminal.unit}]"
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
+    return with_unit(terminal.name.replace("_", " "), terminal.unit)
 
 
 def _ratio(over: str, under: str) -> str:

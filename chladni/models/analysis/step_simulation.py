@@ -26,7 +26,9 @@ def needs_simulation(compiled: CompiledModel) -> bool:
     return not compiled.is_linear() or bool(compiled.delays)
 
 
-def step_simulation(model: Model, compiled: CompiledModel, *, from_input: str, size: float) -> Simulation:
+def step_simulation(
+    model: Model, compiled: CompiledModel, *, from_input: str, size: float, path: LinearPath | None = None
+) -> Simulation:
     """Simulate a step of one input from rest, the others being zero.
 
     Parameters
@@ -39,13 +41,15 @@ def step_simulation(model: Model, compiled: CompiledModel, *, from_input: str, s
         Which steps at 0 s.
     size
         In the input's unit.
+    path
+        From that input to all outputs, when there is one already.
 
     Raises
     ------
     ModelError
         When the model diverges.
     """
-    path = linear_path(compiled, from_input=from_input)
+    path = path or linear_path(compiled, from_input=from_input)
     seconds = horizon(path.poles).seconds
     if needs_simulation(compiled):
         # Imported here: it brings the compiler of laws, which linear models have no use for.

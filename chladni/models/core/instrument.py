@@ -52,6 +52,9 @@ class Instrument:
         Size of the load's step, in the load's unit; a load that the drive is built for shows what one unit hides.
     extra_charts
         Charts of its own (the loops of a damper), from the model; None when it needs none.
+    extra_titles
+        Name and title of each of them, so that a page can offer them without computing them; they are always
+        computed when empty.
     views
         Charts that make sense: ``step``, ``bode``, ``nyquist``, ``poles``, ``root-locus``, ``influence``.
     """
@@ -67,6 +70,7 @@ class Instrument:
     load_input: str = ""
     load_size: float = 1.0
     extra_charts: Callable[[Model], tuple[Chart, ...]] | None = None
+    extra_titles: tuple[tuple[str, str], ...] = ()
     views: tuple[str, ...] = ("step", "bode", "nyquist", "poles", "influence")
 
     def model(self, values: Values | None = None, options: Options | None = None) -> Model:

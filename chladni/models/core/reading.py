@@ -106,13 +106,21 @@ class InstrumentReading(Value):
     Attributes
     ----------
     charts
-        In the order of the page.
+        In the order of the page; those that were asked for.
     quantities
         Behaviour in numbers.
     flags
         Sentences: parameters outside their usual range, validity left, unstable.
+    offered
+        Name and title of every chart that there is at this setting, in the order of the page; those of `charts` when
+        none are given.
     """
 
     charts: tuple[Chart, ...]
     quantities: tuple[Quantity, ...]
     flags: tuple[str, ...]
+    offered: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.offered:
+            object.__setattr__(self, "offered", tuple((chart.name, chart.title) for chart in self.charts))

@@ -22,6 +22,10 @@ _SHOWN = tuple(
 )
 
 
+#: Name and title of the page's own chart.
+FLOW = ("flow", "Flow asked for, without dead zone and limit")
+
+
 def _build(values: Mapping[str, float], options: Mapping[str, str]) -> DriveModel:
     commanded = "reference" if options["loop"] == "position" else "flow"
     inputs = (ChosenSignal(signal=commanded, name=COMMAND), ChosenSignal(signal="load"))
@@ -42,8 +46,8 @@ def _flow_chart(model: Model) -> tuple[Chart, ...]:
     curve = Curve(label="motor_flow", x=response.time_s[0], y=response.values[0])
     return (
         Chart(
-            name="flow",
-            title="Flow into the motor after a step of command, without dead zone and limit",
+            name=FLOW[0],
+            title=FLOW[1],
             x_label="time [s]",
             y_label="motor_flow [m^3/s]",
             curves=(curve,),
@@ -64,5 +68,6 @@ INSTRUMENT = Instrument(
     # A fifth of what is rated.
     load_size=1000.0,
     extra_charts=_flow_chart,
+    extra_titles=(FLOW,),
     views=("step", "bode", "nyquist", "poles", "root-locus", "influence"),
 )

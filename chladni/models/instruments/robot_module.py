@@ -25,6 +25,8 @@ from chladni.models.schemes.scheme_output import SchemeOutput
 
 #: Step of the reference that the page begins with, in rad/s or rad.
 STEP_SIZE = 0.1
+#: Name and title of the page's own chart.
+WITH_LOAD = ("step.with-load", "Step of the reference with and without load")
 #: Switches of the page, and the blocks that each one switches.
 SWITCHES: Mapping[str, tuple[str, ...]] = {
     "regulator": ("regulator",),
@@ -126,8 +128,8 @@ def _with_and_without_load(model: Model) -> tuple[Chart, ...]:
     unit = alone.outputs[0].unit
     return (
         Chart(
-            name="step.with-load",
-            title=f"{output} after a step of {STEP_SIZE:g} {path.source.unit} with and without load",
+            name=WITH_LOAD[0],
+            title=WITH_LOAD[1],
             x_label="time [s]",
             y_label=f"{output} [{unit}]",
             curves=(
@@ -153,6 +155,7 @@ INSTRUMENT = Instrument(
     step_output="arm",
     step_size=STEP_SIZE,
     extra_charts=_with_and_without_load,
+    extra_titles=(WITH_LOAD,),
     load_input="load",
     views=("step", "bode", "nyquist", "poles", "root-locus", "influence"),
 )

@@ -11,6 +11,7 @@ from chladni.models.analysis.step_simulation import needs_simulation, step_simul
 from chladni.models.analysis.variants import Variant, one_at_a_time, require_possible
 from chladni.models.core.instrument import Instrument, Option
 from chladni.models.core.reading import Chart, Curve, InstrumentReading
+from chladni.models.instruments.catalogue import INSTRUMENTS
 from chladni.models.instruments.pneumatic_motor import INSTRUMENT
 from chladni.signals.errors import ModelError
 from tests.models.analysis.systems import FunctionModel, compiled, gain_only, oscillator, pt2, state_space
@@ -46,12 +47,61 @@ def test_a_linear_instrument_shows_every_view() -> None:
     assert list(charts) == expected.split()
     for chart in charts.values():
         assert chart.title
-        assert "[" in chart.x_label
-        assert "[" in chart.y_label
+        assert chart.x_label
+        assert chart.y_label
+        # A plain number has no unit to tell.
+        assert "[1]" not in chart.x_label + chart.y_label
         assert any(np.isfinite(curve.y).all() for curve in chart.curves)
     exact = behaviour(oscillator())
     assert value(reading, "overshoot") == exact.value("overshoot")
     assert reading.flags == ()
+
+
+def test_charts_are_computed_only_where_asked_for() -> None:
+    every = read_instrument(INSTRUMENT)
+    wanted = ("bode.phase", "load.velocity", "no-such-chart")
+    some = read_instrument(INSTRUMENT, charts=wanted)
+    assert [chart.name for chart in some.charts] == ["load.velocity", "bode.phase"]
+    for chart in some.charts:
+        same = named(every)[chart.name]
+        np.testing.assert_array_equal(chart.curves[0].y, same.curves[0].y)
+    assert some.offered == every.offered == tuple((chart.name, chart.title) for chart in every.charts)
+    assert (some.quantities, some.flags) == (every.quantities, every.flags)
+
+
+@pytest.mark.parametrize("name", INSTRUMENTS)
+def test_titles_offered_are_those_of_the_charts(name) -> None:
+    reading = read_instrument(INSTRUMENTS[name])
+    assert reading.offered == tuple((chart.name, chart.title) for chart in reading.charts)
+    # A title must tell its chart from the others.
+    assert len({title for _, title in reading.offered}) == len(reading.offered)
+
+
+def test_a_chart_of_its_own_is_computed_only_where_asked_for() -> None:
+    asked: list[object] = []
+
+    def own(model):
+        asked.append(model)
+        return (Chart(name="own", title="Own", x_label="x", y_label="y", curves=()),)
+
+    told = instrument_of(oscillator(), extra_charts=own, extra_titles=(("own", "Own"),))
+    assert ("own", "Own") in read_instrument(told, charts=("poles",)).offered
+    assert asked == []
+    assert [chart.name for chart in read_instrument(told, charts=("own",)).charts] == ["own"]
+    # Without titles only the charts themselves say what there is.
+    untold = replace(told, extra_titles=())
+    reading = read_instrument(untold, charts=("poles",))
+    assert [chart.name for chart in reading.charts] == ["poles"]
+    assert reading.offered[-1] == ("own", "Own")
+
+
+def test_a_load_steps_by_its_declared_size() -> None:
+    small, large = (
+        named(read_instrument(replace(INSTRUMENT, load_size=size), charts=("load.velocity",)))["load.velocity"]
+        for size in (1.0, 500.0)
+    )
+    np.testing.assert_allclose(large.curves[0].y, 500 * small.curves[0].y, rtol=1e-9)
+    assert large.title == "velocity: load steps by 500 N"
 
 
 def test_the_pneumatic_motor_shows_its_outputs_and_its_load() -> None:
@@ -100,7 +150,7 @@ def test_flags_say_what_is_wrong() -> None:
         parameters=oscillator(stiffness=50.0).parameters, equations=equations, said=("beyond the stroke",)
     )
     flags = read_instrument(instrument_of(unstable)).flags
-    assert any("k = 50 1 lies outside its usual range, 0.1 to 10" in flag for flag in flags)
+    assert any("k = 50 lies outside its usual range, 0.1 to 10" in flag for flag in flags)
     assert any("unstable" in flag for flag in flags)
     assert any("the response grows" in flag for flag in flags)
     assert "beyond the stroke" in flags
