@@ -29,6 +29,7 @@ def _it1(v: Values) -> TransferFunction:
 
 
 def _d(v: Values) -> TransferFunction:
+    # One number only: a gain beside the time would be the same knob twice.
     return TransferFunction(num=(v["derivative_time"], 0))
 
 
@@ -53,6 +54,7 @@ def _dead_time(v: Values) -> TransferFunction:
 
 
 def _all_pass(v: Values) -> TransferFunction:
+    # 1 - T s and not T s - 1, so that it passes what is steady without turning its sign.
     return TransferFunction(num=(-v["gain"] * v["time_constant"], v["gain"]), den=(v["time_constant"], 1))
 
 
@@ -94,6 +96,7 @@ BASIC = (
         parameters=Parameters((declare.gain(unit="1/s"),)), transfer=_i,
     ),
     ElementKind(
+        # What a drive is from its command to its position.
         name="it1", title="IT1, integral inertial", formula="K/(s (T s + 1))", group="basic",
         parameters=Parameters((declare.gain(unit="1/s"), _time_constant())), transfer=_it1,
     ),

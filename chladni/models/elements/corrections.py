@@ -46,6 +46,8 @@ _FREQUENCY = Parameter(
     meaning="middle of the notch",
 )
 
+# A ratio of 5 turns the phase by asin(4/6) = 42 degrees, about what one lead is asked for; the notch goes down to
+# 0.05/0.7, a fourteenth; PD2T2 has its poles a decade beyond its zeros, out of the way of the pair that those cancel.
 CORRECTIONS = (
     ElementKind(
         name="lead", title="Lead", formula="K (α T s + 1)/(T s + 1)", group="correction",

@@ -81,6 +81,7 @@ def _inductance() -> Parameter:
     return declare.constant("inductance", 0.1, "V s/A", "L", "inductance")
 
 
+# Defaults of one millisecond each; with both, 500 Hz at a damping ratio of 0.16, so that resonance shows.
 _RC = Parameters((_resistance(), _capacitance()))
 _RL = Parameters((_resistance(value=100.0), _inductance()))
 _RLC = Parameters((_resistance(value=100.0), _inductance(), _capacitance()))

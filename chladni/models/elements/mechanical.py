@@ -160,6 +160,7 @@ MECHANICAL = (
         Parameters(
             (
                 *_M_C_K.values(),
+                # Tuned by Den Hartog's rule for a tenth of the mass: omega_a/omega = 1/1.1, damping ratio 0.17.
                 _mass(0.1, "absorber_mass", "m_a"),
                 _damping(1.0, "absorber_damping", "c_a"),
                 _stiffness(83.0, "absorber_stiffness", "k_a"),

@@ -25,6 +25,7 @@ def _pidt1(v: Values) -> TransferFunction:
     )
 
 
+# The filter is a tenth of the derivative time and that a tenth of the integral time: each part has its own decade.
 # Standard form: one gain before all three parts, so that a knob for time moves one part only.
 _GAIN = declare.gain(meaning="proportional gain")
 _INTEGRAL = declare.time("integral_time", 1.0, "T_I", "integral (reset) time")

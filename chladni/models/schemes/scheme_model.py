@@ -173,6 +173,7 @@ class SchemeModel:
             sites=frozenset(effect.site for effect in self.effects),
             filter_time_s=self.derivative_filter_s,
         )
+        # Loops are closed already and every block has its ports, so effects attach in the order given, not by stage.
         for effect in self.effects:
             compiled = effect.attach(compiled)
         return compiled
