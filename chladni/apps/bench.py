@@ -1,6 +1,6 @@
 """The bench: pages of the virtual instruments, with everything that they can do."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,10 +88,12 @@ def tools() -> Tools:
     )
 
 
-def _read(instrument: Instrument, values: Values, options: Options) -> InstrumentReading:
+def _read(
+    instrument: Instrument, values: Values, options: Options, charts: Collection[str] | None
+) -> InstrumentReading:
     from chladni.models.analysis.instrument_reading import read_instrument
 
-    return read_instrument(instrument, values, options)
+    return read_instrument(instrument, values, options, charts=charts)
 
 
 def _influence(instrument: Instrument, values: Values, options: Options) -> InfluenceTable:

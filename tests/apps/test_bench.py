@@ -25,7 +25,7 @@ DEFAULTS = {option.name: option.default for option in MOTOR.options}
 
 @pytest.fixture(scope="module")
 def shown() -> Shown:
-    reading = TOOLS.read(MOTOR, MOTOR.parameters.numbers(), DEFAULTS)
+    reading = TOOLS.read(MOTOR, MOTOR.parameters.numbers(), DEFAULTS, None)
     return Shown(instrument=MOTOR, model=MOTOR.model(), reading=reading, charts=reading.charts[:2])
 
 

@@ -56,7 +56,7 @@ def test_the_charts_of_every_instrument_can_be_drawn(name: str) -> None:
 
     instrument = INSTRUMENTS[name]
     options = {option.name: option.default for option in instrument.options}
-    reading = tools().read(instrument, instrument.parameters.numbers(), options)
+    reading = tools().read(instrument, instrument.parameters.numbers(), options, None)
     board = Board(LIGHT)
     board.show(reading.charts)
     assert len(board.slots) == min(SLOTS, len(reading.charts)) >= 3

@@ -1,6 +1,6 @@
 """Up to six charts of a page, in a grid that fills the window; the reader chooses which."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -35,12 +35,14 @@ select { border: 0; font-weight: 600; padding: 0 18px 0 4px; min-height: 22px; t
 """
 
 Kept = tuple[str, str, Sequence[Chart]]
+#: Name and title of each chart there is.
+Offered = Sequence[tuple[str, str]]
 
 
 class Slot:
     """One place of the board: a list of charts to choose from, and the tile of the chosen one."""
 
-    def __init__(self, name: str, charts: Sequence[Chart], *, theme: Theme, chosen: Callable[[], None]) -> None:
+    def __init__(self, name: str, *, theme: Theme, chosen: Callable[[], None]) -> None:
         self._theme, self._chosen = theme, chosen
         self._filling = False
         self.name = name
@@ -49,14 +51,16 @@ class Slot:
             "", [], None, self._on_choice, css=_CHOICE_CSS, sizing_mode="stretch_width", margin=0, height=24
         )
         self.view = column(self.select, sizing_mode="stretch_both", stylesheets=[_CARD_CSS])
-        self.show(charts, ())
 
-    def show(self, charts: Sequence[Chart], kept: Sequence[Kept]) -> None:
-        """Show the chosen chart; the first one when there is no such chart any more."""
+    def show(self, offered: Offered, charts: Mapping[str, Chart], kept: Sequence[Kept]) -> None:
+        """Show the chosen chart, the first one when there is no such chart any more; what isn't computed waits."""
         # A chart may vanish with an option that was switched.
-        chart = next((one for one in charts if one.name == self.name), charts[0])
-        self.name = chart.name
-        self._offer(charts)
+        if self.name not in (name for name, _ in offered):
+            self.name = offered[0][0]
+        self._offer(offered)
+        chart = charts.get(self.name)
+        if chart is None:
+            return
         # A figure is dear; another set of curves on the same axes is cheap.
         if self.tile is None or self.tile.key != key_of(chart):
             self.tile = Tile(chart, self._theme)
@@ -70,8 +74,8 @@ class Slot:
         if self.tile is not None:
             self.tile.show_ghosts(_ghosts(self.name, kept))
 
-    def _offer(self, charts: Sequence[Chart]) -> None:
-        names = {chart.title: chart.name for chart in charts}
+    def _offer(self, offered: Offered) -> None:
+        names = {title: name for name, title in offered}
         if self.select.options != names or self.select.value != self.name:
             # Offering is no choice of the user.
             self._filling = True
@@ -91,20 +95,33 @@ class Board:
     ----------
     first
         Charts to show first, the most wanted first; those there aren't are passed over.
+    wanted
+        Called when the reader chose another chart, which may have to be computed first.
     """
 
-    def __init__(self, theme: Theme, *, first: Sequence[str] = ()) -> None:
-        self._theme, self._first = theme, first
+    def __init__(self, theme: Theme, *, first: Sequence[str] = (), wanted: Callable[[], None] | None = None) -> None:
+        self._theme, self._first, self._wanted = theme, first, wanted
         self.slots: list[Slot] = []
-        self._charts: Sequence[Chart] = ()
+        self._offered: Offered = ()
+        self._charts: Mapping[str, Chart] = {}
         self._kept: Sequence[Kept] = ()
         self.view = column(sizing_mode="stretch_both")
 
-    def show(self, charts: Sequence[Chart]) -> None:
-        """Show these charts."""
-        self._charts = charts
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        """Of the charts that are to be seen; None while nobody knows which there are."""
+        return tuple(dict.fromkeys(slot.name for slot in self.slots)) or None
+
+    def missing(self) -> list[str]:
+        """Names of charts that a slot waits for."""
+        return [name for name in self.names or () if name not in self._charts]
+
+    def show(self, charts: Sequence[Chart], offered: Offered = ()) -> None:
+        """Show these charts, and offer these names and titles; those of the charts when none are given."""
+        self._charts = {chart.name: chart for chart in charts}
+        self._offered = offered or tuple((chart.name, chart.title) for chart in charts)
         # Only then: slots keep what the reader chose.
-        if len(self.slots) != min(SLOTS, len(charts)):
+        if len(self.slots) != min(SLOTS, len(self._offered)):
             self._rebuild()
         else:
             self._redraw()
@@ -117,16 +134,25 @@ class Board:
 
     def shown(self) -> tuple[Chart, ...]:
         """Give the charts in the slots, with the curves of kept variants."""
-        charts = {chart.name: chart for chart in self._charts}
-        return tuple(_overlaid(charts[slot.name], _ghosts(slot.name, self._kept)) for slot in self.slots)
+        return tuple(
+            _overlaid(self._charts[slot.name], _ghosts(slot.name, self._kept))
+            for slot in self.slots
+            if slot.name in self._charts
+        )
 
     def _redraw(self) -> None:
         for slot in self.slots:
-            slot.show(self._charts, self._kept)
+            slot.show(self._offered, self._charts, self._kept)
+
+    def _chosen(self) -> None:
+        self._redraw()
+        if self._wanted is not None and self.missing():
+            self._wanted()
 
     def _rebuild(self) -> None:
-        names = wanted([chart.name for chart in self._charts], self._first)[:SLOTS]
-        self.slots = [Slot(name, self._charts, theme=self._theme, chosen=self._redraw) for name in names]
+        names = wanted([name for name, _ in self._offered], self._first)[:SLOTS]
+        self.slots = [Slot(name, theme=self._theme, chosen=self._chosen) for name in names]
+        self._redraw()
         self.show_ghosts(self._kept)
         self.view.stylesheets = [self._grid()]
         self.view.objects = [slot.view for slot in self.slots]

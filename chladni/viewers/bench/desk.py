@@ -26,6 +26,8 @@ class Desk:
 
     def __init__(self, instrument: Instrument) -> None:
         self.instrument = instrument
+        # Of every parameter once, since each turn of a knob asks for the label of its setting.
+        self._scales = tuple((one, KnobScale.of(one)) for one in instrument.parameters.values())
         self.asked = self._labelled(
             instrument.parameters.numbers(), {option.name: option.default for option in instrument.options}
         )
@@ -56,7 +58,7 @@ class Desk:
         """Label a setting by what differs from the declaration."""
         changes = [
             f"{parameter.symbol or parameter.name} {scale.text(values[parameter.name])} {scale.unit}".rstrip()
-            for parameter, scale in ((one, KnobScale.of(one)) for one in self.instrument.parameters.values())
+            for parameter, scale in self._scales
             # Turned away and back again is no change, whatever rounding left.
             if not isclose(values[parameter.name], parameter.value, rel_tol=1e-9)
         ]

@@ -79,7 +79,7 @@ class InstrumentPage:
         self._error = ""
         self.words = html("", MESSAGE_CSS)
         self.strip = html("", STRIP_CSS, margin=(0, 0, 6, 0))
-        self.board = Board(look, first=_first_charts(instrument))
+        self.board = Board(look, first=_first_charts(instrument), wanted=self._ask)
         self.knobs = {
             name: Knob(parameter, turned=self._turned, refused=self._refuse)
             for name, parameter in instrument.parameters.items()
@@ -146,13 +146,15 @@ class InstrumentPage:
     def _exporting(self, export: Export) -> Callable[[], bytes]:
         """Give the job with what the page shows now, however the knobs turn until it runs."""
         # Taken now, on the page's thread: the job runs later.
-        good, reading, charts = self.desk.good, self.desk.reading, self.board.shown()
+        good, known, charts = self.desk.good, self.desk.reading is not None, self.board.shown()
         instrument = self.desk.instrument
 
         def build() -> bytes:
-            if reading is None:
+            if not known:
                 raise ModelError(f"{instrument.name}: this setting gave no reading; there is nothing to save")
             model = instrument.model(good.values, good.options)
+            # With all charts: a log is as long as the longest step, whatever the page shows.
+            reading = self._tools.read(instrument, good.values, good.options, None)
             return export.build(Shown(instrument=instrument, model=model, reading=reading, charts=charts))
 
         return build
@@ -175,11 +177,11 @@ class InstrumentPage:
         self._ask()
 
     def _ask(self) -> None:
-        setting = self.desk.asked
-        job = partial(self._tools.read, self.desk.instrument, setting.values, setting.options)
-        self._reader.submit(job, partial(self._answered, setting))
+        setting, names = self.desk.asked, self.board.names
+        job = partial(self._tools.read, self.desk.instrument, setting.values, setting.options, names)
+        self._reader.submit(job, partial(self._answered, setting, names))
 
-    def _answered(self, setting: Variant, future: "Future[InstrumentReading]") -> None:
+    def _answered(self, setting: Variant, asked: Sequence[str] | None, future: "Future[InstrumentReading]") -> None:
         error = future.exception()
         with self._one_patch():
             if error is not None:
@@ -194,9 +196,12 @@ class InstrumentPage:
                 knob.echo()
             self.desk.accept(setting, future.result())
             self._draw(future.result())
+        # Another setting has other charts, and the reader may have chosen one meanwhile; but never twice the same.
+        if asked is not None and set(self.board.missing()) - set(asked):
+            self._ask()
 
     def _draw(self, reading: InstrumentReading) -> None:
-        self.board.show(reading.charts)
+        self.board.show(reading.charts, reading.offered)
         self.strip.object = quantity_strip(reading.quantities)
         self.words.object = message(self._error, reading.flags)
         # Last, since each only notes that there is something to follow.

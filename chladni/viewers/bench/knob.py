@@ -44,7 +44,7 @@ class Knob:
         self.scale = KnobScale.of(parameter)
         self.value = parameter.value
         self._turned, self._refused = turned, refused
-        self._showing = False
+        self._showing = self._behind = False
         # Both widgets stand for one value, and each follows the other; `_showing` tells our changes from the user's.
         self.slider = self._slider()
         self.entry = entry(self.scale.text(self.value), _ENTRY_CSS, width=84)
@@ -69,6 +69,10 @@ class Knob:
 
     def echo(self) -> None:
         """Let the entry say what the slider was turned to."""
+        # Twenty knobs stand still while one turns.
+        if not self._behind:
+            return
+        self._behind = False
         self._showing = True
         self.entry.value = self.scale.text(self.value)
         self._showing = False
@@ -98,6 +102,7 @@ class Knob:
     def _on_slider(self, event: Any) -> None:
         if not self._showing:
             # The entry follows with the curves, see `echo`: a message of its own would come before them.
+            self._behind = True
             self._accept(self.scale.value(event.new))
 
     def _on_entry(self, event: Any) -> None:

@@ -1,6 +1,6 @@
 """What a page can do besides drawing, handed in by the floor above: pages compute nothing."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -98,7 +98,8 @@ class Tools:
     Attributes
     ----------
     read
-        Charts and numbers of one setting; called for each turn of a knob.
+        ``read(instrument, values, options, charts)``: numbers and the named charts of one setting, all charts when
+        None; called for each turn of a knob.
     influence
         Influence coefficients at one setting.
     watch
@@ -115,7 +116,7 @@ class Tools:
         What can be saved.
     """
 
-    read: Callable[[Instrument, Values, Options], InstrumentReading]
+    read: Callable[[Instrument, Values, Options, Collection[str] | None], InstrumentReading]
     influence: Callable[[Instrument, Values, Options], InfluenceTable]
     watch: Callable[[Instrument, Path], Callable[[], Rows]]
     open_log: Callable[[Path, str, bool], MeasuredLog]

@@ -1,8 +1,9 @@
 """Kept variants: chips above the charts, faded curves in them, a table of their numbers."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,8 +30,9 @@ WATCH_MS = 1000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kept:
-    """A variant with its reading and colour."""
+    """A variant with its reading and colour; `number` tells it from others that may be alike."""
 
+    number: int
     variant: Variant
     reading: InstrumentReading
     colour: str
@@ -71,7 +73,9 @@ class VariantsView:
         self._rows: list[Kept] = []
         self._looked_at: Rows | None = None
         self._counted = 0
-        self._latest = Latest(document)
+        self._numbers = count()
+        # Two: neither the next look at the file nor the next variant may take the other's place.
+        self._latest, self._completer = Latest(document), Latest(document)
         self.keep = button("Keep this variant", self._keep)
         self.chips = flow()
         self._words, self._table = html("", MESSAGE_CSS), html("")
@@ -98,22 +102,39 @@ class VariantsView:
     def close(self) -> None:
         """End."""
         self._latest.close()
+        self._completer.close()
 
     def _keep(self, _event: Any) -> None:
         if self._desk.reading is not None:
             # The reading is kept with the setting: ghosts must not change when a model does.
-            self._hand.append(Kept(variant=self._desk.good, reading=self._desk.reading, colour=self._next_colour()))
+            self._hand.append(self._numbered(self._desk.good, self._desk.reading))
             self._redraw()
+            self._complete()
+
+    def _complete(self) -> None:
+        """Compute the charts of kept variants that weren't on the page, since the reader may choose them later."""
+        partly = [one for one in self._hand if len(one.reading.charts) < len(one.reading.offered)]
+        if partly:
+            self._completer.submit(partial(_completed, self._desk.instrument, self._tools, partly), self._take)
+
+    def _take(self, future: "Future[dict[int, InstrumentReading]]") -> None:
+        # What could be read with some charts can be read with all; else the charts there are stay.
+        if future.exception() is None:
+            found = future.result()
+            self._hand = [replace(one, reading=found.get(one.number, one.reading)) for one in self._hand]
+            self._changed(self.kept)
 
     def _remove(self, kept: Kept, _event: Any) -> None:
-        # By identity: two variants may be alike.
-        self._hand = [one for one in self._hand if one is not kept]
+        self._hand = [one for one in self._hand if one.number != kept.number]
         self._redraw()
 
     def _next_colour(self) -> str:
         # The first colours are those of what moves now.
         self._counted += 1
         return self._theme.palette[self._counted % len(self._theme.palette)]
+
+    def _numbered(self, variant: Variant, reading: InstrumentReading) -> Kept:
+        return Kept(number=next(self._numbers), variant=variant, reading=reading, colour=self._next_colour())
 
     def _redraw(self) -> None:
         self.chips.objects = [self._chip(kept) for kept in self.kept]
@@ -122,7 +143,7 @@ class VariantsView:
 
     def _chip(self, kept: Kept) -> Any:
         # What a file says is removed in the file.
-        by_hand = kept in self._hand
+        by_hand = any(kept.number == one.number for one in self._hand)
         css = f".bk-btn.bk-btn-default {{ border-left: 5px solid {kept.colour} !important; padding: 1px 8px; }}"
         return button(
             f"{kept.variant.label}  ✕" if by_hand else kept.variant.label,
@@ -165,10 +186,12 @@ class VariantsView:
         self._looked_at = looked.rows
         self._words.object = message(looked.rows.mistake, looked.words)
         self._counted = len(self._hand)
-        self._rows = [
-            Kept(variant=variant, reading=reading, colour=self._next_colour()) for variant, reading in looked.found
-        ]
+        self._rows = [self._numbered(variant, reading) for variant, reading in looked.found]
         self._redraw()
+
+
+def _completed(instrument: Instrument, tools: Tools, partly: Sequence[Kept]) -> dict[int, InstrumentReading]:
+    return {one.number: tools.read(instrument, one.variant.values, one.variant.options, None) for one in partly}
 
 
 def read_rows(instrument: Instrument, tools: Tools, look: Callable[[], Rows], known: Rows | None) -> Looked | None:
@@ -188,7 +211,7 @@ def read_rows(instrument: Instrument, tools: Tools, look: Callable[[], Rows], kn
     # One bad row doesn't take the others away.
     for variant in rows.variants[:MOST_ROWS]:
         try:
-            found.append((variant, tools.read(instrument, variant.values, variant.options)))
+            found.append((variant, tools.read(instrument, variant.values, variant.options, None)))
         except ChladniError as error:
             words.append(f"{variant.label}: {error}")
     if len(rows.variants) > MOST_ROWS:

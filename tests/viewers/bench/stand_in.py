@@ -1,6 +1,6 @@
 """A small instrument, and tools that need nothing but NumPy, so that the pages can be tested alone."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import pi
 from pathlib import Path
@@ -56,7 +56,12 @@ OSCILLATOR = Instrument(
 )
 
 
-def read(instrument: Instrument, values: Mapping[str, float], options: Mapping[str, str]) -> InstrumentReading:
+def read(
+    instrument: Instrument,
+    values: Mapping[str, float],
+    options: Mapping[str, str],
+    wanted: Collection[str] | None = None,
+) -> InstrumentReading:
     """Step, Bode and poles in closed form."""
     model: Any = instrument.model(values, options)
     if options["correction"] == "unstable":
@@ -92,7 +97,12 @@ def read(instrument: Instrument, values: Mapping[str, float], options: Mapping[s
         Quantity(name="damping ratio", value=zeta, unit="1", definition="of the pole pair"),
         Quantity(name="overshoot", value=None, unit="%", definition="highest value over the final one"),
     )
-    return InstrumentReading(charts=charts, quantities=quantities, flags=flags)
+    return InstrumentReading(
+        charts=tuple(chart for chart in charts if wanted is None or chart.name in wanted),
+        quantities=quantities,
+        flags=flags,
+        offered=tuple((chart.name, chart.title) for chart in charts),
+    )
 
 
 def influence(instrument: Instrument, values: Mapping[str, float], options: Mapping[str, str]) -> InfluenceTable:

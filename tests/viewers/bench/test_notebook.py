@@ -154,10 +154,10 @@ def test_rows_of_a_file(tmp_path: Path) -> None:
 
 
 def test_a_row_without_a_reading_is_named_and_the_others_stay(tmp_path: Path) -> None:
-    def picky(instrument: Any, values: Any, options: Any) -> Any:
+    def picky(instrument: Any, values: Any, options: Any, charts: Any) -> Any:
         if values["mass"] == 3:
             raise ModelError("too heavy")
-        return read(instrument, values, options)
+        return read(instrument, values, options, charts)
 
     path = tmp_path / "masses.txt"
     path.write_text("3\n4\n")
@@ -295,3 +295,30 @@ def test_a_model_that_cannot_be_built_for_a_log_is_told(tmp_path: Path) -> None:
     page = InstrumentPage(OSCILLATOR, tools(terminals=terminals), log=path)
     assert "an algebraic loop" in page.log._words.object
     page.close()
+
+
+def test_only_charts_on_the_page_are_computed_and_others_when_they_are_chosen() -> None:
+    asked: list[Any] = []
+
+    def noted(instrument: Any, values: Any, options: Any, charts: Any) -> Any:
+        asked.append(charts)
+        return read(instrument, values, options, charts)
+
+    page = InstrumentPage(OSCILLATOR, tools(read=noted))
+    # Nobody knows before the first reading which charts there are.
+    assert asked == [None]
+    slot = page.board.slots[0]
+    slot.select.value = "poles"
+    assert len(asked) == 1
+    page.knobs["mass"].slider.value = 3.0
+    assert "step.position" not in asked[-1]
+    page.variants.keep.clicks += 1
+    # A kept variant has all, whatever is chosen later.
+    assert asked[-1] is None
+    assert {chart.name for chart in page.variants.kept[0].reading.charts} >= {"step.position", "poles"}
+    readings = len(asked)
+    slot.select.value = "step.position"
+    assert "step.position" in asked[-1]
+    assert len(asked) == readings + 1
+    assert slot.tile.key[0] == "step.position"
+    assert [len(one.ghost_lines.data["xs"]) for one in (slot.tile,)] == [1]

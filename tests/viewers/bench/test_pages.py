@@ -29,11 +29,11 @@ class Counting:
         self.seconds = 0.0
         self.threads: set[str] = set()
 
-    def __call__(self, instrument: Any, values: Any, options: Any) -> Any:
+    def __call__(self, instrument: Any, values: Any, options: Any, charts: Any) -> Any:
         self.asked.append(dict(values))
         self.threads.add(threading.current_thread().name)
         time.sleep(self.seconds)
-        return read(instrument, values, options)
+        return read(instrument, values, options, charts)
 
 
 READ = Counting()
