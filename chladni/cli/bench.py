@@ -38,6 +38,11 @@ def bench(
     chosen = None if instrument is None else named_instrument(instrument)
     if variants is not None and instrument is None:
         raise SetupError("--variants holds rows of one instrument's parameters; name it: chladni bench INSTRUMENT")
+    if variants is not None and chosen is not None:
+        from chladni.models.files.variants_file import read_variants
+
+        # Told here, in the terminal; what goes wrong in the file later is told on the page.
+        read_variants(variants, chosen.parameters, chosen.options)
     # The others' pages stay a click away, unless the file of rows is of this one's parameters.
     others = INSTRUMENTS if variants is None else {}
     named = {} if chosen is None else {chosen.name: chosen}

@@ -51,6 +51,23 @@ def test_rows_need_an_instrument() -> None:
         bench(variants=Path("rows.csv"))
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (None, "rows.csv: can't be read"),
+        ("name,colour\na,3\n", "colour"),
+        ("name,active_area [kg]\na,3\n", "kg"),
+        ("name,active_area\na,nan\n", "nan"),
+    ],
+)
+def test_a_wrong_file_of_rows_is_told_in_the_terminal(tmp_path: Path, text: str | None, words: str) -> None:
+    rows = tmp_path / "rows.csv"
+    if text is not None:
+        rows.write_text(text)
+    with pytest.raises(ModelError, match=words):
+        bench("pneumatic-motor", variants=rows, open_page=False)
+
+
 def test_a_taken_port_is_told() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
@@ -76,7 +93,9 @@ def test_opens_the_page_when_it_can_be_had(monkeypatch: pytest.MonkeyPatch, tmp_
         return Server()
 
     monkeypatch.setattr("chladni.apps.bench.open_bench", open_bench)
-    bench("dc-servo", variants=Path("rows.csv"))
+    rows = tmp_path / "rows.csv"
+    rows.write_text("name,inertia\nheavy,3e-4\n")
+    bench("dc-servo", variants=rows)
     bench()
     file = tmp_path / "arm.toml"
     write_model(INSTRUMENTS["dc-servo"].model().with_values({"inertia": 3e-4}), file)
