@@ -52,6 +52,7 @@ def influence(
     from chladni.apps.influence_document import influence_document
     from chladni.apps.model_sources import named_instrument
     from chladni.models.analysis.influence import influence as coefficients
+    from chladni.models.core.stability import growing_poles
 
     to = Output(json)
     instrument = named_instrument(model)
@@ -64,6 +65,10 @@ def influence(
         to_output=output or instrument.step_output,
     )
     _print(to, table, change)
+    growing = growing_poles(chosen.compile())
+    if growing.size:
+        listed = ", ".join(f"{pole.real:.4g} + {pole.imag:.4g}j" for pole in growing)
+        to.lines([f"Warning: unstable, with poles at {listed} rad/s: what is told of final values is of no use"])
     if figures is not None:
         from chladni.viewers.figures.album import Album
         from chladni.viewers.figures.influence import influence_figure

@@ -71,6 +71,16 @@ def test_the_table_marks_the_strongest_and_defines_its_columns(run: Run, model: 
     assert "- damping ratio: " in outcome.out
 
 
+def test_an_unstable_model_is_told(run: Run, model: Path, tmp_path: Path) -> None:
+    path = tmp_path / "growing.toml"
+    path.write_text(
+        'format = "chladni.model/1"\nname = "growing"\nkind = "scheme"\n[[input]]\nname = "command"\n'
+        '[[block]]\nname = "plant"\nnum = [2.0]\nden = [0.5, 1.0]\ninput = ["+command", "+plant"]\n'
+    )
+    assert "- Warning: unstable, with poles at 2 + 0j rad/s" in run("influence", path).out
+    assert "unstable" not in run("influence", model).out
+
+
 def test_figures_are_written(run: Run, tmp_path: Path) -> None:
     outcome = run("influence", "pneumatic-motor", "--figures", tmp_path / "figures")
     assert outcome.code == 0, outcome.err
