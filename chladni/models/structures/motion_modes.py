@@ -16,12 +16,6 @@ def ordered_poles(compiled: CompiledModel) -> NDArray[np.complex128]:
     return np.asarray(poles[np.argsort(-poles.real, kind="stable")])
 
 
-def unstable_poles(compiled: CompiledModel) -> NDArray[np.complex128]:
-    """Poles to the right of the imaginary axis by more than rounding."""
-    poles = ordered_poles(compiled)
-    return np.asarray(poles[poles.real > AT_REST * np.abs(poles).max(initial=0.0)])
-
-
 def motion_modes(compiled: CompiledModel, bodies: Sequence[str]) -> NaturalModes:
     """Oscillating modes by rising frequency, shapes over the bodies.
 

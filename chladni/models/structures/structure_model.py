@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
-from chladni.models.core.model import Effect, ModelKind
+from chladni.models.core.model import Effect, ModelKind, flags_of_effects
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import Simulation
-from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.models.core.stability import growing_poles
 from chladni.models.structures.closed_loop import close_loop, limit_port
 from chladni.models.structures.controller import Controller
-from chladni.models.structures.motion_modes import motion_modes, ordered_poles, unstable_poles
+from chladni.models.structures.motion_modes import motion_modes, ordered_poles
 from chladni.models.structures.plant import compile_plant, input_terminal, output_terminal
 from chladni.models.structures.structure import NaturalModes, Structure
 from chladni.models.structures.structure_input import StructureInput
@@ -162,12 +162,7 @@ class StructureModel:
     def flags(self, simulation: Simulation) -> tuple[str, ...]:
         """Sentences on an unstable loop, a limit that was reached, laws and numbers that left their range."""
         compiled = self.compile()
-        of_effects = [
-            sentence
-            for effect in self.effects
-            if isinstance(effect, AttachedEffect)
-            for sentence in effect.flags(compiled, simulation)
-        ]
+        of_effects = flags_of_effects(self.effects, compiled, simulation)
         return (*self._instability(compiled), *self._reached(simulation), *of_effects, *self._unusual())
 
     def _name_mistakes(self) -> Iterator[WiringMistake]:
@@ -232,8 +227,10 @@ class StructureModel:
 
     def _instability(self, compiled: CompiledModel) -> tuple[str, ...]:
         # A structure without a controller can't be unstable, only free.
-        unstable = unstable_poles(compiled)
-        if not unstable.size or not self.controllers:
+        if not self.controllers:
+            return ()
+        unstable = growing_poles(compiled)
+        if not unstable.size:
             return ()
         listed = ", ".join(f"{pole.real:.4g}{pole.imag:+.4g}j" for pole in unstable[:6])
         names = ", ".join(controller.name for controller in self.controllers)

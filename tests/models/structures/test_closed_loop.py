@@ -294,10 +294,18 @@ def test_an_unstable_loop_is_told_with_its_poles() -> None:
     model = axis(law="pi", gains={"kp": 1.0, "ki": 90.0})
     (sentence,) = model.flags(simulation())
     worst = model.poles()[0]
+    worst = complex(worst.real, abs(worst.imag))
     assert sentence.startswith("the closed loop is unstable: poles at ")
     assert f"{worst.real:.4g}{worst.imag:+.4g}j" in sentence
     assert "lower the gains of axis" in sentence
     assert axis().flags(simulation()) == ()
+
+
+def test_a_loop_that_dead_time_makes_unstable_is_told() -> None:
+    late = attached("delay", "motor", {"delay": 0.05})
+    assert axis().flags(simulation()) == ()
+    (sentence,) = axis().with_effects([late]).flags(simulation())
+    assert sentence.startswith("the closed loop is unstable: poles at ")
 
 
 def test_a_limit_that_was_reached_is_told_with_its_share() -> None:
