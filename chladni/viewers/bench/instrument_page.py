@@ -79,7 +79,7 @@ class InstrumentPage:
         self._error = ""
         self.words = html("", MESSAGE_CSS)
         self.strip = html("", STRIP_CSS, margin=(0, 0, 6, 0))
-        self.board = Board(look, first=_first_charts(instrument), wanted=self._ask)
+        self.board = Board(look, first=first_charts(instrument), wanted=self._ask)
         self.knobs = {
             name: Knob(parameter, turned=self._turned, refused=self._refuse)
             for name, parameter in instrument.parameters.items()
@@ -238,7 +238,7 @@ class InstrumentPage:
         return held
 
 
-def _first_charts(instrument: Instrument) -> list[str]:
+def first_charts(instrument: Instrument) -> list[str]:
     """Give the charts to open with: time, magnitude and loop above; acceleration, phase and roots below."""
     return [f"step.{instrument.step_output}", "bode.magnitude", "nyquist", "step.acceleration", "bode.phase", "poles"]
 

@@ -10,6 +10,7 @@ from bokeh.models.annotations import Legend, LegendItem
 from bokeh.plotting import figure
 
 from chladni.models.core.reading import Chart, Curve
+from chladni.viewers.bench.curve_points import inline, thinned
 from chladni.viewers.bench.theme import Theme
 from chladni.viewers.bench.words import printed
 
@@ -144,12 +145,13 @@ def _data(curves: Sequence[Curve], labels: Sequence[str], colours: Sequence[str]
             points["colour"] += [colour] * curve.x.size
             points["marker"] += [_marker(curve.label)] * curve.x.size
         else:
-            lines["xs"].append(np.ascontiguousarray(curve.x))
-            lines["ys"].append(np.ascontiguousarray(curve.y))
+            x, y = thinned(curve.x, curve.y)
+            lines["xs"].append(inline(x))
+            lines["ys"].append(inline(y))
             lines["label"].append(label)
             lines["colour"].append(colour)
     for name in ("x", "y"):
-        points[name] = np.concatenate(points[name]) if points[name] else np.empty(0)
+        points[name] = inline(np.concatenate(points[name]) if points[name] else np.empty(0))
     return lines, points
 
 
