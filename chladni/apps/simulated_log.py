@@ -31,7 +31,7 @@ START_TIME_NS = 1_760_000_000_000_000_000
 # The rate is at least so many times the highest natural frequency, the run so many times the longest decay time.
 RATE_OVER_HIGHEST = 20.0
 RUN_OVER_DECAY = 30.0
-SHORTEST_RUN_S, MOST_DEFAULT_SAMPLES = 10.0, 200_000
+SHORTEST_RUN_S, MOST_DEFAULT_SAMPLES = 10.0, 50_000
 SLOWEST_RATE_HZ, FASTEST_RATE_HZ = 10.0, 1e5
 # Of a model without states, such as a damper whose motion is prescribed.
 RATE_WITHOUT_POLES_HZ = 1000.0
@@ -178,7 +178,7 @@ def require_place(path: Path) -> None:
 def default_run(compiled: CompiledModel, *, seconds: float | None = None, rate_hz: float | None = None) -> Run:
     """Choose a rate twenty times the highest natural frequency and a run of thirty of the longest decay times.
 
-    Both are rounded up to 1, 2 or 5 times a power of ten; the run is cut at 200 000 samples.
+    Both are rounded up to 1, 2 or 5 times a power of ten; the run is cut at 50 000 samples.
     """
     poles = np.linalg.eigvals(compiled.a) if compiled.states else np.empty(0, dtype=complex)
     # An integrator or a free body never decays: it has no say in how long to look.

@@ -67,6 +67,8 @@ def in_stock_pint(text: str, oracle: pint.UnitRegistry) -> pint.Quantity:
         ("mN", 1e-3, "N"),
         ("lbf", POUND_FORCE, "N"),
         ("kgf", G, "N"),
+        ("daN", 10.0, "N"),
+        ("L/min", 1e-3 / 60, "m^3/s"),
         ("kg", 1.0, "kg"),
         ("lb", 0.45359237, "kg"),
         ("V", 1.0, "V"),

@@ -81,6 +81,8 @@ INSTRUMENT = Instrument(
     parameters=MR_DAMPER.parameters,
     build=_build,
     options=MR_DAMPER.options,
+    # A step of a prescribed displacement has no finite velocity; the size is that of other excitations.
+    step_size=MEASURED_STROKE_M / 2,
     extra_charts=loop_charts,
     views=(),
 )

@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass
 
+from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.instrument import Instrument, Options, Values
 from chladni.models.core.model import Model
 from chladni.signals.errors import ModelError
+
+REFERENCE = "reference"
 
 
 def instrument_of(model: Model, *, title: str = "") -> Instrument:
@@ -35,10 +38,16 @@ def instrument_of(model: Model, *, title: str = "") -> Instrument:
         title=title or model.name,
         parameters=model.parameters,
         build=_Build(model),
-        step_input=compiled.inputs[0].name,
+        step_input=_commanded(compiled),
         step_output=compiled.outputs[0].name,
         views=("step", "bode", "nyquist", "poles", "influence") if rational else ("bode", "nyquist"),
     )
+
+
+def _commanded(compiled: CompiledModel) -> str:
+    """Name of the input that a person turns: the reference of the outermost loop, else the first."""
+    names = [terminal.name for terminal in compiled.inputs]
+    return REFERENCE if REFERENCE in names else names[0]
 
 
 @dataclass(frozen=True, slots=True)
