@@ -3,13 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.integrator.machine_code import machine_code, part_code
+from chladni.models.integrator.plane import Integers1, Numbers1, Numbers3, opener
 from chladni.models.integrator.port_kernel import Ports, Stage
-
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class History(NamedTuple):
@@ -25,13 +22,13 @@ class History(NamedTuple):
         ``[delay + 1]`` step at which each line was last asked; the last is the number of steps kept.
     """
 
-    begin: Matrix
-    length: Matrix
-    value: Matrix
-    hint: Integers
+    begin: Numbers1
+    length: Numbers1
+    value: Numbers3
+    hint: Integers1
 
 
-@machine_code
+@part_code
 def fill_lagged(history: History, ports: Ports, stage: Stage, t: float) -> None:
     """Displacement of each delay line at `t` less its dead time; 0 before the start."""
     for delay in range(ports.delay_s.size):
@@ -40,7 +37,7 @@ def fill_lagged(history: History, ports: Ports, stage: Stage, t: float) -> None:
 
 @part_code
 def _displacement(history: History, delay: int, t: float) -> float:
-    count = history.hint[-1]
+    count = history.hint[history.hint.size - 1]
     if t < 0.0 or count == 0:
         return 0.0
     step = min(history.hint[delay], count - 1)
@@ -59,3 +56,13 @@ def _displacement(history: History, delay: int, t: float) -> float:
                 factor *= (x - other) / (node - other)
         total += factor * history.value[step, delay, node]
     return total
+
+
+_OPEN = opener(History, Ports)
+
+
+@machine_code
+def ask_delays(book: int, t: float) -> None:
+    """`fill_lagged` at the start of a step, from outside of the kernels."""
+    history, ports = _OPEN(book)
+    fill_lagged(history, ports, np.int64(0), t)

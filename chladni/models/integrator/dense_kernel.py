@@ -3,17 +3,14 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.integrator.delay_kernel import History, fill_lagged
 from chladni.models.integrator.explicit_kernel import Stride
 from chladni.models.integrator.machine_code import part_code
+from chladni.models.integrator.plane import Integers1, Numbers1, Numbers2, Numbers3
 from chladni.models.integrator.port_kernel import Ports, port_forces
 from chladni.models.integrator.radau import LAGRANGE
 from chladni.models.integrator.step_tables import DenseTables
-
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class Dense(NamedTuple):
@@ -33,11 +30,11 @@ class Dense(NamedTuple):
         ``[instant, output, sample]`` result.
     """
 
-    row: Matrix
-    power: Matrix
-    place: Integers
-    force_output: Matrix
-    output: Matrix
+    row: Numbers1
+    power: Numbers2
+    place: Integers1
+    force_output: Numbers2
+    output: Numbers3
 
 
 @part_code
@@ -82,7 +79,7 @@ def keep_history(
     level: int, t: float, step_s: float,
 ) -> None:  # fmt: skip
     """Add the step just made to the history of the delay lines."""
-    step, count = history.hint[-1], ports.first.size - 1
+    step, count = history.hint[history.hint.size - 1], ports.first.size - 1
     motion = stride.here.size - 2 * count
     history.begin[step], history.length[step] = t, step_s
     for delay in range(ports.delay_s.size):
@@ -99,7 +96,7 @@ def keep_history(
                 force = dense.power[0, other] + x * (dense.power[1, other] + x * dense.power[2, other])
                 value += ports.through[0, port, other] * force
             history.value[step, delay, 1 + node] = value
-    history.hint[-1] = step + 1
+    history.hint[history.hint.size - 1] = step + 1
 
 
 @part_code
@@ -115,15 +112,16 @@ def keep_outputs(
         ports.motion[row] = dense.row[row]
     n = tables.advance.shape[2] - stride.inputs.size
     for place in range(ports.state.size):
-        q = dense.power[:, count + place]
-        ports.state[place] = stride.here[n + place] + step_s * x * (q[0] + x * (q[1] / 2 + x * q[2] / 3))
+        rate = dense.power[0, count + place]
+        rate += x * (dense.power[1, count + place] / 2 + x * dense.power[2, count + place] / 3)
+        ports.state[place] = stride.here[n + place] + step_s * x * rate
     fill_lagged(history, ports, np.int64(5), t + x * step_s)
-    if not ports.looped[0]:
-        port_forces(ports, t + x * step_s, np.int64(5), True)
+    if ports.looped[0] == 0:
+        port_forces(ports, t + x * step_s, np.int64(5), np.int64(1))
     for output in range(dense.force_output.shape[0]):
         value = dense.row[2 * count + output]
         for port in range(count):
             # In a loop of laws no order of evaluation exists: there the polynomial of the step is taken.
             force = dense.power[0, port] + x * (dense.power[1, port] + x * dense.power[2, port])
-            value += dense.force_output[output, port] * (force if ports.looped[0] else ports.channels[5, port])
+            value += dense.force_output[output, port] * (force if ports.looped[0] == 1 else ports.channels[5, port])
         dense.output[instant, output, sample] = value

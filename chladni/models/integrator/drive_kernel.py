@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.models.integrator.machine_code import inlined_code
+from chladni.models.integrator.plane import Integers1, Numbers1, Numbers2
 
 Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class Drive(NamedTuple):
@@ -17,12 +17,12 @@ class Drive(NamedTuple):
     ``line [column]`` is the place of each straight column among the straight ones.
     """
 
-    rows: Matrix
-    rate: Integers
-    line: Integers
-    straight: Integers
-    kinked: Integers
-    kink_at: Matrix
+    rows: Numbers2
+    rate: Integers1
+    line: Integers1
+    straight: Integers1
+    kinked: Integers1
+    kink_at: Numbers1
 
 
 @inlined_code

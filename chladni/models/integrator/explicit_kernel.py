@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.models.integrator.machine_code import inlined_code
+from chladni.models.integrator.plane import Integers1, Numbers1
 from chladni.models.integrator.port_kernel import Ports, port_forces
 from chladni.models.integrator.step_tables import SchemeTables
 
@@ -25,6 +26,8 @@ class Stride(NamedTuple):
         Likewise: largest magnitude so far.
     inputs
         ``[width]`` row of inputs of this step.
+    coming
+        ``[width]`` that of a step looked ahead at.
     lines
         ``[state + stages of motion]`` rows of `SchemeTables.advance`: all that is linear.
     ahead
@@ -33,13 +36,14 @@ class Stride(NamedTuple):
         ``[1]`` whether a state is about to leave its scale.
     """
 
-    here: Matrix
-    there: Matrix
-    scale: Matrix
-    inputs: Matrix
-    lines: Matrix
-    ahead: Matrix
-    grown: NDArray[np.int64]
+    here: Numbers1
+    there: Numbers1
+    scale: Numbers1
+    inputs: Numbers1
+    coming: Numbers1
+    lines: Numbers1
+    ahead: Numbers1
+    grown: Integers1
 
 
 @inlined_code
@@ -114,7 +118,7 @@ def explicit_step(tables: SchemeTables, ports: Ports, stride: Stride, level: int
     for stage in range(4):
         row = n + 2 * count * (stage // 2)
         place_stage(tables, ports, stride, ports.channels, _WEIGHTS, level, stage, row, step_s)
-        port_forces(ports, t + (0.5 if stage < 2 else 1.0) * step_s, stage + 1, True)
+        port_forces(ports, t + (0.5 if stage < 2 else 1.0) * step_s, stage + 1, np.int64(1))
     add_forces(tables, ports, stride, ports.channels, level)
     keep_end(ports, stride, n)
 

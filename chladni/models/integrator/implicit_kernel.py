@@ -14,7 +14,9 @@ from chladni.models.integrator.explicit_kernel import (
     place_stage,
 )  # fmt: skip
 from chladni.models.integrator.judge_kernel import Judge
-from chladni.models.integrator.machine_code import part_code
+from chladni.models.integrator.machine_code import PART_SIGNATURE, caller, machine_code, part_code
+from chladni.models.integrator.march import EXPLICIT_RECORDS
+from chladni.models.integrator.plane import Integers1, Numbers1, Numbers2, Numbers3, opener
 from chladni.models.integrator.port_kernel import Ports, law_force, port_forces
 from chladni.models.integrator.radau import GAMMA, LAGRANGE, NODES, WEIGHTS
 from chladni.models.integrator.step_tables import SchemeTables
@@ -46,24 +48,31 @@ class Newton(NamedTuple):
     stiffness
         ``[3, channel]``: how strongly a channel acts back on itself within a step: at the start, the least at
         the stages, at the end.
+    address
+        ``[1]`` of `implicit_step`.
     """
 
-    value: Matrix
-    trial: Matrix
-    change: Matrix
-    residual: Matrix
-    slope: Matrix
-    matrix: Matrix
-    channel_scale: Matrix
-    stiffness: Matrix
+    value: Numbers2
+    trial: Numbers2
+    change: Numbers1
+    residual: Numbers1
+    slope: Numbers3
+    matrix: Numbers2
+    channel_scale: Numbers2
+    stiffness: Numbers2
+    address: Integers1
 
 
-@part_code
-def implicit_step(
-    tables: SchemeTables, ports: Ports, stride: Stride, newton: Newton, judge: Judge,
-    level: int, t: float, step_s: float,
-) -> bool:  # fmt: skip
-    """Step from ``channels[0]`` to ``channels[4]``; the stages are in ``channels[1:4]``. False without a solution."""
+#: What both marches keep in their book.
+IMPLICIT_RECORDS = (*EXPLICIT_RECORDS, SchemeTables, Newton)
+_OPEN = opener(*IMPLICIT_RECORDS)
+CALL_STEP = caller(PART_SIGNATURE)
+
+
+@machine_code
+def implicit_step(book: int, level: int, t: float, step_s: float) -> int:
+    """Step from ``channels[0]`` to ``channels[4]``; the stages are in ``channels[1:4]``. 0 without a solution."""
+    _, ports, stride, _, _, judge, tables, newton = _OPEN(book)
     n = tables.gain.shape[3]
     advance_linear(tables.advance, level, stride.here, stride.inputs, stride.lines)
     note_scale(stride, n)
@@ -75,7 +84,7 @@ def implicit_step(
     for _ in range(_ITERATIONS):
         _linearise(tables, ports, stride, newton, level, t, step_s)
         if not solve_in_place(newton.matrix, newton.residual, newton.change):
-            return False
+            return 0
         _scale_silent(newton)
         size = _residual_size(newton)
         largest = 0.0
@@ -83,16 +92,16 @@ def implicit_step(
             scale = newton.channel_scale[1, place % channels] + 1e-300
             largest = max(largest, abs(newton.change[place]) / scale)
         if not np.isfinite(largest):
-            return False
+            return 0
         if largest <= _CLOSE:
             for place in range(STAGES * channels):
                 newton.value[place // channels, place % channels] += newton.change[place]
             _finish(tables, ports, stride, newton, level, step_s)
-            return True
+            return 1
         size = _damped(tables, ports, stride, newton, level, t, step_s, size)
         if size < 0:
-            return False
-    return False
+            return 0
+    return 0
 
 
 @part_code
@@ -117,7 +126,7 @@ def _first_residual(
         scale = max(newton.channel_scale[0, channel], abs(ports.channels[0, channel]))
         # A force that moves no state by a share of the tolerance worth naming need not be found more closely.
         if judge.weight[channel] > 0.0:
-            scale = max(scale, _UNFELT * min(judge.tolerance, 1e-7) / (_CLOSE * judge.weight[channel]))
+            scale = max(scale, _UNFELT * min(judge.tolerance[0], 1e-7) / (_CLOSE * judge.weight[channel]))
         newton.channel_scale[1, channel] = scale
     _residual(tables, ports, stride, newton, newton.value, level, t, step_s)
     for place in range(STAGES * channels):
@@ -182,7 +191,7 @@ def _residual(
     channels = ports.channels.shape[1]
     for stage in range(STAGES):
         _ask_at(tables, ports, stride, value, level, stage, step_s)
-        port_forces(ports, t + NODES[stage] * step_s, 1 + stage, False)
+        port_forces(ports, t + NODES[stage] * step_s, 1 + stage, np.int64(0))
         for channel in range(channels):
             found = ports.channels[1 + stage, channel]
             newton.residual[stage * channels + channel] = found - value[stage, channel]
@@ -214,7 +223,9 @@ def _linearise(
 def _law_slopes(ports: Ports, stride: Stride, newton: Newton, stage: int, t: float) -> None:
     """Derivatives of forces and rates with respect to displacement, velocity and law states, by differences."""
     count, channels = ports.first.size - 1, ports.channels.shape[1]
-    newton.slope[stage] = 0.0
+    for row in range(channels):
+        for column in range(2 * count + ports.state.size):
+            newton.slope[stage, row, column] = 0.0
     for delay in range(ports.delay_s.size):
         newton.slope[stage, ports.delay_port[delay], ports.delay_port[delay]] -= 1.0
     for port in range(count):

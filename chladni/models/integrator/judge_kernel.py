@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from chladni.models.integrator.drive_kernel import Drive
 from chladni.models.integrator.explicit_kernel import Stride, advance_linear
-from chladni.models.integrator.machine_code import inlined_code, part_code
+from chladni.models.integrator.machine_code import inlined_code
+from chladni.models.integrator.plane import Numbers1, Numbers2, Numbers3
 from chladni.models.integrator.port_kernel import Ports, port_forces
 from chladni.models.integrator.step_tables import DEEPEST
 
@@ -30,14 +31,14 @@ class Judge(NamedTuple):
     before
         ``[2, channel]`` forces and rates at the start and in the middle of the step before.
     tolerance
-        Of one step, relative.
+        ``[1]`` of one step, relative.
     """
 
-    effect: Matrix
-    weight: Matrix
-    difference: Matrix
-    before: Matrix
-    tolerance: float
+    effect: Numbers3
+    weight: Numbers1
+    difference: Numbers2
+    before: Numbers2
+    tolerance: Numbers1
 
 
 @inlined_code
@@ -55,7 +56,7 @@ def weigh(judge: Judge, stride: Stride, ports: Ports, level: int, step_s: float)
         judge.weight[count + place] = step_s / scale
 
 
-@part_code
+@inlined_code
 def look_ahead(advance: Matrix, drive: Drive, ports: Ports, stride: Stride, sample: int, step_s: float) -> None:
     """Renew the scales by what the coming samples would make of the states without forces.
 
@@ -69,7 +70,9 @@ def look_ahead(advance: Matrix, drive: Drive, ports: Ports, stride: Stride, samp
     for place in range(states):
         ports.state[place] = stride.here[n + place]
     for coming in range(sample, min(sample + _AHEAD, drive.rows.shape[0])):
-        advance_linear(advance, 0, stride.ahead, drive.rows[coming], stride.lines)
+        for place in range(stride.coming.size):
+            stride.coming[place] = drive.rows[coming, place]
+        advance_linear(advance, 0, stride.ahead, stride.coming, stride.lines)
         for row in range(n):
             stride.ahead[row] = stride.lines[row]
             stride.scale[row] = max(stride.scale[row], abs(stride.lines[row]))
@@ -77,7 +80,7 @@ def look_ahead(advance: Matrix, drive: Drive, ports: Ports, stride: Stride, samp
             ports.motion[row] = stride.lines[n + 2 * count + row]
             stride.scale[n + states + row] = max(stride.scale[n + states + row], abs(ports.motion[row]))
         if states > 0:
-            port_forces(ports, coming * step_s, np.int64(5), True)
+            port_forces(ports, coming * step_s, np.int64(5), np.int64(1))
         for place in range(states):
             moved = step_s * abs(ports.channels[5, count + place])
             if moved > stride.scale[n + place] and np.isfinite(moved):
@@ -121,7 +124,7 @@ def _curvature_error(judge: Judge, q: Matrix, channel: int, change: int) -> floa
     return missed
 
 
-@part_code
+@inlined_code
 def is_stiff(judge: Judge, ports: Ports) -> bool:
     """Whether forces change nearly as much from the first to the second stage in the middle as they did before."""
     q = ports.channels
@@ -129,4 +132,4 @@ def is_stiff(judge: Judge, ports: Ports) -> bool:
     for channel in range(q.shape[1]):
         again += judge.weight[channel] * abs(q[2, channel] - q[1, channel])
         first += judge.weight[channel] * abs(q[1, channel] - q[0, channel])
-    return not again <= max(0.3 * first, judge.tolerance)
+    return not again <= max(0.3 * first, judge.tolerance[0])

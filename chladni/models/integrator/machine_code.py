@@ -20,6 +20,11 @@ _POINTER = _TYPES.CPointer(types.float64)
 #: Signature of a law in machine code.
 LAW_SIGNATURE = types.float64(types.float64, types.float64, types.float64, _POINTER, _POINTER, _POINTER)
 
+_WORD, _NUMBER = types.int64, types.float64
+#: Signatures of `march` and `march_implicit`, of `inside`, of `implicit_step`.
+MARCH_SIGNATURE = _WORD(_WORD, _NUMBER, _WORD, _WORD, _WORD, _WORD)
+INSIDE_SIGNATURE = _WORD(_WORD, _WORD, _WORD, _NUMBER, _NUMBER)
+PART_SIGNATURE = _WORD(_WORD, _WORD, _NUMBER, _NUMBER)
 
 _OPTIONS: dict[str, Any] = {"cache": CACHED, "nogil": True, "fastmath": False, "error_model": "numpy", "_nrt": False}
 
@@ -33,7 +38,7 @@ def _stamp() -> tuple[float, int]:
 _STAMP = _stamp()
 
 
-def _compile(function: FunctionT, **options: bool) -> FunctionT:
+def _compile(function: FunctionT, **options: bool | str) -> FunctionT:
     compiled: FunctionT = _JIT(**options, **_OPTIONS)(function)
     # numba looks at the file of a kernel only: a part that changed in another file would go on running as it was.
     kept = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
@@ -57,7 +62,35 @@ def part_code(function: FunctionT) -> FunctionT:
 
 def inlined_code(function: FunctionT) -> FunctionT:
     """Compile a part into each kernel that calls it: for what is done in every step, where a call takes its time."""
-    return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
+    return _compile(function, inline="always")
+
+
+def address_of(kernel: Any, signature: Any) -> int:
+    """Address of a kernel for `caller`, compiled for a signature when it's first asked for.
+
+    numba optimises and emits a part again inside every kernel above it; what is called by address, once.
+    """
+    kernel.compile(signature.args)
+    made = kernel.overloads[signature.args]
+    return int(made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name))
+
+
+def caller(signature: Any) -> Callable[..., int]:
+    """Give what calls machine code of a signature in a kernel: ``call(address, arguments)``, these a tuple."""
+    arguments = _TYPES.Tuple(signature.args)
+
+    def generate(context: Any, builder: Any, _called: Any, values: Any) -> Any:
+        kinds = [context.get_value_type(each) for each in signature.args]
+        kind = ir.FunctionType(context.get_value_type(signature.return_type), kinds)
+        code = builder.inttoptr(values[0], kind.as_pointer())
+        return builder.call(code, [builder.extract_value(values[1], place) for place in range(len(kinds))])
+
+    @intrinsic
+    def call(_context: Any, _address: Any, _arguments: Any) -> tuple[Any, Callable[..., Any]]:
+        return signature.return_type(types.int64, arguments), generate
+
+    given: Callable[..., int] = call
+    return given
 
 
 def _typed_call(_context: Any, *_arguments: Any) -> tuple[Any, Callable[..., Any]]:

@@ -8,7 +8,14 @@ from numpy.typing import NDArray
 from chladni.models.integrator.drive_kernel import Drive, fill_inputs
 from chladni.models.integrator.explicit_kernel import Stride, explicit_step
 from chladni.models.integrator.judge_kernel import Judge, explicit_error, is_stiff, look_ahead, weigh
-from chladni.models.integrator.machine_code import inlined_code, machine_code
+from chladni.models.integrator.machine_code import (
+    INSIDE_SIGNATURE,
+    MARCH_SIGNATURE,
+    caller,
+    inlined_code,
+    machine_code,
+)
+from chladni.models.integrator.plane import Integers1, Numbers2, opener
 from chladni.models.integrator.port_kernel import Ports
 from chladni.models.integrator.step_tables import DEEPEST, SchemeTables
 
@@ -18,7 +25,7 @@ Integers = NDArray[np.int64]
 #: Finest steps in a sample interval.
 UNIT = 1 << DEEPEST
 #: How a march ends.
-DONE, DEEPER, MORE_HISTORY, FAILED, TOO_MANY, STIFF = range(6)
+DONE, DEEPER, MORE_HISTORY, FAILED, TOO_MANY, STIFF, SOFT = range(7)
 AUTOMATIC, EXPLICIT, IMPLICIT = range(3)
 #: What the finest step may still be wrong by, relative: a jump inside it can't be met better.
 LAST_RESORT = 1e-4
@@ -42,9 +49,9 @@ class Course(NamedTuple):
         ``[sample, port]``.
     """
 
-    cursor: Integers
-    point: Matrix
-    force: Matrix
+    cursor: Integers1
+    point: Numbers2
+    force: Numbers2
 
 
 @inlined_code
@@ -89,36 +96,61 @@ def move_on(cursor: Integers, error: float, tolerance: float) -> None:
         cursor[LEVEL] = level - 1
 
 
+#: What a march keeps in its book.
+EXPLICIT_RECORDS = (SchemeTables, Ports, Stride, Drive, Course, Judge)
+_OPEN = opener(*EXPLICIT_RECORDS)
+CALL_MARCH, CALL_INSIDE = caller(MARCH_SIGNATURE), caller(INSIDE_SIGNATURE)
+#: Moments of a step.
+BEFORE, INSIDE, AFTER = range(3)
+
+
 @machine_code
-def march(
-    tables: SchemeTables, ports: Ports, stride: Stride, drive: Drive, course: Course, judge: Judge,
-    step_s: float, stop: int, automatic: bool, most: int,
-) -> int:  # fmt: skip
-    """March up to sample `stop`; gives why it ended. What it left behind is enough to go on."""
+def march(book: int, step_s: float, stop: int, automatic: int, most: int, inside: int) -> int:
+    """March up to sample `stop`; gives why it ended. What it left behind is enough to go on.
+
+    Parameters
+    ----------
+    book
+        Address of a book that begins with `EXPLICIT_RECORDS`.
+    automatic
+        1 to end where laws are stiff.
+    most
+        Steps that may be tried.
+    inside
+        Address of the kernel `inside`; 0 for a model without delay lines and without outputs between the samples.
+    """
+    tables, ports, stride, drive, course, judge = _OPEN(book)
     cursor = course.cursor
     while cursor[SAMPLE] < stop:
         level, share = cursor[LEVEL], 1.0 / (1 << cursor[LEVEL])
         if level >= tables.advance.shape[0]:
             return DEEPER
         part, length_s = cursor[POSITION] / UNIT, step_s * share
+        t = (cursor[SAMPLE] + part) * step_s
         if cursor[POSITION] == 0:
             record(course, ports, stride)
         fill_inputs(drive, stride.inputs, cursor[SAMPLE], part, share, step_s)
-        explicit_step(tables, ports, stride, level, (cursor[SAMPLE] + part) * step_s, length_s)
+        if inside != 0 and CALL_INSIDE(inside, (book, BEFORE, 0, t, length_s)) == 1:
+            return MORE_HISTORY
+        explicit_step(tables, ports, stride, level, t, length_s)
         if stride.grown[0] > 0 and cursor[LOOKED] != cursor[SAMPLE]:
             cursor[LOOKED] = cursor[SAMPLE]
             look_ahead(tables.advance, drive, ports, stride, cursor[SAMPLE], step_s)
         weigh(judge, stride, ports, level, length_s)
         error = explicit_error(judge, ports, level, cursor[PREVIOUS])
         cursor[TRIED] += 1
-        if error <= judge.tolerance or (level == DEEPEST and error <= LAST_RESORT):
+        if error <= judge.tolerance[0] or (level == DEEPEST and error <= LAST_RESORT):
+            if inside != 0:
+                CALL_INSIDE(inside, (book, INSIDE, 0, t, length_s))
             accept(ports, stride, judge)
-            move_on(cursor, error, judge.tolerance)
+            move_on(cursor, error, judge.tolerance[0])
+            if inside != 0:
+                CALL_INSIDE(inside, (book, AFTER, 0, t, length_s))
         elif level == DEEPEST:
             return FAILED
         elif cursor[TRIED] > most:
             return TOO_MANY
-        elif automatic and is_stiff(judge, ports):
+        elif automatic == 1 and is_stiff(judge, ports):
             return STIFF
         else:
             cursor[LEVEL] += 1

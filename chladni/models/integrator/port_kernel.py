@@ -4,12 +4,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.integrator.machine_code import call_law, machine_code, part_code
+from chladni.models.integrator.plane import Integers1, Integers2, Numbers1, Numbers2, Numbers3, opener
 
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
 #: A number that numba must not take as part of the type: it would compile the kernel once for each.
 Stage = int | np.int64
 
@@ -36,22 +34,22 @@ class Ports(NamedTuple):
     delay_port, delay_s
         Of each delay line.
     looped
-        ``[1]`` whether no order of evaluation exists, so that only the implicit step can be made.
+        ``[1]``: 1 where no order of evaluation exists, so that only the implicit step can be made.
     lagged
         ``[stage, delay]`` the displacement that a delay line gives.
     """
 
-    table: Integers
-    first: Integers
-    through: Matrix
-    motion: Matrix
-    state: Matrix
-    channels: Matrix
-    address: Integers
-    delay_port: Integers
-    delay_s: Matrix
-    looped: NDArray[np.bool_]
-    lagged: Matrix
+    table: Integers2
+    first: Integers1
+    through: Numbers3
+    motion: Numbers1
+    state: Numbers1
+    channels: Numbers2
+    address: Integers1
+    delay_port: Integers1
+    delay_s: Numbers1
+    looped: Integers1
+    lagged: Numbers2
 
 
 @part_code
@@ -63,16 +61,16 @@ def law_force(ports: Ports, law: int, d: float, s: float, t: float, stage: Stage
     return _CALL(ports.table[law, 0], d, s, t, ports.table[law, 1], ports.address[0] + 8 * first, rates)
 
 
-@machine_code
-def port_forces(ports: Ports, t: float, stage: Stage, through: bool) -> None:
+@part_code
+def port_forces(ports: Ports, t: float, stage: Stage, through: Stage) -> None:
     """Forces and rates of one stage from `motion` and `state`; port by port, so that earlier forces move later ports.
 
-    When `through` is false, `motion` already holds what the forces themselves make.
+    When `through` is 0, `motion` already holds what the forces themselves make.
     """
     count = ports.first.size - 1
     for port in range(count):
         d, s = ports.motion[port], ports.motion[count + port]
-        if through:
+        if through == 1:
             for earlier in range(port):
                 force = ports.channels[stage, earlier]
                 d += ports.through[0, port, earlier] * force
@@ -85,3 +83,13 @@ def port_forces(ports: Ports, t: float, stage: Stage, through: bool) -> None:
             if ports.delay_port[delay] == port:
                 force += ports.lagged[stage, delay] - d
         ports.channels[stage, port] = force
+
+
+_OPEN = opener(Ports)
+
+
+@machine_code
+def ask_laws(book: int, t: float, through: int) -> None:
+    """`port_forces` at the start of a step, from outside of the kernels."""
+    (ports,) = _OPEN(book)
+    port_forces(ports, t, np.int64(0), through)

@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
-from chladni.models.integrator.delay_kernel import History, fill_lagged
+from chladni.models.integrator.delay_kernel import History, ask_delays
 from chladni.models.integrator.dense_kernel import Dense
 from chladni.models.integrator.drive_kernel import Drive
 from chladni.models.integrator.explicit_kernel import Stride
 from chladni.models.integrator.hold import Hold
-from chladni.models.integrator.implicit_kernel import STAGES, Newton
+from chladni.models.integrator.implicit_kernel import STAGES, Newton, implicit_step
+from chladni.models.integrator.inside_kernel import inside
 from chladni.models.integrator.judge_kernel import Judge
+from chladni.models.integrator.machine_code import INSIDE_SIGNATURE, MARCH_SIGNATURE, PART_SIGNATURE, address_of
 from chladni.models.integrator.march import (
     AUTOMATIC,
     COARSEST,
@@ -38,8 +40,9 @@ from chladni.models.integrator.march import (
     Course,
     march,
 )  # fmt: skip
-from chladni.models.integrator.march_all import march_all
-from chladni.models.integrator.port_kernel import Ports, port_forces
+from chladni.models.integrator.march_implicit import alternate, march_implicit
+from chladni.models.integrator.plane import book
+from chladni.models.integrator.port_kernel import Ports, ask_laws
 from chladni.models.integrator.port_plan import LawTable, PortPlan
 from chladni.models.integrator.step_tables import DEEPEST, StepTables
 from chladni.signals.errors import ModelError
@@ -84,15 +87,15 @@ class Run:
         self._scheme = _SCHEMES["implicit" if plan.looped else scheme]
         self._coarsest = self._coarsest_level()
         self._ports = _ports(plan, laws)
+        self._words = book(self._ports)
         self._newton = _newton(len(plan.ports), laws.state.size)
-        # Most models need explicit steps alone, whose kernel is small.
-        self._plain = self._scheme != IMPLICIT and not plan.delay_s.size and not tables.instants.size
+        self._soft = self._scheme != IMPLICIT
         self._judge = Judge(
             effect=tables.effect,
             weight=np.zeros(self._ports.channels.shape[1]),
             difference=_difference_weights(),
             before=np.zeros((2, self._ports.channels.shape[1])),
-            tolerance=tolerance,
+            tolerance=np.array([tolerance]),
         )
 
     def march(self, rows: Matrix, start: Matrix) -> RunResult:
@@ -137,12 +140,13 @@ class Run:
         base = plan.motion_state @ stride.here[:n] + plan.motion_column @ row[: self._hold.columns]
         ports.state[:] = stride.here[n : n + ports.state.size]
         if plan.delay_s.size:
-            fill_lagged(history, ports, 0, t + 1e-9 / self._rate_hz)
+            words = book(history, ports)
+            ask_delays(words.ctypes.data, t + 1e-9 / self._rate_hz)
         if plan.looped:
             self._solve_loop(base, t)
         else:
             ports.motion[:] = base
-            port_forces(ports, t, 0, True)
+            ask_laws(self._words.ctypes.data, t, 1)
         stride.here[n + ports.state.size :] = ports.motion
         course.cursor[PREVIOUS] = -1
         self._newton.stiffness[0] = 0.0
@@ -176,7 +180,7 @@ class Run:
 
     def _loop_residual(self, base: Matrix, through: Matrix, force: Matrix, t: float) -> Matrix:
         self._ports.motion[:] = base + through @ force
-        port_forces(self._ports, t, 0, False)
+        ask_laws(self._words.ctypes.data, t, 0)
         found = self._ports.channels[0, : force.size].copy()
         self._ports.channels[0, : force.size] = force
         return found - force
@@ -193,7 +197,7 @@ class Run:
             if status == DEEPER:
                 self._tables.deepen(min(DEEPEST + 1, max(3, 2 * self._tables.levels)))
             elif status == STIFF:
-                self._plain, course.cursor[HARD] = False, 1
+                self._soft, course.cursor[HARD] = False, 1
             elif status == MORE_HISTORY:
                 history = _shorter(history, float(self._plan.delay_s.max()))
             else:
@@ -203,13 +207,19 @@ class Run:
         self, stride: Stride, course: Course, drive: Drive, dense: Dense, history: History, stop: int, most: int
     ) -> int:
         tables, judge, step_s = self._tables, self._judge._replace(effect=self._tables.effect), 1.0 / self._rate_hz
-        if self._plain:
-            automatic = self._scheme == AUTOMATIC
-            return march(tables.explicit, self._ports, stride, drive, course, judge, step_s, stop, automatic, most)
-        return march_all(
-            tables.explicit, tables.implicit, tables.dense, self._ports, stride, self._newton, history, dense,
-            drive, course, judge, step_s, stop, self._scheme, most,
+        words = book(
+            tables.explicit, self._ports, stride, drive, course, judge, tables.implicit, self._newton,
+            tables.dense, history, dense,
         )  # fmt: skip
+        has_inside = self._plan.delay_s.size > 0 or tables.instants.size > 0
+        within = address_of(inside, INSIDE_SIGNATURE) if has_inside else 0
+        arguments = words.ctypes.data, step_s, stop, int(self._scheme == AUTOMATIC), most, within
+        # Most models need explicit steps alone: the other kernels are compiled when they're met.
+        if self._soft:
+            return march(*arguments)
+        self._newton.address[0] = address_of(implicit_step, PART_SIGNATURE)
+        soft, stiff = (address_of(kernel, MARCH_SIGNATURE) for kernel in (march, march_implicit))
+        return alternate(soft, stiff, int(course.cursor[HARD]), *arguments)
 
     def _failure(self, course: Course, stride: Stride, status: int) -> ModelError:
         t = (course.cursor[SAMPLE] + course.cursor[POSITION] / UNIT) / self._rate_hz
@@ -279,7 +289,7 @@ def _ports(plan: PortPlan, laws: LawTable) -> Ports:
         address=np.array([state.ctypes.data, channels.ctypes.data], dtype=np.int64),
         delay_port=plan.delay_port,
         delay_s=plan.delay_s,
-        looped=np.array([plan.looped]),
+        looped=np.array([int(plan.looped)]),
         lagged=np.zeros((6, plan.delay_s.size)),
     )
 
@@ -296,6 +306,7 @@ def _newton(count: int, states: int) -> Newton:
         matrix=np.zeros((size, size)),
         channel_scale=np.zeros((2, channels)),
         stiffness=np.zeros((3, channels)),
+        address=np.zeros(1, dtype=np.int64),
     )
 
 
@@ -307,6 +318,7 @@ def _stride(plan: PortPlan, hold: Hold, laws: LawTable, start: Matrix) -> Stride
         there=np.zeros(here.size),
         scale=np.abs(here),
         inputs=np.zeros(hold.width),
+        coming=np.zeros(hold.width),
         lines=np.zeros(n + 2 * STAGES * count),
         ahead=np.zeros(n),
         grown=np.zeros(1, dtype=np.int64),

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from chladni.models.integrator.exponential import POWERS, Response, responses
 from chladni.models.integrator.hold import Hold
+from chladni.models.integrator.plane import Numbers2, Numbers3, Numbers4, Numbers5
 from chladni.models.integrator.port_plan import PortPlan
 from chladni.models.integrator.radau import LAGRANGE, NODES
 
@@ -33,9 +34,9 @@ class SchemeTables(NamedTuple):
         ``[level, stage, port, state]``: what forces add to the state at the end.
     """
 
-    advance: Matrix
-    couple: Matrix
-    gain: Matrix
+    advance: Numbers3
+    couple: Numbers5
+    gain: Numbers4
 
 
 class DenseTables(NamedTuple):
@@ -51,9 +52,9 @@ class DenseTables(NamedTuple):
         ``[level, instant]`` where, as a fraction of that level's step.
     """
 
-    advance: Matrix
-    couple: Matrix
-    fraction: Matrix
+    advance: Numbers4
+    couple: Numbers5
+    fraction: Numbers2
 
 
 @dataclass(slots=True)
