@@ -10,6 +10,7 @@ from scipy.optimize import Bounds, differential_evolution, minimize
 from chladni.models.analysis.behaviour import path_behaviour
 from chladni.models.analysis.linear_path import LinearPath, linear_path
 from chladni.models.analysis.wish import Wish, measured
+from chladni.models.core.instrument import Instrument
 from chladni.models.core.model import Model
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.reading import Quantity
@@ -62,14 +63,14 @@ class Optimum:
 
 
 def optimise(
-    model: Model,
+    system: Model | Instrument,
     parameters: Sequence[str],
     wish: Wish | Sequence[Wish],
     *,
     bounds: BoundsByName | None = None,
     from_input: str = "",
     to_output: str = "",
-    size: float = 1.0,
+    size: float | None = None,
     seed: int = 0,
 ) -> Optimum:
     """Find values of a few parameters that fulfil a wish, by the linear equations.
@@ -80,8 +81,8 @@ def optimise(
 
     Parameters
     ----------
-    model
-        Where to begin.
+    system
+        Where to begin: a model, or an instrument at its defaults.
     parameters
         Which are free.
     wish
@@ -89,9 +90,9 @@ def optimise(
     bounds
         Low and high by name, SI; others have their usual range.
     from_input, to_output
-        Whose behaviour; the first of each when empty.
+        Whose behaviour; the instrument's own, or a model's first of each, when empty.
     size
-        Of the step.
+        Of the step; the instrument's own, or 1, when None.
     seed
         Of the search.
 
@@ -106,6 +107,13 @@ def optimise(
         For unknown names, bounds that leave nothing free or what is possible, and more than one aim.
     """
     wishes = (wish,) if isinstance(wish, Wish) else tuple(wish)
+    if isinstance(system, Instrument):
+        model = system.model()
+        from_input, to_output = from_input or system.step_input, to_output or system.step_output
+        size = system.step_size if size is None else size
+    else:
+        model = system
+    size = 1.0 if size is None else size
     search = _Search(model, tuple(parameters), wishes, bounds or {}, from_input, to_output, size)
     # The model is asked anew for the result: what is told is what the values give, not what the search noted.
     values = search.best(seed)
@@ -146,7 +154,7 @@ class _Search:
         unit = Bounds(np.zeros(spans.size), np.ones(spans.size))
         start = np.clip((self._initial - low) / spans, 0.0, 1.0)
         found = differential_evolution(
-            cost, unit, x0=start, rng=seed, popsize=POPULATION, maxiter=GENERATIONS, tol=1e-4, polish=False
+            cost, unit, x0=start, seed=seed, popsize=POPULATION, maxiter=GENERATIONS, tol=1e-4, polish=False
         )
         refined = minimize(
             cost,

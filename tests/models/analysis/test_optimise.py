@@ -17,6 +17,7 @@ from chladni.models.analysis.wish import (
 )
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameters
+from chladni.models.instruments.catalogue import INSTRUMENTS
 from chladni.signals.errors import ModelError
 from tests.models.analysis.systems import FunctionModel, compiled, oscillator, parameter, pt2, state_space
 
@@ -87,6 +88,15 @@ def test_a_quantity_that_doesn_t_exist_says_so() -> None:
     best = optimise(oscillator(), ["c"], least_answer_time(), bounds={"c": (5.0, 9.0)})
     assert not best.met
     assert "there is none" in best.advice[0]
+
+
+def test_an_instrument_knows_what_steps_and_what_counts() -> None:
+    servo = INSTRUMENTS["dc-servo"]
+    wish = Wish(quantity="overshoot", sense="at_most", limit=2.0)
+    of_page = optimise(servo, ["velocity_gain"], wish)
+    of_model = optimise(servo.model(), ["velocity_gain"], wish, from_input="command", to_output="velocity")
+    assert of_page.values == of_model.values
+    assert of_page.wished_after[0].value == pytest.approx(2.0, rel=1e-3)
 
 
 def test_the_same_seed_gives_the_same_values() -> None:
