@@ -8,6 +8,8 @@ and what stays is an integrator with the correction's lag of 0.7 s, at a damping
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -19,7 +21,8 @@ from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Terminal
 from chladni.models.core.reading import Chart, Curve
 from chladni.models.elements import declare
-from chladni.models.schemes.block import element_block
+from chladni.models.elements.element import Element
+from chladni.models.schemes.block import Block, element_block
 from chladni.models.schemes.scheme_model import SchemeModel
 from chladni.models.schemes.scheme_output import SchemeOutput
 
@@ -45,6 +48,7 @@ _SHARED = Parameters(
 )
 
 
+@cache
 def robot_scheme(*, position_loop: bool = False) -> SchemeModel:
     """Give the scheme at its defaults.
 
@@ -109,10 +113,18 @@ def _gains(shared: Mapping[str, float]) -> dict[str, float]:
 def _build(values: Mapping[str, float], options: Mapping[str, str]) -> SchemeModel:
     numbers = {name: value for name, value in values.items() if name not in _SHARED}
     scheme = robot_scheme(position_loop=options["position_loop"] == "on").with_values(numbers)
+    gains = _gains(values)
     # What follows from a knob within its range is usual, whatever one gain alone would be.
-    for name, gain in _gains(values).items():
-        scheme = scheme.with_usual_value(name, gain)
+    scheme = replace(
+        scheme, blocks=tuple(_with_gain(block, gains.get(f"{block.name}.gain")) for block in scheme.blocks)
+    )
     return scheme.switched({block: options[name] == "on" for name, blocks in SWITCHES.items() for block in blocks})
+
+
+def _with_gain(block: Block, gain: float | None) -> Block:
+    if gain is None or not isinstance(block.content, Element):
+        return block
+    return replace(block, content=block.content.with_usual_value("gain", gain))
 
 
 def _with_and_without_load(model: Model) -> tuple[Chart, ...]:

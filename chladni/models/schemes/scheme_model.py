@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import isfinite
 from typing import Self
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Effect, ModelKind, flags_of_effects
-from chladni.models.core.parameter import Parameters
+from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import Simulation
 from chladni.models.core.stability import growing_poles
@@ -93,9 +94,7 @@ class SchemeModel:
         """Every number of every block: ``regulator.gain``."""
         return Parameters(
             tuple(
-                replace(parameter, name=f"{block.name}.{parameter.name}")
-                for block in self.blocks
-                for parameter in block.parameters.values()
+                _of_block(block.name, parameter) for block in self.blocks for parameter in block.parameters.values()
             )
         )
 
@@ -216,3 +215,9 @@ class SchemeModel:
             block, _, parameter = name.partition(".")
             by_block[block][parameter] = number
         return by_block
+
+
+# Names are made for every question to a scheme, and while one knob turns all other parameters stay what they are.
+@lru_cache(maxsize=4096)
+def _of_block(block: str, parameter: Parameter) -> Parameter:
+    return replace(parameter, name=f"{block}.{parameter.name}")
