@@ -68,7 +68,7 @@ class FrequencyMarks:
         return [
             self._refined(lambda omega: float(np.angle(self.response(omega) * turn)), point)
             for point in _sign_changes(away)
-            if not falling_only or away[point] > 0
+            if not falling_only or away[point + 1] < 0
         ]
 
     def magnitude_crossings(self, level: float, *, falling_only: bool = False) -> list[float]:
@@ -77,7 +77,7 @@ class FrequencyMarks:
         return [
             self._refined(lambda omega: abs(self.response(omega)) - level, point)
             for point in _sign_changes(away)
-            if not falling_only or away[point] > 0
+            if not falling_only or away[point + 1] < 0
         ]
 
     def gain_margins(self) -> list[Margin]:
@@ -127,4 +127,9 @@ class FrequencyMarks:
 
 
 def _sign_changes(signal: Matrix) -> list[int]:
-    return [int(point) for point in np.flatnonzero(signal[:-1] * signal[1:] < 0)]
+    """Points after which the sign is the other one; where the signal is zero, it still has the sign it had."""
+    sign = np.sign(signal)
+    # A crossing may lie exactly on a point of the grid, and a response may end on the level without passing it.
+    last = np.maximum.accumulate(np.where(sign != 0, np.arange(sign.size), 0))
+    held = sign[last]
+    return [int(point) for point in np.flatnonzero(held[:-1] * held[1:] < 0)]

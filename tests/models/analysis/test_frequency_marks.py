@@ -1,11 +1,16 @@
 """Margins, crossings and peaks against python-control and closed forms."""
 
+from dataclasses import replace
+
 import control
 import numpy as np
 import pytest
 
 from chladni.models.analysis.frequency_behaviour import frequency_behaviour, frequency_quantities
+from chladni.models.analysis.frequency_curve import frequency_curve
+from chladni.models.analysis.frequency_marks import FrequencyMarks
 from chladni.models.analysis.linear_path import linear_path
+from chladni.models.analysis.resolvent import Resolvent
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.state_space import StateSpace
 from tests.models.analysis.systems import compiled, gain_only, of_control, pt2, state_space
@@ -112,3 +117,18 @@ def test_marks_of_a_loop_with_dead_time_are_on_its_exact_response() -> None:
     assert height == pytest.approx(values.max(), rel=1e-9)
     # On a grid of 1e-6 the place of a maximum is good to a step.
     assert grid[values.argmax()] == pytest.approx(omega, rel=2e-6)
+
+
+def test_a_crossing_on_a_point_of_the_grid_is_one_crossing() -> None:
+    system = pt2(2.0, 0.2)
+    path = linear_path(system)
+    # Grids of odd and even numbers about the corner, so that -90 degrees lies on a point of one of them.
+    for points in (40, 41, 60, 61):
+        curve = frequency_curve(path, band_hz=(0.2 / (2 * np.pi), 20 / (2 * np.pi)))
+        omega = np.geomspace(0.2, 20.0, points)
+        response = Resolvent(path)(omega)
+        phase = np.degrees(np.unwrap(np.angle(response)))
+        on_grid = replace(curve, frequency_hz=omega / (2 * np.pi), response=response, phase_deg=phase)
+        marks = FrequencyMarks(on_grid, Resolvent(path), 0.0)
+        assert marks.phase_crossings(-90.0) == pytest.approx([2.0], rel=1e-12)
+        assert marks.phase_crossings(-90.0, falling_only=True) == pytest.approx([2.0], rel=1e-12)
