@@ -65,7 +65,7 @@ def phase_chart(title: str, shown: Sequence[Shown]) -> Chart:
 
 
 def nyquist_chart(title: str, shown: Sequence[Shown]) -> Chart:
-    """Locus of the frequency response in the complex plane, for positive frequencies, and the point -1."""
+    """Locus of the frequency response in the complex plane, for positive frequencies, and -1 where it's near."""
     path = shown[0].path
     unit = _ratio(path.outputs[0].unit, path.source.unit)
     curves = []
@@ -75,7 +75,9 @@ def nyquist_chart(title: str, shown: Sequence[Shown]) -> Chart:
             reach = NYQUIST_REACH * float(np.median(np.abs(response)))
             response[np.abs(response) > reach] = np.nan
         curves.append(_curve(one.label, response.real, response.imag))
-    curves.append(Curve(label="-1", x=np.array([-1.0]), y=np.zeros(1), points=True))
+    # Beside a compliance of micrometres a newton the point would leave a dot of the curve, and say nothing.
+    if max(float(np.nanmax(np.hypot(curve.x, curve.y), initial=0.0)) for curve in curves) > 1 / NYQUIST_REACH:
+        curves.append(Curve(label="-1", x=np.array([-1.0]), y=np.zeros(1), points=True))
     return Chart(
         name="nyquist",
         title=title,

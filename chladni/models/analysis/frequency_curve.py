@@ -14,13 +14,14 @@ from chladni.signals.value import Value
 Matrix = NDArray[np.float64]
 Roots = NDArray[np.complex128]
 
-POINTS_A_DECADE = 40
+# So dense that a Nyquist plot is round, where a turn of phase takes a good part of a decade.
+POINTS_A_DECADE = 60
 MOST_DECADES = 10.0
 # The grid goes this far beyond the corners, where magnitude and phase are straight lines.
 BEYOND = 30.0
 # A root damped less than this gets points of its own: the phase turns by half a turn within its bandwidth.
-LIGHT = 0.7
-_TURN = np.tan(np.linspace(-1.5, 1.5, 40))
+LIGHT = 0.9
+_TURN = np.tan(np.linspace(-1.5, 1.5, 80))
 # Radians of dead time between two points, and turns of its phase that are followed.
 DEAD_TIME_STEP = 0.5
 DEAD_TIME_TURNS = 12

@@ -104,6 +104,22 @@ def test_a_load_steps_by_its_declared_size() -> None:
     assert large.title == "velocity: load steps by 500 N"
 
 
+def test_the_point_of_instability_stands_only_where_it_is_near() -> None:
+    near, far = (replace(pt2(2.0, 0.1), c=np.array([[size, 0.0]])) for size in (1.0, 1e-6))
+    labels = []
+    for system in (near, far):
+        model = FunctionModel(parameters=oscillator().parameters, equations=lambda _, it=system: compiled(it))
+        (chart,) = read_instrument(instrument_of(model), charts=("nyquist",)).charts
+        labels.append([curve.label for curve in chart.curves])
+        # Round: no corner of the locus turns by more than some degrees.
+        locus = chart.curves[0].x + 1j * chart.curves[0].y
+        steps = np.diff(locus)
+        large = np.abs(steps) > 1e-3 * np.abs(locus).max()
+        turns = np.abs(np.degrees(np.angle(steps[1:] / steps[:-1])))[large[1:] & large[:-1]]
+        assert turns.max() < 6
+    assert labels == [["now", "-1"], ["now"]]
+
+
 def test_the_pneumatic_motor_shows_its_outputs_and_its_load() -> None:
     charts = named(read_instrument(INSTRUMENT))
     assert {"step.displacement", "step.velocity", "step.acceleration", "step.pressure_drop"} <= set(charts)

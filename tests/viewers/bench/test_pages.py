@@ -51,7 +51,9 @@ def address(rows: Path) -> Iterator[str]:
     other = replace(OSCILLATOR, name="watched", title="Watched")
     server = serve([OSCILLATOR], tools(read=READ))
     watched = serve([other], tools(), variants=rows)
-    with running(server), running(watched):
+    # A file is looked at once a second; here nobody types into it.
+    with pytest.MonkeyPatch.context() as patch, running(server), running(watched):
+        patch.setattr("chladni.viewers.bench.variants_view.WATCH_MS", 100)
         yield f"{server.address} {watched.address}watched"
 
 
