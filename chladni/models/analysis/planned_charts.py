@@ -51,14 +51,12 @@ def planned_charts(instrument: Instrument, settings: Sequence[Setting]) -> Itera
     if "step" in views:
         yield from _in_time(instrument, settings)
     if "bode" in views:
-        yield PlannedChart(
-            name="bode.magnitude", title=f"Magnitude: {way}", draw=partial(_of, magnitude_chart, shown)
-        )
+        yield PlannedChart(name="bode.magnitude", title=f"Gain: {way}", draw=partial(_of, magnitude_chart, shown))
         yield PlannedChart(name="bode.phase", title=f"Phase: {way}", draw=partial(_of, phase_chart, shown))
     if "nyquist" in views:
         yield PlannedChart(name="nyquist", title=f"Nyquist: {way}", draw=partial(_of, nyquist_chart, shown))
     if "poles" in views:
-        yield PlannedChart(name="poles", title=f"Poles, zeros: {way}", draw=partial(_of, pole_chart, shown))
+        yield PlannedChart(name="poles", title=f"Poles: {way}", draw=partial(_of, pole_chart, shown))
     # With dead time in the loop there are roots without end.
     if "root-locus" in views and not path.looped:
         yield PlannedChart(
@@ -103,10 +101,10 @@ def stepped(output: str, source: str, size: float, unit: str) -> str:
     Examples
     --------
     >>> stepped("pressure_drop", "flow", 5e-5, "m^3/s")
-    'pressure drop: flow steps by 5e-05 m^3/s'
+    'pressure drop: flow +5e-05 m^3/s'
     """
     told = "" if unit == "1" else f" {unit}"
-    return f"{output.replace('_', ' ')}: {source.replace('_', ' ')} steps by {size:g}{told}"
+    return f"{output.replace('_', ' ')}: {source.replace('_', ' ')} {size:+g}{told}"
 
 
 def _of(draw: Callable[[str, Sequence[Shown]], Chart], shown: Sequence[Shown], title: str) -> Chart:

@@ -101,7 +101,7 @@ def test_a_load_steps_by_its_declared_size() -> None:
         for size in (1.0, 500.0)
     )
     np.testing.assert_allclose(large.curves[0].y, 500 * small.curves[0].y, rtol=1e-9)
-    assert large.title == "velocity: load steps by 500 N"
+    assert large.title == "velocity: load +500 N"
 
 
 def test_the_point_of_instability_stands_only_where_it_is_near() -> None:
