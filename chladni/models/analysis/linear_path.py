@@ -7,8 +7,8 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import matrix_balance
 
+from chladni.models.core.balance import balance
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
 from chladni.models.core.port import Terminal
@@ -222,11 +222,12 @@ def _reached(links: NDArray[np.bool_], start: NDArray[np.bool_]) -> NDArray[np.i
 def _balanced(a: Matrix, b: Matrix) -> tuple[Matrix, Matrix]:
     if not a.size:
         return a, np.ones(0)
-    scaled, (scale, _) = matrix_balance(a, permute=False, separate=True)
+    scaled, scale = balance(a)
     # The exponential of [A b; 0 0] is exact beside its largest entry, which must not be that of b alone.
     entry, size = float(np.abs(b / scale).max()), float(np.abs(scaled).max())
-    common = 2.0 ** round(log2(entry / size)) if entry > 0 and size > 0 else 1.0
-    return np.asarray(scaled), np.asarray(scale * common)
+    # Apart, since the quotient of a tiny and a huge number is nothing.
+    common = 2.0 ** round(log2(entry) - log2(size)) if entry > 0 and size > 0 else 1.0
+    return scaled, np.asarray(scale * common)
 
 
 def _dead_time_s(compiled: CompiledModel | StateSpace, column: int) -> Matrix:

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.models.core.balance import balance
 from chladni.signals.errors import ModelError
 
 
@@ -17,15 +18,9 @@ def resolvent(a: NDArray[np.float64], s: NDArray[np.complex128]) -> NDArray[np.c
     ModelError
         At a point that is an eigenvalue of A: an integrator has no response at 0 Hz.
     """
-    # SciPy's linear algebra takes longer to load than most models take to answer.
-    from scipy.linalg import matrix_balance
-
     if not a.size:
         return np.zeros((s.size, 0, 0), dtype=np.complex128)
-    # SciPy casts the scales to integers too, for a permutation that wasn't asked for: beyond 2^63 that warns.
-    with np.errstate(invalid="ignore"):
-        found, (scale, _) = matrix_balance(a, permute=False, separate=True)
-    balanced = np.asarray(found, dtype=np.float64)
+    balanced, scale = balance(a)
     try:
         inverse = np.linalg.inv(s[:, None, None] * np.eye(len(a)) - balanced)
     except np.linalg.LinAlgError:

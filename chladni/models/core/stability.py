@@ -6,6 +6,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.models.core.balance import balance
 from chladni.models.core.compiled_model import CompiledModel
 
 Matrix = NDArray[np.float64]
@@ -26,14 +27,12 @@ def growing_poles(compiled: CompiledModel) -> NDArray[np.complex128]:
     there are any isn't.
     """
     # SciPy's linear algebra takes longer to load than most models take to answer.
-    from scipy.linalg import eig, matrix_balance
+    from scipy.linalg import eig
 
     a = _with_dead_times(compiled)
     if not a.size:
         return np.empty(0, dtype=np.complex128)
-    # Scales beyond 2^63 warn, see `resolvent`.
-    with np.errstate(invalid="ignore"):
-        balanced = np.asarray(matrix_balance(a, permute=False)[0], dtype=np.float64)
+    balanced, _ = balance(a)
     poles, left, right = cast("tuple[Complex, Complex, Complex]", eig(balanced, left=True))
     # Two integrators in a row have a double pole at 0, which rounding splits by far more than it moves others.
     certain = np.abs(np.sum(left.conj() * right, axis=0))

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, expm, matrix_balance
+from scipy.linalg import block_diag, expm
 
+from chladni.models.core.balance import balance
 from chladni.models.integrator.hold import Hold
 
 Matrix = NDArray[np.float64]
@@ -75,7 +76,7 @@ def _augmented(a: Matrix, b: Matrix, g: Matrix, hold: Hold, step_s: float) -> Ma
 
 def _exponentials(matrix: Matrix, times_s: Matrix) -> Matrix:
     # Balanced by powers of two (exact): stiffness over mass and one stand side by side in A, which would cost digits.
-    balanced, (scale, _) = matrix_balance(matrix, permute=False, separate=True)
+    balanced, scale = balance(matrix)
     distinct, places = np.unique(times_s, return_inverse=True)
     found = expm(balanced * distinct[:, None, None]) * (scale[:, None] / scale[None, :])
     return np.asarray(found[places], dtype=np.float64)

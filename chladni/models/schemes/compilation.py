@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.models.core.balance import balance
 from chladni.models.core.compiled_model import CompiledModel, DelayLine, IdealDerivative
 from chladni.models.core.port import Port, Terminal
 from chladni.models.schemes.block import Block
@@ -239,11 +240,9 @@ def _derivative_ports(full: FilteredEquations, names: Sequence[str]) -> list[Por
 
 def _balanced(a: Matrix, b: Matrix, c: Matrix) -> tuple[Matrix, Matrix, Matrix]:
     """States in units that make rows and columns of A of like size: gains of 1e9 between them would cost digits."""
-    from scipy.linalg import matrix_balance
-
     if not a.size:
         return a, b, c
     if not np.all(np.isfinite(a)):
         raise ModelError("gains and time constants lie too far apart for floating point numbers")
-    balanced, (scale, _) = matrix_balance(a, permute=False, separate=True)
-    return np.asarray(balanced), b / scale[:, None], c * scale
+    balanced, scale = balance(a)
+    return balanced, b / scale[:, None], c * scale
