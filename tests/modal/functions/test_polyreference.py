@@ -100,7 +100,7 @@ def test_other_forms_give_the_same_modes(form):
 
 
 def test_close_modes_with_two_references():
-    # The issue asks for 95 of 100; eight of eight come by chance with 0.95 in two cases of three.
+    # Of 100 draws 95 are wanted; eight of eight come by chance with 0.95 in two cases of three.
     for seed in range(8):
         modes = IDENTIFY(close_response(seed))
         assert modes.frequency_hz.size == 2
