@@ -15,6 +15,8 @@ from chladni.models.integrator.step_tables import DEEPEST
 Matrix = NDArray[np.float64]
 # Samples that a beginning motion is followed ahead, to know its scale.
 _AHEAD = 32
+# A bend counts ten times and more as much as it may miss: behind it neighbouring motions part.
+_BEND = 10.0
 
 
 class Judge(NamedTuple):
@@ -120,7 +122,7 @@ def _curvature_error(judge: Judge, q: Matrix, channel: int, change: int) -> floa
         + judge.difference[change, 4] * q[4, channel]
     )
     second = abs(q[0, channel] - 2 * middle + q[4, channel]) + 1e-300
-    missed: float = fourth * (1 / 45 + 2 / 3 * min(1.0, 4 * fourth / second))
+    missed: float = fourth * (1 / 45 + _BEND * min(1.0, 4 * fourth / second))
     return missed
 
 

@@ -90,6 +90,18 @@ def test_halving_the_step_changes_little(name):
     assert whole.steps > 1000
 
 
+def test_a_tighter_tolerance_changes_little_where_noise_rattles_in_a_backlash():
+    # Each contact that is met a little late is another motion some contacts later.
+    spectrum = np.fft.rfft(np.random.default_rng(1).standard_normal(600))
+    frequency_hz = np.fft.rfftfreq(600, 1 / 200)
+    spectrum[(frequency_hz < 1) | (frequency_hz > 20)] = 0
+    signals = np.fft.irfft(spectrum, 600)[None]
+    compiled = one_body(SWITCHING["backlash"])
+    found = integrate(compiled, 3 * signals / signals.std(), 200.0)
+    tight = integrate(compiled, 3 * signals / signals.std(), 200.0, tolerance=1e-10)
+    assert systems.relative_rms(found.states, tight.states) <= 1e-4
+
+
 def test_sticking_friction_holds_a_body_against_a_lower_force():
     # 4 N against 5 N: the body creeps with the regularised law's velocity, w artanh(4/5).
     compiled = plain_model(
