@@ -2,6 +2,7 @@
 
 import copy
 from dataclasses import fields
+from functools import cache
 from typing import Any, NoReturn, Self, TypeVar
 
 import numpy as np
@@ -63,7 +64,12 @@ def require_frequency_axis(frequency_hz: NDArray[np.float64]) -> None:
 
 
 def _field_names(value: Value) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(value))  # type: ignore[arg-type]  # every final subclass is a dataclass
+    return _names_of(type(value))
+
+
+@cache
+def _names_of(cls: type[Value]) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(cls))  # type: ignore[arg-type]  # every final subclass is a dataclass
 
 
 def _rebuild(cls: type[Value], content: dict[str, Any]) -> Value:
