@@ -2,7 +2,6 @@
 
 import copy
 from dataclasses import fields
-from functools import cache
 from typing import Any, NoReturn, Self, TypeVar
 
 import numpy as np
@@ -63,13 +62,15 @@ def require_frequency_axis(frequency_hz: NDArray[np.float64]) -> None:
         raise EstimateError("frequency_hz must be one-dimensional, finite and strictly rising")
 
 
+# Looked up for every record that is made; dataclasses builds the tuple anew each time.
+_FIELD_NAMES: dict[type[Any], tuple[str, ...]] = {}
+
+
 def _field_names(value: Value) -> tuple[str, ...]:
-    return _names_of(type(value))
-
-
-@cache
-def _names_of(cls: type[Any]) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(cls))
+    cls: type[Any] = type(value)
+    if cls not in _FIELD_NAMES:
+        _FIELD_NAMES[cls] = tuple(field.name for field in fields(cls))
+    return _FIELD_NAMES[cls]
 
 
 def _rebuild(cls: type[Value], content: dict[str, Any]) -> Value:
