@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import numba as nb
 from llvmlite import ir
-from numba.core import types
+from numba.core import config, types
 from numba.extending import intrinsic
 
 from chladni.models.integrator.cache_folder import CACHED
@@ -16,6 +16,7 @@ FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 # numba declares fewer options than it takes.
 _JIT: Any = nb.njit
 _TYPES: Any = types
+_CONFIG: Any = config
 _POINTER = _TYPES.CPointer(types.float64)
 #: Signature of a law in machine code.
 LAW_SIGNATURE = types.float64(types.float64, types.float64, types.float64, _POINTER, _POINTER, _POINTER)
@@ -65,12 +66,25 @@ def inlined_code(function: FunctionT) -> FunctionT:
     return _compile(function, inline="always")
 
 
+def make_ready(kernel: Any, signature: Any) -> None:
+    """Compile a kernel for a signature unless it is, or load it from disk.
+
+    Without vector instructions: loops over a handful of states gain nothing, and they take a fifth of the time.
+    """
+    before = _CONFIG.LOOP_VECTORIZE
+    _CONFIG.LOOP_VECTORIZE = 0
+    try:
+        kernel.compile(signature.args)
+    finally:
+        _CONFIG.LOOP_VECTORIZE = before
+
+
 def address_of(kernel: Any, signature: Any) -> int:
     """Address of a kernel for `caller`, compiled for a signature when it's first asked for.
 
     numba optimises and emits a part again inside every kernel above it; what is called by address, once.
     """
-    kernel.compile(signature.args)
+    make_ready(kernel, signature)
     made = kernel.overloads[signature.args]
     return int(made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name))
 

@@ -16,7 +16,13 @@ from chladni.models.integrator.hold import Hold
 from chladni.models.integrator.implicit_kernel import STAGES, Newton, implicit_step
 from chladni.models.integrator.inside_kernel import inside
 from chladni.models.integrator.judge_kernel import Judge
-from chladni.models.integrator.machine_code import INSIDE_SIGNATURE, MARCH_SIGNATURE, PART_SIGNATURE, address_of
+from chladni.models.integrator.machine_code import (
+    INSIDE_SIGNATURE,
+    MARCH_SIGNATURE,
+    PART_SIGNATURE,
+    address_of,
+    make_ready,
+)
 from chladni.models.integrator.march import (
     AUTOMATIC,
     COARSEST,
@@ -216,6 +222,7 @@ class Run:
         arguments = words.ctypes.data, step_s, stop, int(self._scheme == AUTOMATIC), most, within
         # Most models need explicit steps alone: the other kernels are compiled when they're met.
         if self._soft:
+            make_ready(march, MARCH_SIGNATURE)
             return march(*arguments)
         self._newton.address[0] = address_of(implicit_step, PART_SIGNATURE)
         soft, stiff = (address_of(kernel, MARCH_SIGNATURE) for kernel in (march, march_implicit))
