@@ -1,11 +1,14 @@
 """What two logs compared say of how they were averaged."""
 
+import pytest
+
 import chladni
 from chladni.apps.compare import compare_logs
 from chladni.io.convert import convert
 from tests.arm import FORCE, write_arm
 
 
+@pytest.mark.slow
 def test_a_note_is_told_once_and_with_its_log_when_it_holds_for_one(tmp_path):
     arm = write_arm(tmp_path)
     # The arm's log misses a stretch from 20 s on.

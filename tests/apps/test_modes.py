@@ -90,6 +90,7 @@ def test_bands_are_fitted_one_by_one_and_joined(arm, truth):
     assert_near_truth(modes, truth, floor=0.01)
 
 
+@pytest.mark.slow
 def test_one_band_and_a_count_and_given_frequencies_limit_what_is_found(arm, truth):
     within = identify_modes(arm, reference=FORCE, band_hz=(15, 57))
     assert within.frequency_hz.size == 2
@@ -184,6 +185,7 @@ def test_a_hammer_drives_modes_as_far_as_its_force_stays_within_20_db():
         assert not any("20 dB down" in note for note in further.provenance.notes)
 
 
+@pytest.mark.slow
 def test_a_motion_as_reference_holds_its_point_still(arm, truth):
     def warnings(modes):
         return [note for note in modes.provenance.notes if "held still there" in note]
@@ -193,6 +195,7 @@ def test_a_motion_as_reference_holds_its_point_still(arm, truth):
     assert not warnings(identify_modes(arm))
 
 
+@pytest.mark.slow
 def test_modes_that_nobody_asked_for_are_no_misfit(arm):
     everything, first = identify_modes(arm), identify_modes(arm, count=1)
     assert first.frequency_hz.size == 1

@@ -58,6 +58,7 @@ def test_a_long_list_of_changes_is_cut_with_a_word(run, monkeypatch):
     assert told == [("Peaks: 2 of 5 changes, all of them with --json", 2)]
 
 
+@pytest.mark.slow
 def test_modes_of_both_are_compared_when_asked_for(run, arm_log, tmp_path):
     from tests.arm import write_arm
 

@@ -264,6 +264,7 @@ def test_powers_of_ten_are_printed(value: float, text: str) -> None:
     assert power_of_ten(value) == text
 
 
+@pytest.mark.slow
 def test_saving_writes_every_figure_in_every_format(tmp_path: Path) -> None:
     study = Study(title="psd", densities=(synthetic.density(),))
     written = save_figures(study, tmp_path / "new", formats=("png", "svg", "pdf"))

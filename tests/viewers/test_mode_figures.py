@@ -111,6 +111,7 @@ def single_channel() -> Study:
     )
 
 
+@pytest.mark.slow
 def test_no_picture_is_blank_or_cut_off_and_no_text_lies_on_another() -> None:
     for name, figure in various().items():
         check_picture(name, figure)

@@ -170,6 +170,7 @@ def binomial_limits(trials):
     return binom.ppf(1e-3, trials, 0.92) / trials, binom.ppf(1 - 1e-3, trials, 0.98) / trials
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("make", "at", "runs", "options"),
     [

@@ -27,6 +27,7 @@ def ambient(seed, *, truth=TWO_MODES, cycles=6000):
     return ambient_record(truth, cycles=cycles, rng=np.random.default_rng(seed), noise=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damping", [0.01, 0.003])
 @pytest.mark.parametrize("cycles", [300, 1500])
 def test_modes_driven_by_noise_are_no_harmonics(damping, cycles):

@@ -69,6 +69,7 @@ def test_the_diagram_holds_all_poles_and_says_which_were_taken(modes):
     assert diagram.indicator_unit == "(m/s^2)^2/Hz"
 
 
+@pytest.mark.slow
 def test_intervals_cover_as_they_say():
     runs, hits, asked = 8, np.zeros(3, int), np.zeros(3, int)
     for run in range(runs):
@@ -291,6 +292,7 @@ def test_few_block_rows_limit_the_order():
     assert found.frequency_hz.size == 5
 
 
+@pytest.mark.slow
 def test_the_building_shows_its_published_modes(shared_data):
     log = chladni.open_log(shared_data / "palisaden.mcap")
     (record,) = log.read_groups(None)

@@ -22,6 +22,7 @@ from chladni.signals.errors import ModelError
 from tests.models.analysis.systems import FunctionModel, compiled, oscillator, parameter, pt2, state_space
 
 
+@pytest.mark.slow
 def test_the_least_answer_time_is_the_least_damping_and_mass() -> None:
     best = optimise(oscillator(), ["m", "c"], least_answer_time(), bounds={"m": (0.5, 2.0), "c": (0.1, 0.5)})
     # pi/omega_d, omega_d^2 = k/m - (c/2m)^2: at both lower bounds.
@@ -52,6 +53,7 @@ def test_a_damping_ratio_is_met_by_its_closed_form() -> None:
     assert best.values["c"] == pytest.approx(2 * 0.5 * 2.0, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_an_aim_is_subject_to_its_limits() -> None:
     wishes = [least_answer_time(), overshoot_at_most(5.0)]
     best = optimise(oscillator(), ["c", "k"], wishes, bounds={"c": (0.1, 4.0), "k": (1.0, 9.0)})
