@@ -79,10 +79,11 @@ def simulate(
     if effect:
         chosen = chosen.with_effects((*chosen.effects, *(effect_of(one, chosen) for one in effect)))
     recording = None
+    damage: tuple[str, ...] = ()
     if log is not None:
         _refuse({"--input": None if kind == "random" else kind, "--at": at, "--level": level, "--band": band,
                  "--seconds": seconds, "--rate": rate})  # fmt: skip
-        recording = recording_for(chosen, log)
+        recording, damage = recording_for(chosen, log)
     drive = Drive(
         word=kind,
         level=_usual_level(instrument, at) if level is None else level,
@@ -102,7 +103,7 @@ def simulate(
     for score in made.agreement:
         told = "not known" if score.value is None else f"{score.value:.3g} {score.unit}"
         to.line(f"{score.name}: {told} ({score.definition})")
-    to.lines(made.simulation.flags)
+    to.lines((*damage, *made.simulation.flags))
     to.line(f"wrote {written.path}")
     to.line(f"wrote {truth}")
     nrmse = {score.name.removeprefix("NRMSE "): score.value for score in made.agreement}

@@ -83,6 +83,18 @@ def test_a_log_drives_the_model_and_is_held_beside_it(run: Run, model: Path, tmp
     assert document["excitation"] == {"kind": "log"}
 
 
+def test_a_log_that_was_cut_off_says_so(run: Run, model: Path, tmp_path: Path) -> None:
+    whole, cut = tmp_path / "whole.mcap", tmp_path / "cut.mcap"
+    assert run("simulate", model, "--out", whole, "--seconds", 20, "--rate", 1000, "--noise", 0.1).code == 0
+    content = whole.read_bytes()
+    cut.write_bytes(content[: len(content) * 2 // 3])
+    sound = run("simulate", model, "--log", whole, "--out", tmp_path / "first.mcap")
+    damaged = run("simulate", model, "--log", cut, "--out", tmp_path / "second.mcap")
+    assert (sound.code, damaged.code) == (0, 0)
+    assert "cut off" in damaged.out
+    assert "cut off" not in sound.out
+
+
 def test_the_same_seed_gives_the_same_bytes(run: Run, model: Path, tmp_path: Path) -> None:
     for name in ("a", "b"):
         arguments = ("--out", tmp_path / f"{name}.mcap", "--seconds", 1, "--noise", 0.1, "--seed", 5)
