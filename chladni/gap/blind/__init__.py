@@ -1,0 +1,1 @@
+"""The withheld check: cases whose cause is sealed before the diagnosis runs."""

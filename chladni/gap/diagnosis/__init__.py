@@ -1,0 +1,1 @@
+"""The whole diagnosis: compare, tune, locate, explain, measure the closing."""
