@@ -1,0 +1,1 @@
+"""How far apart measurement and simulation are: noise floors, channels, bands, time, regimes, distortion."""

@@ -1,0 +1,1 @@
+"""The next measurement: what would tell the remaining candidates apart."""

@@ -1,0 +1,1 @@
+"""A model beside a measurement: free simulation, and linear responses on the lines of a record."""

@@ -1,0 +1,1 @@
+"""Values of the diagnosis: what was measured, what was found."""

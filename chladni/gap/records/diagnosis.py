@@ -1,0 +1,289 @@
+"""What a diagnosis says: verdict, causes, where the gap lies, how far it closes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.value import Value
+
+Matrix = NDArray[np.float64]
+Verdict = Literal["none", "parameters", "effect", "unknown"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FittedNumber:
+    """A fitted value with its standard deviation, SI; `std` is None when the log doesn't determine it."""
+
+    value: float
+    std: float | None
+    unit: str
+    nominal: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """An effect at a site.
+
+    Attributes
+    ----------
+    effect, site
+        The word and the name; ``parameter`` with a name like ``elbow.stiffness`` for a wrong value.
+    """
+
+    effect: str
+    site: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cause:
+    """A named cause of the gap.
+
+    Attributes
+    ----------
+    effect, site, probability
+        What, where, and how sure.
+    group
+        Sites that these sensors can't tell from `site`, itself included.
+    alternatives
+        Other candidates that this log can't tell from this one.
+    parameters
+        By name.
+    variant, source
+        Form of the law, and the output that it listens to, as `chladni.attached` takes them.
+    share
+        Share of the gap's power that this cause explains, 0 to 1.
+    """
+
+    effect: str
+    site: str
+    probability: float
+    group: tuple[str, ...]
+    alternatives: tuple[Candidate, ...]
+    parameters: Mapping[str, FittedNumber]
+    variant: str | None = None
+    source: str | None = None
+    share: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ranked:
+    """A row of the ranking; `gap` and `log_evidence` (nats) on held-out samples, None when it wasn't fitted."""
+
+    effect: str
+    site: str
+    probability: float
+    gap: float | None
+    log_evidence: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChannelGap:
+    """Gap of the nominal model and noise of one output, both over the RMS of what was measured."""
+
+    name: str
+    gap: float
+    noise: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BandShare:
+    """Share of the gap's power (outputs scaled by their RMS) between two frequencies."""
+
+    low_hz: float
+    high_hz: float
+    share: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SiteShare:
+    """Share of the gap beyond noise that an unknown force (error, change of input) at this site explains."""
+
+    name: str
+    share: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegimeShare:
+    """Share of the gap's power while a variable, such as ``elbow.velocity``, lies between two values (SI)."""
+
+    variable: str
+    low: float
+    high: float
+    share: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Where:
+    """Where the gap lies."""
+
+    channels: tuple[ChannelGap, ...]
+    bands: tuple[BandShare, ...]
+    sites: tuple[SiteShare, ...]
+    regimes: tuple[RegimeShare, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeldOut:
+    """A stretch of a log that no fit saw, seconds from its start."""
+
+    log: str
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Closing:
+    """How far the gap closes, on held-out samples; all outputs pooled after scaling each by its own RMS.
+
+    Attributes
+    ----------
+    before, tuned, after, noise
+        RMS of (measured - simulated) over RMS of measured: nominal model; best parameters; parameters and effects;
+        the floor.
+    closed
+        (before - after)/(before - noise), clipped to 0..1; None when before - noise is within its own uncertainty.
+    interval
+        95 % interval of `closed`, by block bootstrap.
+    held_out
+        The samples.
+    by
+        ``free_run``, ``windows`` (each from an estimated state, see `horizon_s`) or ``cross_sensor``.
+    horizon_s
+        Length of a window, None in free run.
+    """
+
+    before: float
+    tuned: float
+    after: float
+    noise: float
+    closed: float | None
+    interval: tuple[float, float] | None
+    held_out: tuple[HeldOut, ...]
+    by: Literal["free_run", "windows", "cross_sensor"] = "free_run"
+    horizon_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RestoringForce(Value):
+    """The force that the model lacks at a joint (body, input), recovered from all sensors without assuming a law.
+
+    Attributes
+    ----------
+    site
+        Where.
+    time_s, displacement, velocity, force
+        ``[sample]``, SI.
+    law_force
+        ``[sample]`` what the named effect gives for the same motion, None without one.
+    """
+
+    site: str
+    time_s: Matrix
+    displacement: Matrix
+    velocity: Matrix
+    force: Matrix
+    law_force: Matrix | None = None
+    force_unit: str = "N"
+    displacement_unit: str = "m"
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GapSignals(Value):
+    """Signals behind a diagnosis, for pictures.
+
+    Attributes
+    ----------
+    log, sample_rate_hz, output_names, output_units
+        Which log, and what its rows are.
+    measured, before, after
+        ``[output, sample]``: measured; nominal model; parameters and effects (the tuned model without a named effect).
+    noise_rms
+        ``[output]``.
+    map_time_s, map_frequency_hz, gap_map
+        ``[time]``, ``[frequency]``, ``[time, frequency]`` density of the nominal gap, outputs scaled by their RMS, 1/Hz.
+    gap_map_after
+        The same after.
+    """
+
+    log: str
+    sample_rate_hz: float
+    output_names: tuple[str, ...]
+    output_units: tuple[str, ...]
+    measured: Matrix
+    before: Matrix
+    after: Matrix
+    noise_rms: Matrix
+    map_time_s: Matrix
+    map_frequency_hz: Matrix
+    gap_map: Matrix
+    gap_map_after: Matrix
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DistortionShare:
+    """Split of one output's power at the excited and detection lines of a periodic input, shares of the whole."""
+
+    output: str
+    linear: float
+    even: float
+    odd: float
+    noise: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Diagnosis:
+    """Result of `chladni.diagnose_gap`.
+
+    Attributes
+    ----------
+    model, logs
+        Names.
+    verdict, causes
+        What is said, see docs.
+    ranking
+        Candidates by falling probability.
+    where, gap
+        Where the gap lies; how far it closes.
+    tuned_parameters
+        By name; `std` None for those that this log can't determine, which were held.
+    next_measurement
+        A sentence, or None.
+    naive
+        What the largest drop in RMS alone would have named, or None.
+    remarks
+        Sentences on what limits the answer: short log, few sensors, parameters held, horizon, damage.
+    advice
+        One sentence for the summary of a verdict ``unknown`` or ``none``.
+    restoring_force, signals
+        Evidence for pictures; None when there is none.
+    distortion
+        With a periodic input, output by output.
+    levels
+        With several logs: sentences on what changes with level.
+    """
+
+    model: str
+    logs: tuple[str, ...]
+    verdict: Verdict
+    causes: tuple[Cause, ...]
+    ranking: tuple[Ranked, ...]
+    where: Where
+    gap: Closing
+    tuned_parameters: Mapping[str, FittedNumber]
+    next_measurement: str | None = None
+    naive: Candidate | None = None
+    remarks: tuple[str, ...] = ()
+    advice: str | None = None
+    restoring_force: RestoringForce | None = None
+    signals: GapSignals | None = None
+    distortion: tuple[DistortionShare, ...] = ()
+    levels: tuple[str, ...] = ()

@@ -1,0 +1,61 @@
+"""What a log holds of a model's inputs and outputs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.value import Value, require_shape
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Measurement(Value):
+    """Inputs and outputs of a model as one log holds them, on one clock, whole: no sample is missing.
+
+    Attributes
+    ----------
+    log
+        Name of the log, for people.
+    sample_rate_hz
+        Samples a second.
+    inputs
+        ``[input, sample]``, in the order of the model's inputs, SI; zero for an input that has no channel.
+    outputs
+        ``[output, sample]``, in the order of the names in `output_names`, SI.
+    input_names, output_names
+        Names in the model. Outputs that the log doesn't hold are left out.
+    output_units
+        SI unit of each output.
+    period_samples
+        Length of a period when every input is periodic, else None.
+    transient_periods
+        How many periods at the start the response hasn't settled in; 0 when there's no period.
+    """
+
+    log: str
+    sample_rate_hz: float
+    inputs: Matrix
+    outputs: Matrix
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    output_units: tuple[str, ...]
+    period_samples: int | None = None
+    transient_periods: int = 0
+
+    def __post_init__(self) -> None:
+        samples = self.outputs.shape[-1]
+        require_shape("inputs", self.inputs, (len(self.input_names), samples), "the model's inputs")
+        require_shape("outputs", self.outputs, (len(self.output_names), samples), "the measured outputs")
+        self._freeze()
+
+    @property
+    def samples(self) -> int:
+        """Samples of each signal."""
+        return int(self.outputs.shape[1])
+
+    @property
+    def duration_s(self) -> float:
+        """Length in seconds."""
+        return self.samples / self.sample_rate_hz

@@ -1,0 +1,59 @@
+"""The noise of each measured output: its spectrum as an autoregressive model, and where the estimate comes from."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.value import Value
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NoiseFloor(Value):
+    """What no model can get under, output by output.
+
+    The noise of output j is modelled as autoregressive, ``sum_k whitening[j, k] e[n - k] = innovation_rms[j] w[n]``
+    with white w of unit variance and ``whitening[j, 0] = 1`` (Ljung, *System Identification*, 2nd ed., section 4.2).
+
+    Attributes
+    ----------
+    rms
+        ``[output]``, in the output's unit.
+    whitening
+        ``[output, lag]``; a white noise has 1, 0, 0, ...
+    innovation_rms
+        ``[output]``, in the output's unit: what is left of the noise when its own past is known.
+    method
+        Where each comes from: ``periods``, ``quiet band``, ``fit residual`` or ``explained residual``.
+    std
+        ``[output]`` relative standard deviation of `rms`.
+    upper_bound
+        ``[output]`` whether distortion can be in the estimate too, so that the true floor lies lower.
+    """
+
+    rms: Matrix
+    whitening: Matrix
+    innovation_rms: Matrix
+    method: tuple[str, ...]
+    std: Matrix
+    upper_bound: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+    def density(self, cycles: Matrix) -> Matrix:
+        """Give ``[output, line]`` power density at frequencies in cycles a sample, unit^2: its mean over 0..1 is rms^2."""
+        lags = np.arange(self.whitening.shape[1])
+        response = self.whitening @ np.exp(-2j * np.pi * np.multiply.outer(lags, cycles))
+        return np.asarray(self.innovation_rms[:, None] ** 2 / np.abs(response) ** 2, dtype=np.float64)
+
+    def whitened(self, residual: Matrix) -> Matrix:
+        """Give ``[..., output, sample]`` residuals as white noise of unit variance, were they noise alone."""
+        from scipy.signal import lfilter
+
+        white = np.empty_like(residual)
+        for place, (filter_, scale) in enumerate(zip(self.whitening, self.innovation_rms, strict=True)):
+            white[..., place, :] = lfilter(filter_, [1.0], residual[..., place, :], axis=-1) / scale
+        return white

@@ -1,0 +1,1 @@
+"""Best parameters within their tolerances, by output error."""
