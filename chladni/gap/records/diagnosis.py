@@ -202,11 +202,11 @@ class GapSignals(Value):
     log, sample_rate_hz, output_names, output_units
         Which log, and what its rows are.
     measured, before, after
-        ``[output, sample]``: measured; nominal model; parameters and effects (the tuned model without a named effect).
+        ``[output, sample]``: measured; nominal model; parameters and effects (or tuned, where none is named).
     noise_rms
         ``[output]``.
     map_time_s, map_frequency_hz, gap_map
-        ``[time]``, ``[frequency]``, ``[time, frequency]`` density of the nominal gap, outputs scaled by their RMS, 1/Hz.
+        ``[time]``, ``[frequency]``, ``[time, frequency]``: density of the nominal gap, outputs scaled by RMS, 1/Hz.
     gap_map_after
         The same after.
     """

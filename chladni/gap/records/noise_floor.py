@@ -44,7 +44,7 @@ class NoiseFloor(Value):
         self._freeze()
 
     def density(self, cycles: Matrix) -> Matrix:
-        """Give ``[output, line]`` power density at frequencies in cycles a sample, unit^2: its mean over 0..1 is rms^2."""
+        """Give ``[output, line]`` power density at `cycles` a sample, unit^2; over 0..1 its mean is rms^2."""
         lags = np.arange(self.whitening.shape[1])
         response = self.whitening @ np.exp(-2j * np.pi * np.multiply.outer(lags, cycles))
         return np.asarray(self.innovation_rms[:, None] ** 2 / np.abs(response) ** 2, dtype=np.float64)
