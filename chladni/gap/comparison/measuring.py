@@ -1,0 +1,257 @@
+"""What a log holds of a model: its channels matched to the model's inputs and outputs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.records.measurement import Measurement
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.model import Model
+from chladni.models.core.port import Terminal
+from chladni.signals.channel import Channel
+from chladni.signals.errors import LogError, ModelError, SetupError
+from chladni.signals.time_series import TimeSeries
+from chladni.signals.units import si_factor
+
+Matrix = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# With fewer samples nothing can be told apart from noise at all.
+FEWEST_SAMPLES = 32
+# Below these an answer is possible, but poor.
+FEW_SAMPLES = 200
+FEW_CYCLES = 5.0
+# A stretch without gaps stands for the log when it is at least this share of it.
+LEAST_SHARE = 0.5
+# A channel with this share of its samples missing is no measurement: it's left out rather than the log refused.
+MOSTLY_MISSING = 0.5
+# Sampled more slowly than this many times a cycle, a mode can't be followed between the samples.
+SAMPLES_A_CYCLE = 2.5
+# Poles below this share of the fastest are rigid-body motion or integrators, which have no cycle.
+AT_REST = 1e-7
+NAMES_TOLD = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Match:
+    """A terminal of the model, and the row of the recording that holds it (None: no row)."""
+
+    terminal: Terminal
+    row: int | None
+
+    @property
+    def wanted(self) -> str:
+        """Name of the channel that is looked for."""
+        return self.terminal.channel or self.terminal.name
+
+
+def measurement_of(model: Model, recording: TimeSeries, *, log: str) -> tuple[Measurement, tuple[str, ...]]:
+    """Match the channels of a log to the inputs and outputs of a model.
+
+    A terminal of the model listens to the channel that it names, else to the channel that has its own name. The
+    reference of a controller is an input of the closed model; its command, where the driven input names a channel,
+    is an output like any other.
+
+    Parameters
+    ----------
+    model
+        Whose inputs and outputs are looked for.
+    recording
+        What `Log.read` gave: one rate for all channels.
+    log
+        Name of the log, for messages.
+
+    Returns
+    -------
+    measurement
+        SI, without a missing sample: the longest stretch in which all channels are there, if it is at least half
+        of the log.
+    remarks
+        Sentences on what was left out and what limits an answer: outputs that the log doesn't hold, gaps, a short
+        log, a low rate.
+
+    Raises
+    ------
+    LogError
+        When the log hasn't got the channel of an input, holds none of the outputs, or has no stretch without gaps
+        that is long enough.
+    ModelError
+        When no input of the model could ever be found in a log, or units don't fit.
+    """
+    compiled = model.compile()
+    inputs = [_matched(terminal, recording) for terminal in compiled.inputs]
+    _require_inputs(inputs, recording, model.name, log)
+    rows = [match.row for match in inputs if match.row is not None]
+    outputs, remarks = _usable_outputs(compiled, recording, model.name, log)
+    rows += [match.row for match in outputs if match.row is not None]
+    stretch, gaps = _whole_stretch(recording, rows, log)
+    measurement = Measurement(
+        log=log,
+        sample_rate_hz=recording.sample_rate_hz,
+        inputs=_signals(inputs, recording, stretch, "input", log),
+        outputs=_signals(outputs, recording, stretch, "output", log),
+        input_names=tuple(match.terminal.name for match in inputs),
+        output_names=tuple(match.terminal.name for match in outputs),
+        output_units=tuple(match.terminal.unit for match in outputs),
+    )
+    return measurement, (*remarks, *gaps, *_undriven(inputs), *_limits(compiled, measurement))
+
+
+def _matched(terminal: Terminal, recording: TimeSeries) -> _Match:
+    rows = {channel.name: row for row, channel in enumerate(recording.channels)}
+    found = [rows[name] for name in (terminal.channel, terminal.name) if name in rows]
+    return _Match(terminal=terminal, row=found[0] if found else None)
+
+
+def _require_inputs(inputs: Sequence[_Match], recording: TimeSeries, model: str, log: str) -> None:
+    for match in inputs:
+        if match.row is None and match.terminal.channel is not None:
+            raise LogError(
+                f"{log}: input {match.terminal.name!r} of the model listens to channel {match.wanted!r}, which the "
+                f"log doesn't hold; it holds {_held(recording)}; correct the model's channel or log the input"
+            )
+    if inputs and all(match.row is None for match in inputs):
+        raise ModelError(
+            f"model {model!r}: no input names a channel, and {log} has none of their names; it holds "
+            f"{_held(recording)}; give an [[input]] its channel"
+        )
+
+
+def _usable_outputs(
+    compiled: CompiledModel, recording: TimeSeries, model: str, log: str
+) -> tuple[list[_Match], tuple[str, ...]]:
+    """Give outputs that were measured, and sentences on the others."""
+    used: list[_Match] = []
+    remarks: list[str] = []
+    for terminal in compiled.outputs:
+        match = _matched(terminal, recording)
+        reason = _why_unusable(match, recording, log)
+        if reason is None:
+            used.append(match)
+        else:
+            remarks.append(f"output {terminal.name!r} is left out: {reason}")
+    if not used:
+        told = "; ".join(remarks[:3]) or "the model has no output"
+        raise LogError(
+            f"{log}: nothing to compare model {model!r} with: {told}; the log holds {_held(recording)}; give an "
+            "[[output]] the channel that measured it"
+        )
+    return used, tuple(remarks)
+
+
+def _why_unusable(match: _Match, recording: TimeSeries, log: str) -> str | None:
+    if match.row is None:
+        return f"{log} holds no channel {match.wanted!r}"
+    good = _good(recording, [match.row])
+    if np.mean(good) < MOSTLY_MISSING:
+        return f"channel {match.wanted!r} misses {np.mean(~good):.0%} of its samples"
+    values = recording.values[match.row][good]
+    if values.min() == values.max():
+        return f"channel {match.wanted!r} never changes from {values[0]:g}"
+    return None
+
+
+def _good(recording: TimeSeries, rows: Sequence[int]) -> Mask:
+    """Samples that every one of these rows has."""
+    chosen = list(rows)
+    good = np.isfinite(recording.values[chosen]).all(axis=0)
+    if recording.valid is not None:
+        good &= recording.valid[chosen].all(axis=0)
+    return np.asarray(good)
+
+
+def _whole_stretch(recording: TimeSeries, rows: Sequence[int], log: str) -> tuple[slice, tuple[str, ...]]:
+    """Give the longest stretch without a missing sample, and a sentence when it isn't all of the log."""
+    good = _good(recording, rows)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
+    firsts, lasts = edges[::2], edges[1::2]
+    longest = int(np.argmax(lasts - firsts)) if firsts.size else 0
+    first, last = (int(firsts[longest]), int(lasts[longest])) if firsts.size else (0, 0)
+    rate_hz, samples = recording.sample_rate_hz, good.size
+    if last - first < LEAST_SHARE * samples or last - first < FEWEST_SAMPLES:
+        missing = [int((~_good(recording, [row])).sum()) for row in rows]
+        worst = recording.channels[rows[int(np.argmax(missing))]].name
+        raise LogError(
+            f"{log}: the longest stretch without missing samples is {(last - first) / rate_hz:g} s "
+            f"({last - first} samples) of {samples / rate_hz:g} s; at least half of the log and {FEWEST_SAMPLES} "
+            f"samples are needed; {max(missing)} are missing in {worst!r}; leave that channel out of the model, or "
+            "cut the log"
+        )
+    if last - first == samples:
+        return slice(first, last), ()
+    told = (
+        f"{int((~good).sum())} samples are missing in {log}; used is its longest stretch without gaps, "
+        f"{first / rate_hz:g} s to {last / rate_hz:g} s of {samples / rate_hz:g} s"
+    )
+    return slice(first, last), (told,)
+
+
+def _signals(matches: Sequence[_Match], recording: TimeSeries, stretch: slice, kind: str, log: str) -> Matrix:
+    signals = np.zeros((len(matches), stretch.stop - stretch.start))
+    for place, match in enumerate(matches):
+        if match.row is not None:
+            factor = _factor(match.terminal, recording.channels[match.row], f"{log}: ", kind)
+            signals[place] = factor * recording.values[match.row, stretch]
+    return signals
+
+
+def _factor(terminal: Terminal, channel: Channel, where: str, kind: str) -> float:
+    """Give what turns a channel into the terminal's unit; `ModelError` when they don't fit."""
+    # A channel without unit is a log that doesn't say; the model does.
+    if channel.unit == "1":
+        return 1.0
+    try:
+        factor, si_unit = si_factor(channel.unit)
+    except SetupError:
+        factor, si_unit = 1.0, channel.unit
+    if si_unit == si_factor(terminal.unit)[1]:
+        return factor
+    raise ModelError(
+        f"{where}channel {channel.name!r} is in {channel.unit}, {kind} {terminal.name!r} of the model in "
+        f"{terminal.unit}; connect another channel, or state the channel's true unit in the setup"
+    )
+
+
+def _undriven(inputs: Sequence[_Match]) -> tuple[str, ...]:
+    idle = [match.terminal.name for match in inputs if match.row is None]
+    return (f"not logged, taken as zero: input {', '.join(idle)}",) if idle else ()
+
+
+def _limits(compiled: CompiledModel, measurement: Measurement) -> tuple[str, ...]:
+    """Sentences on a log that is too short or too coarse for a good answer."""
+    remarks = []
+    duration_s, rate_hz = measurement.duration_s, measurement.sample_rate_hz
+    if measurement.samples < FEW_SAMPLES:
+        remarks.append(f"the log is short: {measurement.samples} samples, {FEW_SAMPLES} or more tell more")
+    modes_hz = _modes_hz(compiled)
+    if modes_hz.size and duration_s * modes_hz.min() < FEW_CYCLES:
+        remarks.append(
+            f"the log is short: {duration_s:.3g} s hold {duration_s * modes_hz.min():.2g} cycles of the lowest mode "
+            f"({modes_hz.min():.3g} Hz), {FEW_CYCLES:g} or more tell more"
+        )
+    if modes_hz.size and rate_hz < SAMPLES_A_CYCLE * modes_hz.max():
+        beyond = int(np.sum(rate_hz < SAMPLES_A_CYCLE * modes_hz))
+        remarks.append(
+            f"{beyond} of the model's modes lie above {rate_hz / SAMPLES_A_CYCLE:.3g} Hz, where a log at "
+            f"{rate_hz:g} Hz can't follow them"
+        )
+    if not np.any(np.ptp(measurement.inputs, axis=1) > 0):
+        remarks.append("no input moves in this log: only what starts in motion or isn't logged shows")
+    return tuple(remarks)
+
+
+def _modes_hz(compiled: CompiledModel) -> Matrix:
+    """Natural frequencies of the model's vibrating modes, one for each pair of poles."""
+    if not compiled.states:
+        return np.empty(0)
+    poles = np.linalg.eigvals(compiled.a)
+    vibrating = poles.imag > AT_REST * float(np.abs(poles).max(initial=0.0))
+    return np.asarray(np.abs(poles[vibrating]) / (2 * np.pi))
+
+
+def _held(recording: TimeSeries) -> str:
+    names = [channel.name for channel in recording.channels]
+    more = f" and {len(names) - NAMES_TOLD} more" if len(names) > NAMES_TOLD else ""
+    return f"{', '.join(names[:NAMES_TOLD])}{more}"

@@ -1,0 +1,170 @@
+"""Whether all inputs of a measurement repeat, with which period, and from when on the outputs repeat too."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from chladni.gap.records.measurement import Measurement
+
+Matrix = NDArray[np.float64]
+
+SHORTEST_PERIOD = 8
+FEWEST_PERIODS = 2
+# Maxima of the correlation that are looked at; the noise allowed below lowers it to 0.998, a transient further.
+LEAST_CORRELATION = 0.8
+MOST_CANDIDATES = 64
+# What doesn't repeat of an input, over its RMS, in the steady periods: sensors' noise of 3 %, and some scatter.
+LARGEST_SCATTER = 0.035
+# A shorter lag is the period only if it repeats as exactly as the best does: one strong line of many imitates one.
+SCATTER_SLACK = 1.3
+EXACT = 1e-6
+# Inputs that die out after a first event are no repetition.
+LEAST_STEADY_POWER = 0.2
+# A period is transient when its step to the next one has this many times the power of later steps ...
+TRANSIENT_RATIO = 2.0
+# ... and by more than this share of the signal's power, below which data without noise stop mattering.
+TRANSIENT_FLOOR = 1e-8
+# With two periods only, the transient shows in that their difference fades.
+FADING_PARTS = 4
+FADING_RATIO = 2.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Repetition:
+    """How a measurement repeats.
+
+    Attributes
+    ----------
+    period_samples
+        Length of a period.
+    periods
+        Whole periods in the log, transient ones included.
+    transient_periods
+        Periods at the start in which the outputs (or inputs) haven't settled.
+    input_scatter
+        RMS of what doesn't repeat over RMS of what does, the largest of all inputs.
+    """
+
+    period_samples: int
+    periods: int
+    transient_periods: int
+    input_scatter: float
+
+
+def find_repetition(measurement: Measurement) -> Repetition | None:
+    """Find the shortest whole number of samples after which every input repeats.
+
+    A lag is a candidate where the inputs' correlation with themselves has a maximum; it's a period when what
+    doesn't repeat is at most 3.5 % of every input, and as small (within 1.3) as at the best candidate. Any shape
+    repeats: multisines, sines, trains of hits.
+
+    Returns
+    -------
+    Repetition or None
+        None when an input doesn't repeat, none moves, or fewer than two periods are there. With two periods of
+        which the first hasn't settled, ``transient_periods`` is 1 and no scatter is known.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> u = np.tile(rng.standard_normal((1, 100)), 5)
+    >>> one = Measurement(log="a", sample_rate_hz=1e2, inputs=u, outputs=2 * u, input_names=("f",),
+    ...                   output_names=("y",), output_units=("m",))
+    >>> found = find_repetition(one)
+    >>> found.period_samples, found.periods, found.transient_periods
+    (100, 5, 0)
+    """
+    moving = measurement.inputs[np.ptp(measurement.inputs, axis=1) > 0]
+    if not moving.size:
+        return None
+    tried = [(lag, _scatter(moving, lag)) for lag in _candidates(moving)]
+    repeating = [(lag, scatter) for lag, scatter in tried if scatter <= LARGEST_SCATTER]
+    if not repeating:
+        return None
+    best = min(scatter for _, scatter in repeating)
+    period, scatter = next(one for one in repeating if one[1] <= SCATTER_SLACK * best + EXACT)
+    return Repetition(
+        period_samples=period,
+        periods=measurement.samples // period,
+        transient_periods=transient_periods(np.concatenate([measurement.outputs, moving]), period),
+        input_scatter=scatter,
+    )
+
+
+def with_period(measurement: Measurement) -> Measurement:
+    """Give the measurement with its period and transient periods filled in, where its inputs repeat."""
+    found = find_repetition(measurement)
+    if found is None:
+        return replace(measurement, period_samples=None, transient_periods=0)
+    return replace(measurement, period_samples=found.period_samples, transient_periods=found.transient_periods)
+
+
+def periods_of(signals: Matrix, period: int) -> Matrix:
+    """Cut ``[signal, sample]`` into ``[signal, period, sample]``; what's left behind the last one is dropped."""
+    count = signals.shape[1] // period
+    return signals[:, : count * period].reshape(len(signals), count, period)
+
+
+def transient_periods(signals: Matrix, period: int) -> int:
+    """Count leading periods that differ, in any of ``[signal, sample]``, from the next more than later ones do."""
+    periods = periods_of(signals, period)
+    if periods.shape[1] == FEWEST_PERIODS:
+        return int(_fades(periods[:, 0] - periods[:, 1], periods[:, 1]))
+    # From period to period, so that a machine that drifts slowly all the time isn't taken for one that settles.
+    steps = np.mean(np.diff(periods, axis=1) ** 2, axis=2)
+    floor = TRANSIENT_FLOOR * np.var(periods, axis=(1, 2))
+    usual = steps[:, steps.shape[1] // 2 :].mean(axis=1)
+    unsettled = np.any(steps > (TRANSIENT_RATIO * usual + floor)[:, None], axis=0)
+    settled = np.flatnonzero(~unsettled)
+    return int(settled[0]) if settled.size else periods.shape[1] - 2
+
+
+def _fades(difference: Matrix, steady: Matrix) -> bool:
+    """Whether the difference of two periods is larger at its begin than at its end."""
+    samples = difference.shape[1] // FADING_PARTS
+    parts = difference[:, : samples * FADING_PARTS].reshape(len(difference), FADING_PARTS, samples)
+    power = np.mean(parts**2, axis=2)
+    floor = TRANSIENT_FLOOR * np.var(steady, axis=1)
+    return bool(np.any(power[:, 0] > FADING_RATIO * power[:, -1] + floor))
+
+
+def _candidates(inputs: Matrix) -> list[int]:
+    """Give lags at which all inputs together correlate with themselves, shortest first."""
+    samples = inputs.shape[1]
+    lags = samples // FEWEST_PERIODS + 1
+    if lags <= SHORTEST_PERIOD:
+        return []
+    correlation = np.min([_self_correlation(row - row.mean(), lags) for row in inputs], axis=0)
+    # The last lag is looked at as if what follows were lower: exactly two periods are two periods.
+    padded = np.append(correlation, -1.0)
+    inner = padded[1:-1]
+    peaks = 1 + np.flatnonzero((inner >= padded[:-2]) & (inner > padded[2:]) & (inner > LEAST_CORRELATION))
+    peaks = peaks[peaks >= SHORTEST_PERIOD]
+    if peaks.size > MOST_CANDIDATES:
+        # Of a narrow band every cycle is a maximum; the highest ones hold the period.
+        peaks = np.sort(peaks[np.argsort(-correlation[peaks], kind="stable")[:MOST_CANDIDATES]])
+    return [int(lag) for lag in peaks]
+
+
+def _self_correlation(signal: Matrix, lags: int) -> Matrix:
+    """Correlate a signal with itself at lags from 0, over the power of the parts compared."""
+    size = fft.next_fast_len(signal.size + lags, real=True)
+    spectrum = fft.rfft(signal, size)
+    products = fft.irfft(spectrum.real**2 + spectrum.imag**2, size)[:lags]
+    power = np.concatenate([[0.0], np.cumsum(signal**2)])
+    shift = np.arange(lags)
+    norm = np.sqrt(power[signal.size - shift] * (power[-1] - power[shift]))
+    return np.asarray(np.divide(products, norm, out=np.zeros(lags), where=norm > 0), dtype=np.float64)
+
+
+def _scatter(inputs: Matrix, lag: int) -> float:
+    """Give what doesn't repeat over what does, of the worst input, without the first period where there are more."""
+    periods = periods_of(inputs, lag)
+    # A force that was measured feels the machine, so it settles with it.
+    steady = periods[:, 1:] if periods.shape[1] > FEWEST_PERIODS else periods
+    power = np.var(steady.mean(axis=1), axis=1)
+    if np.any(power < LEAST_STEADY_POWER * np.var(inputs, axis=1)):
+        return np.inf
+    return float(np.sqrt(np.max(steady.var(axis=1, ddof=1).mean(axis=1) / power)))
