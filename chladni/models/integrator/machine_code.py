@@ -10,6 +10,7 @@ from numba.core import config, types
 from numba.extending import intrinsic
 
 from chladni.models.integrator.cache_folder import CACHED
+from chladni.models.integrator.part_compiler import PartCompiler
 
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
@@ -27,7 +28,7 @@ MARCH_SIGNATURE = _WORD(_WORD, _NUMBER, _WORD, _WORD, _WORD, _WORD)
 INSIDE_SIGNATURE = _WORD(_WORD, _WORD, _WORD, _NUMBER, _NUMBER)
 PART_SIGNATURE = _WORD(_WORD, _WORD, _NUMBER, _NUMBER)
 
-_OPTIONS: dict[str, Any] = {"cache": CACHED, "nogil": True, "fastmath": False, "error_model": "numpy", "_nrt": False}
+_OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy", "_nrt": False}
 
 
 def _stamp() -> tuple[float, int]:
@@ -39,8 +40,12 @@ def _stamp() -> tuple[float, int]:
 _STAMP = _stamp()
 
 
-def _compile(function: FunctionT, **options: bool | str) -> FunctionT:
-    compiled: FunctionT = _JIT(**options, **_OPTIONS)(function)
+def machine_code(function: FunctionT) -> FunctionT:
+    """Compile a kernel when it's first called; the result is kept on disk where that is possible.
+
+    Kernels allocate nothing, so they need no reference counts.
+    """
+    compiled: FunctionT = _JIT(cache=CACHED, **_OPTIONS)(function)
     # numba looks at the file of a kernel only: a part that changed in another file would go on running as it was.
     kept = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if kept is not None:
@@ -48,22 +53,20 @@ def _compile(function: FunctionT, **options: bool | str) -> FunctionT:
     return compiled
 
 
-def machine_code(function: FunctionT) -> FunctionT:
-    """Compile a kernel when it's first called; the result is kept on disk where that is possible.
-
-    Kernels allocate nothing, so they need no reference counts.
-    """
-    return _compile(function)
-
-
 def part_code(function: FunctionT) -> FunctionT:
-    """Compile a part that only kernels call: without the door for Python, which takes longer than the part itself."""
-    return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    """Compile a part that only kernels call, into each kernel that does; it's kept on disk with them alone."""
+    return _part(function, inline=False)
 
 
 def inlined_code(function: FunctionT) -> FunctionT:
-    """Compile a part into each kernel that calls it: for what is done in every step, where a call takes its time."""
-    return _compile(function, inline="always")
+    """Compile a part in place of each of its calls: for what is done in every step, where a call takes its time."""
+    return _part(function, inline=True)
+
+
+def _part(function: FunctionT, *, inline: bool) -> FunctionT:
+    doors = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    compiled: FunctionT = _JIT(forceinline=inline, pipeline_class=PartCompiler, **doors, **_OPTIONS)(function)
+    return compiled
 
 
 def make_ready(kernel: Any, signature: Any) -> None:
@@ -82,7 +85,7 @@ def make_ready(kernel: Any, signature: Any) -> None:
 def address_of(kernel: Any, signature: Any) -> int:
     """Address of a kernel for `caller`, compiled for a signature when it's first asked for.
 
-    numba optimises and emits a part again inside every kernel above it; what is called by address, once.
+    A part is optimised and emitted again inside every kernel that calls it; what is called by address, once.
     """
     make_ready(kernel, signature)
     made = kernel.overloads[signature.args]
