@@ -1,0 +1,225 @@
+"""Free simulation of a model with a log's own inputs, as often as a fit wants it."""
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.plant.tunable import Tunables
+from chladni.gap.records.measurement import Measurement
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.model import Effect, Model
+from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.models.integrator.hold import hold_of
+from chladni.models.integrator.input_rows import input_rows
+from chladni.models.integrator.integrator import Integration, Integrator
+from chladni.signals.errors import ModelError
+from chladni.signals.value import Value
+
+Matrix = NDArray[np.float64]
+Windows = Sequence[tuple[int, int]]
+#: Integrators kept; a fit asks for the same model again when it draws, never for more than a few.
+_KEPT = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SiteMotion(Value):
+    """Motion at a site during a free run, ``[sample]``: relative displacement and velocity, and the laws' force.
+
+    `force` is that of the laws at the site, without its linear spring and damper; 0 when there's no law.
+    """
+
+    site: str
+    displacement: Matrix
+    velocity: Matrix
+    force: Matrix
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+
+class FreeRun:
+    """A model that is driven by the inputs of one log, for any parameters and effects.
+
+    Parameters
+    ----------
+    model
+        Nominal model; effects that it already has stay.
+    measurement
+        Inputs in the order of the model's, and the outputs that the log holds.
+    tolerance
+        Largest error of a step, see `Integrator`.
+    windows
+        ``(start, stop)`` samples, one after another; each begins at its own initial state. None for the whole record.
+
+    Raises
+    ------
+    ModelError
+        When the inputs aren't the model's, an output is missing in the model, or windows overlap or leave the record.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        measurement: Measurement,
+        *,
+        tolerance: float = 1e-6,
+        windows: Windows | None = None,
+    ) -> None:
+        self.model = model
+        self.measurement = measurement
+        self.tolerance = tolerance
+        self.windows: tuple[tuple[int, int], ...] = _checked(windows, measurement.samples)
+        self.tunables = Tunables.of(model)
+        compiled = model.compile()
+        self.rows = _rows(compiled, measurement)
+        self._kept: OrderedDict[object, tuple[CompiledModel, Integrator]] = OrderedDict()
+
+    def compiled(self, z: Matrix | None = None, effects: Sequence[Effect] = ()) -> CompiledModel:
+        """Equations of the model at some parameters, with these effects behind those that it has."""
+        model = self.model
+        if z is not None and np.any(z):
+            model = model.with_values(self.tunables.values(np.asarray(z, dtype=np.float64)))
+        if effects:
+            model = model.with_effects((*model.effects, *effects))
+        return model.compile()
+
+    def outputs(
+        self, z: Matrix | None = None, effects: Sequence[AttachedEffect] = (), initial: Matrix | None = None
+    ) -> Matrix:
+        """Give ``[output, sample]`` of the measured outputs as the model would have them.
+
+        Parameters
+        ----------
+        z
+            ``[parameter]`` of `tunables`, nominal by default.
+        effects
+            Appended to those that the model has.
+        initial
+            ``[state]`` or ``[window, state]`` in the order of the compiled model's states; at rest by default.
+
+        Raises
+        ------
+        ModelError
+            When parameters are impossible or the model diverges.
+        """
+        found = [integration.outputs[self.rows] for _, integration in self._integrations(z, effects, initial)]
+        return found[0] if len(found) == 1 else np.hstack(found)
+
+    def motion(
+        self,
+        z: Matrix | None = None,
+        effects: Sequence[AttachedEffect] = (),
+        initial: Matrix | None = None,
+        *,
+        site: str,
+    ) -> SiteMotion:
+        """Motion at a joint, body or input of the model during the same run.
+
+        Raises
+        ------
+        ModelError
+            When the site has no port; see `outputs` too.
+        """
+        compiled = self.compiled(z, effects)
+        port = compiled.port_index(site)
+        parts = [
+            _port_motion(compiled, port, integration, self._columns(compiled, window))
+            for window, integration in self._integrations(z, effects, initial)
+        ]
+        displacement, velocity, force = np.concatenate(parts, axis=1)
+        return SiteMotion(site=site, displacement=displacement, velocity=velocity, force=force)
+
+    def _integrations(
+        self, z: Matrix | None, effects: Sequence[AttachedEffect], initial: Matrix | None
+    ) -> list[tuple[tuple[int, int], Integration]]:
+        compiled, integrator = self._integrator(z, effects)
+        starts = initial_states(initial, len(self.windows), len(compiled.states))
+        return [
+            (window, integrator.run(self.measurement.inputs[:, slice(*window)], initial=start))
+            for window, start in zip(self.windows, starts, strict=True)
+        ]
+
+    def _integrator(self, z: Matrix | None, effects: Sequence[AttachedEffect]) -> tuple[CompiledModel, Integrator]:
+        key = (None if z is None else np.asarray(z).tobytes(), tuple(effect_key(effect) for effect in effects))
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key]
+        compiled = self.compiled(z, effects)
+        made = compiled, Integrator(compiled, self.measurement.sample_rate_hz, tolerance=self.tolerance)
+        self._kept[key] = made
+        if len(self._kept) > _KEPT:
+            self._kept.popitem(last=False)
+        return made
+
+    def _columns(self, compiled: CompiledModel, window: tuple[int, int]) -> Matrix:
+        """``[sample, column]`` of the compiled model's u in a window."""
+        rate = self.measurement.sample_rate_hz
+        hold = hold_of(compiled, rate)
+        signals = self.measurement.inputs[:, slice(*window)]
+        rows = input_rows(compiled, hold, signals, rate, extra=0)
+        columns = np.zeros((signals.shape[1], compiled.columns))
+        known = hold.source >= 0
+        columns[:, hold.source[known]] = rows[:, : hold.columns][:, known]
+        return columns
+
+
+def effect_key(effect: AttachedEffect) -> tuple[object, ...]:
+    """What tells one attached effect from another."""
+    return effect.effect, effect.site, effect.variant, effect.source, tuple(sorted(effect.values.items()))
+
+
+def initial_states(initial: Matrix | None, windows: int, states: int) -> Matrix:
+    """``[window, state]`` from what a caller gave; `ModelError` when the shape doesn't fit."""
+    if initial is None:
+        return np.zeros((windows, states))
+    given = np.asarray(initial, dtype=np.float64)
+    if given.ndim == 1:
+        given = np.broadcast_to(given, (windows, given.size))
+    if given.shape != (windows, states):
+        raise ModelError(f"initial state has shape {given.shape}; [{windows} windows, {states} states] was expected")
+    return given
+
+
+def _checked(windows: Windows | None, samples: int) -> tuple[tuple[int, int], ...]:
+    if windows is None:
+        return ((0, samples),)
+    at = 0
+    for start, stop in windows:
+        if start != at or not start < stop <= samples:
+            raise ModelError(f"window ({start}, {stop}) must begin at sample {at} and end by {samples}")
+        at = stop
+    if at != samples:
+        raise ModelError(f"windows end at sample {at}, the record has {samples}; cover all of it")
+    return tuple((int(start), int(stop)) for start, stop in windows)
+
+
+def _rows(compiled: CompiledModel, measurement: Measurement) -> NDArray[np.int64]:
+    """Rows of the measured outputs among the model's."""
+    inputs = tuple(terminal.name for terminal in compiled.inputs)
+    if measurement.input_names != inputs:
+        raise ModelError(
+            f"log {measurement.log!r} has inputs {', '.join(measurement.input_names) or 'none'}, the model takes "
+            f"{', '.join(inputs) or 'none'}; take the measurement for this model"
+        )
+    names = [terminal.name for terminal in compiled.outputs]
+    missing = [name for name in measurement.output_names if name not in names]
+    if missing:
+        raise ModelError(f"no output {missing[0]!r} in the model; outputs: {', '.join(names) or 'none'}")
+    return np.array([names.index(name) for name in measurement.output_names], dtype=np.int64)
+
+
+def _port_motion(compiled: CompiledModel, port: int, integration: Integration, columns: Matrix) -> Matrix:
+    """``[displacement, velocity, force; sample]`` at any port, whether a law acts there or not."""
+    active = list(integration.ports)
+    found = []
+    for state, column, through in (
+        (compiled.displacement_state, compiled.displacement_column, compiled.displacement_port),
+        (compiled.velocity_state, compiled.velocity_column, compiled.velocity_port),
+    ):
+        moved = state[port] @ integration.states + columns @ column[port]
+        found.append(moved + through[port, active] @ integration.force)
+    own = integration.force[active.index(port)] if port in active else np.zeros(columns.shape[0])
+    return np.vstack([*found, own])

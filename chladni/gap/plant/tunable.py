@@ -1,0 +1,86 @@
+"""Parameters that a fit may move, on the scale of how well they are believed."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.core.model import Model
+from chladni.signals.errors import ModelError
+from chladni.signals.value import Value, require_shape
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Tunables(Value):
+    """Parameters with a tolerance and a value other than 0, as ``z = ln(value/nominal)/tolerance``.
+
+    On this scale what is believed before any log is seen is the same for all: normal, mean 0, variance 1. A logarithm
+    keeps masses and stiffnesses positive, and makes twice and half equally far.
+
+    Attributes
+    ----------
+    names
+        In the model.
+    nominal
+        ``[parameter]``, SI.
+    tolerance
+        ``[parameter]``, one sigma over the value.
+    units
+        SI unit of each.
+    """
+
+    names: tuple[str, ...]
+    nominal: Matrix
+    tolerance: Matrix
+    units: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        require_shape("nominal", self.nominal, (len(self.names),), "the parameters")
+        require_shape("tolerance", self.tolerance, (len(self.names),), "the parameters")
+        self._freeze()
+
+    @classmethod
+    def of(cls, model: Model) -> Self:
+        """Those of a model, in its order; the model's values are the nominal ones."""
+        moving = [one for one in model.parameters.values() if one.tolerance > 0 and one.value != 0]
+        return cls(
+            names=tuple(one.name for one in moving),
+            nominal=np.array([one.value for one in moving], dtype=np.float64),
+            tolerance=np.array([one.tolerance for one in moving], dtype=np.float64),
+            units=tuple(one.unit for one in moving),
+        )
+
+    def values(self, z: Matrix) -> dict[str, float]:
+        """Value of each parameter by name, SI.
+
+        Parameters
+        ----------
+        z
+            ``[parameter]``, in sigmas of the tolerance.
+        """
+        require_shape("z", z, (len(self.names),), "the tunable parameters")
+        numbers = self.nominal * np.exp(self.tolerance * z)
+        return dict(zip(self.names, numbers.tolist(), strict=True))
+
+    def z(self, values: Mapping[str, float]) -> Matrix:
+        """``[parameter]`` from values by name; those that are missing stay nominal.
+
+        Raises
+        ------
+        ModelError
+            When a name is not tunable, or a value lies on the other side of 0.
+        """
+        found = np.zeros(len(self.names))
+        for name, value in values.items():
+            if name not in self.names:
+                raise ModelError(f"{name!r} can't be tuned; tunable are {', '.join(self.names) or 'none'}")
+            place = self.names.index(name)
+            ratio = value / self.nominal[place]
+            if not (np.isfinite(ratio) and ratio > 0):
+                raise ModelError(f"{name} = {value:g} has another sign than its nominal {self.nominal[place]:g}")
+            found[place] = np.log(ratio) / self.tolerance[place]
+        return found

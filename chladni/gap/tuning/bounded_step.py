@@ -1,0 +1,52 @@
+"""Step of a least-squares fit inside bounds."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.errors import EstimateError
+
+Matrix = NDArray[np.float64]
+#: Added to the curvature of each unknown, relative: what a log doesn't show at all must not make it singular.
+_RIDGE = 1e-12
+
+
+def bounded_step(curvature: Matrix, gradient: Matrix, low: Matrix, high: Matrix, *, damping: float) -> Matrix:
+    """Minimise ``gradient.p + p.(H + damping diag H) p / 2`` for ``low <= p <= high``.
+
+    Levenberg and Marquardt's step, with bounds as a linear least-squares problem (Stark & Parker 1995).
+
+    Parameters
+    ----------
+    curvature
+        H ``[unknown, unknown]``, positive semidefinite.
+    gradient, low, high
+        ``[unknown]``; 0 lies between the bounds.
+
+    Raises
+    ------
+    EstimateError
+        When a number isn't finite.
+    """
+    from scipy.linalg import cholesky, solve_triangular
+    from scipy.optimize import lsq_linear
+
+    if not (np.all(np.isfinite(curvature)) and np.all(np.isfinite(gradient))):
+        raise EstimateError("the slopes of the fit are not finite; start from other values")
+    # An unknown that does nothing stays where it is.
+    size = np.sqrt(np.diag(curvature))
+    moving = size > 0
+    step = np.zeros(gradient.size)
+    if not moving.any():
+        return step
+    scale = size[moving]
+    scaled = curvature[np.ix_(moving, moving)] / np.multiply.outer(scale, scale)
+    root = cholesky(scaled + (damping + scale.size * _RIDGE) * np.eye(scale.size), lower=False)
+    target = -solve_triangular(root, gradient[moving] / scale, trans="T")
+    free = solve_triangular(root, target)
+    below, above = low[moving] * scale, high[moving] * scale
+    if np.any(free < below) or np.any(free > above):
+        # The solver wants room between the bounds, also where an unknown stands on both.
+        above = np.maximum(above, below + 1e-12 * (1.0 + np.abs(below)))
+        free = lsq_linear(root, target, bounds=(below, above), method="bvls").x
+    step[moving] = np.clip(free / scale, low[moving], high[moving])
+    return step

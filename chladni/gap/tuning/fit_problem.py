@@ -1,0 +1,228 @@
+"""An output-error fit as a least-squares problem: what it costs at a point, and how that changes around it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.plant.free_run import FreeRun, initial_states
+from chladni.gap.tuning.decay import decay
+from chladni.gap.tuning.effect_scale import EffectNumber, with_numbers
+from chladni.gap.tuning.residual import Residual, Whitening, likelihood_cost, weights
+from chladni.models.effects.attached_effect import AttachedEffect
+
+Matrix = NDArray[np.float64]
+#: How far apart the two runs of a difference are, in ln(value) of a parameter.
+_APART = 1e-5
+#: The same for laws, whose runs carry the errors of their steps.
+_APART_WITH_LAWS = 1e-3
+#: One sigma of an initial state is what alone would make the outputs this many times what was measured.
+_WIDE = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """Unknowns: ``x`` of the parameters and effects, ``initial [window, state]``."""
+
+    x: Matrix
+    initial: Matrix
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """A free run at a point, its residual, and the cost in nats."""
+
+    point: Point
+    outputs: Matrix
+    residual: Residual
+    cost: float
+
+
+@dataclass(frozen=True, slots=True)
+class Slopes:
+    """Least-squares equations around a point, initial states eliminated.
+
+    Attributes
+    ----------
+    curvature, gradient
+        ``[unknown, unknown]``, ``[unknown]`` of the cost.
+    back
+        For each window ``(constant [state], per unknown [state, unknown])``: step of its initial state.
+    """
+
+    curvature: Matrix
+    gradient: Matrix
+    back: tuple[tuple[Matrix, Matrix], ...]
+
+    def initial_step(self, step: Matrix) -> Matrix:
+        """``[window, state]`` that goes with a step of the unknowns."""
+        return np.array([constant - per @ step for constant, per in self.back])
+
+
+class FitProblem:
+    """Unknowns, bounds, prior, cost and slopes of one fit.
+
+    Parameters
+    ----------
+    run
+        The model driven by the log.
+    whitening
+        Of the outputs, on the training samples.
+    training
+        ``[sample]``.
+    effects
+        With their start values.
+    numbers
+        Which of their parameters move.
+    tune
+        Whether the model's parameters move too.
+    z_limit
+        Bound on ``abs(z)``, one for all or by name.
+    start_z
+        ``[parameter]``: where they start, or stay.
+    """
+
+    def __init__(
+        self,
+        run: FreeRun,
+        whitening: Whitening,
+        training: NDArray[np.bool_],
+        *,
+        effects: Sequence[AttachedEffect],
+        numbers: Sequence[EffectNumber],
+        tune: bool,
+        z_limit: float | Mapping[str, float],
+        start_z: Matrix,
+    ) -> None:
+        self.run, self.whitening, self.training = run, whitening, training
+        self.effects, self.numbers = tuple(effects), tuple(numbers)
+        self.tuned = len(run.tunables.names) if tune else 0
+        self.start_z = start_z
+        self.evaluations = 0
+        limit = _limits(run.tunables.names, z_limit)[: self.tuned]
+        self.low = np.concatenate([-limit, [number.low for number in numbers]])
+        self.high = np.concatenate([limit, [number.high for number in numbers]])
+        self._prior = np.concatenate([np.ones(self.tuned), np.zeros(len(numbers))])
+        self._decay = self._wide = np.zeros(0)
+        self.has_laws = bool(run.compiled(start_z, self.effects).laws)
+
+    def start(self) -> Point:
+        """Where the fit begins: at rest, moved into the bounds."""
+        states = len(self.run.compiled(self.start_z, self.effects).states)
+        x = np.concatenate([self.start_z[: self.tuned], np.zeros(len(self.numbers))])
+        return Point(np.clip(x, self.low, self.high), initial_states(None, len(self.run.windows), states))
+
+    def z(self, x: Matrix) -> Matrix:
+        """``[parameter]`` of the model."""
+        return np.concatenate([x[: self.tuned], self.start_z[self.tuned :]])
+
+    def effects_at(self, x: Matrix) -> tuple[AttachedEffect, ...]:
+        """Effects with their parameters."""
+        return with_numbers(self.effects, self.numbers, x[self.tuned :])
+
+    def evaluate(self, point: Point) -> Evaluation:
+        """Run freely and judge; `ModelError` when the run diverges."""
+        outputs = self._outputs(point.x, point.initial)
+        residual = self.whitening.residual(self.run.measurement.outputs - outputs)
+        cost = likelihood_cost(residual.power, self.whitening.samples) + self.prior_cost(point)
+        return Evaluation(point, outputs, residual, cost)
+
+    def prior_cost(self, point: Point) -> float:
+        """Half the squares of what is believed beforehand, in nats."""
+        spread = self._spread(point)
+        at_start = np.sum((point.initial * (spread > 0) / np.where(spread > 0, spread, 1.0)) ** 2)
+        return float(0.5 * np.sum(self._prior * point.x**2) + 0.5 * at_start)
+
+    def slopes(self, here: Evaluation) -> Slopes:
+        """Gauss and Newton's equations around a point, each output weighed by what it misses."""
+        root = np.sqrt(weights(here.residual.power))[:, None]
+        residual = here.residual.white * root
+        columns = np.concatenate([self.whitening.seen(self._columns(here)), self.whitening.constants()]) * root
+        curvature, gradient = _products(columns, columns), -_products(columns, residual[None])[:, 0]
+        unknowns = here.point.x.size
+        curvature[:unknowns, :unknowns] += np.diag(self._prior)
+        gradient[:unknowns] += self._prior * here.point.x
+        spread = self._spread(here.point)
+        sure = np.where(spread > 0, spread, 1.0) ** -2.0
+        back = []
+        for place, (start, stop) in enumerate(self.run.windows):
+            seen, local = self._seen(start, stop), self._local(start, stop) * root[None]
+            local[spread == 0] = 0.0
+            slope = sure * here.point.initial[place] - _products(local, residual[None, :, seen])[:, 0]
+            cross = _products(local, columns[..., seen])
+            per, constant = _eliminated(_products(local, local) + np.diag(sure), cross, slope)
+            curvature -= cross.T @ per
+            gradient += cross.T @ constant
+            back.append((constant, per))
+        # Constants last: they are free, and known once the rest is.
+        cross = curvature[unknowns:, :unknowns]
+        per, constant = _eliminated(curvature[unknowns:, unknowns:], cross, gradient[unknowns:])
+        return Slopes(
+            curvature[:unknowns, :unknowns] - cross.T @ per,
+            gradient[:unknowns] + cross.T @ constant,
+            tuple((c - b[:, unknowns:] @ constant, b[:, :unknowns] - b[:, unknowns:] @ per) for c, b in back),
+        )
+
+    def _outputs(self, x: Matrix, initial: Matrix) -> Matrix:
+        self.evaluations += 1
+        return self.run.outputs(self.z(x), self.effects_at(x), initial)
+
+    def _columns(self, here: Evaluation) -> Matrix:
+        """``[unknown, output, sample]``: change of the outputs, by differences."""
+        apart = _APART_WITH_LAWS if self.has_laws else _APART
+        columns = np.empty((here.point.x.size, *here.outputs.shape))
+        for place, by in enumerate(self._steps(here.point.x, apart)):
+            x = here.point.x.copy()
+            x[place] += by
+            columns[place] = (self._outputs(x, here.point.initial) - here.outputs) / by
+        return columns
+
+    def _steps(self, x: Matrix, apart: float) -> Matrix:
+        """Steps of each unknown, away from the nearer bound."""
+        steps = np.concatenate([apart / self.run.tunables.tolerance[: self.tuned], np.full(len(self.numbers), apart)])
+        return np.asarray(np.where(x + steps > self.high, -steps, steps))
+
+    def _spread(self, point: Point) -> Matrix:
+        """``[state]`` one sigma of an initial state, so wide that it only keeps the equations regular."""
+        if not self._wide.size:
+            compiled = self.run.compiled(self.z(point.x), self.effects_at(point.x))
+            longest = max(stop - start for start, stop in self.run.windows)
+            found = decay(compiled, self.run.rows, self.run.measurement.sample_rate_hz, longest)
+            self._decay = self.whitening.whitened(found)
+            measured = np.mean(self.whitening.whitened(self.run.measurement.outputs) ** 2)
+            alone = np.sqrt(np.mean(self._decay**2, axis=(1, 2)))
+            seen = alone > 1e-12 * max(alone.max(initial=0.0), 1e-300)
+            self._wide = np.where(seen, _WIDE * np.sqrt(measured) / np.where(seen, alone, 1.0), 0.0)
+        return self._wide
+
+    def _local(self, start: int, stop: int) -> Matrix:
+        return self._decay[..., : stop - start][..., self.training[start:stop]]
+
+    def _seen(self, start: int, stop: int) -> slice:
+        """Place of a window's samples among the training samples."""
+        before = int(np.count_nonzero(self.training[:start]))
+        return slice(before, before + int(np.count_nonzero(self.training[start:stop])))
+
+
+def _products(left: Matrix, right: Matrix) -> Matrix:
+    """``[left, right]`` sums over outputs and samples."""
+    return left.reshape(len(left), -1) @ right.reshape(len(right), -1).T
+
+
+def _eliminated(own: Matrix, cross: Matrix, slope: Matrix) -> tuple[Matrix, Matrix]:
+    """Best step of some unknowns, ``constant - per step``, from ``own p + cross step + slope = 0``."""
+    if not len(own):
+        return np.zeros(cross.shape), np.zeros(0)
+    solved = np.asarray(np.linalg.solve(own, np.column_stack([cross, slope])), dtype=np.float64)
+    return solved[:, :-1], -solved[:, -1]
+
+
+def _limits(names: Sequence[str], z_limit: float | Mapping[str, float]) -> Matrix:
+    if isinstance(z_limit, Mapping):
+        return np.array([z_limit.get(name, Z_LIMIT) for name in names], dtype=np.float64)
+    return np.full(len(names), float(z_limit))
+
+
+#: Hard bound on parameters, in sigmas of their tolerance.
+Z_LIMIT = 3.0

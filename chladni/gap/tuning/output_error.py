@@ -1,0 +1,253 @@
+"""Output-error fit: parameters and effects with which a free run of the model comes nearest to the log."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.gap.tuning.bounded_step import bounded_step
+from chladni.gap.tuning.effect_scale import effect_numbers
+from chladni.gap.tuning.fit_problem import Z_LIMIT, Evaluation, FitProblem, Point, Slopes
+from chladni.gap.tuning.residual import Whitening
+from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.signals.errors import ModelError
+from chladni.signals.value import Value, require_shape
+
+Matrix = NDArray[np.float64]
+#: A step that promises less than this, in nats, changes no decision.
+_ENOUGH = 0.02
+#: Most that one step may change an unknown: sigmas of a parameter, factors of e of an effect's.
+_LONGEST = 2.0
+#: An unknown that a log leaves as uncertain as it was.
+_UNDETERMINED = 0.9
+_DAMPINGS = (0.0, 1e-2, 1e-1, 1.0, 10.0, 100.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OutputErrorFit(Value):
+    """What an output-error fit found.
+
+    Attributes
+    ----------
+    values
+        Every tunable parameter by name, SI.
+    z
+        ``[parameter]`` the same in sigmas of their tolerances.
+    parameter_std
+        ``[parameter]`` standard deviations, SI.
+    effects
+        With fitted values.
+    effect_std
+        For each effect the standard deviation of each fitted parameter, SI; infinite when nothing determines it.
+    initial
+        ``[window, state]`` estimated initial states.
+    offsets
+        ``[output]`` constants of the measured outputs that no model explains.
+    outputs
+        ``[output, sample]`` of the free run, offsets added.
+    misfit
+        Mean square of the whitened residual over the training samples; 1 when only noise is left.
+    misfit_by_output
+        ``[output]`` the same.
+    held_misfit
+        The same over the samples that the fit didn't see, None when it saw all.
+    held_by_output
+        ``[output]`` the same, empty when it saw all.
+    prior_cost
+        ``z.z``: what leaving the nominal values costs.
+    cost
+        Negative log-likelihood and half the prior cost, nats: what the fit made least.
+    converged
+        Whether no step promised more, within the iterations.
+    iterations, evaluations
+        Of the fit; evaluations are free runs.
+    undetermined
+        Names of the parameters that this log leaves as uncertain as they were: they stay near nominal.
+    covariance
+        Of z and of the unknowns of the effects, in that order.
+    """
+
+    values: Mapping[str, float]
+    z: Matrix
+    parameter_std: Matrix
+    effects: tuple[AttachedEffect, ...]
+    effect_std: tuple[Mapping[str, float], ...]
+    initial: Matrix
+    offsets: Matrix
+    outputs: Matrix
+    misfit: float
+    misfit_by_output: Matrix
+    held_misfit: float | None
+    held_by_output: Matrix
+    prior_cost: float
+    cost: float
+    converged: bool
+    iterations: int
+    evaluations: int
+    undetermined: tuple[str, ...]
+    covariance: Matrix
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+
+def fit_output_error(
+    run: FreeRun,
+    noise: NoiseFloor,
+    *,
+    effects: Sequence[AttachedEffect] = (),
+    fitted: Sequence[Sequence[str]] | None = None,
+    training: NDArray[np.bool_] | None = None,
+    start_z: Matrix | None = None,
+    start_initial: Matrix | None = None,
+    z_limit: float | Mapping[str, float] = Z_LIMIT,
+    tune: bool = True,
+    offsets: bool = True,
+    max_iterations: int = 12,
+) -> OutputErrorFit:
+    """Fit parameters, effects and initial states to a log.
+
+    Least squares on whitened residuals with the prior ``z.z`` (Ljung, *System Identification*, 2nd ed., section 7.4),
+    by Gauss and Newton inside hard bounds, damped where a step makes things worse. Where a residual is larger than
+    the noise, its own size takes the noise's place, see `likelihood_cost`.
+
+    Parameters
+    ----------
+    run
+        The model driven by the log.
+    noise
+        Of the measured outputs.
+    effects
+        With the values that the fit starts from.
+    fitted
+        Names of the parameters that move, for each effect; by default those that it can't do without.
+    training
+        ``[sample]``: what the fit may see; all by default.
+    start_z
+        ``[parameter]`` where the parameters start; nominal by default. Without `tune` they stay there.
+    start_initial
+        ``[window, state]`` where initial states start; at rest by default.
+    z_limit
+        Bound on the parameters in sigmas of their tolerances, one for all or by name.
+    tune
+        Whether the parameters move.
+    offsets
+        Whether each output may have an unknown constant.
+    max_iterations
+        Of the fit.
+
+    Raises
+    ------
+    ModelError
+        When the model diverges at the start already.
+    EstimateError
+        When nothing is left to fit on.
+    """
+    count, samples = len(run.tunables.names), run.measurement.samples
+    training = np.ones(samples, dtype=bool) if training is None else np.asarray(training, dtype=bool)
+    require_shape("training", training, (samples,), "the log")
+    z = np.zeros(count) if start_z is None else np.asarray(start_z, dtype=np.float64)
+    require_shape("start_z", z, (count,), "the tunable parameters")
+    problem = FitProblem(
+        run, Whitening(noise, training, offsets=offsets), training,
+        effects=effects, numbers=effect_numbers(effects, fitted), tune=tune, z_limit=z_limit, start_z=z,
+    )  # fmt: skip
+    start = problem.start()
+    if start_initial is not None:
+        start = Point(start.x, np.array(start_initial, dtype=np.float64).reshape(start.initial.shape))
+    here, slopes, converged, iterations = _descend(problem, problem.evaluate(start), max_iterations)
+    return _report(problem, here, slopes, converged=converged, iterations=iterations)
+
+
+def _descend(problem: FitProblem, here: Evaluation, most: int) -> tuple[Evaluation, Slopes, bool, int]:
+    level, iterations = 0, 0
+    slopes = problem.slopes(here)
+    while iterations < most:
+        iterations += 1
+        found, promised, level = _search(problem, here, slopes, level)
+        if found is None:
+            return here, slopes, promised < 50 * _ENOUGH, iterations
+        gained, here = here.cost - found.cost, found
+        slopes = problem.slopes(here)
+        if max(promised, gained) < _ENOUGH:
+            return here, slopes, True, iterations
+    return here, slopes, False, iterations
+
+
+def _search(
+    problem: FitProblem, here: Evaluation, slopes: Slopes, level: int
+) -> tuple[Evaluation | None, float, int]:
+    """First damping whose step makes the cost less, from the one that did last time; what the first promised."""
+    promised = np.inf
+    for place in range(level, len(_DAMPINGS)):
+        step = _step(problem, here, slopes, _DAMPINGS[place])
+        expected = _expected(slopes, step)
+        promised = min(promised, expected) if np.isfinite(promised) else expected
+        try:
+            found = problem.evaluate(Point(here.point.x + step, here.point.initial + slopes.initial_step(step)))
+        except ModelError:
+            continue
+        if found.cost < here.cost:
+            return found, promised, max(0, place - 1)
+    return None, promised, level
+
+
+def _step(problem: FitProblem, here: Evaluation, slopes: Slopes, damping: float) -> Matrix:
+    low = np.minimum(np.maximum(problem.low - here.point.x, -_LONGEST), 0.0)
+    high = np.maximum(np.minimum(problem.high - here.point.x, _LONGEST), 0.0)
+    return bounded_step(slopes.curvature, slopes.gradient, low, high, damping=damping)
+
+
+def _expected(slopes: Slopes, step: Matrix) -> float:
+    """Nats that a step promises to gain."""
+    return float(-(slopes.gradient @ step) - 0.5 * step @ slopes.curvature @ step)
+
+
+def _report(
+    problem: FitProblem, here: Evaluation, slopes: Slopes, *, converged: bool, iterations: int
+) -> OutputErrorFit:
+    x, run = here.point.x, problem.run
+    z = problem.z(x)
+    covariance = np.asarray(np.linalg.pinv(slopes.curvature, rcond=1e-14, hermitian=True), dtype=np.float64)
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    values = run.tunables.values(z)
+    own = np.concatenate([std[: problem.tuned], np.zeros(z.size - problem.tuned)])
+    offsets = here.residual.offsets
+    outputs = here.outputs + offsets[:, None]
+    held = ~problem.training
+    white = problem.whitening.whitened(run.measurement.outputs - outputs)[:, held]
+    by_output = np.mean(white**2, axis=1) if held.any() else np.zeros(0)
+    return OutputErrorFit(
+        values=values,
+        z=z,
+        parameter_std=own * run.tunables.tolerance * np.abs(np.array([values[name] for name in run.tunables.names])),
+        effects=problem.effects_at(x),
+        effect_std=_effect_std(problem, x, std),
+        initial=here.point.initial,
+        offsets=offsets,
+        outputs=outputs,
+        misfit=float(np.mean(here.residual.power)),
+        misfit_by_output=here.residual.power,
+        held_misfit=float(np.mean(by_output)) if held.any() else None,
+        held_by_output=by_output,
+        prior_cost=float(z @ z),
+        cost=here.cost,
+        converged=converged,
+        iterations=iterations,
+        evaluations=problem.evaluations,
+        undetermined=tuple(
+            name for name, one in zip(run.tunables.names[: problem.tuned], std, strict=False) if one > _UNDETERMINED
+        ),
+        covariance=covariance,
+    )
+
+
+def _effect_std(problem: FitProblem, x: Matrix, std: Matrix) -> tuple[Mapping[str, float], ...]:
+    found: list[dict[str, float]] = [{} for _ in problem.effects]
+    for number, at, spread in zip(problem.numbers, x[problem.tuned :], std[problem.tuned :], strict=True):
+        # Nothing changes with it, so nothing tells it.
+        found[number.effect][number.name] = abs(number.slope(float(at))) * float(spread) if spread > 0 else np.inf
+    return tuple(found)

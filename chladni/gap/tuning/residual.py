@@ -1,0 +1,106 @@
+"""Residuals of a free run as white noise, on the samples that a fit may see, and what they cost."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.errors import EstimateError
+
+Matrix = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Residual:
+    """Whitened residual of one free run.
+
+    Attributes
+    ----------
+    white
+        ``[output, training sample]``, offsets taken out.
+    power
+        ``[output]`` mean square of it.
+    offsets
+        ``[output]`` constant that was taken out, in the output's unit.
+    """
+
+    white: Matrix
+    power: Matrix
+    offsets: Matrix
+
+
+class Whitening:
+    """Whitens signals over the whole record, then keeps the training samples and takes constants out.
+
+    Parameters
+    ----------
+    noise
+        Of each output.
+    training
+        ``[sample]``: what the fit may see.
+    offsets
+        Whether each output may have an unknown constant, which no dynamic model explains.
+    """
+
+    def __init__(self, noise: NoiseFloor, training: Mask, *, offsets: bool) -> None:
+        if not training.any():
+            raise EstimateError("no sample is left to fit on; give at least some as training")
+        self._noise = noise
+        self._places = np.flatnonzero(training)
+        self.samples = int(self._places.size)
+        self._whole = bool(training.all())
+        self._offsets = offsets
+        self._constant = self._kept(self.whitened(np.ones((noise.rms.size, training.size))))
+        self._size = np.maximum(np.sum(self._constant**2, axis=1), np.finfo(np.float64).tiny)
+
+    def whitened(self, signals: Matrix) -> Matrix:
+        """``[..., output, sample]`` divided by the noise, its colour taken out."""
+        filters = self._noise.whitening
+        if not np.any(filters[:, 1:]):
+            return np.asarray(signals / self._noise.innovation_rms[:, None])
+        white = np.empty_like(signals)
+        count = signals.shape[-1]
+        for place, (own, scale) in enumerate(zip(filters, self._noise.innovation_rms, strict=True)):
+            lags = np.trim_zeros(own / scale, "b")
+            for index in np.ndindex(signals.shape[:-2]):
+                # A short filter costs a convolution a tenth of what it costs a recursive filter.
+                white[(*index, place)] = np.convolve(signals[(*index, place)], lags)[:count]
+        return white
+
+    def seen(self, signals: Matrix) -> Matrix:
+        """``[..., output, training sample]``: whitened."""
+        return self._kept(self.whitened(signals))
+
+    def constants(self) -> Matrix:
+        """``[constant, output, training sample]``: what an offset of each output adds; none without offsets."""
+        count = len(self._constant) if self._offsets else 0
+        columns = np.zeros((count, *self._constant.shape))
+        places = np.arange(count)
+        columns[places, places] = self._constant[places]
+        return columns
+
+    def residual(self, missed: Matrix) -> Residual:
+        """Judge ``[output, sample]`` of measured minus simulated."""
+        white = self._kept(self.whitened(missed))
+        offsets = np.einsum("os,os->o", white, self._constant) / self._size * self._offsets
+        white = white - offsets[:, None] * self._constant
+        return Residual(white=white, power=np.mean(white**2, axis=1), offsets=offsets)
+
+    def _kept(self, white: Matrix) -> Matrix:
+        return white if self._whole else np.take(white, self._places, axis=-1)
+
+
+def likelihood_cost(power: Matrix, samples: int) -> float:
+    """Negative log-likelihood of whitened residuals whose true variance is unknown, but at least 1.
+
+    ``sum_j N/2 (v_j if v_j < 1 else 1 + ln v_j)``: the variance of each output is taken as what makes it most likely.
+    An unmodelled effect then weighs on the parameters as noise of its size would, not as a hundred sigma.
+    """
+    return float(0.5 * samples * np.sum(np.where(power < 1.0, power, 1.0 + np.log(np.maximum(power, 1.0)))))
+
+
+def weights(power: Matrix) -> Matrix:
+    """``[output]`` weight of squared residuals: slope of `likelihood_cost` over ``N v_j/2``."""
+    return np.asarray(1.0 / np.maximum(power, 1.0))
