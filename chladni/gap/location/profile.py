@@ -1,0 +1,224 @@
+"""Unknown forces profiled out: what is left of a residual when forces at given sites may be anything."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.optimize import lsq_linear
+
+from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.places import Site
+
+Matrix = NDArray[np.float64]
+Spectrum = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Profile:
+    """Fit of the bounded parameters under the hypothesis that forces of any shape act at some sites.
+
+    Attributes
+    ----------
+    sites
+        Where.
+    z
+        Parameters in units of their tolerance.
+    transient
+        ``[state, segment]``.
+    forces
+        ``[segment, line]`` at each site.
+    misfit
+        ``sum |what is left|^2`` over outputs and lines, whitened: expected to be (outputs - sites) x lines.
+    expected
+        That number.
+    prior
+        ``z'z``.
+    """
+
+    sites: tuple[Site, ...]
+    z: Matrix
+    transient: Matrix
+    forces: tuple[Spectrum, ...]
+    misfit: float
+    expected: float
+    prior: float
+
+    @property
+    def chi(self) -> float:
+        """Misfit over what noise alone leaves."""
+        return self.misfit / self.expected
+
+    @property
+    def cost(self) -> float:
+        """Minus twice the log posterior, but for constants."""
+        return 2.0 * self.misfit + self.prior
+
+
+class Elimination:
+    """Takes from whitened spectra what forces of any shape at some sites, and transients, can print.
+
+    Parameters
+    ----------
+    patterns
+        ``[output, 1, line]`` of each site.
+    transients
+        ``[state, output, 1, line]``.
+    """
+
+    def __init__(self, patterns: Sequence[Spectrum], transients: Spectrum) -> None:
+        self._patterns = np.asarray(patterns, dtype=np.complex128)
+        self._unit = _orthonormal(patterns)
+        self._transients = transients
+        self._stacked = _real(np.moveaxis(self.away(transients), -2, -3)[:, 0])
+        self._basis = _range(self._stacked.T)
+
+    def away(self, spectra: Spectrum) -> Spectrum:
+        """Take the forces from ``[..., output, segment, line]``."""
+        for known in self._unit:
+            spectra = spectra - known * np.sum(known.conj() * spectra, axis=-3, keepdims=True)
+        return spectra
+
+    def rest(self, spectra: Spectrum) -> Matrix:
+        """Take forces and transients; give real numbers ``[..., number]``."""
+        real = _real(np.moveaxis(self.away(spectra), -2, -3))
+        left = real - (real @ self._basis) @ self._basis.T
+        return np.asarray(left.reshape(*spectra.shape[:-3], -1), dtype=np.float64)
+
+    def unknowns(self, residual: Spectrum) -> tuple[Matrix, list[Spectrum]]:
+        """Best transients ``[state, segment]`` and forces ``[segment, line]`` for a residual."""
+        real = _real(np.moveaxis(self.away(residual), -2, -3))
+        size = np.linalg.norm(self._stacked, axis=1)
+        scale = np.where(size > 0, 1.0 / np.where(size > 0, size, 1.0), 0.0)
+        scaled = np.linalg.lstsq((self._stacked * scale[:, None]).T, real.T, rcond=1e-10)[0]
+        transient = np.asarray(scaled * scale[:, None], dtype=np.float64)
+        if not len(self._patterns):
+            return transient, []
+        left = residual - np.einsum("sok,sm->omk", self._transients[:, :, 0], transient)
+        return transient, list(_forces(self._patterns, left))
+
+
+def _forces(patterns: Spectrum, left: Spectrum) -> Spectrum:
+    """Least squares ``[site, segment, line]`` of ``left [output, segment, line]`` along the patterns."""
+    flat = patterns[:, :, 0]
+    gram = np.einsum("aol,bol->lab", flat.conj(), flat)
+    right = np.einsum("aol,oml->lam", flat.conj(), left)
+    tiny = 1e-12 * np.trace(gram, axis1=1, axis2=2).real
+    tiny[tiny == 0] = 1.0
+    found = np.linalg.solve(gram + tiny[:, None, None] * np.eye(len(flat)), right)
+    return np.asarray(np.moveaxis(found, 0, -1), dtype=np.complex128)
+
+
+def _orthonormal(patterns: Sequence[Spectrum]) -> list[Spectrum]:
+    """One small basis a line (Gram and Schmidt, twice is enough for two patterns)."""
+    basis: list[Spectrum] = []
+    for pattern in patterns:
+        rest = pattern
+        for _ in range(2):
+            for known in basis:
+                rest = rest - known * np.sum(known.conj() * rest, axis=0)
+        size = np.sqrt(np.sum(np.abs(rest) ** 2, axis=0))
+        sound = size > 1e-9 * np.sqrt(np.sum(np.abs(pattern) ** 2, axis=0))
+        basis.append(np.where(sound, rest / np.where(sound, size, 1.0), 0.0))
+    return basis
+
+
+def _range(matrix: Matrix) -> Matrix:
+    """Orthonormal basis of the columns' span; columns that print nothing or the same as others add nothing."""
+    size = np.linalg.norm(matrix, axis=0)
+    scaled = matrix[:, size > 0] / size[size > 0]
+    if not scaled.size:
+        return np.zeros((len(matrix), 0))
+    vectors, values, _ = np.linalg.svd(scaled, full_matrices=False)
+    return np.asarray(vectors[:, values > 1e-10 * values[0]], dtype=np.float64)
+
+
+def profiled(
+    problem: LinearProblem,
+    sites: Sequence[Site],
+    start: Matrix,
+    *,
+    iterations: int = 8,
+    limit: float = 3.0,
+) -> Profile:
+    """Refit the parameters and the transient while forces at `sites` may be anything.
+
+    Gauss and Newton steps within ``|z| <= limit`` on what is left (variable projection: Golub and Pereyra 1973),
+    shortened while they don't improve.
+    """
+    best = profile_at(problem, sites, start)
+    for _ in range(iterations):
+        step, promised = _step(problem, best, limit)
+        if (
+            best.misfit + best.prior / 2 - promised - (best.z + step) @ (best.z + step) / 2
+            < 1e-3 * best.expected**0.5
+        ):
+            break
+        improved = _searched(problem, best, step)
+        if improved is None:
+            break
+        best = improved
+    return best
+
+
+def _step(problem: LinearProblem, here: Profile, limit: float) -> tuple[Matrix, float]:
+    """Solve the linearised problem within the bounds; give the step in z and the misfit that it promises."""
+    z = here.z
+    view = problem.view(z)
+    out = Elimination([problem.pattern(view, site) for site in here.sites], problem.transients(view))
+    residual = problem.measured * problem.weight - problem.response(z, np.zeros_like(here.transient), ())
+    # Where forces and transients are large, so is what the parameters do to them (Kaufman 1975).
+    slopes = problem.slopes(z, here.transient, list(zip(here.sites, here.forces, strict=True)))
+    matrix, right = out.rest(slopes).T, out.rest(residual)
+    normal = matrix.T @ matrix + np.eye(z.size) / 2.0
+    moved = _bounded(normal, matrix.T @ right - z / 2.0, -limit - z, limit - z)
+    return moved, float(np.sum((right - matrix @ moved) ** 2))
+
+
+def _bounded(normal: Matrix, toward: Matrix, low: Matrix, high: Matrix) -> Matrix:
+    """Minimise ``x'Nx/2 - x't`` within bounds."""
+    if not toward.size:
+        return toward
+    root = np.linalg.cholesky(normal)
+    right = solve_triangular(root, toward, lower=True)
+    plain = solve_triangular(root.T, right)
+    if np.all(plain >= low) and np.all(plain <= high):
+        return np.asarray(plain, dtype=np.float64)
+    # A start on a bound is inside by rounding only.
+    bounds = (np.minimum(low, -1e-12), np.maximum(high, 1e-12))
+    return np.asarray(lsq_linear(root.T, right, bounds=bounds, method="bvls").x, dtype=np.float64)
+
+
+def _searched(problem: LinearProblem, best: Profile, step: Matrix) -> Profile | None:
+    share = 1.0
+    for _ in range(4):
+        found = profile_at(problem, best.sites, best.z + share * step)
+        if found.cost < best.cost:
+            return found
+        share *= 0.3
+    return None
+
+
+def profile_at(problem: LinearProblem, sites: Sequence[Site], z: Matrix) -> Profile:
+    """Profile at given parameters: only the forces and the transients are free."""
+    view = problem.view(z)
+    out = Elimination([problem.pattern(view, site) for site in sites], problem.transients(view))
+    residual = np.asarray((problem.measured - view.forced()) * problem.weight, dtype=np.complex128)
+    transient, forces = out.unknowns(residual)
+    outputs, *others = problem.measured.shape
+    return Profile(
+        sites=tuple(sites),
+        z=z,
+        transient=transient,
+        forces=tuple(forces),
+        misfit=float(np.sum(out.rest(residual) ** 2)),
+        expected=float(max(outputs - len(sites), 0) * np.prod(others)) or 1.0,
+        prior=float(z @ z),
+    )
+
+
+def _real(spectra: Spectrum) -> Matrix:
+    """``[..., number]`` real and imaginary parts of ``[..., output, line]``."""
+    flat = spectra.reshape(*spectra.shape[:-2], -1)
+    return np.asarray(np.concatenate([flat.real, flat.imag], axis=-1), dtype=np.float64)

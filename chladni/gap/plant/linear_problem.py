@@ -1,0 +1,103 @@
+"""A measurement beside the linear part of a model: residual spectra, and how they move with the parameters."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.plant.linear_view import LinearView, Way
+from chladni.gap.plant.places import Site, way_to
+from chladni.gap.plant.record_lines import RecordLines
+from chladni.gap.records.measurement import Measurement
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.model import Model
+
+Matrix = NDArray[np.float64]
+Spectrum = NDArray[np.complex128]
+#: Of a tunable's sigma: small against curvature, large against rounding.
+_STEP = 1e-4
+
+
+class Scaled(Protocol):
+    """Parameters that may move, in units of their tolerance."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names."""
+
+    def values(self, z: Matrix) -> Mapping[str, float]:
+        """Values ``nominal exp(tolerance z)`` by name."""
+
+
+class LinearProblem:
+    """One measurement, one model, some lines; linearised wherever it's asked for.
+
+    Parameters
+    ----------
+    model, measurement, noise, tunables, lines
+        What is compared, and where.
+    changed
+        ``changed(model) -> compiled``: how the model is compiled, for instance with an effect in it.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        measurement: Measurement,
+        noise: NoiseFloor,
+        tunables: Scaled,
+        lines: RecordLines,
+        *,
+        changed: Callable[[Model], CompiledModel] | None = None,
+    ) -> None:
+        self.model, self.measurement, self.tunables, self.lines = model, measurement, tunables, lines
+        self._compile = changed or _compiled
+        compiled = self._compile(model)
+        names = [terminal.name for terminal in compiled.outputs]
+        self.rows = tuple(names.index(name) for name in measurement.output_names)
+        self.weight = 1.0 / np.sqrt(noise.density(lines.cycles))[:, None]
+        self.measured = lines.spectrum(measurement.outputs)
+
+    @property
+    def scale(self) -> int:
+        """Complex numbers on all lines and outputs together."""
+        return int(self.measured.size)
+
+    def view(self, z: Matrix) -> LinearView:
+        """Give the linear part at parameters z."""
+        model = self.model.with_values(self.tunables.values(z)) if z.size else self.model
+        return LinearView(self._compile(model), self.lines, self.measurement.inputs, self.rows)
+
+    def way(self, view: LinearView, site: Site) -> Way:
+        """How a force at a site enters the equations of a view."""
+        return way_to(view, site, self.measurement.output_names)
+
+    def pattern(self, view: LinearView, site: Site) -> Spectrum:
+        """Whitened ``[output, 1, line]`` of a force at a site."""
+        return view.pattern(self.way(view, site))[:, None] * self.weight
+
+    def transients(self, view: LinearView) -> Spectrum:
+        """Whitened ``[state, output, 1, line]``, see `LinearView.transients`: each segment has its own."""
+        return view.transients()[:, :, None] * self.weight
+
+    def response(self, z: Matrix, transient: Matrix, forces: Sequence[tuple[Site, Spectrum]]) -> Spectrum:
+        """Whitened ``[output, segment, line]`` response at parameters z to inputs, transients and forces."""
+        view = self.view(z)
+        ways = [(self.way(view, site), force) for site, force in forces]
+        return np.asarray(view.response(transient, ways) * self.weight, dtype=np.complex128)
+
+    def slopes(self, z: Matrix, transient: Matrix, forces: Sequence[tuple[Site, Spectrum]]) -> Spectrum:
+        """``[tunable, output, segment, line]``: derivatives of `response` with all else held."""
+        here = self.response(z, transient, forces)
+        found = np.empty((z.size, *here.shape), dtype=np.complex128)
+        for place in range(z.size):
+            moved = z.copy()
+            moved[place] += _STEP
+            found[place] = (self.response(moved, transient, forces) - here) / _STEP
+        return found
+
+
+def _compiled(model: Model) -> CompiledModel:
+    return model.compile()

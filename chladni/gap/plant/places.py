@@ -1,0 +1,101 @@
+"""Places: the sites of a model, put together where a force would print the same pattern on these sensors."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.plant.linear_view import LinearView, Way
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.port import PortKind
+
+Spectrum = NDArray[np.complex128]
+#: Patterns that differ by less than this share of their power are the same but for rounding.
+_SAME = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Site:
+    """A joint, body, input, output or the ground.
+
+    Attributes
+    ----------
+    name, kind
+        As in the model.
+    """
+
+    name: str
+    kind: PortKind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Sites at which a missing force prints one and the same pattern: a joint to the ground and its body, say."""
+
+    sites: tuple[Site, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the sites."""
+        return tuple(site.name for site in self.sites)
+
+
+def sites_of(compiled: CompiledModel, outputs: Sequence[str]) -> tuple[Site, ...]:
+    """Give every site of a model at which an effect of the vocabulary may act.
+
+    Parameters
+    ----------
+    outputs
+        Names of the measured ones: an error of a sensor that isn't in the log shows nowhere.
+    """
+    ports = [
+        Site(name=port.name, kind=port.kind) for port in compiled.ports if port.kind in ("joint", "body", "ground")
+    ]
+    loops = {port.name for port in compiled.ports if port.kind == "input" and not port.name.endswith(".limit")}
+    names = dict.fromkeys([*(terminal.name for terminal in compiled.inputs), *sorted(loops)])
+    inputs = [Site(name=name, kind="input") for name in names]
+    return (*dict.fromkeys(ports), *inputs, *(Site(name=name, kind="output") for name in outputs))
+
+
+def way_to(view: LinearView, site: Site, outputs: Sequence[str]) -> Way:
+    """Give how a force (change, error) at a site enters the equations.
+
+    Parameters
+    ----------
+    outputs
+        Names of the measured ones, in the order of the view.
+    """
+    has_port = any((port.name, port.kind) == (site.name, site.kind) for port in view.compiled.ports)
+    if site.kind == "output" and not has_port:
+        return view.way_of_output(list(outputs).index(site.name))
+    if site.kind == "input" and not has_port:
+        return view.way_of_input(site.name)
+    return view.way_of_port(view.compiled.port_index(site.name, site.kind))
+
+
+def placed(view: LinearView, sites: Sequence[Site], outputs: Sequence[str]) -> tuple[Place, ...]:
+    """Put together sites whose patterns are proportional on every line."""
+    found: list[tuple[list[Site], Spectrum]] = []
+    for site in sites:
+        if _is_motion(view.compiled, site):
+            continue
+        printed = view.pattern(way_to(view, site, outputs))
+        size = np.sqrt(np.sum(np.abs(printed) ** 2, axis=0))
+        if not np.any(size > 0):
+            continue
+        unit = printed / np.where(size > 0, size, 1.0)
+        for group, known in found:
+            if np.mean(np.abs(np.sum(known.conj() * unit, axis=0)) ** 2) > 1 - _SAME:
+                group.append(site)
+                break
+        else:
+            found.append(([site], unit))
+    return tuple(Place(sites=tuple(group)) for group, _ in found)
+
+
+def _is_motion(compiled: CompiledModel, site: Site) -> bool:
+    """Whether the site is an input that prescribes a motion: its change moves through its derivatives too."""
+    return site.kind == "input" and any(
+        terminal.name == site.name and terminal.derivatives for terminal in compiled.inputs
+    )
