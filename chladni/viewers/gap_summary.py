@@ -1,0 +1,186 @@
+"""A diagnosis in sentences that read as an answer."""
+
+from collections.abc import Iterator, Sequence
+
+from chladni.gap.records.diagnosis import Cause, Closing, Diagnosis, FittedNumber
+from chladni.viewers.effect_words import PARAMETER, cause_phrase, effect_at, effect_heading
+from chladni.viewers.engineering import chance, engineering, percent
+
+# Above the first one says "most likely", above the second "probably", else "perhaps".
+LIKELY, PROBABLE = 0.9, 0.6
+# An error of less than so many times the noise makes any name uncertain.
+FAINT = 3.0
+# Candidates that are named when none explains the gap.
+NEAREST = 3
+
+
+def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Say what was found: the answer first, then how far it goes, what else it may be and what limits it.
+
+    Returns
+    -------
+    tuple of str
+        Sentences for a terminal, a report, a picture's title; plain text. The first one is the answer.
+    """
+    return tuple(_sentences(diagnosis))
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """Give the answer alone, in one sentence."""
+    return summary(diagnosis)[0]
+
+
+def naive_sentence(found: Diagnosis) -> str | None:
+    """Say what the largest drop of the error alone would have named, where that is something else."""
+    naive = found.naive
+    if naive is None or (naive.effect, naive.site) in {(cause.effect, cause.site) for cause in found.causes}:
+        return None
+    return f"The largest drop of the error alone would have named {effect_at(naive.effect, naive.site)}."
+
+
+def _sentences(found: Diagnosis) -> Iterator[str]:
+    match found.verdict:
+        case "effect":
+            yield from _effects(found)
+        case "parameters":
+            yield from _parameters(found)
+        case "none":
+            yield f"Nothing is missing: {_agreement(found.gap)}."
+            yield from _moved(found)
+        case "unknown":
+            yield from _unknown(found)
+    if found.verdict in ("effect", "parameters"):
+        yield from _closed(found.gap)
+    yield from _how(found.gap)
+    if found.advice:
+        yield found.advice
+
+
+def _effects(found: Diagnosis) -> Iterator[str]:
+    causes = found.causes
+    if len(causes) == 1:
+        (cause,) = causes
+        yield f"{_certainty(cause)} {cause_phrase(cause)} ({chance(cause.probability)})."
+    else:
+        least = min(causes, key=lambda cause: cause.probability)
+        told = _listed([f"{cause_phrase(cause)} ({chance(cause.probability)})" for cause in causes])
+        yield f"{_certainty(least)} {_COUNT.get(len(causes), 'several')} causes at once: {told}."
+    yield _closing(found)
+    if found.gap.before < FAINT * found.gap.noise:
+        yield f"The gap is faint: the error is {found.gap.before / found.gap.noise:.2g} times the noise."
+    for cause in causes:
+        yield from _reservations(cause)
+
+
+_COUNT = {2: "two", 3: "three", 4: "four"}
+
+
+def _certainty(cause: Cause) -> str:
+    if cause.probability >= LIKELY:
+        return "Most likely"
+    return "Probably" if cause.probability >= PROBABLE else "Perhaps"
+
+
+def _closing(found: Diagnosis) -> str:
+    gap, shares = found.gap, [cause.share for cause in found.causes if cause.share is not None]
+    subject = "It explains" if len(found.causes) == 1 else "Together they explain"
+    explained = f"{subject} {percent(min(sum(shares), 1.0))} of the gap; " if shares else ""
+    adding = "adding it brings" if len(found.causes) == 1 else "adding them brings"
+    brings = f"{adding} the error from {percent(gap.before)} to {percent(gap.after)}"
+    text = f"{explained}{brings}, noise {percent(gap.noise)}."
+    return text if explained else text[0].upper() + text[1:]
+
+
+def _reservations(cause: Cause) -> Iterator[str]:
+    others = [site for site in cause.group if site != cause.site]
+    if others:
+        yield f"These sensors can't tell {cause.site} from {_listed(others, word='or')}."
+    if cause.alternatives:
+        told = _listed([effect_at(one.effect, one.site) for one in cause.alternatives], word="or")
+        yield f"This log can't tell {effect_heading(cause.effect)} at {cause.site} from {told}."
+
+
+def _parameters(found: Diagnosis) -> Iterator[str]:
+    wrong = [cause for cause in found.causes if cause.effect == PARAMETER]
+    told = _listed([_wrong_value(cause, found) for cause in wrong])
+    yield f"Nothing is missing, but {told}: more than the stated tolerance allows."
+    gap = found.gap
+    yield (
+        f"With that the error falls from {percent(gap.before)} to {percent(gap.after)}, noise {percent(gap.noise)}."
+    )
+    for cause in wrong:
+        yield from _reservations(cause)
+
+
+def _wrong_value(cause: Cause, found: Diagnosis) -> str:
+    number = found.tuned_parameters.get(cause.site) or next(iter(cause.parameters.values()), None)
+    if number is None:
+        return f"{cause.site} has another value ({chance(cause.probability)})"
+    return f"{cause.site} is {_against_nominal(number)} ({chance(cause.probability)})"
+
+
+def _against_nominal(number: FittedNumber) -> str:
+    told = engineering(number.value, number.std, number.unit)
+    if number.nominal is None:
+        return told
+    return f"{told} where the model has {engineering(number.nominal, None, number.unit)}"
+
+
+def _moved(found: Diagnosis) -> Iterator[str]:
+    """The tuned value that lies farthest from its nominal, in words; tables hold the others."""
+    moved = {
+        name: number
+        for name, number in found.tuned_parameters.items()
+        if number.std is not None and number.nominal and number.value != number.nominal
+    }
+    if moved:
+        name = max(moved, key=lambda one: abs(moved[one].value / (moved[one].nominal or 1.0) - 1))
+        yield f"Tuned inside its tolerance, {name} is {_against_nominal(moved[name])}; that changed most."
+
+
+def _agreement(gap: Closing) -> str:
+    tuned = "" if gap.tuned == gap.before else f" ({percent(gap.before)} before its parameters were tuned)"
+    return f"the model's error is {percent(gap.after)}{tuned}, the noise {percent(gap.noise)}"
+
+
+def _unknown(found: Diagnosis) -> Iterator[str]:
+    gap = found.gap
+    yield (
+        f"There is a gap that no known effect explains: the error is {percent(gap.before)}, "
+        f"{percent(gap.tuned)} with the best parameters, and the noise {percent(gap.noise)}."
+    )
+    where = []
+    if found.where.sites:
+        site = max(found.where.sites, key=lambda one: one.share)
+        where.append(f"{percent(site.share)} of it can come from {site.name}")
+    if found.where.bands:
+        band = max(found.where.bands, key=lambda one: one.share)
+        where.append(f"{percent(band.share)} lies between {band.low_hz:.4g} and {band.high_hz:.4g} Hz")
+    if where:
+        text = ", and ".join(where)
+        yield f"{text[0].upper()}{text[1:]}."
+    nearest = [effect_at(one.effect, one.site) for one in found.ranking[:NEAREST]]
+    if nearest:
+        yield f"Nearest, but not good enough: {', '.join(nearest)}."
+
+
+def _closed(gap: Closing) -> Iterator[str]:
+    """How sure the share that closes is, or that nothing can be said of it."""
+    if gap.closed is None:
+        yield "The gap is too near to the noise to say which share of it closes."
+    elif gap.interval is not None:
+        low, high = (percent(end).removesuffix(" %") for end in gap.interval)
+        yield f"Closed: {percent(gap.closed)} of what noise leaves to close, 95 % interval {low} to {high} %."
+
+
+def _how(gap: Closing) -> Iterator[str]:
+    """How the closing was measured, where it wasn't by free run."""
+    if gap.by == "cross_sensor":
+        yield "The cause isn't among the log's inputs: the closing is that of each sensor predicted from the others."
+    elif gap.by == "windows" and gap.horizon_s is not None:
+        span = engineering(gap.horizon_s, None, "s")
+        yield f"Errors are those of windows of {span}, each from an estimated state; beyond, they drift apart."
+
+
+def _listed(parts: Sequence[str], *, word: str = "and") -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} {word} {parts[-1]}" if parts else ""

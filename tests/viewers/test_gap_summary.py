@@ -1,0 +1,179 @@
+"""A diagnosis in sentences and tables."""
+
+from dataclasses import replace
+
+import pytest
+
+from chladni.gap.records.diagnosis import Candidate, Cause, FittedNumber
+from chladni.models.effects.catalogue import CATALOGUE
+from chladni.viewers import effect_words
+from chladni.viewers import gap_tables as tables
+from chladni.viewers.effect_words import cause_law, cause_phrase, effect_at, effect_heading, effect_name
+from chladni.viewers.engineering import engineering, percent
+from chladni.viewers.gap_summary import headline, naive_sentence, summary
+from tests import made_diagnosis as made
+
+
+def cause(effect: str, site: str, **numbers: tuple[float, float | None, str]) -> Cause:
+    parameters = {name: FittedNumber(value=v, std=s, unit=u) for name, (v, s, u) in numbers.items()}
+    return made.friction(effect=effect, site=site, parameters=parameters, variant=None)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (cause("coulomb_friction", "elbow", force=(8.1, 0.2, "N")), "Coulomb friction of 8.10 ± 0.20 N at elbow"),
+        (cause("delay", "hammer", delay=(0.0031, 5e-5, "s")), "a delay of 3.100 ± 0.050 ms at hammer"),
+        (cause("backlash", "elbow", gap=(2e-4, 1e-6, "m")), "backlash of 200.0 ± 1.0 µm at elbow"),
+        (cause("gain_error", "acc", gain=(0.92, 0.01, "1")), "a gain error at acc (gain 0.920 ± 0.010)"),
+        (
+            cause("extra_mode", "wrist", mass=(0.31, 0.02, "kg"), frequency=(48.2, 0.3, "Hz")),
+            "an extra mode at wrist (mass 0.310 ± 0.020 kg, frequency 48.20 ± 0.30 Hz)",
+        ),
+        (cause("base_vibration", "ground"), "base vibration of the ground"),
+        (cause("magnetic_brake", "elbow", drag=(3.0, None, "N s/m")), "magnetic brake of 3 N s/m at elbow"),
+    ],
+)  # fmt: skip
+def test_a_cause_is_said_with_its_size_and_site(given: Cause, said: str) -> None:
+    assert cause_phrase(given) == said
+
+
+@pytest.mark.parametrize("effect", CATALOGUE)
+def test_every_word_of_the_catalogue_has_words_for_people(effect: str) -> None:
+    assert effect_name(effect)
+    assert "_" not in effect_name(effect)
+    assert effect_at(effect, "x").endswith(" x")
+    # A new word must not go without its article.
+    assert effect in effect_words._SPOKEN
+    assert not effect_heading(effect).startswith(("a ", "an "))
+
+
+def test_the_law_is_told_with_its_variant() -> None:
+    told = cause_law(made.friction(variant="bristle"))
+    assert told.startswith("dry friction of one size, whatever the speed: F = force w")
+    assert told.endswith("(bristle)")
+    crossed = replace(cause("cross_axis", "acc_x"), source="acc_y")
+    assert "heard from acc_y" in cause_law(crossed)
+    assert cause_law(made.friction(effect="magnetic_brake")) == ""
+
+
+def test_an_effect_is_the_answer_with_how_far_it_goes() -> None:
+    said = summary(made.diagnosis())
+    assert said == (
+        "Most likely Coulomb friction of 8.10 ± 0.20 N at elbow (97 %).",
+        "It explains 93 % of the gap; adding it brings the error from 28 % to 1.0 %, noise 1.0 %.",
+        "Closed: 99.5 % of what noise leaves to close, 95 % interval 99.0 to 99.8 %.",
+    )
+
+
+def test_how_sure_it_is_shows_in_the_first_word() -> None:
+    for probability, word in ((0.95, "Most likely"), (0.7, "Probably"), (0.4, "Perhaps")):
+        found = replace(made.diagnosis(), causes=(made.friction(probability=probability),))
+        assert headline(found).startswith(f"{word} Coulomb friction")
+
+
+def test_two_causes_are_told_together_with_the_less_certain_ones_word() -> None:
+    said = summary(made.two_causes())
+    assert said[0].startswith("Probably two causes at once: Coulomb friction")
+    assert "(97 %) and a gain error at acc_wrist" in said[0]
+    assert said[1].startswith("Together they explain 90 % of the gap; adding them brings")
+
+
+def test_sites_and_effects_that_cant_be_told_apart_are_named() -> None:
+    said = summary(made.indistinguishable())
+    assert "These sensors can't tell elbow from shoulder." in said
+    assert "This log can't tell Coulomb friction at elbow from hysteresis at elbow." in said
+
+
+def test_nothing_missing_is_told_with_what_was_tuned() -> None:
+    said = summary(made.agreeing())
+    assert said[0].startswith("Nothing is missing: the model's error is 1.0 %")
+    assert "elbow.stiffness is 20.400 ± 0.080 kN/m where the model has 20 kN/m" in said[1]
+    assert not any("closed" in one.lower() for one in said)
+
+
+def test_wrong_values_are_told_against_the_nominal_ones() -> None:
+    said = summary(made.wrong_values())
+    assert "elbow.stiffness is 31.000 ± 0.090 kN/m where the model has 20 kN/m (96 %)" in said[0]
+    alone = summary(replace(made.wrong_values(), tuned_parameters={}))
+    assert "elbow.stiffness is 31.000 ± 0.090 kN/m (96 %)" in alone[0]
+
+
+def test_an_unknown_gap_is_told_with_where_it_lies_and_what_is_nearest() -> None:
+    said = summary(made.unknown())
+    assert said[0].startswith("There is a gap that no known effect explains: the error is 28 %")
+    assert said[1] == "93 % of it can come from elbow, and 71 % lies between 8 and 16 Hz."
+    assert said[2].startswith("Nearest, but not good enough: Coulomb friction at elbow, hysteresis at elbow")
+    assert said[-1] == "Measure the wrist's rotation, too."
+
+
+def test_how_it_was_measured_is_told_where_it_was_not_by_free_run() -> None:
+    assert any("windows of 500 ms" in one or "windows of 0.5 s" in one for one in summary(made.drifting()))
+    assert any("predicted from the others" in one for one in summary(made.hidden_floor()))
+
+
+def test_a_gap_near_the_noise_is_called_faint() -> None:
+    found = made.diagnosis()
+    faint = replace(found, gap=replace(found.gap, before=0.018, noise=0.01, closed=None, interval=None))
+    said = summary(faint)
+    assert "The gap is faint: the error is 1.8 times the noise." in said
+    assert "The gap is too near to the noise to say which share of it closes." in said
+    assert not any("faint" in one for one in summary(found))
+
+
+def test_the_naive_answer_is_told_only_when_it_differs() -> None:
+    assert naive_sentence(made.diagnosis()) is not None
+    same = replace(made.diagnosis(), naive=Candidate(effect="coulomb_friction", site="elbow"))
+    assert naive_sentence(same) is None
+    assert naive_sentence(replace(same, naive=None)) is None
+
+
+def test_tables_are_in_the_order_that_one_reads() -> None:
+    found = made.diagnosis()
+    assert [row[0] for row in tables.channel_table(found)[1]] == ["acc_column", "acc_wrist"]
+    assert [row[1] for row in tables.channel_table(found)[1]] == sorted(
+        (percent(one.gap) for one in found.where.channels), reverse=True
+    )
+    assert [row[0] for row in tables.site_table(found)[1]] == ["elbow", "shoulder", "shaker", "acc_wrist"]
+    assert len(tables.band_table(found, least=0.15)[1]) == 2
+    assert len(tables.ranking_table(found)[1]) == tables.RANKED
+    assert tables.ranking_table(found, count=9)[1][-1] == ("delay", "shaker", "under 1 %", "–", "–")
+
+
+def test_parameters_that_moved_or_were_held_are_listed_and_no_others() -> None:
+    rows = tables.parameter_table(made.diagnosis())[1]
+    assert rows == [
+        ("elbow.stiffness", "20 kN/m", "20.400 ± 0.080 kN/m", "+2 %"),
+        ("shoulder.damping", "400 N s/m", "400 N s/m", "held: not determined"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "unit", "printed"),
+    [
+        (0.0, None, "N", "0 N"),
+        (0.0, 0.05, "N", "0.000 ± 0.050 N"),
+        (61234.0, 1500.0, "1", "61234 ± 1500"),
+        (1.5e12, 1e11, "1", "1.500e+12 ± 1.0e+11"),
+        (1.5e12, 1e11, "kg", "(1.500e+12 ± 1.0e+11) kg"),
+        (-3e-4, 1e-5, "m/s", "-300 ± 10 µm/s"),
+        (2.5e-9, float("nan"), "s", "2.5 ns"),
+        (3.1e-5, None, "kg", "3.1e-05 kg"),
+        (12.0, 1.0, "m^2", "12.0 ± 1.0 m²"),
+        (2e-4, None, "m^2", "0.0002 m²"),
+        (0.05, None, "mol", "0.05 mol"),
+    ],
+)
+def test_quantities_have_the_digits_and_prefix_they_deserve(
+    value: float, std: float | None, unit: str, printed: str
+) -> None:
+    assert engineering(value, std, unit) == printed
+
+
+@pytest.mark.parametrize(
+    ("share", "printed"),
+    [(1.0, "100 %"), (0.99949, "99.9 %"), (0.9996, "100 %"), (0.985, "98 %"), (1.12, "112 %"), (0.0996, "10 %"),
+     (-0.02, "-2.0 %"), (1e-12, "0 %")],
+)  # fmt: skip
+def test_percents_have_two_digits(share: float, printed: str) -> None:
+    assert percent(share) == printed
