@@ -1,0 +1,145 @@
+"""The document of a diagnosis, held against the format that programs rely on, key by key."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from chladni.apps.gap_document import gap_document
+from chladni.gap.records.diagnosis import Candidate, ChannelGap, Diagnosis, FittedNumber
+from tests import made_diagnosis as made
+
+# Of each key: what its value may be. A list holds things of one kind, a mapping of str any names.
+NUMBER, OPTIONAL = (float,), (float, type(None))
+CANDIDATE = {"effect": (str,), "site": (str,)}
+SCHEMA: Mapping[str, Any] = {
+    "format": (str,),
+    "model": (str,),
+    "logs": [(str,)],
+    "verdict": (str,),
+    "causes": [
+        {
+            "effect": (str,),
+            "site": (str,),
+            "probability": NUMBER,
+            "group": [(str,)],
+            "alternatives": [CANDIDATE],
+            "parameters": {str: {"value": NUMBER, "std": OPTIONAL, "unit": (str,)}},
+        }
+    ],
+    "ranking": [{"effect": (str,), "site": (str,), "probability": NUMBER, "gap": OPTIONAL, "log_evidence": OPTIONAL}],
+    "where": {
+        "channels": [{"name": (str,), "gap": NUMBER, "noise": NUMBER}],
+        "bands": [{"low_hz": NUMBER, "high_hz": NUMBER, "share": NUMBER}],
+        "sites": [{"name": (str,), "share": NUMBER}],
+        "regimes": [{"variable": (str,), "low": NUMBER, "high": NUMBER, "share": NUMBER}],
+    },
+    "gap": {
+        "before": NUMBER,
+        "tuned": NUMBER,
+        "after": NUMBER,
+        "noise": NUMBER,
+        "closed": OPTIONAL,
+        "interval": (list, type(None)),
+        "held_out": [{"log": (str,), "start_s": NUMBER, "end_s": NUMBER}],
+    },
+    "tuned_parameters": {str: {"nominal": OPTIONAL, "value": NUMBER, "std": OPTIONAL, "unit": (str,)}},
+    "next_measurement": (str, type(None)),
+}
+# What may stand beside the agreed keys, by the place it stands in.
+MORE = {
+    "": {"naive", "advice", "remarks", "distortion", "levels"},
+    ".causes": {"variant", "from", "share"},
+    ".gap": {"by", "horizon_s"},
+}
+KINDS = made.every_kind()
+
+
+def hold(value: Any, schema: Any, place: str = "") -> None:
+    """Compare a value with a schema: every key there, none that isn't known, every value of its kind."""
+    if isinstance(schema, tuple):
+        assert isinstance(value, schema), (place, value)
+    elif isinstance(schema, list):
+        assert isinstance(value, list), place
+        for one in value:
+            hold(one, schema[0], place)
+    elif str in schema:
+        for one in value.values():
+            hold(one, schema[str], place)
+    else:
+        assert set(schema) <= set(value) <= set(schema) | MORE.get(place, set()), (place, set(value) ^ set(schema))
+        for key, expected in schema.items():
+            hold(value[key], expected, f"{place}.{key}")
+
+
+def written(found: Diagnosis) -> Any:
+    return json.loads(json.dumps(gap_document(found), allow_nan=False))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_document_has_the_agreed_keys_and_kinds_of_values(kind: str) -> None:
+    hold(written(KINDS[kind]), SCHEMA)
+
+
+def test_the_numbers_are_those_of_the_diagnosis() -> None:
+    document = written(made.diagnosis())
+    assert document["format"] == "chladni.gap/1"
+    assert (document["model"], document["logs"], document["verdict"]) == ("arm", ["arm.mcap"], "effect")
+    (cause,) = document["causes"]
+    assert (cause["effect"], cause["site"], cause["probability"]) == ("coulomb_friction", "elbow", 0.97)
+    assert cause["parameters"]["force"] == {"value": 8.1, "std": 0.2, "unit": "N"}
+    assert cause["parameters"]["creep_speed"]["std"] is None
+    assert (cause["variant"], cause["share"]) == ("regularised", 0.93)
+    assert document["ranking"][1] == {
+        "effect": "hysteresis", "site": "elbow", "probability": 0.02, "gap": 0.031, "log_evidence": -130.2
+    }  # fmt: skip
+    assert document["where"]["regimes"] == [{"variable": "elbow.velocity", "low": -0.01, "high": 0.01, "share": 0.6}]
+    assert document["gap"]["interval"] == [0.99, 0.998]
+    assert document["gap"]["held_out"][0] == {"log": "arm.mcap", "start_s": 2.0, "end_s": 4.0}
+    assert document["tuned_parameters"]["elbow.stiffness"] == {
+        "nominal": 20000.0, "value": 20400.0, "std": 80.0, "unit": "N/m"
+    }  # fmt: skip
+    assert document["naive"] == {"effect": "hysteresis", "site": "elbow"}
+
+
+def test_groups_and_alternatives_are_lists_of_names_and_candidates() -> None:
+    (cause,) = written(made.indistinguishable())["causes"]
+    assert cause["group"] == ["elbow", "shoulder"]
+    assert cause["alternatives"] == [{"effect": "hysteresis", "site": "elbow"}]
+
+
+def test_how_it_was_measured_is_told_only_where_it_was_not_by_free_run() -> None:
+    assert "by" not in written(made.diagnosis())["gap"]
+    assert written(made.hidden_floor())["gap"]["by"] == "cross_sensor"
+    windows = written(made.drifting())["gap"]
+    assert (windows["by"], windows["horizon_s"]) == ("windows", 0.5)
+
+
+def test_what_is_not_known_is_null_and_never_nan() -> None:
+    found = made.agreeing()
+    assert written(found)["gap"]["closed"] is None
+    strange = replace(
+        found,
+        tuned_parameters={"elbow.damping": FittedNumber(value=1.0, std=float("inf"), unit="N s/m", nominal=None)},
+        where=replace(found.where, channels=(ChannelGap(name="a", gap=float("nan"), noise=0.1),)),
+    )
+    document = written(strange)
+    assert document["tuned_parameters"]["elbow.damping"]["std"] is None
+    assert document["where"]["channels"][0]["gap"] is None
+
+
+def test_whole_numbers_are_written_as_floats() -> None:
+    found = replace(made.diagnosis(), tuned_parameters={"a.mass": FittedNumber(value=2, std=None, unit="kg")})
+    assert isinstance(written(found)["tuned_parameters"]["a.mass"]["value"], float)
+
+
+def test_keys_beside_the_agreed_ones_are_there_only_with_content() -> None:
+    bare = replace(made.diagnosis(), naive=None, remarks=(), advice=None)
+    assert set(written(bare)) == set(SCHEMA)
+    full = written(replace(made.periodic(), advice="Measure longer.", naive=Candidate(effect="lag", site="shaker")))
+    assert set(full) == set(SCHEMA) | MORE[""]
+    assert full["distortion"][0] == {
+        "output": "acc_column", "linear": 0.93, "even": 0.001, "odd": 0.068, "noise": 0.001
+    }  # fmt: skip
