@@ -9,6 +9,7 @@
 
     model = chladni.load_model("arm.toml")                      # what the simulation believes
     run = chladni.simulate(model, log.read())                   # driven by the log's own inputs
+    found = chladni.diagnose_gap(model, log)                    # what the simulation forgot, and how far that closes
 
 The names below are the public surface; each is imported when it is first used, so that ``import chladni`` is cheap.
 """
@@ -20,6 +21,7 @@ __version__ = "0.1.0"
 # Public name -> module that defines it.
 _HOME = {
     "analyse": "chladni.apps.analyse",
+    "diagnose_gap": "chladni.apps.diagnose",
     "frf": "chladni.apps.spectra",
     "identify_modes": "chladni.apps.modes",
     "psd": "chladni.apps.spectra",
@@ -88,6 +90,7 @@ __all__ = [
     "attached",
     "coherence",
     "cross_spectra",
+    "diagnose_gap",
     "find_peaks",
     "find_response_peaks",
     "frf",
@@ -110,6 +113,7 @@ __all__ = [
 
 if TYPE_CHECKING:
     from chladni.apps.analyse import analyse
+    from chladni.apps.diagnose import diagnose_gap
     from chladni.apps.modes import identify_modes
     from chladni.apps.show import show
     from chladni.apps.spectra import frf, psd

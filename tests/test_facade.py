@@ -11,7 +11,7 @@ SURFACE = {
     "EnhancedFrequencyDomainDecomposition", "EstimateError", "FrequencyDomainDecomposition",
     "FrequencyResponse", "HalfPower", "LogError", "ModeSet", "ModelError", "PolyReferenceLeastSquares",
     "PowerSpectralDensity", "SetupError", "Study", "TimeSeries", "Wish", "analyse", "attached",
-    "coherence", "cross_spectra",
+    "coherence", "cross_spectra", "diagnose_gap",
     "find_peaks", "find_response_peaks", "frf", "identify_modes", "influence", "load_model", "load_setup", "mac",
     "open_log", "optimise", "psd",
     "relative_motion", "show", "simulate", "validate", "waterfall", "write_mcap", "write_model",

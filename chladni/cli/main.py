@@ -14,6 +14,7 @@ from chladni.cli.compare import compare
 from chladni.cli.convert import convert
 from chladni.cli.demo import demo
 from chladni.cli.frf import frf
+from chladni.cli.gap import gap
 from chladni.cli.influence import influence
 from chladni.cli.info import info
 from chladni.cli.modes import modes
@@ -33,7 +34,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (info, psd, frf, modes, view, compare, convert, simulate, influence, bench, demo):
+for command in (info, psd, frf, modes, view, compare, convert, simulate, influence, gap, bench, demo):
     app.command()(command)
 
 

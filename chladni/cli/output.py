@@ -2,10 +2,10 @@
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rich import box
 from rich.console import Console
@@ -16,9 +16,14 @@ from rich.text import Text
 if TYPE_CHECKING:
     from chladni.signals.study import Study
 
-Progress = Callable[[float], None]
-
 PROGRESS_AFTER_S = 1.0
+
+
+class Progress(Protocol):
+    """Shows how far a command is."""
+
+    def __call__(self, share: float, step: str = "") -> None:
+        """Show the share done, 0 to 1, and what is being done where there are several steps."""
 
 
 class Output:
@@ -98,10 +103,10 @@ class Output:
         task = bar.add_task(escape(title), total=1.0)
         begun = monotonic()
 
-        def show(share: float) -> None:
+        def show(share: float, step: str = "") -> None:
             if not bar.disable and not bar.live.is_started and monotonic() - begun > PROGRESS_AFTER_S:
                 bar.start()
-            bar.update(task, completed=share)
+            bar.update(task, completed=share, description=escape(f"{title}: {step}" if step else title))
 
         try:
             yield show

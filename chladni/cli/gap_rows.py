@@ -1,0 +1,51 @@
+"""A diagnosis as an answer and compact tables for people."""
+
+from typing import TYPE_CHECKING
+
+from chladni.cli.output import Output
+
+if TYPE_CHECKING:
+    from chladni.gap.records.diagnosis import Diagnosis
+    from chladni.viewers.gap_tables import Table
+
+# Bands and regimes with less of the gap than this don't tell where it lies.
+LEAST_SHARE = 0.05
+# Rows of a table of sites or regimes, as many as one reads.
+MOST_ROWS = 6
+
+
+def print_diagnosis(out: Output, found: "Diagnosis") -> None:
+    """Print the answer, where the gap lies, what was weighed, what was tuned, and what to measure next."""
+    from chladni.viewers import gap_tables as tables
+    from chladni.viewers.gap_summary import naive_sentence, summary
+
+    first, *rest = summary(found)
+    out.line(first, style="bold")
+    for sentence in rest:
+        out.line(sentence)
+    out.line()
+    _print(out, "Error of the nominal model by output, over the RMS of each", tables.channel_table(found))
+    _print(out, "Where in frequency", tables.band_table(found, least=LEAST_SHARE))
+    _print(out, "What an unknown force, error or change at one site can explain", tables.site_table(found))
+    _print(out, "While", tables.regime_table(found, least=LEAST_SHARE))
+    _print(out, "Linear, even, odd and noise, as shares of each output", tables.distortion_table(found))
+    _print(out, "Parameters of the causes", tables.cause_table(found))
+    _print(out, "What was weighed", tables.ranking_table(found))
+    if (naive := naive_sentence(found)) is not None:
+        out.line(naive)
+        out.line()
+    _print(out, "Parameters that moved, or that this log doesn't determine", tables.parameter_table(found))
+    if found.next_measurement is not None:
+        out.line("Measure next", style="bold")
+        out.line(found.next_measurement)
+    out.lines((*found.levels, *found.remarks))
+
+
+def _print(out: Output, title: str, table: "Table") -> None:
+    headings, rows = table
+    if not rows:
+        return
+    out.table(title, headings, rows[:MOST_ROWS])
+    if len(rows) > MOST_ROWS:
+        out.line(f"and {len(rows) - MOST_ROWS} more; all are in the report and the JSON document")
+    out.line()

@@ -1,0 +1,100 @@
+"""``chladni gap``: its answer, its files, its refusals."""
+
+from pathlib import Path
+
+import pytest
+
+from chladni.io.mcap.writer import write_mcap
+from chladni.models.files.model_file import load_model
+from tests import made_diagnosis as made
+from tests.cli.conftest import Run
+from tests.gap_stand_in import StandIn, put_in_place
+
+
+@pytest.fixture
+def engine(monkeypatch: pytest.MonkeyPatch) -> StandIn:
+    return put_in_place(monkeypatch, made.diagnosis())
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("gap")
+    write_mcap(made.log_series(), folder / "arm.mcap")
+    return made.write_arm_model(folder), folder / "arm.mcap"
+
+
+def test_the_summary_reads_as_an_answer(run: Run, engine: StandIn, files: tuple[Path, Path]) -> None:
+    outcome = run("gap", *files)
+    assert outcome.code == 0, outcome.err
+    lines = outcome.out.splitlines()
+    assert lines[0] == "Most likely Coulomb friction of 8.10 ± 0.20 N at elbow (97 %)."
+    assert lines[1].startswith(
+        "It explains 93 % of the gap; adding it brings the error from 28 % to 1.0 %, noise 1.0 %."
+    )
+    for words in (
+        "acc_wrist", "8 – 16", "elbow.velocity", "hysteresis", "-130.2", "held: not determined", "Measure next",
+        "Repeat at half the level", "alone would have named hysteresis at elbow", "was held.",
+    ):  # fmt: skip
+        assert words in outcome.out
+    # It didn't move by more than its sigma.
+    assert "shoulder.stiffness" not in outcome.out
+
+
+@pytest.mark.parametrize("kind", made.every_kind())
+def test_any_verdict_is_an_answer(
+    run: Run, monkeypatch: pytest.MonkeyPatch, files: tuple[Path, Path], kind: str
+) -> None:
+    put_in_place(monkeypatch, made.every_kind()[kind])
+    outcome = run("gap", *files, "--json", "-")
+    assert outcome.code == 0, outcome.err
+    assert outcome.document["verdict"] == made.every_kind()[kind].verdict
+    assert "acc_wrist" in outcome.err
+
+
+def test_options_reach_the_diagnosis(run: Run, engine: StandIn, files: tuple[Path, Path]) -> None:
+    assert run("gap", *files, "--without", "delay", "--without", "lag", "--seed", 4, "--end", 2).code == 0
+    assert engine.options["leave_out"] == frozenset({"delay", "lag"})
+    assert engine.options["seed"] == 4
+    assert engine.measurements[0].duration_s == 2.0
+
+
+def test_several_logs_are_taken_together(run: Run, engine: StandIn, files: tuple[Path, Path], tmp_path: Path) -> None:
+    write_mcap(made.log_series(), tmp_path / "loud.mcap")
+    assert run("gap", *files, tmp_path / "loud.mcap").code == 0
+    assert [one.log for one in engine.measurements] == ["arm.mcap", "loud.mcap"]
+
+
+def test_the_explained_model_is_written(run: Run, engine: StandIn, files: tuple[Path, Path], tmp_path: Path) -> None:
+    target = tmp_path / "explained.toml"
+    outcome = run("gap", *files, "--write-model", target)
+    assert (outcome.code, f"model: {target}" in outcome.out) == (0, True)
+    assert [one.effect for one in load_model(target).effects] == ["coulomb_friction"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--without", "coulomb_fricton"], "did you mean coulomb_friction"),
+        (["--figure", "gap.bmp"], "a figure is one of .png, .svg, .pdf"),
+        (["--save", "none/gap.rrd"], "there is no folder none"),
+        (["--write-model", "none/gap.toml"], "there is no folder none"),
+        (["--seed", "-1"], "--seed"),
+        (["--start", "9"], "9"),
+    ],
+)
+def test_mistakes_are_told_in_one_line_before_anything_is_diagnosed(
+    run: Run, engine: StandIn, files: tuple[Path, Path], arguments: list[str], words: str
+) -> None:
+    outcome = run("gap", *files, *arguments)
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert words in outcome.err
+    assert engine.model is None
+
+
+@pytest.mark.parametrize("missing", [0, 1])
+def test_a_file_that_is_not_there_is_told(run: Run, engine: StandIn, files: tuple[Path, Path], missing: int) -> None:
+    given = list(files)
+    given[missing] = given[missing].with_name("absent.toml")
+    outcome = run("gap", *given)
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert "absent.toml" in outcome.err
