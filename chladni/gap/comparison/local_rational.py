@@ -1,0 +1,104 @@
+"""What no linear system explains of the outputs: a local rational fit of the spectra, without a model."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from chladni.gap.comparison.residual_spectra import ResidualSpectra
+
+Matrix = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# Terms of each local polynomial: 1, r, r^2.
+TERMS = 3
+POLES = 2
+# Lines in a block over its unknowns. Few follow a light resonance, many leave more to see the noise by.
+LINES_A_TERM = 3
+# Poles are kept in a block where they lower the residual of an output, for its freedom, below this share.
+WORTH_POLES = 0.7
+
+
+def local_fit(inputs: Matrix, outputs: Matrix) -> ResidualSpectra | None:
+    """Fit, block by block of lines, a rational function from the inputs to each output, and give the residual.
+
+    Over the lines k + r of a block, with r scaled to -1..1,
+
+        D(r) Y(k + r) = sum_i N_i(r) U_i(k + r) + T(r),   D = 1 + d_1 r + d_2 r^2,
+
+    N and T of second degree. T holds what start and end of the record leak (the whole record is transformed
+    without window, which makes it smooth). d comes from this equation by linear least squares, then N and T from
+    the output error ``Y - (N U + T)/D`` (McKelvey & Guerin 2012; Pintelon & Schoukens 2012, section 7.2). Where D = 1
+    leaves less for its freedom, D is 1.
+
+    Parameters
+    ----------
+    inputs, outputs
+        ``[input, sample]``, ``[output, sample]``.
+
+    Returns
+    -------
+    ResidualSpectra or None
+        None when the record has fewer lines than one block.
+    """
+    samples = outputs.shape[1]
+    unknowns = TERMS * (len(inputs) + 1)
+    lines = LINES_A_TERM * (unknowns + POLES)
+    # The line at 0 Hz is a matter of offsets, the last one has no imaginary part.
+    blocks = ((samples - 1) // 2 - 1) // lines
+    if blocks < 1:
+        return None
+    used = slice(1, 1 + blocks * lines)
+    scale = np.std(inputs, axis=1, keepdims=True)
+    spectra_in = fft.rfft(inputs / np.where(scale > 0, scale, 1.0), axis=1)[:, used] / np.sqrt(samples)
+    spectra_out = fft.rfft(outputs, axis=1)[:, used] / np.sqrt(samples)
+    u = spectra_in.reshape(-1, blocks, lines).transpose(1, 2, 0)
+    y = spectra_out.reshape(-1, blocks, lines).transpose(1, 2, 0)
+    r = np.linspace(-1, 1, lines)
+    plain = _beside(_regressors(u, r), y)
+    shaped = np.stack([_output_error(u, y[:, :, place], r) for place in range(len(outputs))], axis=2)
+    free = lines - unknowns
+    # Where little but noise answers, poles are fitted to noise. All outputs go together, so that what they share
+    # stays shared.
+    power = np.sum(np.abs(plain) ** 2, axis=1), np.sum(np.abs(shaped) ** 2, axis=1)
+    with_poles = np.any(power[1] / (free - POLES) < WORTH_POLES * power[0] / free, axis=1)
+    freedom = np.where(with_poles[:, None], free - POLES, free) * np.ones((1, len(outputs)))
+    residual = np.where(with_poles[:, None, None], shaped, plain).astype(np.complex128)
+    return ResidualSpectra(
+        residual=residual / np.sqrt(freedom[:, None, :]),
+        freedom=freedom,
+        edges=(0.5 + np.arange(blocks + 1) * lines) / samples,
+    )
+
+
+def _regressors(u: Complex, r: Matrix) -> Complex:
+    """``[block, line, term]``: inputs ``[block, line, input]`` and 1, each times 1, r, r^2."""
+    signals = np.concatenate([u, np.ones((*u.shape[:2], 1))], axis=2)
+    return np.asarray((signals[:, :, :, None] * _powers(r, 0, TERMS)[:, None, :]).reshape(*u.shape[:2], -1))
+
+
+def _output_error(u: Complex, y: Complex, r: Matrix) -> Complex:
+    """Residual ``[block, line]`` of one output with poles of its own; `u` is ``[block, line, input]``."""
+    regressors, target = _regressors(u, r), y[:, :, None]
+    shifted = target * _powers(r, 1, 1 + POLES)
+    d = _solved(_beside(regressors, shifted), _beside(regressors, target))
+    denominator = 1 - _powers(r, 1, 1 + POLES) @ d
+    return np.asarray(_beside(regressors / denominator, target)[:, :, 0])
+
+
+def _powers(r: Matrix, first: int, end: int) -> Complex:
+    """``[line, power]``."""
+    return np.asarray(r[:, None] ** np.arange(first, end), dtype=np.complex128)
+
+
+def _beside(regressors: Complex, targets: Complex) -> Complex:
+    """Part of the targets ``[block, line, target]`` that the regressors don't reach."""
+    q, _ = np.linalg.qr(regressors)
+    return np.asarray(targets - q @ (q.conj().transpose(0, 2, 1) @ targets))
+
+
+def _solved(regressors: Complex, targets: Complex) -> Complex:
+    q, r = np.linalg.qr(regressors)
+    # An output that is exactly zero has nothing to fit poles to.
+    tiny = 1e-12 * np.abs(r).max(axis=(1, 2), keepdims=True) + np.finfo(float).tiny
+    loaded = r + tiny * np.eye(r.shape[-1])
+    return np.asarray(np.linalg.solve(loaded, q.conj().transpose(0, 2, 1) @ targets))

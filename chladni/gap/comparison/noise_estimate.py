@@ -1,0 +1,210 @@
+"""How loud the noise of each measured output is, estimated without a model."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from chladni.gap.comparison.autoregressive import noise_floor_of
+from chladni.gap.comparison.local_rational import local_fit
+from chladni.gap.comparison.periodicity import periods_of
+from chladni.gap.comparison.residual_spectra import ResidualSpectra
+from chladni.gap.records.measurement import Measurement
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.errors import EstimateError
+from chladni.spectral.windows import window_samples
+
+Matrix = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# Degrees of freedom wanted in a block of lines between periods; as many as a local fit has.
+BLOCK_FREEDOM = 24
+# Scatter about the mean period over scatter from one period to the next, of a machine that doesn't drift: 1.
+DRIFT_RATIO = 1.25
+# What the other outputs share of a residual must be more than this share of its RMS to be worth a word.
+SHARED = 0.1
+# A block is quiet where the response stands out of what is left by less than this in power.
+QUIET = 3.0
+LEAST_QUIET = 0.05
+# Residuals in loud bands that exceed the quiet ones by this power ratio may hold distortion.
+LOUDER = 1.5
+# Top of the band that a log too short for anything else is judged by.
+TOP_QUARTER = 0.75
+RESIDUAL_SEGMENT = 512
+SHORTEST_SEGMENT = 16
+GRID = 1024
+
+
+def estimate_noise(measurement: Measurement) -> NoiseFloor:
+    """Estimate the floor that no model can get under.
+
+    With a periodic input (two steady periods or more): scatter between periods, which nonlinear distortion, being
+    periodic too, stays out of (Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed.,
+    chapter 4); from one period to the next where the machine drifts slowly. Otherwise: the residual of a local
+    rational fit of every frequency response. It holds distortion too, so it's an upper bound, unless it's as low
+    where the machine responds as where it's quiet.
+
+    Of either, only that is kept which the other outputs don't share, since a force that nobody modelled (distortion,
+    a floor that shakes) reaches all sensors, while each has its own noise; the method then is ``incoherent
+    residual``.
+
+    Returns
+    -------
+    NoiseFloor
+        `std` is the relative standard deviation of `rms` by its degrees of freedom; bias by distortion isn't in it.
+    """
+    outputs = measurement.outputs
+    steady = _steady_periods(measurement)
+    spectra = None if steady is None else _between_periods(steady)
+    if spectra is not None:
+        return _floor(spectra, outputs, "periods", np.zeros(len(outputs), dtype=np.bool_))
+    spectra = local_fit(measurement.inputs, outputs)
+    if spectra is None:
+        return _of_top_quarter(outputs)
+    floor = _floor(spectra, outputs, "fit residual", np.ones(len(outputs), dtype=np.bool_))
+    # What the other outputs share of a residual is distortion, and some of it may be left.
+    shared = np.array([method == "incoherent residual" for method in floor.method])
+    return replace(floor, upper_bound=shared | _louder_than_quiet(spectra, outputs))
+
+
+def noise_of_residual(residual: Matrix, *, sample_rate_hz: float, method: str = "explained residual") -> NoiseFloor:
+    """Estimate the noise from ``[output, sample]`` that a fitted model leaves; it's an upper bound.
+
+    The spectrum is averaged over Hann segments of 512 samples (or an eighth of the record) with half overlap.
+    `sample_rate_hz` must be positive; densities are in cycles a sample, so it doesn't change the result.
+    """
+    if not sample_rate_hz > 0:
+        raise EstimateError(f"sample_rate_hz {sample_rate_hz} must be positive")
+    samples = residual.shape[1]
+    length = min(samples, max(SHORTEST_SEGMENT, min(RESIDUAL_SEGMENT, samples // 8)))
+    window = window_samples("hann", length)
+    hop = max(1, length // 2)
+    segments = np.lib.stride_tricks.sliding_window_view(residual, length, axis=1)[:, ::hop]
+    density = np.mean(np.abs(fft.rfft(segments * window, axis=2)) ** 2, axis=1)
+    mean_square = np.mean(residual**2, axis=1, keepdims=True)
+    spread = _on_grid(density, _line_edges(length))
+    # The mean square itself is known better than its spread over lines; the window shifts some at the ends.
+    mean_density = fft.irfft(spread, axis=1)[:, :1]
+    scaled = np.divide(mean_square, mean_density, out=np.zeros_like(mean_square), where=mean_density > 0) * spread
+    with np.errstate(invalid="ignore", divide="ignore"):
+        lines = np.sum(density, axis=1) ** 2 / np.sum(density**2, axis=1)
+    return noise_floor_of(
+        scaled,
+        samples=samples,
+        # Lines of one segment, as independent as its window lets them be, times segments without overlap.
+        freedom=np.nan_to_num(2 * lines * samples / length, nan=1.0),
+        method=(method,) * len(residual),
+        upper_bound=np.ones(len(residual), dtype=np.bool_),
+        scale=np.sqrt(mean_square[:, 0]),
+    )
+
+
+def _line_edges(length: int) -> Matrix:
+    """Edges of the lines of a segment, halfway between neighbours."""
+    inner = (np.arange(length // 2) + 0.5) / length
+    return np.concatenate([[0.0], inner, [0.5]])
+
+
+def smaller_floor(first: NoiseFloor, second: NoiseFloor) -> NoiseFloor:
+    """Give, output by output, the floor that is lower; both hold the same outputs."""
+    lower = second.rms < first.rms
+    lags = max(first.whitening.shape[1], second.whitening.shape[1])
+    padded = [np.pad(one.whitening, ((0, 0), (0, lags - one.whitening.shape[1]))) for one in (first, second)]
+    methods = zip(lower, first.method, second.method, strict=True)
+    return NoiseFloor(
+        rms=np.where(lower, second.rms, first.rms),
+        whitening=np.where(lower[:, None], padded[1], padded[0]),
+        innovation_rms=np.where(lower, second.innovation_rms, first.innovation_rms),
+        method=tuple(theirs if lowest else ours for lowest, ours, theirs in methods),
+        std=np.where(lower, second.std, first.std),
+        upper_bound=np.where(lower, second.upper_bound, first.upper_bound),
+    )
+
+
+def _steady_periods(measurement: Measurement) -> Matrix | None:
+    """``[output, period, sample]`` after the transient ones; None with fewer than two."""
+    if measurement.period_samples is None:
+        return None
+    steady = periods_of(measurement.outputs, measurement.period_samples)[:, measurement.transient_periods :]
+    return steady if steady.shape[1] >= 2 else None
+
+
+def _between_periods(periods: Matrix) -> ResidualSpectra | None:
+    """Spectra of what differs between periods; None when a period is too short for that."""
+    count, samples = periods.shape[1:]
+    about_mean = (periods - periods.mean(axis=1, keepdims=True)) * np.sqrt(count / (count - 1))
+    steps = np.diff(periods, axis=1) / np.sqrt(2)
+    drifts = np.mean(about_mean**2) > DRIFT_RATIO**2 * np.mean(steps**2)
+    scatter = steps if drifts else about_mean
+    # Neighbouring steps share a period: of n - 1 of them, two thirds count (von Neumann 1941).
+    worth = (count - 1) * (2 / 3 if drifts and count > 2 else 1.0) / scatter.shape[1]
+    lines = max(1, int(np.ceil(BLOCK_FREEDOM / (worth * scatter.shape[1]))))
+    blocks = (samples - 1) // 2 // lines
+    if blocks < 1:
+        return None
+    spectra = fft.rfft(scatter, axis=2)[:, :, 1 : 1 + blocks * lines] / np.sqrt(samples)
+    parts = spectra.reshape(*spectra.shape[:2], blocks, lines).transpose(2, 1, 3, 0)
+    residual = parts.reshape(blocks, -1, len(periods))
+    return ResidualSpectra(
+        residual=residual / np.sqrt(residual.shape[1]),
+        freedom=np.full((blocks, len(periods)), residual.shape[1] * worth),
+        edges=(0.5 + np.arange(blocks + 1) * lines) / samples,
+    )
+
+
+def _floor(spectra: ResidualSpectra, outputs: Matrix, method: str, upper_bound: Mask) -> NoiseFloor:
+    whole, own = spectra.densities(), spectra.incoherent_densities()
+    lower = own.mean(axis=1) < (1 - SHARED) ** 2 * whole.mean(axis=1)
+    density = np.where(lower[:, None], own, whole)
+    freedom = spectra.freedom.T - np.where(lower[:, None], len(outputs) - 1, 0)
+    # Power in few blocks is known by the freedom of those only; each complex number counts twice.
+    with np.errstate(invalid="ignore", divide="ignore"):
+        effective = 2 * np.sum(density, axis=1) ** 2 / np.sum(density**2 / freedom, axis=1)
+    return noise_floor_of(
+        _on_grid(density, spectra.edges),
+        samples=outputs.shape[1],
+        freedom=np.nan_to_num(effective, nan=1.0),
+        method=tuple("incoherent residual" if one else method for one in lower),
+        upper_bound=upper_bound | lower,
+        scale=np.std(outputs, axis=1),
+    )
+
+
+def _louder_than_quiet(spectra: ResidualSpectra, outputs: Matrix) -> Mask:
+    """Whether each residual is louder where the machine responds: then it may hold distortion."""
+    samples = outputs.shape[1]
+    left = spectra.densities()
+    blocks, lines = left.shape[1], spectra.residual.shape[1]
+    power = np.abs(fft.rfft(outputs, axis=1)[:, 1 : 1 + blocks * lines]) ** 2 / samples
+    response = power.reshape(len(outputs), blocks, lines).mean(axis=2)
+    own = spectra.incoherent_densities()
+    answer = np.ones(len(outputs), dtype=np.bool_)
+    for place in range(len(outputs)):
+        quiet = response[place] < QUIET * left[place]
+        if LEAST_QUIET < quiet.mean() < 1:
+            loud = float(min(left[place, ~quiet].mean(), own[place, ~quiet].mean()))
+            answer[place] = loud > LOUDER * left[place, quiet].mean()
+    return answer
+
+
+def _of_top_quarter(outputs: Matrix) -> NoiseFloor:
+    """Take the top quarter of the band for white noise: all that a very short log gives."""
+    samples = outputs.shape[1]
+    power = np.abs(fft.rfft(outputs - outputs.mean(axis=1, keepdims=True), axis=1)) ** 2 / samples
+    top = power[:, int(TOP_QUARTER * power.shape[1]) :]
+    return noise_floor_of(
+        np.repeat(top.mean(axis=1, keepdims=True), GRID + 1, axis=1),
+        samples=samples,
+        freedom=np.full(len(outputs), 2.0 * top.shape[1]),
+        method=("quiet band",) * len(outputs),
+        upper_bound=np.ones(len(outputs), dtype=np.bool_),
+        scale=np.std(outputs, axis=1),
+    )
+
+
+def _on_grid(density: Matrix, edges: Matrix) -> Matrix:
+    """Spread ``[output, block]`` over evenly spaced lines from 0 to half the rate; ends take the nearest block."""
+    lines = np.linspace(0, 0.5, GRID + 1)
+    block = np.clip(np.searchsorted(edges, lines, side="right") - 1, 0, density.shape[1] - 1)
+    return np.asarray(density[:, block])
