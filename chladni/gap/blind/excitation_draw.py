@@ -1,0 +1,102 @@
+"""Random excitations of a bench."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.blind.plan import GROUND
+from chladni.gap.blind.structure_draw import Bench
+from chladni.models.excitations.impact import Impact
+from chladni.models.excitations.multisine import Multisine
+from chladni.models.excitations.random_noise import RandomNoise
+from chladni.models.excitations.swept_sine import SweptSine
+
+Matrix = NDArray[np.float64]
+#: Samples simulated beyond the log, so that a clock that is early has something to show.
+BEYOND = 64
+_WORDS, _SHARES = ("random", "multisine", "sweep", "steps", "impacts"), (0.42, 0.28, 0.15, 0.08, 0.07)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """What drives a bench: samples that begin before the log when it starts in motion.
+
+    Attributes
+    ----------
+    signals
+        ``[driving signal, sample]``, in the order of ``plan.driven()``.
+    before
+        Samples before the log's first.
+    words
+        Kind of each.
+    """
+
+    signals: Matrix
+    before: int
+    words: tuple[str, ...]
+
+
+def draw_drive(rng: np.random.Generator, bench: Bench) -> Drive:
+    """Draw kind, band and level of every driving signal; a third of the logs start in motion."""
+    before = int(rng.uniform(1.0, 3.0) * bench.rate_hz) if rng.random() < 1 / 3 else 0
+    rows: list[Matrix] = []
+    words: list[str] = []
+    for name in bench.plan.driven():
+        word = str(rng.choice(_WORDS, p=_SHARES))
+        reference = bench.plan.loop is not None and name == bench.plan.loop.name
+        # A second, quieter input mostly.
+        level = _level(rng, bench, name) * (rng.uniform(0.3, 1.0) if rows else 1.0)
+        band_hz = _band(rng, bench, reference=reference)
+        if reference and word in ("impacts", "steps"):
+            word = "random"
+        rows.append(level * _unit(rng, word, bench, before + bench.samples + BEYOND, band_hz))
+        words.append(word)
+    return Drive(signals=np.vstack(rows), before=before, words=tuple(words))
+
+
+def _level(rng: np.random.Generator, bench: Bench, name: str) -> float:
+    plan = bench.plan
+    if plan.loop is not None and name == plan.loop.name:
+        return float(np.exp(rng.uniform(np.log(1e-3), np.log(3e-2))))
+    if any(one.name == name and one.at == GROUND for one in plan.inputs):
+        return float(np.exp(rng.uniform(np.log(0.5), np.log(10.0))))
+    return float(np.exp(rng.uniform(np.log(0.2), np.log(5.0))) if plan.rotary else np.exp(rng.uniform(1.5, 5.5)))
+
+
+def _band(rng: np.random.Generator, bench: Bench, *, reference: bool) -> tuple[float, float]:
+    if reference:
+        return 0.05 * bench.modes_hz[0], min(1.5 * bench.modes_hz[0], 0.2 * bench.rate_hz)
+    return (
+        float(bench.modes_hz[0] * rng.uniform(0.1, 0.5)),
+        float(min(bench.modes_hz[-1] * rng.uniform(1.1, 1.6), 0.3 * bench.rate_hz)),
+    )
+
+
+def _unit(rng: np.random.Generator, word: str, bench: Bench, count: int, band_hz: tuple[float, float]) -> Matrix:
+    """Samples of unit RMS, or a peak of a few for what is mostly zero."""
+    if word == "random":
+        return RandomNoise(band_hz=band_hz).samples(count, bench.rate_hz, rng)
+    if word == "multisine":
+        # Several periods in the log, a whole number of samples each.
+        period = bench.samples // int(rng.integers(3, 9))
+        lines = ("full", "odd", "odd-detection")[int(rng.integers(3))]
+        sines = Multisine(period_s=period / bench.rate_hz, band_hz=band_hz, lines=lines)  # type: ignore[arg-type]
+        return sines.samples(count, bench.rate_hz, rng)
+    if word == "sweep":
+        law = ("linear", "logarithmic")[int(rng.integers(2))]
+        sweep = SweptSine(amplitude=np.sqrt(2.0), start_hz=band_hz[0], end_hz=band_hz[1], law=law)  # type: ignore[arg-type]
+        return sweep.samples(count, bench.rate_hz, rng)
+    if word == "steps":
+        return _steps(rng, count, round(bench.rate_hz * rng.uniform(0.2, 0.8)))
+    width_s = max(4.0 / bench.rate_hz, 0.4 / band_hz[1])
+    every_s = rng.uniform(0.6, 1.5)
+    blows = Impact(peak=8.0, width_s=width_s, at_s=rng.uniform(0.05, 0.3), every_s=every_s)
+    return blows.samples(count, bench.rate_hz, rng)
+
+
+def _steps(rng: np.random.Generator, count: int, hold: int) -> Matrix:
+    """Levels at random, each held for a while; from zero."""
+    levels = rng.uniform(-1.7, 1.7, size=count // hold + 1)
+    levels[0] = 0.0
+    return np.asarray(np.repeat(levels, hold)[:count], dtype=np.float64)
