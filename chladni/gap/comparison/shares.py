@@ -1,0 +1,232 @@
+"""Where the gap lies: by channel, by band of frequency, by regime of motion, and over time and frequency.
+
+Outputs differ in unit and size: each is scaled by the RMS of what was measured, and powers of scaled outputs add up.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy import fft
+
+from chladni.gap.records.diagnosis import BandShare, ChannelGap, RegimeShare
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.errors import EstimateError
+from chladni.spectral.windows import window_samples
+
+Matrix = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+BANDS = 10
+# Bands span the frequencies between which all but this share of measured power and gap lies, on either side.
+TAIL = 1e-3
+FEWEST_LINES = 3
+# Quantiles of a variable between which regimes are cut; beside them stands the one around zero.
+QUANTILES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
+AROUND_ZERO = 0.2
+MOST_REGIMES = 6
+# A regime is told when its share exceeds its share of time by this factor, and by so many standard errors.
+LEAST_EXCESS = 1.25
+LEAST_SIGMAS = 3.0
+BLOCKS = 16
+# Slices of the map over time; twice the square root of the samples balances them with lines.
+LONGEST_SLICE = 1024
+SHORTEST_SLICE = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Regime:
+    """A regime found, and by how much its share of the gap exceeds its share of time."""
+
+    told: RegimeShare
+    excess: float
+    inside: tuple[float, float]
+
+
+def relative_residual(residual: Matrix, measured: Matrix) -> Matrix:
+    """Give ``[output, sample]`` residuals over the RMS of what was measured; an output of zero stays as it is."""
+    if residual.shape != measured.shape:
+        raise EstimateError(
+            f"residual has shape {residual.shape}, measured {measured.shape}; both are [output, sample]"
+        )
+    rms = np.sqrt(np.mean(measured**2, axis=1, keepdims=True))
+    return np.asarray(residual / np.where(rms > 0, rms, 1.0))
+
+
+def pooled_gap(residual: Matrix, measured: Matrix) -> float:
+    """RMS of the residual over the RMS of what was measured, all outputs pooled after scaling each by its own."""
+    return float(np.sqrt(np.mean(relative_residual(residual, measured) ** 2)))
+
+
+def channel_gaps(
+    residual: Matrix, measured: Matrix, noise: NoiseFloor, *, output_names: Sequence[str]
+) -> tuple[ChannelGap, ...]:
+    """Give gap and noise of each output, over the RMS of what was measured; arrays are ``[output, sample]``."""
+    gaps = np.sqrt(np.mean(relative_residual(residual, measured) ** 2, axis=1))
+    floors = relative_residual(np.broadcast_to(noise.rms[:, None], measured.shape), measured)[:, 0]
+    return tuple(
+        ChannelGap(name=name, gap=float(gap), noise=float(floor))
+        for name, gap, floor in zip(output_names, gaps, floors, strict=True)
+    )
+
+
+def band_shares(
+    residual: Matrix, measured: Matrix, *, sample_rate_hz: float, modes_hz: Sequence[float] = ()
+) -> tuple[BandShare, ...]:
+    """Split the gap's power over frequency.
+
+    Parameters
+    ----------
+    residual, measured
+        ``[output, sample]``.
+    sample_rate_hz
+        Samples a second.
+    modes_hz
+        Natural frequencies: bands end halfway between neighbours (geometric mean). Without any, ten bands of equal
+        ratio between the frequencies that hold all but 0.1 % of what was measured and of the gap.
+
+    Returns
+    -------
+    tuple of BandShare
+        From 0 Hz to half the rate without gaps; shares add up to 1, or are all 0 when there is no gap.
+    """
+    samples = residual.shape[1]
+    frequency_hz = fft.rfftfreq(samples, 1 / sample_rate_hz)
+    gap, whole = (_line_power(relative_residual(one, measured)) for one in (residual, measured))
+    edges_hz = _mode_edges_hz(modes_hz, frequency_hz) if len(modes_hz) else _log_edges_hz(gap, whole, frequency_hz)
+    band = np.clip(np.searchsorted(edges_hz, frequency_hz, side="right") - 1, 0, edges_hz.size - 2)
+    power = np.bincount(band, weights=gap, minlength=edges_hz.size - 1)
+    shares = power / power.sum() if power.sum() > 0 else power
+    return tuple(
+        BandShare(low_hz=float(low), high_hz=float(high), share=float(share))
+        for low, high, share in zip(edges_hz[:-1], edges_hz[1:], shares, strict=True)
+    )
+
+
+def regime_shares(residual: Matrix, measured: Matrix, variables: Mapping[str, Matrix]) -> tuple[RegimeShare, ...]:
+    """Find the regimes of motion in which the gap is larger than elsewhere.
+
+    Each variable is cut at its quantiles (0, 10, 25, 50, 75, 90, 100 %), and around zero at the 20 % of smallest
+    magnitude. A regime counts when it holds at least 1.25 times as large a share of the gap's power as of time, by
+    three standard errors over 16 stretches of the record.
+
+    Parameters
+    ----------
+    residual, measured
+        ``[output, sample]``.
+    variables
+        Name, such as ``elbow.velocity``, to ``[sample]``, SI.
+
+    Returns
+    -------
+    tuple of RegimeShare
+        At most six, by falling excess over their share of time; one of two that overlap. Empty when the gap doesn't
+        depend on the variables.
+    """
+    power = np.mean(relative_residual(residual, measured) ** 2, axis=0)
+    if not power.sum() > 0:
+        return ()
+    found = []
+    for name, values in variables.items():
+        if values.shape != power.shape:
+            raise EstimateError(f"variable {name!r} has {values.size} samples, the residual {power.size}")
+        found += _apart([_regime(name, values, power, edges) for edges in _regimes(values)])
+    found.sort(key=lambda regime: -regime.excess)
+    return tuple(regime.told for regime in found[:MOST_REGIMES])
+
+
+def gap_map(residual: Matrix, measured: Matrix, sample_rate_hz: float) -> tuple[Matrix, Matrix, Matrix]:
+    """Give the gap's density over time and frequency.
+
+    Hann segments with half overlap, about as many slices as lines.
+
+    Returns
+    -------
+    time_s, frequency_hz
+        ``[time]`` middle of each slice, ``[frequency]``.
+    density
+        ``[time, frequency]`` 1/Hz, mean over outputs of the one-sided density of the scaled residual: over frequency
+        it integrates to the square of the pooled gap of that slice.
+    """
+    samples = residual.shape[1]
+    length = 2 ** round(np.log2(2 * np.sqrt(samples)))
+    length = min(max(length, SHORTEST_SLICE), LONGEST_SLICE, samples)
+    window, hop = window_samples("hann", length), max(1, length // 2)
+    segments = sliding_window_view(relative_residual(residual, measured), length, axis=1)[:, ::hop]
+    density = np.mean(np.abs(fft.rfft(segments * window, axis=2)) ** 2, axis=0)
+    density *= 2 / (sample_rate_hz * np.sum(window**2))
+    # 0 Hz and half the rate stand for themselves only.
+    density[:, 0] /= 2
+    if length % 2 == 0:
+        density[:, -1] /= 2
+    time_s = (np.arange(len(density)) * hop + length / 2) / sample_rate_hz
+    return time_s, fft.rfftfreq(length, 1 / sample_rate_hz), density
+
+
+def _line_power(scaled: Matrix) -> Matrix:
+    """``[line]`` power of all outputs together, each line's twin at negative frequency included."""
+    power = np.sum(np.abs(fft.rfft(scaled, axis=1)) ** 2, axis=0)
+    power[1:] *= 2
+    if scaled.shape[1] % 2 == 0:
+        power[-1] /= 2
+    return np.asarray(power)
+
+
+def _mode_edges_hz(modes_hz: Sequence[float], frequency_hz: Matrix) -> Matrix:
+    modes = np.sort(np.asarray(modes_hz, dtype=np.float64))
+    inner = np.sqrt(modes[:-1] * modes[1:])
+    top_hz, apart_hz = float(frequency_hz[-1]), FEWEST_LINES * float(frequency_hz[1])
+    return _spaced([*inner, *(2 * modes[-1:])], top_hz, apart_hz)
+
+
+def _log_edges_hz(gap: Matrix, whole: Matrix, frequency_hz: Matrix) -> Matrix:
+    power = gap / max(gap.sum(), np.finfo(float).tiny) + whole / max(whole.sum(), np.finfo(float).tiny)
+    rising = np.cumsum(power[1:]) / max(float(power[1:].sum()), np.finfo(float).tiny)
+    low_hz, high_hz = (float(frequency_hz[1 + int(np.searchsorted(rising, at))]) for at in (TAIL, 1 - TAIL))
+    top_hz, apart_hz = float(frequency_hz[-1]), FEWEST_LINES * float(frequency_hz[1])
+    return _spaced(np.geomspace(max(low_hz, apart_hz), max(high_hz, 2 * apart_hz), BANDS + 1), top_hz, apart_hz)
+
+
+def _spaced(inner_hz: Sequence[float] | Matrix, top_hz: float, apart_hz: float) -> Matrix:
+    """Put edges between 0 and the top, without those that would leave a band of less than some lines."""
+    edges = [0.0]
+    for edge in inner_hz:
+        if edges[-1] + apart_hz <= edge <= top_hz - apart_hz:
+            edges.append(float(edge))
+    return np.array([*edges, top_hz])
+
+
+def _regimes(values: Matrix) -> list[tuple[float, float]]:
+    edges = np.unique(np.quantile(values, QUANTILES))
+    near = float(np.quantile(np.abs(values), AROUND_ZERO))
+    bins = [(float(low), float(high)) for low, high in pairwise(edges)]
+    # A variable that never changes sign has no motion around zero.
+    return [*bins, (-near, near)] if near > 0 and values.min() < 0 < values.max() else bins
+
+
+def _regime(name: str, values: Matrix, power: Matrix, edges: tuple[float, float]) -> _Regime:
+    low, high = edges
+    inside = (values >= low) & (values <= high)
+    share, time = float(power[inside].sum() / power.sum()), float(inside.mean())
+    excess = share - time
+    # Over stretches of the record, since neighbouring samples tell the same.
+    parts = np.array_split(power * (inside - time), BLOCKS)
+    sums = np.array([part.sum() for part in parts]) / power.sum()
+    error = float(np.sqrt(BLOCKS) * np.std(sums, ddof=1))
+    told = RegimeShare(variable=name, low=low, high=high, share=share)
+    counts = share >= LEAST_EXCESS * time and excess > LEAST_SIGMAS * error
+    return _Regime(told=told, excess=excess if counts else 0.0, inside=edges)
+
+
+def _apart(regimes: list[_Regime]) -> list[_Regime]:
+    """Give those that count, the strongest of any that overlap."""
+    kept: list[_Regime] = []
+    for regime in sorted(regimes, key=lambda one: -one.excess):
+        low, high = regime.inside
+        overlaps = any(low < other.inside[1] and other.inside[0] < high for other in kept)
+        if regime.excess > 0 and not overlaps:
+            kept.append(regime)
+    return kept
