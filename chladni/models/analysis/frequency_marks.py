@@ -1,13 +1,14 @@
 """Where a frequency response passes levels of phase and magnitude: margins, critical frequency, bandwidth, peak."""
 
+import cmath
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
+from chladni.models.analysis.bracketed_root import bracketed_root
 from chladni.models.analysis.frequency_curve import FrequencyCurve
 from chladni.models.analysis.resolvent import Resolvent
 
@@ -15,6 +16,8 @@ Matrix = NDArray[np.float64]
 
 # Phases that touch a level by rounding only (two integrators lie at -180 degrees for ever) don't cross it.
 ROUNDING_DEG = 1e-7
+# Of a frequency, when a crossing is found.
+ROUNDING = 1e-15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,21 +67,23 @@ class FrequencyMarks:
         """Give angular frequencies at which the unwrapped phase passes a level."""
         away = self._curve.phase_deg - level_deg
         away = np.where(np.abs(away) < ROUNDING_DEG, 0.0, away)
-        turn = np.exp(-1j * np.radians(level_deg))
-        return [
-            self._refined(lambda omega: float(np.angle(self.response(omega) * turn)), point)
-            for point in _sign_changes(away)
-            if not falling_only or away[point + 1] < 0
-        ]
+        turn = complex(np.exp(-1j * np.radians(level_deg)))
+
+        def measure(omega: float) -> tuple[float, float]:
+            value, slope = self._value_and_slope(omega)
+            return cmath.phase(value * turn), (slope / value).imag if value else 0.0
+
+        return self._crossings(measure, away, falling_only=falling_only)
 
     def magnitude_crossings(self, level: float, *, falling_only: bool = False) -> list[float]:
         """Give angular frequencies at which the magnitude passes a level."""
-        away = np.abs(self._curve.response) - level
-        return [
-            self._refined(lambda omega: abs(self.response(omega)) - level, point)
-            for point in _sign_changes(away)
-            if not falling_only or away[point + 1] < 0
-        ]
+
+        def measure(omega: float) -> tuple[float, float]:
+            value, slope = self._value_and_slope(omega)
+            size = abs(value)
+            return size - level, (value.conjugate() * slope).real / size if size else 0.0
+
+        return self._crossings(measure, np.abs(self._curve.response) - level, falling_only=falling_only)
 
     def gain_margins(self) -> list[Margin]:
         """Give every crossing of -180 degrees, whole turns more or less included, by rising frequency."""
@@ -107,23 +112,40 @@ class FrequencyMarks:
         omega = self._turning(float(self._omega[top - 1]), float(self._omega[top + 1]))
         return omega, abs(self.response(omega))
 
+    def _value_and_slope(self, omega: float) -> tuple[complex, complex]:
+        """Give the response and its derivative to omega, dead time included."""
+        value, slope, _ = self._resolvent.derivatives(omega)
+        turn = cmath.exp(-1j * omega * self._dead_time_s)
+        return value * turn, (slope - 1j * self._dead_time_s * value) * turn
+
+    def _crossings(
+        self, measure: Callable[[float], tuple[float, float]], away: Matrix, *, falling_only: bool
+    ) -> list[float]:
+        """Refine each change of sign of `away` on the grid by what `measure` gives exactly."""
+        found = []
+        for point in _sign_changes(away):
+            low, high = float(self._omega[point]), float(self._omega[point + 1])
+            before, after = float(away[point]), float(away[point + 1])
+            if falling_only and after >= 0:
+                continue
+            guess = low + (high - low) * before / (before - after) if before != after else low
+            found.append(
+                bracketed_root(measure, low, high, begins_below=after > 0, guess=guess, rounding=ROUNDING * high)
+            )
+        return found
+
     def _turning(self, low: float, high: float) -> float:
         """Angular frequency between two at which the magnitude stops rising."""
 
-        def rise(omega: float) -> float:
-            value, slope = self._resolvent.value_and_slope(omega)
-            return float((value.conjugate() * slope).real) / abs(value) ** 2
+        def measure(omega: float) -> tuple[float, float]:
+            value, slope, curvature = self._resolvent.derivatives(omega)
+            rise = (value.conjugate() * slope).real
+            return rise, abs(slope) ** 2 + (value.conjugate() * curvature).real
 
-        if rise(low) * rise(high) > 0:
+        if measure(low)[0] * measure(high)[0] > 0:
             return 0.5 * (low + high)
-        return float(brentq(rise, low, high, xtol=1e-15 * high, rtol=1e-14))
-
-    def _refined(self, away: Callable[[float], float], point: int) -> float:
-        low, high = float(self._omega[point]), float(self._omega[point + 1])
-        if away(low) * away(high) > 0:
-            # Only rounding parts them: the crossing lies at an end.
-            return low if abs(away(low)) < abs(away(high)) else high
-        return float(brentq(away, low, high, xtol=1e-15 * high, rtol=1e-14))
+        middle = 0.5 * (low + high)
+        return bracketed_root(measure, low, high, begins_below=False, guess=middle, rounding=ROUNDING * high)
 
 
 def _sign_changes(signal: Matrix) -> list[int]:

@@ -6,6 +6,7 @@ from math import ceil, log2
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.models.analysis.bracketed_root import bracketed_root
 from chladni.models.analysis.exponential import exponential, moved
 from chladni.signals.value import Value
 
@@ -15,9 +16,8 @@ Matrix = NDArray[np.float64]
 STAGE_POINTS = 32
 # Of the shortest time constant: the first step.
 FIRST_STEP = 0.1
-# Of the time, when a crossing is found; bisection alone would need about as many steps as a double has bits.
+# Of the time, when a crossing is found.
 ROUNDING = 2e-16
-MOST_STEPS = 60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -85,22 +85,18 @@ class Trajectory(Value):
 
     def crossing(self, row: Matrix, level: float, point: int) -> float:
         """Time between a point and the next at which ``row . w`` passes `level`."""
-        start, width = self.states[:, point], float(self.time_s[point + 1] - self.time_s[point])
-        before, after = float(row @ start) - level, float(row @ self.states[:, point + 1]) - level
-        rate = row @ self.generator
-        low, high = 0.0, width
-        # Newton's steps, kept inside what is known to hold the crossing.
-        at = width * before / (before - after) if before != after else 0.0
-        for _ in range(MOST_STEPS):
-            state = moved(self.generator * at, start)
-            away, slope = float(row @ state) - level, float(rate @ state)
-            low, high = (at, high) if (away < 0) == (before < 0) else (low, at)
-            further = at - away / slope if slope else low
-            further = further if low <= further <= high else 0.5 * (low + high)
-            if abs(further - at) <= ROUNDING * (float(self.time_s[point]) + width):
-                return float(self.time_s[point]) + further
-            at = further
-        return float(self.time_s[point]) + at
+        start, begun = self.states[:, point], float(self.time_s[point])
+        width, rate = float(self.time_s[point + 1]) - begun, row @ self.generator
+        ends = self.states[:, point : point + 2]
+        (before, after), (first, last) = (row @ ends - level).tolist(), (width * (rate @ ends)).tolist()
+
+        def measure(after_s: float) -> tuple[float, float]:
+            state = moved(self.generator * after_s, start)
+            return float(row @ state) - level, float(rate @ state)
+
+        below, rounding = before < 0, ROUNDING * (begun + width)
+        guess = width * _cubic_root(before, after, first, last)
+        return begun + bracketed_root(measure, 0.0, width, begins_below=below, guess=guess, rounding=rounding)
 
 
 def trajectory(
@@ -124,6 +120,17 @@ def trajectory(
     if remaining > 0:
         _extend(times, states, transition, step_s, remaining)
     return Trajectory(generator=generator, time_s=np.concatenate(times), states=np.concatenate(states, axis=1))
+
+
+def _cubic_root(before: float, after: float, first: float, last: float) -> float:
+    """Where, from 0 to 1, the cubic with these values and slopes at its ends passes zero."""
+    square, cube = 3 * (after - before) - 2 * first - last, 2 * (before - after) + first + last
+
+    def measure(x: float) -> tuple[float, float]:
+        return before + x * (first + x * (square + x * cube)), first + x * (2 * square + 3 * x * cube)
+
+    line = before / (before - after) if before != after else 0.0
+    return bracketed_root(measure, 0.0, 1.0, begins_below=before < 0, guess=line, rounding=1e-9)
 
 
 def powers(transition: Matrix, start: Matrix, count: int) -> Matrix:
