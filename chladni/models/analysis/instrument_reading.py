@@ -68,9 +68,9 @@ def read_instrument(
     if not set(LINEAR_VIEWS) & set(instrument.views):
         own, offered = _own(instrument, model, charts)
         return InstrumentReading(charts=own, quantities=(), flags=unusual, offered=offered)
-    one = _analysed(instrument, model, output, NOW)
+    one = _analysed(instrument, model, output, NOW, charts)
     kept = [
-        _analysed(instrument, instrument.model(other.values, other.options), output, other.name).setting
+        _analysed(instrument, instrument.model(other.values, other.options), output, other.name, charts).setting
         for other in variants
     ]
     planned = list(planned_charts(instrument, [one.setting, *kept]))
@@ -107,18 +107,29 @@ def _own(
     return shown, titles or tuple((chart.name, chart.title) for chart in own)
 
 
-def _analysed(instrument: Instrument, model: Model, output: str | None, label: str) -> _Analysed:
+def _analysed(
+    instrument: Instrument, model: Model, output: str | None, label: str, charts: Collection[str] | None
+) -> _Analysed:
     compiled = model.compile()
     source = instrument.step_input or compiled.inputs[0].name
     paths = linear_path(compiled, from_input=source)
     path = paths.to(output or _told_output(instrument, paths))
     found = path_behaviour(path, size=instrument.step_size)
     simulation = step_simulation(model, compiled, from_input=source, size=instrument.step_size, path=paths)
-    step, quantities = _step(compiled, paths, simulation, found, instrument.step_size)
+    drawn = paths if charts is None else paths.seen_by({path.outputs[0].name, *_stepped(charts)})
+    step, quantities = _step(compiled, drawn, simulation, found, instrument.step_size)
     shown = Shown(label=label, step=step, curve=found.frequency.curve, path=path)
     return _Analysed(
         setting=Setting(shown=shown, compiled=compiled), quantities=quantities, flags=tuple(model.flags(simulation))
     )
+
+
+def _stepped(charts: Collection[str]) -> Iterator[str]:
+    """Outputs whose step responses are asked for: a large scheme has dozens, a page shows a few."""
+    for name in charts:
+        kind, _, output = name.partition(".")
+        if kind == "step":
+            yield output
 
 
 def _step(

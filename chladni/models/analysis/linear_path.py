@@ -1,6 +1,6 @@
 """The linear way from one input of a system to its outputs, in states whose numbers are of like size."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from math import log2
 from typing import Self
@@ -86,6 +86,17 @@ class LinearPath(Value):
             scale=self.scale[seen],
             looped=self.looped,
             exact=self.exact,
+        )
+
+    def seen_by(self, outputs: Collection[str]) -> Self:
+        """Give the way to some of the outputs, with all states; unlike those of `to` they are the same for any."""
+        rows = [row for row, output in enumerate(self.outputs) if output.name in outputs]
+        return replace(
+            self,
+            c=self.c[rows],
+            d=self.d[rows],
+            dead_time_s=self.dead_time_s[rows],
+            outputs=tuple(self.outputs[row] for row in rows),
         )
 
     def rate(self) -> Self | None:

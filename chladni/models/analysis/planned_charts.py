@@ -76,7 +76,7 @@ def _in_time(instrument: Instrument, settings: Sequence[Setting]) -> Iterator[Pl
     first, shown = settings[0], [one.shown for one in settings]
     path, steps = first.shown.path, [(one.label, one.step) for one in shown]
     source, output = path.source, path.outputs[0].name
-    for terminal in first.shown.step.outputs:
+    for terminal in first.compiled.outputs:
         name = f"step.{terminal.name}"
         title = stepped(terminal.name, source.name, instrument.step_size, source.unit)
         yield PlannedChart(name=name, title=title, draw=partial(_response, name, steps, terminal.name))

@@ -1,6 +1,7 @@
 """Exact response of every output to a step or an impulse of one input."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,9 +64,9 @@ def step_response(path: LinearPath, *, size: float = 1.0, seconds: float | None 
         When a dead time acts inside a loop; such a system is simulated instead.
     """
     chosen = _chosen(path, seconds)
-    return _response(
-        path, step_trajectory(path, chosen, size=size), np.append(path.c, path.d[:, None], axis=1), chosen
-    )
+    # The size last: whoever reads behaviour off the unit step has followed the same states already.
+    rows = size * np.append(path.c, path.d[:, None], axis=1)
+    return _response(path, step_trajectory(path, chosen), rows, chosen)
 
 
 def impulse_response(path: LinearPath, *, area: float = 1.0, seconds: float | None = None) -> TransientResponse:
@@ -87,21 +88,25 @@ def impulse_response(path: LinearPath, *, area: float = 1.0, seconds: float | No
     return _response(path, motion, path.c, chosen, notes)
 
 
-def step_trajectory(path: LinearPath, chosen: Horizon, *, size: float = 1.0) -> Trajectory:
-    """Follow the states, and last the constant input, after a step.
+def step_trajectory(path: LinearPath, chosen: Horizon) -> Trajectory:
+    """Follow the states, and last the constant input, after a unit step.
 
     ::
 
-        d/dt [x; u] = [A b; 0 0] [x; u],   [x; u](0) = [0; size]
+        d/dt [x; u] = [A b; 0 0] [x; u],   [x; u](0) = [0; 1]
     """
     count = path.b.size
     generator = np.zeros((count + 1, count + 1))
     generator[:count, :count], generator[:count, count] = path.a, path.b
-    start = np.zeros(count + 1)
-    start[count] = size
+    return _unit_step(generator.tobytes(), count + 1, chosen)
+
+
+# Of one setting the numbers and the charts need the same motion.
+@lru_cache(maxsize=2)
+def _unit_step(generator: bytes, states: int, chosen: Horizon) -> Trajectory:
     return trajectory(
-        generator,
-        start,
+        np.frombuffer(generator).reshape(states, states),
+        np.eye(states)[-1],
         seconds=chosen.seconds,
         fastest_s=chosen.fastest_s,
         longest_step_s=chosen.longest_step_s,
