@@ -1,6 +1,7 @@
 """Loops of a scheme, and whether those without any lag determine their signals."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,15 +24,22 @@ def loops_of(blocks: Matrix, *, through: NDArray[np.bool_] | None = None) -> lis
     through
         ``[block]``: only loops through these blocks alone are wanted; all blocks by default.
     """
-    from scipy.sparse.csgraph import connected_components
-
-    # Strongly connected blocks: each reaches every other one, which is what a common loop means.
     links = blocks != 0
     if through is not None:
         links = links & through[:, None] & through[None, :]
+    return [list(group) for group in _groups(links.tobytes(), len(links))]
+
+
+# Which block feeds which stays as it is while numbers change, and is asked several times for each setting.
+@lru_cache(maxsize=64)
+def _groups(pattern: bytes, count: int) -> tuple[tuple[int, ...], ...]:
+    from scipy.sparse.csgraph import connected_components
+
+    links = np.frombuffer(pattern, dtype=bool).reshape(count, count)
+    # Strongly connected blocks: each reaches every other one, which is what a common loop means.
     _, label = connected_components(links, directed=True, connection="strong")
-    groups = [[int(place) for place in np.flatnonzero(label == group)] for group in np.unique(label)]
-    return [group for group in groups if len(group) > 1 or links[group[0], group[0]]]
+    groups = [tuple(int(place) for place in np.flatnonzero(label == group)) for group in np.unique(label)]
+    return tuple(group for group in groups if len(group) > 1 or links[group[0], group[0]])
 
 
 def require_well_posed(direct: Matrix, blocks: Matrix, names: Sequence[str]) -> None:

@@ -1,5 +1,7 @@
 """Matrix algebra that keeps zeros zero: rounding must not link signals that nothing links."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,24 +32,31 @@ def structural_inverse(matrix: Matrix) -> Matrix:
     ModelError
         When the matrix is singular.
     """
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import maximum_bipartite_matching
-
-    count = matrix.shape[0]
-    # Matched to each column: the row that gives its entry on the diagonal.
-    row = maximum_bipartite_matching(csr_array(matrix != 0), perm_type="row")
-    if np.any(row < 0):
-        raise ModelError("the equations do not determine every signal")
-    links = (matrix[row] != 0) | np.eye(count, dtype=bool)
-    reached = np.zeros_like(links)
-    # Squaring the pattern doubles the length of the chains in it; it's done when nothing new is reached.
-    while not np.array_equal(links, reached):
-        reached = links
-        links = (reached.astype(np.float32) @ reached.astype(np.float32)) > 0
+    row, reached = _structure((matrix != 0).tobytes(), matrix.shape[0])
     try:
         inverse = np.linalg.inv(matrix[row])
     except np.linalg.LinAlgError:
         raise ModelError("the equations do not determine every signal") from None
     back = np.empty_like(row)
-    back[row] = np.arange(count)
+    back[row] = np.arange(row.size)
     return np.asarray(np.where(reached, inverse, 0.0)[:, back], dtype=np.float64)
+
+
+# A pattern stays as it is while a knob turns.
+@lru_cache(maxsize=64)
+def _structure(pattern: bytes, count: int) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """Row that gives each column its entry on the diagonal, and which entries of the inverse may not be zero."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import maximum_bipartite_matching
+
+    entries = np.frombuffer(pattern, dtype=bool).reshape(count, count)
+    row = np.asarray(maximum_bipartite_matching(csr_array(entries), perm_type="row"), dtype=np.int32)
+    if np.any(row < 0):
+        raise ModelError("the equations do not determine every signal")
+    links = entries[row] | np.eye(count, dtype=bool)
+    reached = np.zeros_like(links)
+    # Squaring the pattern doubles the length of the chains in it; it's done when nothing new is reached.
+    while not np.array_equal(links, reached):
+        reached = links
+        links = (reached.astype(np.float32) @ reached.astype(np.float32)) > 0
+    return row, reached
