@@ -10,7 +10,7 @@ from bokeh.models.annotations import Legend, LegendItem
 from bokeh.plotting import figure
 
 from chladni.models.core.reading import Chart, Curve
-from chladni.viewers.bench.curve_points import inline, thinned
+from chladni.viewers.bench.curve_points import inline, straightened, thinned
 from chladni.viewers.bench.theme import Theme
 from chladni.viewers.bench.words import printed
 
@@ -47,6 +47,7 @@ class Tile:
     def __init__(self, chart: Chart, theme: Theme) -> None:
         self._theme = theme
         self.key = key_of(chart)
+        self._scales = (chart.x_scale, chart.y_scale)
         self.lines, self.points = ColumnDataSource(_no_lines()), ColumnDataSource(_no_points())
         self.ghost_lines, self.ghost_points = ColumnDataSource(_no_lines()), ColumnDataSource(_no_points())
         self.figure = _figure(chart)
@@ -58,7 +59,7 @@ class Tile:
         # By place, so that a curve keeps its colour while a knob turns.
         colours = [self._theme.palette[place % len(self._theme.palette)] for place in range(len(chart.curves))]
         labels = [curve.label for curve in chart.curves]
-        lines, points = _data(chart.curves, labels, colours)
+        lines, points = self._data(chart.curves, labels, colours)
         _replace(self.lines, lines)
         _replace(self.points, points)
         # A single curve is named by the chart.
@@ -69,7 +70,7 @@ class Tile:
         """Replace the faded curves of kept variants."""
         curves = [(curve, ghost) for ghost in ghosts for curve in ghost.chart.curves]
         labels = [f"{ghost.label}: {curve.label}" if curve.label else ghost.label for curve, ghost in curves]
-        lines, points = _data([curve for curve, _ in curves], labels, [ghost.colour for _, ghost in curves])
+        lines, points = self._data([curve for curve, _ in curves], labels, [ghost.colour for _, ghost in curves])
         _replace(self.ghost_lines, lines)
         _replace(self.ghost_points, points)
 
@@ -91,6 +92,26 @@ class Tile:
         self.legend = Legend(items=items, location="top_left" if beside else "top_right")
         self.figure.add_layout(self.legend, "right" if beside else "center")
         self.figure.add_tools(HoverTool(renderers=[line, point], tooltips=[("", "@label"), ("", "$x, $y")]))
+
+    def _data(self, curves: Sequence[Curve], labels: Sequence[str], colours: Sequence[str]) -> tuple[Data, Data]:
+        """Give columns of the lines and columns of the points."""
+        lines, points = _no_lines(), _no_points()
+        for curve, label, colour in zip(curves, labels, colours, strict=True):
+            if curve.points:
+                points["x"].append(curve.x)
+                points["y"].append(curve.y)
+                points["label"] += [label] * curve.x.size
+                points["colour"] += [colour] * curve.x.size
+                points["marker"] += [_marker(curve.label)] * curve.x.size
+            else:
+                x, y = straightened(*thinned(curve.x, curve.y), *self._scales)
+                lines["xs"].append(inline(x))
+                lines["ys"].append(inline(y))
+                lines["label"].append(label)
+                lines["colour"].append(colour)
+        for name in ("x", "y"):
+            points[name] = inline(np.concatenate(points[name]) if points[name] else np.empty(0))
+        return lines, points
 
 
 def key_of(chart: Chart) -> tuple[str, ...]:
@@ -134,31 +155,19 @@ def _figure(chart: Chart) -> Any:
     return made
 
 
-def _data(curves: Sequence[Curve], labels: Sequence[str], colours: Sequence[str]) -> tuple[Data, Data]:
-    """Give columns of the lines and columns of the points."""
-    lines, points = _no_lines(), _no_points()
-    for curve, label, colour in zip(curves, labels, colours, strict=True):
-        if curve.points:
-            points["x"].append(curve.x)
-            points["y"].append(curve.y)
-            points["label"] += [label] * curve.x.size
-            points["colour"] += [colour] * curve.x.size
-            points["marker"] += [_marker(curve.label)] * curve.x.size
-        else:
-            x, y = thinned(curve.x, curve.y)
-            lines["xs"].append(inline(x))
-            lines["ys"].append(inline(y))
-            lines["label"].append(label)
-            lines["colour"].append(colour)
-    for name in ("x", "y"):
-        points[name] = inline(np.concatenate(points[name]) if points[name] else np.empty(0))
-    return lines, points
-
-
 def _replace(source: ColumnDataSource, data: Data) -> None:
-    # An empty source that stays empty needs no message.
-    if data["label"] or source.data["label"]:
+    # What stays as it is needs no message, such as poles while a gain turns.
+    if not _same(source.data, data):
         source.data = data
+
+
+def _same(one: Any, other: Data) -> bool:
+    if one["label"] != other["label"] or one["colour"] != other["colour"]:
+        return False
+    if "x" in other:
+        return all(np.array_equal(one[name], other[name]) for name in ("x", "y"))
+    pairs = (pair for name in ("xs", "ys") for pair in zip(one[name], other[name], strict=True))
+    return all(np.array_equal(first, second, equal_nan=True) for first, second in pairs)
 
 
 def _marker(label: str) -> str:

@@ -3,9 +3,11 @@
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from bokeh.core.serialization import Deserializer, Serializer
 
-from chladni.viewers.bench.curve_points import STRETCHES, inline, thinned
+from chladni.models.core.reading import Scale
+from chladni.viewers.bench.curve_points import ROUNDS, STRAIGHT, STRETCHES, inline, straightened, thinned
 
 
 def test_an_array_travels_inside_its_message() -> None:
@@ -47,3 +49,41 @@ def test_short_curves_loops_and_gaps_stay_as_they_are() -> None:
     gap[100] = np.nan
     for x, y in ((angle[:3999], np.sin(angle[:3999])), (np.cos(angle), np.sin(angle)), (angle, gap)):
         assert thinned(x, y)[0] is x
+
+
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_what_is_left_is_the_curve_that_was(scale: Scale) -> None:
+    x = np.geomspace(1e-3, 1e3, 601)
+    y = 1 / np.hypot(1 - x**2, 0.1 * x)
+    left_x, left_y = straightened(x, y, scale, scale)
+    assert left_x.size < 0.6 * x.size
+    assert (left_x[0], left_x[-1], left_y.max()) == (x[0], x[-1], y.max())
+    # As drawn: straight between the points that stay, on the chart's own axes, of height and width one.
+    x, y, left_x, left_y = (np.log10(one) if scale == "log" else one for one in (x, y, left_x, left_y))
+    heights = np.abs(np.interp(x, left_x, left_y) - y) / np.ptp(y)
+    slopes = np.abs(np.gradient(y, x)) * np.ptp(x) / np.ptp(y)
+    # A distance from a line is that along the ordinate but for its slope; each round adds one.
+    assert np.all(heights <= ROUNDS * STRAIGHT * np.hypot(1, 2 * slopes) + 1e-12)
+
+
+def test_a_line_keeps_its_ends_and_a_point_beside_it() -> None:
+    x = np.linspace(0.0, 1.0, 500)
+    y = 2 * x
+    assert straightened(x, y)[0].size <= 2 * 32
+    y[251] += 1e-3
+    assert y[251] in straightened(x, y)[1]
+
+
+def test_gaps_turns_and_empty_curves_stay() -> None:
+    x = np.linspace(0.0, 1.0, 201)
+    gap = 2 * x
+    gap[101] = np.nan
+    left_x, left_y = straightened(x, gap)
+    assert np.isnan(left_y).sum() == 1
+    # Both of its neighbours, or the gap would be wider.
+    assert {x[100], x[101], x[102]} <= set(left_x)
+    there_and_back = np.concatenate([x, x[::-1]])
+    assert straightened(there_and_back, np.zeros(402))[0].max() == 1.0
+    assert straightened(np.empty(0), np.empty(0))[0].size == 0
+    unknown = np.full(100, np.nan)
+    assert straightened(np.arange(100.0), unknown)[0].size == 100
