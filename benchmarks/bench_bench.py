@@ -1,15 +1,18 @@
 """How fast a page of the bench answers: in the server, from key to data in a headless browser, and after a burst."""
 
+import multiprocessing
+import os
 import shutil
 import statistics
 import sys
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Sequence
 from itertools import pairwise
+from multiprocessing.connection import Connection
 from typing import Any
 
+import numpy as np
 from playwright.sync_api import Page, sync_playwright
 
 from chladni.apps.bench import open_bench
@@ -43,9 +46,12 @@ class Stopwatch:
         self.writes: list[tuple[float, float]] = []
         self.readings = 0
 
-    @contextmanager
-    def running(self) -> Iterator[None]:
-        """Watch the server of this process."""
+    def begin(self) -> None:
+        """Forget what was."""
+        self.entries, self.writes, self.readings = [], [], 0
+
+    def watch(self) -> None:
+        """Watch the server of this process, from now on."""
         from tornado.websocket import WebSocketHandler
 
         from chladni.viewers.bench.desk import Desk
@@ -68,13 +74,8 @@ class Stopwatch:
                 self.writes.append(now())
             return write(socket, *arguments, **options)
 
-        KnobScale.value, Desk.accept = timed_value, counted_accept  # type: ignore[method-assign]
-        WebSocketHandler.write_message = timed_write  # type: ignore[method-assign]
-        try:
-            yield
-        finally:
-            KnobScale.value, Desk.accept = value, accept  # type: ignore[method-assign]
-            WebSocketHandler.write_message = write  # type: ignore[method-assign]
+        KnobScale.value, Desk.accept = timed_value, counted_accept  # type: ignore[assignment]
+        WebSocketHandler.write_message = timed_write  # type: ignore[assignment]
 
     def sent_ms(self, clock: int) -> list[float]:
         """For each turn, milliseconds until its last message; clock 0 of the wall, 1 of the CPU."""
@@ -87,9 +88,50 @@ class Stopwatch:
 
 def now() -> tuple[float, float]:
     """Wall time, and the server's CPU time, which doesn't grow when other programs have the cores."""
-    # The browser is driven from the main thread, whose own time is none of the server's.
-    driver = time.pthread_getcpuclockid(threading.main_thread().ident or 0)
-    return time.perf_counter(), time.process_time() - time.clock_gettime(driver)
+    return time.perf_counter(), time.process_time()
+
+
+class Server:
+    """The bench in a process of its own, as whoever uses it has it: the browser's driver takes none of its time."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(target=serve, args=(theirs, names))
+        self._process.start()
+        self.address: str = self._pipe.recv()
+
+    def ask(self, *words: str) -> Any:
+        """Send an order, and wait for its answer."""
+        self._pipe.send(words)
+        return self._pipe.recv()
+
+    def end(self) -> None:
+        """End the process."""
+        self._pipe.send(("end",))
+        self._process.join(30)
+
+
+def serve(pipe: Connection, names: Sequence[str]) -> None:
+    """Serve pages, and answer the driver's questions about them."""
+    server, ready, watch = open_bench([INSTRUMENTS[name] for name in names]), threading.Event(), Stopwatch()
+    thread = threading.Thread(target=server.run, args=(ready.set,), daemon=True)
+    thread.start()
+    ready.wait(30)
+    watch.watch()
+    pipe.send(server.address)
+    while (order := pipe.recv())[0] != "end":
+        if order[0] == "begin":
+            watch.begin()
+            pipe.send(True)
+        elif order[0] == "times":
+            pipe.send((watch.sent_ms(0), watch.sent_ms(1), watch.readings))
+        elif order[0] == "knob":
+            pipe.send(knob_that_matters(INSTRUMENTS[order[1]]))
+        else:
+            pipe.send(reading_ms(INSTRUMENTS[order[1]]))
+    server.stop()
+    thread.join(10)
 
 
 def single_keys(page: Page) -> list[float]:
@@ -116,39 +158,57 @@ def burst(page: Page) -> float:
     return float(max(arrivals) - pressed[-1]) if arrivals else float("nan")
 
 
-def reading_ms(instrument: Instrument) -> float:
-    """Milliseconds of one reading of the six charts that a page opens with, the least of a few."""
+def first_shown(instrument: Instrument) -> list[str]:
+    """Names of the six charts that a page opens with."""
     load_toolkit()
     from chladni.viewers.bench.board import SLOTS, wanted
     from chladni.viewers.bench.instrument_page import first_charts
 
-    first, times = first_charts(instrument), []
-    shown = wanted([name for name, _ in read_instrument(instrument).offered], first)[:SLOTS]
-    for _ in range(5):
+    return wanted([name for name, _ in read_instrument(instrument).offered], first_charts(instrument))[:SLOTS]
+
+
+def knob_that_matters(instrument: Instrument) -> int:
+    """Place of the first knob that moves a curve: a damper that is nowhere moves none."""
+    shown = first_shown(instrument)
+    for place, parameter in enumerate(instrument.parameters.values()):
+        value = parameter.value + 0.01 * (parameter.high - parameter.low)
+        values = {parameter.name: min(value, parameter.maximum)}
+        before, after = (read_instrument(instrument, found, charts=shown) for found in ({}, values))
+        for old, new in zip(before.charts, after.charts, strict=True):
+            for one, other in zip(old.curves, new.curves, strict=True):
+                if one.y.shape != other.y.shape or not np.allclose(one.y, other.y, rtol=1e-6, equal_nan=True):
+                    return place
+    return 0
+
+
+def reading_ms(instrument: Instrument) -> float:
+    """Milliseconds of one reading of the charts that a page opens with, each with another value; median of nine."""
+    shown, times = first_shown(instrument), []
+    parameter = list(instrument.parameters.values())[knob_that_matters(instrument)]
+    for turn in range(9):
+        values = {parameter.name: parameter.value + 1e-3 * turn * (parameter.high - parameter.low)}
         begun = time.perf_counter()
-        read_instrument(instrument, charts=shown)
+        read_instrument(instrument, values, charts=shown)
         times.append(1000 * (time.perf_counter() - begun))
-    return min(times)
+    return statistics.median(times)
 
 
-def measure(page: Page, address: str, instrument: Instrument) -> str:
+def measure(page: Page, server: Server, name: str) -> str:
     """Measure one page and give its row."""
-    page.goto(address + instrument.name)
-    handle = page.locator(".noUi-handle").first
+    page.goto(server.address + name)
+    handle = page.locator(".noUi-handle").nth(server.ask("knob", name))
     handle.wait_for()
     page.wait_for_timeout(1500)
     page.evaluate(WATCH)
     handle.focus()
-    watch = Stopwatch()
-    with watch.running():
-        keys = single_keys(page)
-    sent, busy = watch.sent_ms(0), watch.sent_ms(1)
-    held = Stopwatch()
-    with held.running():
-        after = burst(page)
-    cells = [instrument.name, f"{reading_ms(instrument):.1f}", spread(sent), spread(busy), spread(keys)]
-    cells += [f"{after:.0f}", str(held.readings)]
-    return f"| {' | '.join(cells)} |"
+    server.ask("begin")
+    keys = single_keys(page)
+    sent, busy, _ = server.ask("times")
+    server.ask("begin")
+    after = burst(page)
+    readings = server.ask("times")[2]
+    cells = [name, f"{server.ask('reading', name):.1f}", spread(sent), spread(busy), spread(keys)]
+    return f"| {' | '.join([*cells, f'{after:.0f}', str(readings), f'{os.getloadavg()[0]:.1f}'])} |"
 
 
 def spread(times: list[float]) -> str:
@@ -158,28 +218,18 @@ def spread(times: list[float]) -> str:
 
 def main() -> None:
     """Print the table; names of instruments may be given."""
-    chosen = [INSTRUMENTS[name] for name in sys.argv[1:] or INSTRUMENTS]
-    server, ready = open_bench(chosen), threading.Event()
-    thread = threading.Thread(target=server.run, args=(ready.set,), daemon=True)
-    thread.start()
-    ready.wait(30)
-    print(
-        "Milliseconds, median / worst of",
-        KEYS,
-        "key presses on the first knob; wished: 20 to sent, 50 to data.",
-    )
-    print(
-        "| instrument | reading | callback to sent | same, CPU | key to data | after a burst of 30 | readings in it |"
-    )
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+    names = sys.argv[1:] or list(INSTRUMENTS)
+    server = Server(names)
+    print(f"Milliseconds, median / worst of {KEYS} presses on a knob; wished: 20 to sent, 50 to data.")
+    print("| instrument | reading | callback to sent | same, CPU | key to data | after 30 keys | readings | load |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=ARGUMENTS)
         page = browser.new_page(viewport={"width": 1280, "height": 800})
-        for instrument in chosen:
-            print(measure(page, server.address, instrument), flush=True)
+        for name in names:
+            print(measure(page, server, name), flush=True)
         browser.close()
-    server.stop()
-    thread.join(10)
+    server.end()
 
 
 if __name__ == "__main__":
