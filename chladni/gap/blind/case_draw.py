@@ -1,12 +1,13 @@
 """Draws one case: a bench, a drive, true numbers, hidden effects of the asked severity, and noise."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.blind.distinction import left_after_tuning
 from chladni.gap.blind.draft import Scene
 from chladni.gap.blind.excitation_draw import Drive, draw_drive
 from chladni.gap.blind.noise import SensorNoise, draw_noise
@@ -24,6 +25,8 @@ _MOST_DRAWS = 200
 CLEAR, FAINT = (3.3, 60.0), (0.33, 2.8)
 #: Share of the outputs' RMS above which a change isn't moderate any more; a wrong sign alone makes two of it.
 _LARGEST_CHANGE, _LARGEST_OF_GAIN = 1.0, 2.3
+#: What must be left of a change, over the noise, when numbers inside their tolerances have imitated it.
+LEAST_LEFT = 1.0
 _SETTLED_SHARE = 0.1
 
 
@@ -62,8 +65,10 @@ class Case:
     change, ratio
         What the effects change, pooled RMS over each output's own RMS, and that over the pooled noise; None when
         nothing is hidden.
+    ratio_tuned
+        What is left of the change when the model's numbers are tuned inside their tolerances, RMS in units of noise.
     ratios
-        Likewise of each effect alone.
+        Like `ratio`, of each effect alone.
     off
         Parameter that left its tolerance, and by how many sigma; empty when none did.
     steps
@@ -81,6 +86,7 @@ class Case:
     steps: int
     change: float | None = None
     ratio: float | None = None
+    ratio_tuned: float | None = None
     ratios: tuple[float, ...] = ()
     off: Mapping[str, float] = field(default_factory=dict)
 
@@ -135,11 +141,31 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case | None:
     change = pooled_change(bench, clean, after) if effects or off else None
     if change is not None and not _fits(order, change, share):
         return None
+    tuned = _left(bench, numbers, drive, effects, off, clean, after, noise)
+    if tuned is not None and order.kind != "faint" and tuned < LEAST_LEFT:
+        return None
     return Case(
         order=order, bench=bench, numbers=numbers, drive=drive, effects=effects, clean=after,
         recorded=_recorded(moved, effects, noise, rng), noise=noise, steps=steps, change=change,
-        ratio=None if change is None else change / share, ratios=tuple(one / share for one in changes), off=off,
+        ratio=None if change is None else change / share, ratio_tuned=tuned,
+        ratios=tuple(one / share for one in changes), off=off,
     )  # fmt: skip
+
+
+def _left(bench: Bench, numbers: Mapping[str, float], drive: Drive, effects: tuple[Hidden, ...],
+          off: Mapping[str, float], clean: Mapping[str, Matrix], after: Mapping[str, Matrix],
+          noise: Mapping[str, SensorNoise]) -> float | None:  # fmt: skip
+    """What tuning leaves of the effects, or of a number beyond the last three sigma."""
+    if not effects and not off:
+        return None
+    # A wrong number may be tuned as far as its tolerance lets it, from the nominal one.
+    near = {name: bench.plan.numbers[name] * (1 + np.sign(z) * 3 * bench.plan.tolerance[name]) for name, z in
+            off.items()}  # fmt: skip
+    about = {**numbers, **near}
+    before = perform(bench, about, drive) if off else clean
+    change = {name: after[name] - before[name] for name in noise}
+    kept = replace(bench, plan=replace(bench.plan, tolerance={**bench.plan.tolerance, **dict.fromkeys(off, 0.0)}))
+    return left_after_tuning(kept, about, drive, change, before, noise)
 
 
 def _fits(order: Order, change: float, share: float) -> bool:

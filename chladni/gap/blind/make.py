@@ -137,6 +137,7 @@ def truth_of(case: Case, seed: tuple[int, int]) -> dict[str, Any]:
         "coloured": case.order.coloured,
         "change": case.change,
         "ratio": case.ratio,
+        "ratio_tuned": case.ratio_tuned,
         # The true law at the true site leaves the noise, whatever it is: it closes all that can be closed.
         "ideal": 1.0,
         "noise_share": case.noise_share,

@@ -1,0 +1,96 @@
+"""The score of a campaign as rows for people: what was measured, and what must be met."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+Row = list[str]
+HEADER = ("what", "measured", "95 % interval", "cases", "must be", "met")
+
+
+def score_rows(score: Mapping[str, Any]) -> list[Row]:
+    """Give one row for each figure: ``what, measured, interval, cases, must be, met``."""
+    faint, two, closed = score["faint"], score["two"], score["closed"]
+    return [
+        _share("right effect, first place", score["effect"], at_least=0.92),
+        _share("right family", score["family"], at_least=0.96),
+        _share("right effect by the lowest RMS alone (naive)", score["effect_naive"]),
+        _share("right site, or a group that holds it", score["site"], at_least=0.95),
+        _share("false alarm: an effect named where there is none", score["false_alarm"], at_most=0.03),
+        _share("of those, with coloured noise", score["false_alarm_coloured"]),
+        _share("unknown where nothing is missing", score["false_unknown"]),
+        _share("wrong parameter: verdict parameters", score["parameter_named"]),
+        _share("left out or outside: unknown, or a sibling", score["strange_recognised"], at_least=0.90),
+        _share("unknown where the effect was in the catalogue", score["unknown_in_catalogue"], at_most=0.05),
+        _number("gap closed over the true law's, median", closed["median"], closed["count"], at_least=0.98),
+        _number("gap closed, 10th percentile", closed["tenth_percentile"], closed["count"], at_least=0.92),
+        _number("expected calibration error", score["calibration"]["expected_error"], score["calibration"]["count"],
+                at_most=0.07),
+        _share("two effects: both named", two["both"], at_least=0.75),
+        _share("two effects: at least one", two["at_least_one"], at_least=0.95),
+        _share("faint: wrong name with probability over 0.8", faint["confidently_wrong"], at_most=0.05),
+        _share("faint: named rightly", faint["named"]),
+    ]  # fmt: skip
+
+
+def _share(what: str, told: Mapping[str, Any], *, at_least: float | None = None, at_most: float | None = None) -> Row:
+    low, high = told["interval"]
+    interval = f"{100 * low:.1f} to {100 * high:.1f} %" if told["count"] else "-"
+    shown = "-" if told["share"] is None else f"{100 * told['share']:.1f} % ({told['right']})"
+    demand, met = _demand(told["share"], at_least, at_most, "{:.0%}")
+    return [what, shown, interval, str(told["count"]), demand, met]
+
+
+def _number(what: str, value: float | None, count: int, *, at_least: float | None = None,
+            at_most: float | None = None) -> Row:  # fmt: skip
+    demand, met = _demand(value, at_least, at_most, "{:g}")
+    return [what, "-" if value is None else f"{value:.4f}", "", str(count), demand, met]
+
+
+def _demand(value: float | None, at_least: float | None, at_most: float | None, form: str) -> tuple[str, str]:
+    if at_least is None and at_most is None:
+        return "", ""
+    if at_least is not None:
+        return f"at least {form.format(at_least)}", "-" if value is None else "yes" if value >= at_least else "no"
+    return f"at most {form.format(at_most)}", "-" if value is None else "yes" if value <= (at_most or 0.0) else "no"
+
+
+def confusion_rows(table: Mapping[str, Mapping[str, int]]) -> tuple[list[str], list[Row]]:
+    """Give header and rows of a confusion matrix: hidden down, named across."""
+    answers = sorted({answer for row in table.values() for answer in row})
+    rows = [[hidden, *(str(row[answer]) if answer in row else "" for answer in answers)] for hidden, row in
+            table.items()]  # fmt: skip
+    return ["hidden, down; named, across", *answers], rows
+
+
+def reliability_rows(score: Mapping[str, Any]) -> tuple[list[str], list[Row]]:
+    """Give header and rows of the reliability diagram."""
+    rows = [
+        [f"{one['low']:.1f} to {one['high']:.1f}", str(one["count"]), f"{one['probability']:.3f}",
+         f"{one['right']:.3f}"]
+        for one in score["calibration"]["bins"]
+    ]  # fmt: skip
+    return ["probability", "answers", "mean probability", "share right"], rows
+
+
+def detection_rows(score: Mapping[str, Any]) -> tuple[list[str], list[Row]]:
+    """Give header and rows of the detection curve of faint effects."""
+    rows = []
+    for one in score["faint"]["curve"]:
+        noticed, named = one["noticed"], one["named"]
+        rows.append([f"{one['low']:g} to {one['high']:g}", str(noticed["count"]), str(noticed["right"]),
+                     str(named["right"])])  # fmt: skip
+    return ["effect over noise", "cases", "noticed", "named rightly"], rows
+
+
+def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Give a Markdown table.
+
+    Examples
+    --------
+    >>> print(markdown(["a", "b"], [["1", "2"]]))
+    | a | b |
+    | --- | --- |
+    | 1 | 2 |
+    """
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
