@@ -54,8 +54,9 @@ def local_fit(inputs: Matrix, outputs: Matrix) -> ResidualSpectra | None:
     u = spectra_in.reshape(-1, blocks, lines).transpose(1, 2, 0)
     y = spectra_out.reshape(-1, blocks, lines).transpose(1, 2, 0)
     r = np.linspace(-1, 1, lines)
-    plain = _beside(_regressors(u, r), y)
-    shaped = np.stack([_output_error(u, y[:, :, place], r) for place in range(len(outputs))], axis=2)
+    signals = np.concatenate([u, np.ones((*u.shape[:2], 1))], axis=2)
+    plain = _beside(_regressors(signals, r), y)
+    shaped = np.stack([output_error(signals, y[:, :, place], r) for place in range(len(outputs))], axis=2)
     free = lines - unknowns
     # Where little but noise answers, poles are fitted to noise. All outputs go together, so that what they share
     # stays shared.
@@ -70,24 +71,34 @@ def local_fit(inputs: Matrix, outputs: Matrix) -> ResidualSpectra | None:
     )
 
 
-def _regressors(u: Complex, r: Matrix) -> Complex:
-    """``[block, line, term]``: inputs ``[block, line, input]`` and 1, each times 1, r, r^2."""
-    signals = np.concatenate([u, np.ones((*u.shape[:2], 1))], axis=2)
-    return np.asarray((signals[:, :, :, None] * _powers(r, 0, TERMS)[:, None, :]).reshape(*u.shape[:2], -1))
+def output_error(signals: Complex, y: Complex, r: Matrix) -> Complex:
+    """Residual ``[block, line]`` of one output with poles of its own.
 
-
-def _output_error(u: Complex, y: Complex, r: Matrix) -> Complex:
-    """Residual ``[block, line]`` of one output with poles of its own; `u` is ``[block, line, input]``."""
-    regressors, target = _regressors(u, r), y[:, :, None]
+    Parameters
+    ----------
+    signals
+        ``[block, line, signal]``: the inputs, and 1 where the record's ends leak. Each gets a second-degree N(r).
+    y
+        ``[block, line]``.
+    r
+        ``[line]`` or ``[block, line]`` where the lines lie, -1 to 1.
+    """
+    regressors, target = _regressors(signals, r), y[:, :, None]
     shifted = target * _powers(r, 1, 1 + POLES)
     d = _solved(_beside(regressors, shifted), _beside(regressors, target))
     denominator = 1 - _powers(r, 1, 1 + POLES) @ d
     return np.asarray(_beside(regressors / denominator, target)[:, :, 0])
 
 
+def _regressors(signals: Complex, r: Matrix) -> Complex:
+    """``[block, line, term]``: each signal times 1, r, r^2."""
+    terms = signals[:, :, :, None] * _powers(r, 0, TERMS)[..., None, :]
+    return np.asarray(terms.reshape(*signals.shape[:2], -1))
+
+
 def _powers(r: Matrix, first: int, end: int) -> Complex:
-    """``[line, power]``."""
-    return np.asarray(r[:, None] ** np.arange(first, end), dtype=np.complex128)
+    """``[..., line, power]``."""
+    return np.asarray(r[..., None] ** np.arange(first, end), dtype=np.complex128)
 
 
 def _beside(regressors: Complex, targets: Complex) -> Complex:
