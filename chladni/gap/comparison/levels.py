@@ -1,0 +1,171 @@
+"""What changes with the level of excitation: resonances, and the share that no linear system gives."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from chladni.gap.comparison.distortion import distortion_of
+from chladni.gap.comparison.linear_approximation import best_linear_approximation, moving_inputs
+from chladni.gap.comparison.local_rational import local_fit
+from chladni.gap.records.measurement import Measurement
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.peak import Peak
+from chladni.spectral.peaks import find_response_peaks
+
+# Levels nearer than this ratio aren't different levels.
+LEAST_RATIO = 1.1
+# A resonance moves by less than this from one level to the next, or it's another one.
+FARTHEST = 0.08
+# Changes are told from this many standard deviations on, and from these sizes.
+LEAST_SIGMAS = 3.0
+LEAST_SHIFT = 1e-3
+LEAST_HEIGHT = 0.03
+# The share that isn't linear is told to grow when it does so by this factor and to this share of the RMS.
+LEAST_GROWTH = 1.5
+LEAST_NONLINEAR = 0.02
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LevelResponse:
+    """One measurement among several levels.
+
+    Attributes
+    ----------
+    log, level
+        Its log, and the RMS of its strongest input.
+    response
+        From every input that moves to every output.
+    nonlinear
+        By output: RMS of what no linear system gives (noise aside where the input is periodic) over RMS of it.
+    """
+
+    log: str
+    level: float
+    response: FrequencyResponse
+    nonlinear: tuple[float, ...]
+
+
+def level_responses(measurements: Sequence[Measurement]) -> tuple[LevelResponse, ...]:
+    """Estimate the frequency responses of several measurements, by rising level of their strongest input."""
+    moving = [one for one in measurements if moving_inputs(one)]
+    if not moving:
+        return ()
+    # One input for all logs, so that the levels mean the same.
+    name = moving_inputs(moving[0])[int(np.argmax([_level(moving[0], one) for one in moving_inputs(moving[0])]))]
+    levels = [
+        LevelResponse(
+            log=one.log,
+            level=_level(one, name),
+            response=best_linear_approximation(one),
+            nonlinear=_nonlinear(one),
+        )
+        for one in moving
+        if name in moving_inputs(one)
+    ]
+    return tuple(sorted(levels, key=lambda one: one.level))
+
+
+def compare_levels(measurements: Sequence[Measurement]) -> tuple[str, ...]:
+    """Say what changes with level.
+
+    A linear machine has the same frequency response at every level. Here the strongest resonance of each output at
+    the lowest level is followed to the highest one: a frequency that falls speaks for a stiffness that gives way
+    (clearance, friction that slips), one that rises for hardening; a height that falls speaks for damping that
+    grows with level, one that rises for damping that shrinks (Coulomb friction).
+
+    Parameters
+    ----------
+    measurements
+        Of one machine with one sensor set at different levels, in any order.
+
+    Returns
+    -------
+    tuple of str
+        Sentences; none for fewer than two levels.
+    """
+    levels = level_responses(measurements)
+    if len(levels) < 2:
+        return ()
+    if levels[-1].level < LEAST_RATIO * levels[0].level:
+        return (f"the levels differ by less than {LEAST_RATIO - 1:.0%}: they tell nothing about nonlinearity",)
+    outputs = [channel.name for channel in levels[0].response.responses]
+    told = [_of_output(output, levels) for output in outputs if _everywhere(output, levels)]
+    return tuple(sentence for sentences in told for sentence in sentences)
+
+
+def _everywhere(output: str, levels: Sequence[LevelResponse]) -> bool:
+    return all(output in [channel.name for channel in one.response.responses] for one in levels)
+
+
+def _of_output(output: str, levels: Sequence[LevelResponse]) -> list[str]:
+    reference = levels[0].response.references[0].name
+    span = f"while {reference} rises from {levels[0].level:.3g} to {levels[-1].level:.3g} RMS"
+    sentences = []
+    peaks = followed_peak(output, levels)
+    if peaks is not None:
+        sentences.append(f"{output}: {_resonance(peaks[0], peaks[-1])} {span}")
+    first, last = (_nonlinear_of(output, one) for one in (levels[0], levels[-1]))
+    if last > LEAST_GROWTH * first and last > LEAST_NONLINEAR:
+        sentences.append(
+            f"{output}: what no linear system gives grows from {first:.2g} to {last:.2g} of its RMS {span}"
+        )
+    return sentences
+
+
+def followed_peak(output: str, levels: Sequence[LevelResponse]) -> tuple[Peak, ...] | None:
+    """Give the strongest resonance of the lowest level at every level; None where it's lost on the way.
+
+    Between one level and the next it moves by at most 8 %.
+    """
+    followed: list[Peak] = []
+    for level in levels:
+        rows = level.response.select([output])
+        peaks = [peak for peak in find_response_peaks(rows) if peak.channels[1] == rows.references[0].name]
+        if followed:
+            before = followed[-1].frequency_hz
+            peaks = [peak for peak in peaks if abs(peak.frequency_hz - before) <= FARTHEST * before]
+        if not peaks:
+            return None
+        followed.append(max(peaks, key=lambda peak: peak.height))
+    return tuple(followed)
+
+
+def _resonance(first: Peak, last: Peak) -> str:
+    shift_std = float(np.hypot(first.frequency_std_hz, last.frequency_std_hz))
+    height_std = float(np.hypot(first.height_std, last.height_std))
+    shift, growth = last.frequency_hz - first.frequency_hz, last.height - first.height
+    moves = abs(shift) > max(LEAST_SIGMAS * shift_std, LEAST_SHIFT * first.frequency_hz)
+    swells = abs(growth) > max(LEAST_SIGMAS * height_std, LEAST_HEIGHT * first.height)
+    if not moves and not swells:
+        return f"its resonance at {first.frequency_hz:.4g} Hz stays as it is"
+    parts = []
+    if moves:
+        word, why = ("falls", "a stiffness gives way") if shift < 0 else ("rises", "a stiffness hardens")
+        parts.append(f"{word} from {first.frequency_hz:.4g} to {last.frequency_hz:.4g} Hz ({why})")
+    if swells:
+        word, why = ("falls", "damping grows") if growth < 0 else ("rises", "damping shrinks")
+        parts.append(f"in height {word} from {first.height:.3g} to {last.height:.3g} ({why})")
+    at = "" if moves else f" at {first.frequency_hz:.4g} Hz"
+    return f"its resonance{at} {' and '.join(parts)}"
+
+
+def _level(measurement: Measurement, name: str) -> float:
+    return float(np.std(measurement.inputs[measurement.input_names.index(name)]))
+
+
+def _nonlinear(measurement: Measurement) -> tuple[float, ...]:
+    """RMS share by output; without a period noise is in it."""
+    distortion = distortion_of(measurement)
+    if distortion is not None:
+        return tuple(float(share) for share in np.sqrt(distortion.nonlinear))
+    spectra = local_fit(measurement.inputs, measurement.outputs)
+    if spectra is None:
+        return (0.0,) * len(measurement.output_names)
+    power = spectra.densities().mean(axis=1) / np.var(measurement.outputs, axis=1)
+    return tuple(float(share) for share in np.sqrt(power))
+
+
+def _nonlinear_of(output: str, level: LevelResponse) -> float:
+    names = [channel.name for channel in level.response.responses]
+    return level.nonlinear[names.index(output)]

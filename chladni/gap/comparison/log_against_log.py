@@ -1,0 +1,185 @@
+"""A simulated log against a measured one: where the gap lies, whatever simulator made it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.comparison.noise_estimate import estimate_noise
+from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, pooled_gap, regime_shares
+from chladni.gap.records.diagnosis import Where
+from chladni.gap.records.measurement import Measurement
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.errors import LogError
+from chladni.signals.value import Value
+
+Matrix = NDArray[np.float64]
+
+# Rates of two clocks agree to this; beyond, samples drift apart.
+SAME_RATE = 1e-6
+# Inputs that differ by more than this share of their RMS didn't drive the same experiment.
+SAME_INPUT = 0.01
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GapView(Value):
+    """Everything about a gap that needs no model.
+
+    Attributes
+    ----------
+    residual
+        ``[output, sample]`` measured minus simulated.
+    gap
+        Pooled over outputs: RMS of the residual over RMS of measured, each output scaled by its own.
+    where
+        Channels, bands, regimes; no sites, since those are a model's.
+    noise
+        Of the measured outputs.
+    map_time_s, map_frequency_hz, map_density
+        See `gap_map`.
+    remarks
+        Outputs that only one side holds; inputs that differ.
+    """
+
+    residual: Matrix
+    gap: float
+    where: Where
+    noise: NoiseFloor
+    map_time_s: Matrix
+    map_frequency_hz: Matrix
+    map_density: Matrix
+    remarks: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+
+def view_gap(
+    measured: Measurement,
+    simulated: Matrix,
+    *,
+    noise: NoiseFloor | None = None,
+    modes_hz: Sequence[float] = (),
+    variables: Mapping[str, Matrix] | None = None,
+) -> GapView:
+    """Say where measured and simulated outputs differ.
+
+    Parameters
+    ----------
+    measured
+        With its period filled in, if it has one; see `with_period`.
+    simulated
+        ``[output, sample]`` of the same experiment.
+    noise
+        Floor of the measured outputs; estimated if None.
+    modes_hz
+        Natural frequencies that bands are cut between; see `band_shares`.
+    variables
+        Motions whose regimes are looked at, ``[sample]`` each; see `regime_shares`.
+    """
+    residual = measured.outputs - simulated
+    floor = estimate_noise(measured) if noise is None else noise
+    rate_hz = measured.sample_rate_hz
+    map_time_s, map_frequency_hz, map_density = gap_map(residual, measured.outputs, rate_hz)
+    return GapView(
+        residual=residual,
+        gap=pooled_gap(residual, measured.outputs),
+        where=Where(
+            channels=channel_gaps(residual, measured.outputs, floor, output_names=measured.output_names),
+            bands=band_shares(residual, measured.outputs, sample_rate_hz=rate_hz, modes_hz=modes_hz),
+            sites=(),
+            regimes=regime_shares(residual, measured.outputs, variables or {}),
+        ),
+        noise=floor,
+        map_time_s=map_time_s,
+        map_frequency_hz=map_frequency_hz,
+        map_density=map_density,
+    )
+
+
+def compare_logs(
+    measured: Measurement, simulated: Measurement, *, variables: Mapping[str, Matrix] | None = None
+) -> GapView:
+    """Compare a measured log with one that any simulator wrote, of the same experiment.
+
+    Parameters
+    ----------
+    measured, simulated
+        Outputs are matched by name. Both begin with the same sample; the longer one is cut.
+    variables
+        As for `view_gap`, ``[sample]`` of the measurement.
+
+    Raises
+    ------
+    LogError
+        When rates differ, no output is held by both, or an output's units differ.
+    """
+    _require_same_rate(measured, simulated)
+    names = [name for name in measured.output_names if name in simulated.output_names]
+    if not names:
+        raise LogError(
+            f"{measured.log} and {simulated.log} share no output: {', '.join(measured.output_names)} against "
+            f"{', '.join(simulated.output_names)}; give them the same names"
+        )
+    samples = min(measured.samples, simulated.samples)
+    ours, theirs = _cut(measured, names, samples), _cut(simulated, names, samples)
+    _require_same_units(ours, theirs)
+    kept = {name: values[:samples] for name, values in (variables or {}).items()}
+    return replace(view_gap(ours, theirs.outputs, variables=kept), remarks=_remarks(measured, simulated, samples))
+
+
+def _cut(measurement: Measurement, names: Sequence[str], samples: int) -> Measurement:
+    rows = [measurement.output_names.index(name) for name in names]
+    return replace(
+        measurement,
+        inputs=measurement.inputs[:, :samples],
+        outputs=measurement.outputs[rows, :samples],
+        output_names=tuple(names),
+        output_units=tuple(measurement.output_units[row] for row in rows),
+    )
+
+
+def _require_same_rate(measured: Measurement, simulated: Measurement) -> None:
+    ours_hz, theirs_hz = measured.sample_rate_hz, simulated.sample_rate_hz
+    if abs(ours_hz - theirs_hz) > SAME_RATE * ours_hz:
+        raise LogError(
+            f"{measured.log} has {ours_hz:g} Hz, {simulated.log} {theirs_hz:g} Hz; bring them to one rate, "
+            f"chladni convert {simulated.log} OUT.mcap --rate {ours_hz:g}"
+        )
+
+
+def _require_same_units(measured: Measurement, simulated: Measurement) -> None:
+    for name, ours, theirs in zip(measured.output_names, measured.output_units, simulated.output_units, strict=True):
+        if ours != theirs and "1" not in (ours, theirs):
+            raise LogError(
+                f"output {name!r} is in {ours} in {measured.log}, in {theirs} in {simulated.log}; state the true unit"
+            )
+
+
+def _remarks(measured: Measurement, simulated: Measurement, samples: int) -> tuple[str, ...]:
+    remarks = []
+    for one, other in ((measured, simulated), (simulated, measured)):
+        lone = [name for name in one.output_names if name not in other.output_names]
+        if lone:
+            remarks.append(f"left out, since only {one.log} holds them: {', '.join(lone)}")
+        if one.samples > samples:
+            remarks.append(f"{one.log} is cut to the {samples / one.sample_rate_hz:g} s that {other.log} has too")
+    return (*remarks, *_input_remarks(measured, simulated, samples))
+
+
+def _input_remarks(measured: Measurement, simulated: Measurement, samples: int) -> list[str]:
+    remarks = []
+    for place, name in enumerate(measured.input_names):
+        if name in simulated.input_names:
+            ours = measured.inputs[place, :samples]
+            theirs = simulated.inputs[simulated.input_names.index(name), :samples]
+            size = float(np.sqrt(np.mean(ours**2)))
+            off = float(np.sqrt(np.mean((ours - theirs) ** 2)))
+            if off > SAME_INPUT * size:
+                share = off / size if size > 0 else np.inf
+                remarks.append(
+                    f"input {name!r} differs by {share:.2g} of its RMS between the logs: part of the gap is the "
+                    "excitation's"
+                )
+    return remarks
