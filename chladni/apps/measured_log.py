@@ -5,13 +5,14 @@ import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from chladni.apps.findings import damage_sentences
 from chladni.apps.measured_charts import comparison_charts, scores
 from chladni.io.log import open_log
 from chladni.models.core.model import Model
 from chladni.models.core.port import Terminal
 from chladni.models.core.reading import InstrumentReading
 from chladni.signals.channel import Channel
-from chladni.signals.errors import ModelError, SetupError
+from chladni.signals.errors import LogError, ModelError, SetupError
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import si_factor
 from chladni.viewers.bench.tools import Assignment, MeasuredLog
@@ -26,20 +27,32 @@ class OpenedLog:
     Raises
     ------
     LogError
-        When it can't be read.
+        When it can't be read, or nothing in it.
     """
 
     def __init__(self, path: Path, title: str, *, private: bool) -> None:
         self.title = title
-        self._log = open_log(path)
+        try:
+            self._log = open_log(path)
+        except LogError as error:
+            # By the name that the user knows: a dropped log lies under another one.
+            raise LogError(str(error).replace(str(path), title)) from error
         # Also when the program ends before the page is closed.
         self._removal = weakref.finalize(self, _remove, path) if private else None
         try:
             self.channels: tuple[Channel, ...] = self._log.channels
-            self.duration_s: float = self._log.info().duration_s
+            info = self._log.info()
+            self.duration_s: float = info.duration_s
+            self.damage = damage_sentences(info.damage)
+            self._require_channels()
         except BaseException:
             self.close()
             raise
+
+    def _require_channels(self) -> None:
+        if not self.channels:
+            told = " ".join(self.damage) or "record at least one message with a number in it"
+            raise LogError(f"{self.title}: holds no channel that can be read; {told}")
 
     def read(self, names: Sequence[str], start_s: float, end_s: float) -> TimeSeries:
         """Give channels on their common grid."""

@@ -206,6 +206,43 @@ def test_what_is_no_log_is_told(tmp_path: Path) -> None:
         TOOLS.open_log(tmp_path / "missing.mcap", "missing.mcap", True)
 
 
+@pytest.mark.parametrize("size", [20, 300, 20_000])
+def test_a_log_that_was_cut_off_before_its_first_channel_says_what_is_missing(
+    saved: dict[str, bytes], tmp_path: Path, size: int
+) -> None:
+    path = tmp_path / "chladni-x1y2.mcap"
+    path.write_bytes(saved["Log"][:size])
+    with pytest.raises(LogError, match=r"^press\.mcap: holds no channel that can be read; ") as caught:
+        TOOLS.open_log(path, "press.mcap", True)
+    assert "its recording was cut off" in str(caught.value)
+    assert "an unknown number of messages lost" in str(caught.value)
+    # The private copy is of no use to anybody.
+    assert not path.exists()
+
+
+def test_a_log_that_was_cut_off_later_says_what_is_missing_and_is_read(
+    saved: dict[str, bytes], tmp_path: Path
+) -> None:
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(saved["Log"][: len(saved["Log"]) // 2])
+    opened = TOOLS.open_log(path, "cut.mcap", False)
+    assert len(opened.channels) == 6
+    assert any("its recording was cut off" in sentence for sentence in opened.damage)
+    opened.close()
+
+
+def test_a_whole_log_has_no_damage(log: Any) -> None:
+    assert log.damage == ()
+
+
+def test_a_dropped_log_is_called_by_its_own_name(tmp_path: Path) -> None:
+    path = tmp_path / "chladni-x1y2.mcap"
+    path.write_bytes(b"")
+    with pytest.raises(LogError, match=r"^press\.mcap: the file is empty") as caught:
+        TOOLS.open_log(path, "press.mcap", True)
+    assert "chladni-x1y2" not in str(caught.value)
+
+
 def test_a_private_copy_is_removed_when_the_program_ends(saved: dict[str, bytes], tmp_path: Path) -> None:
     path = tmp_path / "copy.mcap"
     path.write_bytes(saved["Log"])

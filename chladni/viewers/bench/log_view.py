@@ -45,7 +45,7 @@ class LogView:
         self._path = path
         self._opener, self._comparer = Latest(document), Latest(document)
         self._pause = Pause(document, seconds=REST_S, action=self._compare)
-        self.dropper = Dropper(taken=self._taken, refused=self._refuse)
+        self.dropper = Dropper(taken=self._taken, refused=self._fail)
         self.start = seconds_entry("from [s]", 0.0, self._changed)
         self.span = seconds_entry("length [s]", FIRST_SPAN_S, self._changed)
         self.selects: dict[str, Any] = {}
@@ -80,10 +80,7 @@ class LogView:
         """End, and let go of the log."""
         self._opener.close()
         self._comparer.close()
-        if self._log is not None:
-            # One log at a time: a dropped one would otherwise lie on the disk until the page is closed.
-            self._log.close()
-        self._log = None
+        self._close_log()
 
     def _taken(self, name: str, content: bytes) -> None:
         self._words.object = f"<p>reading {len(content) / 1e6:.1f} MB …</p>"
@@ -101,17 +98,36 @@ class LogView:
     def _opened(self, future: "Future[MeasuredLog]") -> None:
         error = future.exception()
         if error is not None:
-            self._refuse(told(error))
+            self._fail(told(error))
             return
-        if self._log is not None:
-            self._log.close()
+        self._let_go()
         self._log = future.result()
-        self._words.object = ""
+        self._words.object = message("", self._log.damage)
         if self._offer_choices(self._log):
             self._compare()
 
+    def _let_go(self) -> None:
+        """Close the log that was, and take away what was said about it: it would pass for the next one's."""
+        # One log at a time: a dropped one would otherwise lie on the disk until the page is closed.
+        self._close_log()
+        self.selects = {}
+        with pn.io.hold(self._document):
+            self._scores.object = ""
+            self._choices.objects = []
+            self.board.show(())
+
+    def _close_log(self) -> None:
+        if self._log is not None:
+            self._log.close()
+        self._log = None
+
+    def _fail(self, line: str) -> None:
+        """Say why there is no log; the name where it was dropped is already that of the one that failed."""
+        self._let_go()
+        self._refuse(line)
+
     def _refuse(self, line: str) -> None:
-        self._words.object = message(line, ())
+        self._words.object = message(line, self._log.damage if self._log is not None else ())
 
     def _offer_choices(self, log: MeasuredLog) -> bool:
         """Offer the log's channels for the model's signals, and say whether there are any."""
@@ -149,14 +165,18 @@ class LogView:
         # The last good setting: what the other view shows.
         setting = self._desk.good
         self._comparer.submit(
-            partial(self._job, setting.values, setting.options, self._log, assignment), self._compared
+            partial(self._job, setting.values, setting.options, self._log, assignment),
+            partial(self._compared, self._log),
         )
 
     def _job(self, values: Values, options: Options, log: MeasuredLog, assignment: Assignment) -> InstrumentReading:
         model = self._desk.instrument.model(values, options)
         return self._tools.compare(model, log, assignment, self.start.value or 0.0, self.span.value or FIRST_SPAN_S)
 
-    def _compared(self, future: "Future[InstrumentReading]") -> None:
+    def _compared(self, log: MeasuredLog, future: "Future[InstrumentReading]") -> None:
+        # An answer may be on its way while another log is dropped.
+        if log is not self._log:
+            return
         error = future.exception()
         if error is not None:
             # The comparison that stands stays, with the line that says why there is no new one.
@@ -164,7 +184,7 @@ class LogView:
             return
         reading = future.result()
         with pn.io.hold(self._document):
-            self._words.object = message("", reading.flags)
+            self._words.object = message("", (*log.damage, *reading.flags))
             self._scores.object = quantity_strip(reading.quantities)
             self.board.show(reading.charts)
 

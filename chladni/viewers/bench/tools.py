@@ -30,6 +30,10 @@ class MeasuredLog(Protocol):
     def duration_s(self) -> float:
         """Its length."""
 
+    @property
+    def damage(self) -> tuple[str, ...]:
+        """Sentences about what is lost of it; none for a whole one."""
+
     def close(self) -> None:
         """Let go of the file, and remove it when it was a private copy."""
 

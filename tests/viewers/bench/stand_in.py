@@ -143,6 +143,7 @@ class StandInLog:
     private: bool
     channels: tuple[Channel, ...] = ()
     duration_s: float = 5.0
+    damage: tuple[str, ...] = ()
 
     def close(self) -> None:
         """Remove a private copy."""
