@@ -10,6 +10,7 @@ import typer
 
 from chladni import __version__
 from chladni.cli.bench import bench
+from chladni.cli.blind import blind
 from chladni.cli.compare import compare
 from chladni.cli.convert import convert
 from chladni.cli.demo import demo
@@ -36,6 +37,7 @@ app = typer.Typer(
 )
 for command in (info, psd, frf, modes, view, compare, convert, simulate, influence, gap, bench, demo):
     app.command()(command)
+app.add_typer(blind)
 
 
 def _print_version(wanted: bool) -> None:

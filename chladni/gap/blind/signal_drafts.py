@@ -106,9 +106,10 @@ def ac_coupling(scene: Scene, site: str) -> Draft:
 def time_offset(scene: Scene, site: str) -> Draft:
     """A clock that is early or late by a part of a sample, or by many."""
     sign = scene.sign()
-    # A sixteenth of a sample is the integrator's coarsest step.
-    return _draft("time_offset", site, "shift", lambda size: {"offset": 0.125 * sign * size * scene.interval},
-                  least=0.5, most=400.0)  # fmt: skip
+    step = sign * scene.interval / 32
+    # Whole steps of the integrator: the truth then says what was done, to the last digit.
+    return _draft("time_offset", site, "shift", lambda size: {"offset": max(round(4 * size), 1) * step},
+                  least=0.25, most=400.0)  # fmt: skip
 
 
 def clipping(scene: Scene, site: str) -> Draft:

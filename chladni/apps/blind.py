@@ -1,0 +1,84 @@
+"""The withheld check with this project's own diagnosis, on all cores."""
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from chladni.apps.diagnose import diagnosis_json
+from chladni.gap.blind.make import make_cases
+from chladni.gap.blind.run import RunReport, run_cases
+from chladni.gap.blind.score import score_cases
+from chladni.signals.errors import SetupError
+
+Progress = Callable[[float], None]
+
+
+def make_campaign(
+    directory: Path, *, count: int, seed: int, jobs: int | None = None, progress: Progress = lambda _share: None
+) -> int:
+    """Make a campaign in the default composition, or what is missing of it; give the number of cases made.
+
+    Parameters
+    ----------
+    directory
+        Where cases and truths go, see `chladni.gap.blind.make.make_cases`.
+    count, seed
+        Number of cases, and where everything random in them comes from.
+    jobs
+        Processes; as many as the machine has cores if None.
+    progress
+        Gets the share done.
+    """
+    with workers(jobs) as executor:
+        return make_cases(directory, count=count, seed=seed, executor=executor, progress=progress)
+
+
+def run_campaign(
+    directory: Path, *, seed: int = 0, jobs: int | None = None, progress: Progress = lambda _share: None
+) -> RunReport:
+    """Diagnose every case that has no result yet; the truth isn't opened.
+
+    Parameters
+    ----------
+    directory, seed
+        See `chladni.gap.blind.run.run_cases`.
+    jobs
+        Processes; as many as the machine has cores if None.
+    progress
+        Gets the share done.
+    """
+    with workers(jobs) as executor:
+        return run_cases(directory, diagnosis_json, seed=seed, executor=executor, progress=progress)
+
+
+def score_campaign(directory: Path) -> Mapping[str, Any]:
+    """Verify the seals, mark the answers, write ``score.json`` and give its content."""
+    return score_cases(directory)
+
+
+@contextmanager
+def workers(jobs: int | None) -> Iterator[Executor | None]:
+    """Give processes to work with; None for one, which is this process.
+
+    Raises
+    ------
+    SetupError
+        When `jobs` is below one.
+    """
+    count = (os.cpu_count() or 1) if jobs is None else jobs
+    if count < 1:
+        raise SetupError(f"jobs {count} must be at least 1")
+    if count == 1:
+        yield None
+        return
+    # A forked child of a process with threads may wait for a lock that nobody holds any more.
+    pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
+    try:
+        yield pool
+    finally:
+        # After Ctrl-C nobody wants the cases that haven't begun.
+        pool.shutdown(cancel_futures=True)

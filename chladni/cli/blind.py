@@ -1,0 +1,85 @@
+"""``chladni blind make|run|score``: the diagnosis on cases whose cause is sealed."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from chladni.cli import options
+from chladni.cli.output import Output
+from chladni.cli.words import count as counted
+
+blind = typer.Typer(
+    name="blind",
+    help="Check the diagnosis on machines whose hidden effects are sealed: make them, run it, score it.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the campaign.", show_default=False)]
+Jobs = Annotated[
+    int | None,
+    typer.Option(metavar="N", min=1, help="Processes; one a core if not given.", show_default=False),
+]
+
+
+@blind.command()
+def make(
+    directory: Folder,
+    *,
+    count: Annotated[int, typer.Option(metavar="N", min=1, help="Number of cases.")] = 200,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of everything random in them.")] = 0,
+    jobs: Jobs = None,
+    json: options.Json = None,
+) -> None:
+    """Make cases: random machines with hidden effects, and their sealed truths; what is there stays."""
+    from chladni.apps.blind import make_campaign
+
+    to = Output(json)
+    with to.progress("making cases") as show:
+        made = make_campaign(directory, count=count, seed=seed, jobs=jobs, progress=show)
+    to.line(f"made {counted(made)} of {counted(count)} cases in {directory / 'cases'}; the others were there")
+    to.line(f"their truths are in {directory / 'truth'}: move it away before the run, and back for the score")
+    to.json({"format": "chladni.blind-make/1", "directory": str(directory), "count": count, "seed": seed,
+             "made": made})  # fmt: skip
+
+
+@blind.command()
+def run(
+    directory: Folder,
+    *,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of everything random in the diagnosis.")] = 0,
+    jobs: Jobs = None,
+    json: options.Json = None,
+) -> None:
+    """Diagnose every case that has no result yet; the truths are never opened."""
+    from chladni.apps.blind import run_campaign
+
+    to = Output(json)
+    with to.progress("diagnosing") as show:
+        report = run_campaign(directory, seed=seed, jobs=jobs, progress=show)
+    to.line(f"diagnosed {counted(report.done)} cases; {counted(report.there)} had a result")
+    if report.failed:
+        to.lines([f"Warning: no answer for {', '.join(report.failed)}; their results say why"])
+    to.json({"format": "chladni.blind-run/1", "done": report.done, "there": report.there,
+             "failed": list(report.failed)})  # fmt: skip
+
+
+@blind.command()
+def score(directory: Folder, *, json: options.Json = None) -> None:
+    """Verify the seals and hold the answers against the truths."""
+    from chladni.apps.blind import score_campaign
+    from chladni.gap.blind.score_table import HEADER, confusion_rows, detection_rows, reliability_rows, score_rows
+
+    to = Output(json)
+    found = score_campaign(directory)
+    to.table(f"Score of {found['cases']} cases", HEADER, score_rows(found))
+    for title, (header, rows) in (
+        ("Families: hidden and named", confusion_rows(found["confusion_family"])),
+        ("Reliability of the probabilities", reliability_rows(found)),
+        ("Detection of faint effects", detection_rows(found)),
+    ):
+        to.table(title, header, rows)
+    if found["missing"]:
+        to.lines([f"Warning: {len(found['missing'])} cases have no result yet; chladni blind run {directory}"])
+    to.line(f"wrote {directory / 'score.json'}")
+    to.json(found)
