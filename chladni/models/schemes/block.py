@@ -100,9 +100,7 @@ class Block:
             for name in values:
                 self.parameters.require(name)
             return self
-        content = self.content.with_values(values)
-        # While one knob turns every other block stays what it is, and has been checked already.
-        return self if content == self.content else replace(self, content=content)
+        return replace(self, content=self.content.with_values(values))
 
     def with_tolerances(self, tolerances: Values) -> Self:
         """Give the block with some of its numbers believed more or less."""
@@ -112,7 +110,7 @@ class Block:
 
     def switched(self, *, on: bool) -> Self:
         """Give the block switched on or off."""
-        return replace(self, on=on)
+        return self if on == self.on else replace(self, on=on)
 
 
 def element_block(

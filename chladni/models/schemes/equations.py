@@ -104,8 +104,6 @@ def _descriptor(forms: Sequence[Realization], between: Matrix, columns: Matrix) 
         (K y + N w)' = p_1,  p_k' = p_(k+1)      for each improper block
         0  = C x + Q p + (D K - 1) y + D N w
     """
-    from scipy.linalg import block_diag
-
     count, orders = len(forms), [form.q.size - 1 for form in forms]
     extra = sum(orders)
     # Block that each derivative belongs to.
@@ -127,7 +125,7 @@ def _descriptor(forms: Sequence[Realization], between: Matrix, columns: Matrix) 
     r_r[extra + owner, np.arange(extra)] = [q for form in forms for q in form.q[1:]]
     r_r[extra:, extra:] = total(direct[:, None] * between, -np.eye(count))
     r_w[0, extra:] = direct[:, None] * columns
-    a = np.asarray(block_diag(*[form.a for form in forms]))
+    a = _block_diagonal([form.a for form in forms])
     x_w = np.zeros((2, b.shape[0], columns.shape[1]))
     x_w[0] = b @ columns
     return Descriptor(
@@ -149,6 +147,16 @@ def _stacked(vectors: Sequence[Matrix]) -> Matrix:
     for column, vector in enumerate(vectors):
         matrix[row : row + vector.size, column] = vector
         row += vector.size
+    return matrix
+
+
+def _block_diagonal(parts: Sequence[Matrix]) -> Matrix:
+    # As SciPy's `block_diag`, which looks at every array for so long that a scheme of many blocks waits for it.
+    matrix = np.zeros((sum(len(part) for part in parts),) * 2)
+    first = 0
+    for part in parts:
+        matrix[first : first + len(part), first : first + len(part)] = part
+        first += len(part)
     return matrix
 
 

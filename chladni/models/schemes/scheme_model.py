@@ -106,8 +106,13 @@ class SchemeModel:
     def with_values(self, values: Mapping[str, float]) -> Self:
         """Give the scheme with some parameters replaced; `ModelError` for an unknown name or impossible value."""
         # Asked of the scheme first: a block would tell a mistake by its own short name.
-        by_block = self._by_block(self._possible(values))
-        return replace(self, blocks=tuple(block.with_values(by_block.get(block.name, {})) for block in self.blocks))
+        by_block = self._by_block(self._changed(values))
+        return replace(
+            self,
+            blocks=tuple(
+                block.with_values(by_block[block.name]) if block.name in by_block else block for block in self.blocks
+            ),
+        )
 
     def with_usual_value(self, name: str, value: float) -> Self:
         """Give the scheme with one parameter replaced, whose usual range then reaches at least to its value."""
@@ -199,12 +204,16 @@ class SchemeModel:
         """Sentences about the scheme itself: what is off, unconnected, or computed through a filter in time."""
         return scheme_remarks(self.blocks, self.inputs, self.outputs, self.derivative_filter_s)
 
-    def _possible(self, values: Mapping[str, float]) -> Mapping[str, float]:
-        """Give the values back; `ModelError` for an unknown name or impossible value."""
-        declared = self.parameters
+    def _changed(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Give the values that are others than now; `ModelError` for an unknown name or impossible value."""
+        declared = {parameter.name: parameter for parameter in self.parameters.items_in_order}
+        changed = {}
         for name, value in values.items():
-            declared.require(name).with_value(value)
-        return values
+            now = declared[name] if name in declared else self.parameters.require(name)
+            # While one knob turns all other values are what they were, and possible.
+            if now.value != value:
+                changed[name] = now.with_value(value).value
+        return changed
 
     def _by_block(self, numbers: Mapping[str, float]) -> dict[str, dict[str, float]]:
         """Sort numbers by the block that their parameter belongs to; unknown names are refused."""
