@@ -1,0 +1,279 @@
+"""Kernel: MuJoCo's steps with laws at joints, called by the addresses of MuJoCo's own functions."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from chladni.models.integrator.machine_code import call_law, caller, machine_code, part_code
+
+Numbers1 = NDArray[np.float64]
+Numbers2 = NDArray[np.float64]
+Integers1 = NDArray[np.int64]
+Integers2 = NDArray[np.int64]
+
+_WORD = types.int64
+# In a kernel it takes no context.
+_LAW: Callable[..., float] = call_law
+_STEP: Any = caller(_WORD(_WORD, _WORD))
+_SOLVE: Any = caller(_WORD(_WORD, _WORD, _WORD, _WORD, types.int32))
+_ROOT_STEPS = 60
+# Relative to the change of velocity that the law makes; far below what a step's own error leaves.
+_ROOT = 1e-9
+_RUNAWAY = 1e8
+
+
+class Simulated(NamedTuple):
+    """MuJoCo's memory, which it moves while it runs, and its functions.
+
+    Attributes
+    ----------
+    address
+        ``[9]`` of the model, the data, ``mj_step1``, ``mj_fwdActuation``, ``mj_fwdAcceleration``, ``mj_solveM``,
+        ``mj_step2``, `column`, `unit`.
+    command, velocity, position, applied, smooth, sensors
+        MuJoCo's ``ctrl``, ``qvel``, ``qpos``, ``qfrc_applied``, ``qacc_smooth``, ``sensordata``.
+    damping
+        ``[dof]``: what MuJoCo treats implicitly.
+    unit, column
+        ``[dof]`` work space: a unit force, and the accelerations that it makes.
+    """
+
+    address: Integers1
+    command: Numbers1
+    velocity: Numbers1
+    position: Numbers1
+    applied: Numbers1
+    smooth: Numbers1
+    sensors: Numbers1
+    damping: Numbers1
+    unit: Numbers1
+    column: Numbers1
+
+
+class Laws(NamedTuple):
+    """Laws at joints.
+
+    Attributes
+    ----------
+    table
+        ``[law, 4]``: address of the function, address of its numbers, first state, number of states.
+    first
+        ``[joint + 1]`` first law of each joint.
+    dof, place
+        ``[joint]`` index of the joint's velocity and position.
+    rest
+        ``[joint]`` position where the joint's spring is at rest.
+    state, trial, rates, nudged
+        ``[law state]``; `rates` and `nudged` are work space.
+    numbers
+        What the laws read.
+    address
+        ``[3]`` of `trial`, `rates` and `nudged`.
+    """
+
+    table: Integers2
+    first: Integers1
+    dof: Integers1
+    place: Integers1
+    rest: Numbers1
+    state: Numbers1
+    trial: Numbers1
+    rates: Numbers1
+    nudged: Numbers1
+    numbers: Numbers1
+    address: Integers1
+
+
+class Record(NamedTuple):
+    """What is kept of a run.
+
+    Attributes
+    ----------
+    outputs
+        ``[output, sample]``.
+    rows
+        ``[output]`` place in MuJoCo's sensor data.
+    displacement, motion, force
+        ``[joint, sample]``.
+    """
+
+    outputs: Numbers2
+    rows: Integers1
+    displacement: Numbers2
+    motion: Numbers2
+    force: Numbers2
+
+
+@part_code
+def advanced_force(laws: Laws, joint: int, d: float, s: float, t: float, step_s: float) -> float:
+    """Force of a joint's laws at the end of a step that ends with this motion; `trial` takes the states there.
+
+    States move by one linearly implicit step each: bristles bend within microns.
+    """
+    force = 0.0
+    for law in range(laws.first[joint], laws.first[joint + 1]):
+        function, numbers = laws.table[law, 0], laws.table[law, 1]
+        start, count = laws.table[law, 2], laws.table[law, 3]
+        trial, rates, nudged = (
+            laws.address[0] + 8 * start,
+            laws.address[1] + 8 * start,
+            laws.address[2] + 8 * start,
+        )
+        for place in range(start, start + count):
+            laws.trial[place] = laws.nudged[place] = laws.state[place]
+        if count > 0:
+            _LAW(function, d, s, t, numbers, nudged, rates)
+        for place in range(start, start + count):
+            value, rate = laws.state[place], laws.rates[place]
+            nudge = 1e-6 * max(abs(value), 1e-3)
+            laws.nudged[place] = value + nudge
+            _LAW(function, d, s, t, numbers, nudged, rates)
+            slope = min((laws.rates[place] - rate) / nudge, 0.0)
+            laws.nudged[place] = value
+            # Other states' rates are asked anew at the common starting point.
+            _LAW(function, d, s, t, numbers, nudged, rates)
+            laws.trial[place] = value + step_s * rate / (1.0 - step_s * slope)
+        force += _LAW(function, d, s, t, numbers, trial, rates)
+    return force
+
+
+@part_code
+def implicit_force(
+    laws: Laws, joint: int, d: float, s: float, t: float, step_s: float, free: float, mobility: float
+) -> float:
+    """Force F of the motion that follows: ``s+ = s + step_s (free - mobility F(s+))``, so that friction sticks.
+
+    By regula falsi with Illinois' halving (Dahlquist & Björck, *Numerical Methods*, section 6.2).
+    """
+    drop = step_s * mobility
+    high = s + step_s * free
+    force = advanced_force(laws, joint, d + step_s * high, high, t, step_s)
+    over = drop * force
+    # A force that rises with speed has its root between the free velocity and the one that its force there gives.
+    low = high - over
+    force = advanced_force(laws, joint, d + step_s * low, low, t, step_s)
+    under = low - s - step_s * free + drop * force
+    size = abs(over)
+    if over * under >= 0.0:
+        # It falls with speed by more than the inertia in one step: what it is at the explicit step must do.
+        return force
+    side = 0
+    for _ in range(_ROOT_STEPS):
+        middle = (low * over - high * under) / (over - under)
+        force = advanced_force(laws, joint, d + step_s * middle, middle, t, step_s)
+        left = middle - s - step_s * free + drop * force
+        if abs(left) <= _ROOT * size:
+            break
+        if left * over > 0.0:
+            high, over = middle, left
+            # An end that stays a second time counts half, or it would stay for ever.
+            under *= 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            low, under = middle, left
+            over *= 0.5 if side == -1 else 1.0
+            side = -1
+    return force
+
+
+@part_code
+def resist(mujoco: Simulated, laws: Laws, t: float, step_s: float) -> None:
+    """Set the generalised forces of the laws for the step that begins, joint after joint."""
+    _STEP(mujoco.address[3], (mujoco.address[0], mujoco.address[1]))
+    _STEP(mujoco.address[4], (mujoco.address[0], mujoco.address[1]))
+    for joint in range(laws.dof.size):
+        if laws.first[joint] == laws.first[joint + 1]:
+            continue
+        dof = laws.dof[joint]
+        mujoco.unit[dof] = 1.0
+        _SOLVE(
+            mujoco.address[5],
+            (
+                mujoco.address[0],
+                mujoco.address[1],
+                mujoco.address[7],
+                mujoco.address[8],
+                np.int32(1),
+            ),
+        )
+        mujoco.unit[dof] = 0.0
+        # MuJoCo adds the joint's damping to the inertia, by the step's length.
+        heavier = 1.0 + step_s * mujoco.damping[dof] * mujoco.column[dof]
+        d = mujoco.position[laws.place[joint]] - laws.rest[joint]
+        force = implicit_force(
+            laws,
+            joint,
+            d,
+            mujoco.velocity[dof],
+            t + step_s,
+            step_s,
+            mujoco.smooth[dof] / heavier,
+            mujoco.column[dof] / heavier,
+        )
+        for law in range(laws.first[joint], laws.first[joint + 1]):
+            start = laws.table[law, 2]
+            for place in range(start, start + laws.table[law, 3]):
+                laws.state[place] = laws.trial[place]
+        mujoco.applied[dof] = -force
+        for other in range(mujoco.smooth.size):
+            mujoco.smooth[other] -= mujoco.column[other] * force
+
+
+@part_code
+def keep(mujoco: Simulated, laws: Laws, record: Record, sample: int) -> None:
+    """Write down what the first step of a sample saw."""
+    for row in range(record.rows.size):
+        record.outputs[row, sample] = mujoco.sensors[record.rows[row]]
+    for joint in range(laws.dof.size):
+        record.force[joint, sample] = -mujoco.applied[laws.dof[joint]]
+
+
+@part_code
+def runs_away(mujoco: Simulated) -> bool:
+    """Whether a velocity is beyond all physics, or no number."""
+    largest = 0.0
+    for dof in range(mujoco.velocity.size):
+        # Written so that NaN counts.
+        if not abs(mujoco.velocity[dof]) <= largest:
+            largest = abs(mujoco.velocity[dof])
+    return not largest < _RUNAWAY
+
+
+@machine_code
+def run(
+    mujoco: Simulated, laws: Laws, record: Record, inputs: Numbers2, rows: Integers1, steps: int, step_s: float
+) -> int:
+    """Simulate sample by sample, each input held until the next; give the samples done, fewer when it runs away.
+
+    Parameters
+    ----------
+    inputs
+        ``[input, sample]``.
+    rows
+        ``[input]`` place in MuJoCo's ``ctrl``.
+    steps, step_s
+        Steps a sample, and how long each is.
+    """
+    busy = laws.first[-1] > 0
+    samples: int = inputs.shape[1]
+    for sample in range(samples):
+        for row in range(rows.size):
+            mujoco.command[rows[row]] = inputs[row, sample]
+        for joint in range(laws.dof.size):
+            record.displacement[joint, sample] = mujoco.position[laws.place[joint]] - laws.rest[joint]
+            record.motion[joint, sample] = mujoco.velocity[laws.dof[joint]]
+        for step in range(steps):
+            for joint in range(laws.dof.size):
+                mujoco.applied[laws.dof[joint]] = 0.0
+            _STEP(mujoco.address[2], (mujoco.address[0], mujoco.address[1]))
+            if busy:
+                resist(mujoco, laws, (sample * steps + step) * step_s, step_s)
+            _STEP(mujoco.address[6], (mujoco.address[0], mujoco.address[1]))
+            if step == 0:
+                keep(mujoco, laws, record, sample)
+        if runs_away(mujoco):
+            return sample
+    return samples
