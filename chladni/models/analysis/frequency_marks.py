@@ -16,6 +16,8 @@ Matrix = NDArray[np.float64]
 
 # Phases that touch a level by rounding only (two integrators lie at -180 degrees for ever) don't cross it.
 ROUNDING_DEG = 1e-7
+# The same of magnitudes, over the level: that of a dead time is 1 everywhere.
+ROUNDING_SHARE = 1e-12
 # Of a frequency, when a crossing is found.
 ROUNDING = 1e-15
 
@@ -83,7 +85,9 @@ class FrequencyMarks:
             size = abs(value)
             return size - level, (value.conjugate() * slope).real / size if size else 0.0
 
-        return self._crossings(measure, np.abs(self._curve.response) - level, falling_only=falling_only)
+        away = np.abs(self._curve.response) - level
+        away = np.where(np.abs(away) <= ROUNDING_SHARE * level, 0.0, away)
+        return self._crossings(measure, away, falling_only=falling_only)
 
     def gain_margins(self) -> list[Margin]:
         """Give every crossing of -180 degrees, whole turns more or less included, by rising frequency."""

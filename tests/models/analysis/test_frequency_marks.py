@@ -132,3 +132,11 @@ def test_a_crossing_on_a_point_of_the_grid_is_one_crossing() -> None:
         marks = FrequencyMarks(on_grid, Resolvent(path), 0.0)
         assert marks.phase_crossings(-90.0) == pytest.approx([2.0], rel=1e-12)
         assert marks.phase_crossings(-90.0, falling_only=True) == pytest.approx([2.0], rel=1e-12)
+
+
+def test_a_magnitude_that_is_one_but_for_rounding_passes_no_level() -> None:
+    # Dead time alone: rounding puts the magnitude now above one and now below.
+    assert found(compiled(gain_only(1.0), input_delays_s=(0.37,)))["phase_margin"] is None
+    # A band pass touches one at its peak.
+    touching = frequency_behaviour(linear_path(of_control(0.3 * S / (S**2 + 0.3 * S + 1))))
+    assert touching.phase_margins == ()
