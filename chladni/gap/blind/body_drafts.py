@@ -9,7 +9,7 @@ Drafter = Callable[[Scene, str], Draft]
 
 
 def _mass_of(scene: Scene, body: str) -> float:
-    return scene.numbers[f"{body}.{scene.bench.plan.inertia}"]
+    return scene.numbers[scene.bench.plan.inertia_of(body)]
 
 
 def extra_mode(scene: Scene, site: str) -> Draft:
@@ -32,7 +32,7 @@ def extra_mode(scene: Scene, site: str) -> Draft:
 def added_mass(scene: Scene, site: str) -> Draft:
     """A payload, rigid or on a mount well above what is measured; more than the tolerance explains."""
     mass, plan = _mass_of(scene, site), scene.bench.plan
-    least = 4.5 * plan.tolerance[f"{site}.{plan.inertia}"]
+    least = 4.5 * plan.tolerance[plan.inertia_of(site)]
     stiff, ratio = scene.rng.random() < 0.6, scene.between(0.02, 0.1)
     frequency = min(6.0 * scene.bench.modes_hz[-1], 1.5 * scene.bench.rate_hz)
 

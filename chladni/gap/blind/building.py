@@ -1,9 +1,21 @@
 """A whole machine from a plan, true numbers and hidden effects."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from chladni.gap.blind.assembly import added
-from chladni.gap.blind.equations import FLOOR, Machine, begin, command, effects_at, finish, motion
+from chladni.gap.blind.drive_equations import begin_drive, finish_drive
+from chladni.gap.blind.equations import (
+    FLOOR,
+    Machine,
+    begin_structure,
+    command,
+    effects_at,
+    empty_machine,
+    finish_structure,
+    motion,
+    write_motion,
+)
 from chladni.gap.blind.hidden_forces import at_body, at_joint, tone_name
 from chladni.gap.blind.hidden_signals import acting_place, through_actuator, through_sensor
 from chladni.gap.blind.plan import Hidden, Output, Plan
@@ -25,13 +37,16 @@ def built(plan: Plan, numbers: Mapping[str, float], effects: Sequence[Hidden] = 
         Whether displacement and speed of each joint, and what acts at each input, are outputs too:
         ``JOINT.d``, ``JOINT.s``, ``INPUT.u``, ``INPUT.x`` (where it acts).
     """
-    machine = begin(plan, numbers, unseen_signals(effects))
+    machine = empty_machine(plan, numbers, unseen_signals(effects))
+    begin, finish = (begin_drive, finish_drive) if plan.drive else (begin_structure, finish_structure)
+    begin(machine)
     _place_bodies(machine, effects)
     _place_inputs(machine, effects)
     for joint in plan.joints:
         for hidden in effects_at(effects, joint.name):
             at_joint(machine, hidden)
     finish(machine)
+    write_motion(machine)
     _place_outputs(machine, effects)
     if watched:
         _watch(machine)
@@ -64,7 +79,7 @@ def _place_inputs(machine: Machine, effects: Sequence[Hidden]) -> None:
 
 
 def _rate_of(sensor: Output) -> Output:
-    return Output(name=sensor.name, channel=sensor.channel, measures="velocity", at=sensor.at, joint=sensor.joint)
+    return replace(sensor, measures="velocity")
 
 
 def _place_outputs(machine: Machine, effects: Sequence[Hidden]) -> None:
@@ -83,6 +98,8 @@ def _watch(machine: Machine) -> None:
     for joint in machine.plan.joints:
         d, s = machine.stretch(joint)
         machine.assembly.outputs |= {f"{joint.name}.d": d, f"{joint.name}.s": s}
+    if "force" in machine.signals:
+        machine.assembly.outputs["drive.force"] = machine.signals["force"]
     for one in machine.plan.inputs:
         machine.assembly.outputs[f"{one.name}.u"] = dict(machine.acting[one.name])
         machine.assembly.outputs[f"{one.name}.x"] = acting_place(machine, one.name)[0]

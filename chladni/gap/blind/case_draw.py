@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from chladni.gap.blind.distinction import left_after_tuning
 from chladni.gap.blind.draft import Scene
+from chladni.gap.blind.drive_draw import draw_drive_bench
 from chladni.gap.blind.excitation_draw import Drive, draw_drive
 from chladni.gap.blind.noise import SensorNoise, draw_noise
 from chladni.gap.blind.performance import measured, perform, pooled_change, rms, settled_steps
-from chladni.gap.blind.plan import Hidden
+from chladni.gap.blind.plan import Bench, Hidden
 from chladni.gap.blind.severity import converted, sized
 from chladni.gap.blind.site_draw import draw_draft, draw_numbers
-from chladni.gap.blind.structure_draw import Bench, Footing, draw_bench
+from chladni.gap.blind.structure_draw import Footing, draw_structure
 from chladni.signals.errors import EstimateError
 
 Matrix = NDArray[np.float64]
@@ -25,6 +26,9 @@ _MOST_DRAWS = 200
 CLEAR, FAINT = (3.3, 60.0), (0.33, 2.8)
 #: Share of the outputs' RMS above which a change isn't moderate any more; a wrong sign alone makes two of it.
 _LARGEST_CHANGE, _LARGEST_OF_GAIN = 1.0, 2.3
+_DRIVES = 0.15
+_FOOTINGS: Sequence[Footing] = ("grounded", "free", "loop")
+_FOOTING_SHARES = (0.64, 0.12, 0.24)
 #: What must be left of a change, over the noise, when numbers inside their tolerances have imitated it.
 LEAST_LEFT = 1.0
 _SETTLED_SHARE = 0.1
@@ -115,8 +119,7 @@ def draw_case(order: Order, rng: np.random.Generator) -> Case:
 
 
 def _attempt(order: Order, rng: np.random.Generator) -> Case | None:
-    footings: Sequence[Footing] = ("grounded", "free", "loop")
-    bench = draw_bench(rng, footings[int(rng.choice(3, p=(0.64, 0.12, 0.24)))])
+    bench = _draw_bench(rng)
     drive = draw_drive(rng, bench)
     exact = order.kind == "none" and rng.random() < 0.2
     numbers = dict(bench.plan.numbers) if exact else draw_numbers(rng, bench.plan)
@@ -168,6 +171,12 @@ def _left(bench: Bench, numbers: Mapping[str, float], drive: Drive, effects: tup
     return left_after_tuning(kept, about, drive, change, before, noise)
 
 
+def _draw_bench(rng: np.random.Generator) -> Bench:
+    if rng.random() < _DRIVES:
+        return draw_drive_bench(rng)
+    return draw_structure(rng, _FOOTINGS[int(rng.choice(len(_FOOTINGS), p=_FOOTING_SHARES))])
+
+
 def _fits(order: Order, change: float, share: float) -> bool:
     least, most = (0.3, 3.0) if order.kind == "faint" else (3.0, np.inf)
     gains = any(word == "gain_error" for word in order.words)
@@ -199,9 +208,9 @@ def _wrong_parameter(bench: Bench, rng: np.random.Generator) -> dict[str, float]
     """A number that left its tolerance; a mass only downwards, since upwards it is an added one."""
     plan = bench.plan
     names = [name for name, tolerance in plan.tolerance.items() if tolerance > 0 and plan.numbers[name] > 0]
-    name = str(rng.choice(names))
+    name, masses = str(rng.choice(names)), [plan.inertia_of(body) for body in plan.bodies]
     sigmas = float(rng.uniform(4.0, 8.0))
-    down = name.endswith(f".{plan.inertia}") or (rng.random() < 0.5 and sigmas * plan.tolerance[name] < 0.7)
+    down = name in masses or (rng.random() < 0.5 and sigmas * plan.tolerance[name] < 0.7)
     return {name: -sigmas if down else sigmas}
 
 

@@ -13,7 +13,7 @@ from scipy.optimize import lsq_linear
 from chladni.gap.blind.excitation_draw import Drive
 from chladni.gap.blind.noise import SensorNoise
 from chladni.gap.blind.performance import measured, perform, rms
-from chladni.gap.blind.structure_draw import Bench
+from chladni.gap.blind.plan import Bench
 
 Matrix = NDArray[np.float64]
 #: Numbers are moved by this part of a sigma for their sensitivities, and believed within so many.

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from chladni.gap.blind.plan import Hidden
-from chladni.gap.blind.structure_draw import Bench
+from chladni.gap.blind.plan import Bench, Hidden
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +70,10 @@ class Scene:
 
     def force_at(self, joint: str) -> float:
         """RMS force that a joint holds: its spring's, or where it has none what the inputs push."""
-        held = self.numbers[f"{joint}.stiffness"] * self.moving[f"{joint}.d"]
+        held = self.stiffness(joint) * self.moving[f"{joint}.d"]
         pushed = max((value for name, value in self.moving.items() if name.endswith(".u")), default=0.0)
-        return float(held) if held > 0 else float(pushed)
+        return float(held) if held > 0 else float(self.moving.get("drive.force", pushed))
+
+    def stiffness(self, joint: str) -> float:
+        """True stiffness of a joint; zero at a free guide and in a drive."""
+        return self.bench.plan.of_joint(self.numbers, joint, "stiffness")

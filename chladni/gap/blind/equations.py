@@ -24,6 +24,8 @@ class Machine:
         Of each body.
     acting
         Of each input, the signal behind its actuator.
+    signals
+        Of a drive, what may be measured besides motions.
     """
 
     assembly: Assembly
@@ -32,6 +34,7 @@ class Machine:
     forces: dict[str, dict[str, float]]
     masses: dict[str, float]
     acting: dict[str, dict[str, float]] = field(default_factory=dict)
+    signals: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def displacement(self, body: str) -> dict[str, float]:
         """Displacement of a body; the ground has none."""
@@ -68,24 +71,31 @@ class Machine:
         self.forces[name], self.masses[name] = {}, mass
 
 
-def begin(plan: Plan, numbers: Mapping[str, float], unseen: Sequence[str] = ()) -> Machine:
-    """Start a machine: bodies, springs and dampers. `unseen` names driving signals that aren't in the plan."""
-    machine = Machine(
-        assembly=Assembly(inputs=[*plan.driven(), *unseen]), plan=plan, numbers=numbers, forces={}, masses={}
-    )
+def empty_machine(plan: Plan, numbers: Mapping[str, float], unseen: Sequence[str] = ()) -> Machine:
+    """Start a machine without parts. `unseen` names driving signals that aren't in the plan."""
+    assembly = Assembly(inputs=[*plan.driven(), *unseen])
+    return Machine(assembly=assembly, plan=plan, numbers=numbers, forces={}, masses={})
+
+
+def begin_structure(machine: Machine) -> None:
+    """Add bodies, springs and dampers."""
+    plan, numbers = machine.plan, machine.numbers
     for body in plan.bodies:
-        machine.new_body(body, numbers[f"{body}.{plan.inertia}"])
+        machine.new_body(body, numbers[plan.inertia_of(body)])
     for joint in plan.joints:
         d, s = machine.stretch(joint)
         k, c = numbers[f"{joint.name}.stiffness"], numbers[f"{joint.name}.damping"]
         machine.resist(joint, added((k, d), (c, s)))
-    return machine
 
 
-def finish(machine: Machine) -> None:
-    """Let the inputs act, and write the rates of all bodies."""
+def finish_structure(machine: Machine) -> None:
+    """Let the inputs act as forces."""
     for one in machine.plan.inputs:
         _act(machine, one)
+
+
+def write_motion(machine: Machine) -> None:
+    """Write the rates of all bodies, once all forces are known."""
     floor = machine.floor()
     for body, force in machine.forces.items():
         machine.assembly.rates[f"{body}.q"] = {f"{body}.v": 1.0}
@@ -104,6 +114,8 @@ def _act(machine: Machine, one: Input) -> None:
 
 def motion(machine: Machine, output: Output) -> dict[str, float]:
     """What a perfect sensor measures. Accelerations are those in space, and need a finished machine."""
+    if output.measures not in ("acceleration", "velocity", "displacement"):
+        return machine.signals[output.measures]
     ends = [(1.0, output.at)]
     if output.joint:
         joint = machine.plan.joint(output.joint)

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.blind.plan import GROUND
-from chladni.gap.blind.structure_draw import Bench
+from chladni.gap.blind.plan import GROUND, Bench
 from chladni.models.excitations.impact import Impact
 from chladni.models.excitations.multisine import Multisine
 from chladni.models.excitations.random_noise import RandomNoise
@@ -15,6 +14,8 @@ from chladni.models.excitations.swept_sine import SweptSine
 Matrix = NDArray[np.float64]
 #: Samples simulated beyond the log, so that a clock that is early has something to show.
 BEYOND = 64
+#: RMS of what drives a drive, at most, in its unit.
+_DRIVE_LEVELS = {"flow": 2.5e-5, "load": 150.0, "voltage": 8.0, "load_torque": 0.1, "position_reference": 0.5}
 _WORDS, _SHARES = ("random", "multisine", "sweep", "steps", "impacts"), (0.42, 0.28, 0.15, 0.08, 0.07)
 
 
@@ -44,7 +45,7 @@ def draw_drive(rng: np.random.Generator, bench: Bench) -> Drive:
     words: list[str] = []
     for name in bench.plan.driven():
         word = str(rng.choice(_WORDS, p=_SHARES))
-        reference = bench.plan.loop is not None and name == bench.plan.loop.name
+        reference = name == "position_reference" or (bench.plan.loop is not None and name == bench.plan.loop.name)
         # A second, quieter input mostly.
         level = _level(rng, bench, name) * (rng.uniform(0.3, 1.0) if rows else 1.0)
         band_hz = _band(rng, bench, reference=reference)
@@ -59,6 +60,8 @@ def _level(rng: np.random.Generator, bench: Bench, name: str) -> float:
     plan = bench.plan
     if plan.loop is not None and name == plan.loop.name:
         return float(np.exp(rng.uniform(np.log(1e-3), np.log(3e-2))))
+    if name in _DRIVE_LEVELS:
+        return _DRIVE_LEVELS[name] * float(np.exp(rng.uniform(-0.7, 0.0)))
     if any(one.name == name and one.at == GROUND for one in plan.inputs):
         return float(np.exp(rng.uniform(np.log(0.5), np.log(10.0))))
     return float(np.exp(rng.uniform(np.log(0.2), np.log(5.0))) if plan.rotary else np.exp(rng.uniform(1.5, 5.5)))

@@ -61,7 +61,7 @@ def acting_place(machine: Machine, site: str) -> tuple[Expression, Expression]:
     one = next(each for each in machine.plan.inputs if each.name == site)
     if one.joint:
         return machine.stretch(machine.plan.joint(one.joint))
-    return (machine.displacement(one.at), machine.velocity(one.at)) if one.at != GROUND else ({}, {})
+    return (machine.displacement(one.at), machine.velocity(one.at)) if one.at not in ("", GROUND) else ({}, {})
 
 
 def _factor(_machine: Machine, hidden: Hidden, signal: Sum) -> Expression:

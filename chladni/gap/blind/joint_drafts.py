@@ -67,7 +67,7 @@ def quadratic(scene: Scene, site: str) -> Draft:
 
 def hardening(scene: Scene, site: str) -> Draft:
     """Cubic with a fifth power, or a progressive buffer."""
-    k, d = scene.numbers[f"{site}.stiffness"], scene.moving[f"{site}.d"]
+    k, d = scene.stiffness(site), scene.moving[f"{site}.d"]
     if scene.one_of("cubic_quintic", "rubber") == "rubber":
         return _draft("hardening_stiffness", site, "rubber", lambda size: {
             "stiffness": k, "length": 3.0 * d / size**0.5}, most=6.0)  # fmt: skip
@@ -78,7 +78,7 @@ def hardening(scene: Scene, site: str) -> Draft:
 
 def softening(scene: Scene, site: str) -> Draft:
     """A spring that yields like an arc tangent, or like a sine as far as it goes."""
-    k, d = scene.numbers[f"{site}.stiffness"], scene.moving[f"{site}.d"]
+    k, d = scene.stiffness(site), scene.moving[f"{site}.d"]
     law, reach = scene.one_of("arctangent", "sine_spring"), scene.between(4.0, 5.0)
     return _draft("softening_stiffness", site, law, lambda size: {
         "stiffness": k, "length": reach * d / size**0.5}, most=6.0)  # fmt: skip
@@ -86,7 +86,7 @@ def softening(scene: Scene, site: str) -> Draft:
 
 def backlash(scene: Scene, site: str) -> Draft:
     """Play with rounded corners, with and without the damper inside."""
-    k, d = scene.numbers[f"{site}.stiffness"], scene.moving[f"{site}.d"]
+    k, d = scene.stiffness(site), scene.moving[f"{site}.d"]
     c = scene.numbers[f"{site}.damping"] if scene.rng.random() < 0.5 else 0.0
     corner = scene.between(0.03, 0.1)
     return _draft("backlash", site, "soft_play", lambda size: {
@@ -106,7 +106,7 @@ def stop(scene: Scene, site: str) -> Draft:
 
 def varying(scene: Scene, site: str) -> Draft:
     """Smooth drift, ramp, or a step that takes a while."""
-    k, sign, middle = scene.numbers[f"{site}.stiffness"], scene.sign(), scene.between(0.3, 0.7) * scene.seconds
+    k, sign, middle = scene.stiffness(site), scene.sign(), scene.between(0.3, 0.7) * scene.seconds
     law = scene.one_of("smooth_change", "smooth_change", "ramp_change")
     width = scene.seconds * (scene.between(0.05, 0.15) if scene.rng.random() < 0.5 else 0.002)
     place = {"middle": middle, "width": width} if law == "smooth_change" else {

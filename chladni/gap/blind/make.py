@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -92,33 +92,25 @@ def make_case(task: CaseTask) -> str:
 
 def log_of(case: Case) -> TimeSeries:
     """What the log holds: driving signals, then outputs with their noise."""
-    plan, rows, channels = case.bench.plan, [], []
-    units = _units(case)
-    for name, row in zip(plan.driven(), case.drive.signals, strict=True):
-        rows.append(row[case.drive.before : case.drive.before + case.bench.samples])
-        channels.append(Channel(name=_channel(case, name), unit=units[name], role="reference"))
-    for name in measured(case.bench):
-        rows.append(case.recorded[name])
-        channels.append(Channel(name=_channel(case, name), unit=units[name]))
+    plan, terminals = case.bench.plan, _terminals(case)
+    window = slice(case.drive.before, case.drive.before + case.bench.samples)
+    names = measured(case.bench)
+    rows = [*case.drive.signals[:, window], *(case.recorded[name] for name in names)]
+    channels = [*(replace(terminals[name], role="reference") for name in plan.driven()),
+                *(terminals[name] for name in names)]  # fmt: skip
     return TimeSeries(values=np.vstack(rows), sample_rate_hz=case.bench.rate_hz, start_time_ns=START_TIME_NS,
                       channels=tuple(channels))  # fmt: skip
 
 
-def _channel(case: Case, name: str) -> str:
+def _terminals(case: Case) -> dict[str, Channel]:
+    """Channel of each input and output, and of a loop's reference."""
     plan = case.bench.plan
-    if plan.loop is not None and name == plan.loop.name:
-        return plan.loop.reference
-    channels = {one.name: one.channel for one in plan.inputs} | {one.name: one.channel for one in plan.outputs}
-    return channels[name]
-
-
-def _units(case: Case) -> dict[str, str]:
-    plan = case.bench.plan
-    length = "rad" if plan.rotary else "m"
-    units = {one.name: ("N m" if plan.rotary else "N") if one.at != "ground" else "m/s^2" for one in plan.inputs}
-    of_motion = {"acceleration": f"{length}/s^2", "velocity": f"{length}/s", "displacement": length}
-    units |= {one.name: of_motion[one.measures] for one in plan.outputs}
-    return units if plan.loop is None else units | {plan.loop.name: length}
+    found = {one.name: Channel(name=one.channel, unit=one.unit) for one in plan.inputs}
+    found |= {one.name: Channel(name=one.channel, unit=one.unit) for one in plan.outputs}
+    if plan.loop is not None:
+        sensor = found[plan.loop.feedback]
+        found[plan.loop.name] = Channel(name=plan.loop.reference, unit=sensor.unit)
+    return found
 
 
 def truth_of(case: Case, seed: tuple[int, int]) -> dict[str, Any]:

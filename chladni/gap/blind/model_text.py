@@ -7,9 +7,13 @@ from chladni.gap.blind.plan import GROUND, Input, Output, Plan
 
 def model_text(plan: Plan) -> str:
     """Give ``model.toml`` with the nominal numbers."""
-    tables = [
+    return "\n\n".join(_drive_tables(plan) if plan.drive else _structure_tables(plan)) + "\n"
+
+
+def _structure_tables(plan: Plan) -> list[str]:
+    return [
         f'format = "chladni.model/1"\nname = "{plan.name}"\nkind = "structure"',
-        *(_table("body", {"name": body, plan.inertia: plan.numbers[f"{body}.{plan.inertia}"]})
+        *(_table("body", {"name": body, plan.inertia_of(body).split(".")[1]: plan.numbers[plan.inertia_of(body)]})
           for body in plan.bodies),
         *(_table("joint", {
             "name": joint.name, "between": [joint.first, joint.second],
@@ -20,7 +24,18 @@ def model_text(plan: Plan) -> str:
         *_controllers(plan),
         _tolerances(plan),
     ]  # fmt: skip
-    return "\n\n".join(tables) + "\n"
+
+
+def _drive_tables(plan: Plan) -> list[str]:
+    options = [f'{name} = "{word}"' for name, word in plan.options.items()]
+    return [
+        f'format = "chladni.model/1"\nname = "{plan.name}"\nkind = "drive"\ndrive = "{plan.drive}"',
+        *(["\n".join(["[options]", *options])] if options else []),
+        "\n".join(["[parameters]", *(f"{name} = {value!r}" for name, value in plan.numbers.items())]),
+        *(_table("input", {"signal": one.name, "channel": one.channel}) for one in plan.inputs),
+        *(_table("output", {"signal": one.measures, "channel": one.channel}) for one in plan.outputs),
+        "\n".join(["[tolerance]", *(f"{name} = {value!r}" for name, value in plan.tolerance.items())]),
+    ]
 
 
 def _table(name: str, content: dict[str, object]) -> str:

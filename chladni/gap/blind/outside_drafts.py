@@ -11,7 +11,7 @@ Drafter = Callable[[Scene, str], Draft]
 
 def viscoelastic(scene: Scene, site: str) -> Draft:
     """Rubber: a stiffness that rises, and a loss that stays, over two decades of frequency."""
-    k = scene.numbers[f"{site}.stiffness"]
+    k = scene.stiffness(site)
     numbers = {"branches": 5.0, "lowest_hz": 0.1 * scene.bench.modes_hz[0]}
 
     def hidden(size: float) -> Hidden:
@@ -25,7 +25,7 @@ def gyroscopic_coupling(scene: Scene, site: str) -> Draft:
     """Two bodies' velocities push each other aside, as where a wheel spins."""
     plan = scene.bench.plan
     partner = scene.one_of(*(body for body in plan.bodies if body != site))
-    mass = (scene.numbers[f"{site}.{plan.inertia}"] * scene.numbers[f"{partner}.{plan.inertia}"]) ** 0.5
+    mass = (scene.numbers[plan.inertia_of(site)] * scene.numbers[plan.inertia_of(partner)]) ** 0.5
     rate = 2 * pi * scene.bench.modes_hz[0] * mass * scene.sign()
 
     def hidden(size: float) -> Hidden:
@@ -37,7 +37,7 @@ def gyroscopic_coupling(scene: Scene, site: str) -> Draft:
 
 def periodic_stiffness(scene: Scene, site: str) -> Draft:
     """A spring that swings with a shaft which turns: parametric excitation."""
-    k, turning = scene.numbers[f"{site}.stiffness"], 2 * pi * scene.bench.modes_hz[0] * scene.between(0.15, 0.6)
+    k, turning = scene.stiffness(site), 2 * pi * scene.bench.modes_hz[0] * scene.between(0.15, 0.6)
     phase = scene.between(-3, 3)
 
     def hidden(size: float) -> Hidden:

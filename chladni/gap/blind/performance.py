@@ -9,8 +9,7 @@ from chladni.gap.blind.building import built, unseen_signals
 from chladni.gap.blind.equations import FLOOR
 from chladni.gap.blind.excitation_draw import Drive
 from chladni.gap.blind.integration import MOST_STEPS, integrate, steps_for
-from chladni.gap.blind.plan import Hidden
-from chladni.gap.blind.structure_draw import Bench
+from chladni.gap.blind.plan import Bench, Hidden
 from chladni.signals.errors import EstimateError
 
 Matrix = NDArray[np.float64]

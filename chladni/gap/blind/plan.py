@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-Measured = Literal["acceleration", "velocity", "displacement"]
 GROUND = "ground"
 
 
@@ -23,19 +22,30 @@ class Input:
 
     name: str
     channel: str
+    unit: str
     at: str = ""
     joint: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Output:
-    """What is measured at a body, or between the bodies of a joint."""
+    """What is measured at a body, or between the bodies of a joint.
+
+    Attributes
+    ----------
+    measures
+        ``acceleration``, ``velocity`` or ``displacement``, or a drive's own signal, such as ``pressure_drop``.
+    fed_back
+        Whether a controller sees it.
+    """
 
     name: str
     channel: str
-    measures: Measured
+    measures: str
+    unit: str
     at: str = ""
     joint: str = ""
+    fed_back: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +80,8 @@ class Plan:
         One sigma over the value, of each number.
     rotary
         Whether bodies turn: inertias, torques, angles.
+    drive, options
+        Kind of drive and its options; a structure has neither.
     """
 
     name: str
@@ -81,11 +93,18 @@ class Plan:
     numbers: Mapping[str, float] = field(default_factory=dict)
     tolerance: Mapping[str, float] = field(default_factory=dict)
     rotary: bool = False
+    drive: str = ""
+    options: Mapping[str, str] = field(default_factory=dict)
 
-    @property
-    def inertia(self) -> str:
-        """Word of a body's inertia."""
-        return "inertia" if self.rotary else "mass"
+    def inertia_of(self, body: str) -> str:
+        """Name of the number that holds a body's inertia."""
+        if self.drive:
+            return "inertia" if self.rotary else "reduced_mass"
+        return f"{body}.inertia" if self.rotary else f"{body}.mass"
+
+    def of_joint(self, numbers: Mapping[str, float], joint: str, word: str) -> float:
+        """A joint's ``stiffness`` or ``damping``; a drive has no springs."""
+        return numbers.get(f"{joint}.{word}", 0.0)
 
     def joint(self, name: str) -> Joint:
         """Joint by its name."""
@@ -121,3 +140,21 @@ class Hidden:
     law: str
     numbers: Mapping[str, float]
     source: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bench:
+    """A plan, and the grid on which its log is taken.
+
+    Attributes
+    ----------
+    rate_hz, samples
+        Of the log.
+    modes_hz
+        Natural frequencies of the nominal machine but for rigid motion, rising; a loop's own are among them.
+    """
+
+    plan: Plan
+    rate_hz: float
+    samples: int
+    modes_hz: tuple[float, ...]

@@ -13,7 +13,7 @@ from chladni.gap.blind.signal_drafts import INPUT_DRAFTS, OUTPUT_DRAFTS
 def draw_draft(scene: Scene, word: str) -> Draft | None:
     """Draw a site of the word and a draft there; None when this bench has no such site."""
     if word == "base_vibration":
-        return base_vibration(scene, GROUND)
+        return None if scene.bench.plan.drive else base_vibration(scene, GROUND)
     places = _places(scene, word)
     if not places:
         return None
@@ -38,7 +38,7 @@ def _places(scene: Scene, word: str) -> list[tuple[str, list[str]]]:
 def _joints(scene: Scene, word: str) -> list[str]:
     springs = word in NEED_A_SPRING or word in OUTSIDE_DRAFTS
     names = [joint.name for joint in scene.bench.plan.joints]
-    return [name for name in names if not springs or scene.numbers[f"{name}.stiffness"] > 0]
+    return [name for name in names if not springs or scene.stiffness(name) > 0]
 
 
 def _bodies(plan: Plan, word: str) -> list[str]:
@@ -47,13 +47,12 @@ def _bodies(plan: Plan, word: str) -> list[str]:
 
 def _inputs(plan: Plan, word: str) -> list[str]:
     moving = word in ("ripple", "position_dependent_gain")
-    return [one.name for one in plan.inputs if not moving or one.at != GROUND]
+    return [one.name for one in plan.inputs if not moving or one.at not in ("", GROUND) or one.joint]
 
 
 def _outputs(plan: Plan, word: str) -> list[str]:
     # What a controller sees is kept sound but for its gain: anything else there is another plant, not a sensor.
-    fed_back = None if plan.loop is None or word == "gain_error" else plan.loop.feedback
-    usable = [one for one in plan.outputs if one.name != fed_back]
+    usable = [one for one in plan.outputs if not one.fed_back or (word == "gain_error" and not plan.drive)]
     if word != "cross_axis":
         return [one.name for one in usable]
     kinds: list[str] = [one.measures for one in plan.outputs]

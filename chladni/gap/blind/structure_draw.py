@@ -1,6 +1,6 @@
 """Random structures with instruments: chains and trees, on springs, on free guides, and in position loops."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import pi
 from typing import Any, Literal
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.blind.building import built
-from chladni.gap.blind.plan import GROUND, Input, Joint, Loop, Output, Plan
+from chladni.gap.blind.plan import GROUND, Bench, Input, Joint, Loop, Output, Plan
 
 Matrix = NDArray[np.float64]
 Footing = Literal["grounded", "free", "loop"]
@@ -17,28 +17,11 @@ RATES_HZ = (500.0, 512.0, 800.0, 1000.0, 1024.0, 1600.0, 2000.0, 2048.0)
 #: Frequencies that count for a draw, as shares of the sample rate.
 LOWEST_SHARE, HIGHEST_SHARE = 1 / 100, 1 / 5.5
 _LEAST_DAMPING, _MOST_DAMPING = 0.002, 0.06
-_MOST_DRAWS = 400
+#: Units of force and length, where bodies move along and where they turn.
+_FORCE, _LENGTH = ("N", "N m"), ("m", "rad")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bench:
-    """A plan, and the grid on which its log is taken.
-
-    Attributes
-    ----------
-    rate_hz, samples
-        Of the log.
-    modes_hz
-        Natural frequencies of the nominal structure but for rigid motion, rising; a loop's own are among them.
-    """
-
-    plan: Plan
-    rate_hz: float
-    samples: int
-    modes_hz: tuple[float, ...]
-
-
-def draw_bench(rng: np.random.Generator, footing: Footing) -> Bench:
+def draw_structure(rng: np.random.Generator, footing: Footing) -> Bench:
     """Draw until the modes lie where the log can show them and a loop is stable with some margin."""
     while True:
         rate_hz = float(rng.choice(RATES_HZ))
@@ -105,7 +88,7 @@ def _numbers(rng: np.random.Generator, plan: Plan, rate_hz: float, footing: Foot
     dampers = 2 * ratio / omega * springs * np.exp(rng.uniform(-0.5, 0.5, springs.size))
     if springs[0] == 0:
         dampers[0] = masses.sum() * omega * np.exp(rng.uniform(np.log(0.01), np.log(0.05)))
-    numbers = {f"{body}.{plan.inertia}": float(m) for body, m in zip(plan.bodies, masses, strict=True)}
+    numbers = {plan.inertia_of(body): float(m) for body, m in zip(plan.bodies, masses, strict=True)}
     for joint, k, c in zip(plan.joints, springs, dampers, strict=True):
         numbers |= {f"{joint.name}.stiffness": float(k), f"{joint.name}.damping": float(c)}
     # Data sheets don't give more digits.
@@ -120,7 +103,7 @@ def _tolerances(rng: np.random.Generator, numbers: dict[str, float]) -> dict[str
 
 def _in_loop(rng: np.random.Generator, plan: Plan, rate_hz: float) -> Plan:
     """Close a position loop around a motor at the first body."""
-    mass = sum(plan.numbers[f"{body}.{plan.inertia}"] for body in plan.bodies)
+    mass = sum(plan.numbers[plan.inertia_of(body)] for body in plan.bodies)
     omega = 2 * pi * rate_hz * rng.uniform(1 / 90, 1 / 50)
     gain = float(f"{mass * np.exp(rng.uniform(0.0, 2.0)):.3g}")
     law: Literal["p-p", "pd", "pid"] = ("p-p", "pd", "pid")[int(rng.integers(3))]
@@ -133,8 +116,9 @@ def _in_loop(rng: np.random.Generator, plan: Plan, rate_hz: float) -> Plan:
     numbers = {**plan.numbers, "axis.gain": gain, **{f"axis.{key}": float(f"{value:.4g}") for key, value in
                                                       gains.items()}}  # fmt: skip
     tolerance = {**plan.tolerance, **dict.fromkeys((name for name in numbers if name.startswith("axis.")), 0.0)}
-    motor = Input(name="motor", channel="/daq.u1", at=plan.bodies[0])
-    position = Output(name="pos1", channel="/daq.y0", measures="displacement", at=plan.bodies[0])
+    motor = Input(name="motor", channel="/daq.u1", unit=_FORCE[plan.rotary], at=plan.bodies[0])
+    position = Output(name="pos1", channel="/daq.y0", measures="displacement", unit=_LENGTH[plan.rotary],
+                      at=plan.bodies[0], fed_back=True)  # fmt: skip
     return replace(plan, loop=loop, numbers=numbers, tolerance=tolerance, inputs=(motor,), outputs=(position,))
 
 
@@ -148,14 +132,16 @@ def _inputs(rng: np.random.Generator, plan: Plan, footing: Footing) -> list[Inpu
     first = len(plan.inputs) + 1
     count = int(rng.integers(0, 2)) if footing == "loop" else 1 + int(rng.random() < 0.3)
     bodies = rng.permutation(plan.bodies)[:count]
-    made = [Input(name=f"input{first + p}", channel=f"/daq.u{first + p}", at=str(body)) for p, body in
-            enumerate(bodies)]  # fmt: skip
+    made = [
+        Input(name=f"input{p}", channel=f"/daq.u{p}", unit=_FORCE[plan.rotary], at=str(body))
+        for p, body in enumerate(bodies, start=first)
+    ]
     chance = rng.random()
     if footing != "loop" and chance < 0.1:
         joint = plan.joints[int(rng.integers(1, len(plan.joints)))]
         made[0] = replace(made[0], at="", joint=joint.name)
     elif footing == "grounded" and chance < 0.2 and not plan.rotary:
-        made[0] = replace(made[0], at=GROUND)
+        made[0] = replace(made[0], at=GROUND, unit="m/s^2")
     return made
 
 
@@ -168,7 +154,8 @@ def _sensors(rng: np.random.Generator, plan: Plan, footing: Footing) -> list[Out
         # A free axis drifts away: its displacement would be all that counts.
         chances = (0.88, 0.12, 0.0) if footing == "free" else (0.75, 0.1, 0.15)
         word = ("acceleration", "velocity", "displacement")[int(rng.choice(3, p=chances))]
+        unit = _LENGTH[plan.rotary] + {"acceleration": "/s^2", "velocity": "/s", "displacement": ""}[word]
         measured.append(
-            Output(name=f"sensor{place + 1}", channel=f"/daq.y{place + 1}", measures=word, at=body)  # type: ignore[arg-type]
+            Output(name=f"sensor{place + 1}", channel=f"/daq.y{place + 1}", measures=word, unit=unit, at=body)
         )
     return measured
