@@ -16,6 +16,7 @@ from chladni.models.core.instrument import Instrument, Options, Values
 from chladni.models.core.model import Model
 from chladni.models.core.reading import Chart, InstrumentReading, Quantity
 from chladni.models.core.simulation import Simulation
+from chladni.signals.units import si_factor
 
 # Units of what loops of drives control.
 COMMANDED = ("m", "m/s", "rad", "rad/s", "A")
@@ -79,7 +80,7 @@ def read_instrument(
     return InstrumentReading(
         charts=(*drawn, *own),
         quantities=one.quantities,
-        flags=(*unusual, *_flags(one.setting.shown), *one.flags),
+        flags=(*unusual, *_flags(one.setting.shown), *_not_unusual(one.flags, model)),
         offered=(*((chart.name, chart.title) for chart in planned), *offered),
     )
 
@@ -162,11 +163,18 @@ def _told_output(instrument: Instrument, paths: LinearPath) -> str:
 
 def _unusual(model: Model) -> Iterator[str]:
     for parameter in model.parameters.unusual():
-        unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-        yield (
-            f"{parameter.name} = {parameter.value:g}{unit} lies outside its usual range, "
-            f"{parameter.low:g} to {parameter.high:g}{unit}"
-        )
+        # As its knob shows it: nobody turns an area in square metres.
+        shown = parameter.shown_unit or parameter.unit
+        factor = si_factor(shown)[0]
+        value, low, high = (f"{number / factor:g}" for number in (parameter.value, parameter.low, parameter.high))
+        unit = "" if shown == "1" else f" {shown}"
+        yield f"{parameter.name} = {value}{unit} lies outside its usual range, {low} to {high}{unit}"
+
+
+def _not_unusual(flags: Sequence[str], model: Model) -> Iterator[str]:
+    """Leave out what a model says of unusual values itself, in SI units: it's told already."""
+    heads = tuple(f"{parameter.name} = " for parameter in model.parameters.unusual())
+    return (flag for flag in flags if not (flag.startswith(heads) and "outside its usual range" in flag))
 
 
 def _flags(shown: Shown) -> Iterator[str]:

@@ -172,6 +172,17 @@ def test_flags_say_what_is_wrong() -> None:
     assert "beyond the stroke" in flags
 
 
+def test_an_unusual_value_is_told_once_in_the_unit_of_its_knob() -> None:
+    from chladni.models.instruments.pneumatic_motor import INSTRUMENT as MOTOR
+    from chladni.models.instruments.robot_arm import INSTRUMENT as ARM
+
+    (flag,) = read_instrument(MOTOR, {"active_area": 9e-3}, charts=()).flags
+    assert flag == "active_area = 90 cm^2 lies outside its usual range, 50 to 80 cm^2"
+    # A structure tells it of its own accord too.
+    told = [flag for flag in read_instrument(ARM, {"arm.mass": 48.0}, charts=()).flags if "arm.mass" in flag]
+    assert told == ["arm.mass = 48 kg lies outside its usual range, 1.5 to 24 kg"]
+
+
 def test_limits_that_the_step_breaks_are_flagged() -> None:
     calm, hard = INSTRUMENT, replace(INSTRUMENT, step_size=1e-3)
     assert read_instrument(calm).flags == ()
