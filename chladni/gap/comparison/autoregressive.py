@@ -14,6 +14,8 @@ HIGHEST_ORDER = 12
 LOADING = 1e-8
 # Outputs without any scatter (noise-free simulations) get this share of their signal's RMS, so that whitening works.
 SMALLEST = 1e-9
+# Of signals that are zero altogether.
+TINY = 1e-100
 
 
 def noise_floor_of(
@@ -46,7 +48,7 @@ def noise_floor_of(
         ``[output]`` RMS of the signal; a floor below 1e-9 of it is lifted there.
     """
     lags = fft.irfft(spectrum, axis=1)[:, : HIGHEST_ORDER + 1]
-    lags[:, 0] = np.maximum(lags[:, 0], (SMALLEST * scale) ** 2)
+    lags[:, 0] = np.maximum(lags[:, 0], np.maximum(SMALLEST * scale, TINY) ** 2)
     fitted = [_lowest_aic(row, samples) for row in lags]
     whitening = np.zeros((len(lags), max(row.size for row, _ in fitted)))
     for place, (row, _) in enumerate(fitted):

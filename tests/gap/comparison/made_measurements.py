@@ -1,0 +1,63 @@
+"""Measurements of discrete linear systems, whose noise and distortion are known exactly."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from chladni.gap.records.measurement import Measurement
+
+RATE_HZ = 500.0
+# Modes in cycles a sample, with their damping ratios.
+MODES = ((0.021, 0.01), (0.054, 0.008), (0.093, 0.015))
+
+Matrix = NDArray[np.float64]
+
+
+def measurement(inputs: Matrix, outputs: Matrix, *, rate_hz: float = RATE_HZ, log: str = "made.mcap") -> Measurement:
+    return Measurement(
+        log=log,
+        sample_rate_hz=rate_hz,
+        inputs=np.atleast_2d(inputs),
+        outputs=np.atleast_2d(outputs),
+        input_names=tuple(f"force{place + 1}" for place in range(len(np.atleast_2d(inputs)))),
+        output_names=tuple(f"acc{place + 1}" for place in range(len(np.atleast_2d(outputs)))),
+        output_units=("m/s^2",) * len(np.atleast_2d(outputs)),
+    )
+
+
+def machine(force: Matrix, weights: Matrix) -> Matrix:
+    """Outputs ``[output, sample]`` of three modes that a force excites, from rest; `weights` is [output, mode]."""
+    modal = []
+    for cycles, zeta in MODES:
+        pole = np.exp(2 * np.pi * cycles * (-zeta + 1j * np.sqrt(1 - zeta**2)))
+        # Twice differenced, as an acceleration is.
+        modal.append(lfilter([1.0, -2.0, 1.0], [1.0, -2 * pole.real, abs(pole) ** 2], force))
+    return np.asarray(weights @ np.array(modal))
+
+
+def weights(outputs: int, seed: int) -> Matrix:
+    return np.asarray(np.random.default_rng([seed, 7]).uniform(0.3, 1.0, (outputs, len(MODES)))) * np.sign(
+        np.random.default_rng([seed, 8]).standard_normal((outputs, len(MODES)))
+    )
+
+
+def coloured(rng: np.random.Generator, shape: tuple[int, int], colour: str) -> Matrix:
+    """Noise of unit RMS: white, pink down to a thousandth of a cycle, or resonant."""
+    white = rng.standard_normal(shape)
+    if colour == "white":
+        return white / white.std(axis=1, keepdims=True)
+    if colour == "pink":
+        cycles = np.fft.rfftfreq(shape[1])
+        noise = np.fft.irfft(np.fft.rfft(white) / np.sqrt(np.maximum(cycles, 1e-3)), shape[1])
+    else:
+        pole = 0.97 * np.exp(2j * np.pi * 0.2)
+        noise = lfilter([1.0], [1.0, -2 * pole.real, abs(pole) ** 2], white)
+    return np.asarray(noise / noise.std(axis=1, keepdims=True))
+
+
+def multisine(rng: np.random.Generator, period: int, lines: NDArray[np.intp]) -> Matrix:
+    """One period of random phases and unit RMS."""
+    spectrum = np.zeros(period // 2 + 1, dtype=complex)
+    spectrum[lines] = np.exp(2j * np.pi * rng.random(lines.size))
+    one = np.fft.irfft(spectrum, period)
+    return np.asarray(one / one.std())

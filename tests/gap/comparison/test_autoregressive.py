@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from chladni.gap.comparison.autoregressive import noise_floor_of
+from chladni.gap.records.noise_floor import NoiseFloor
+
+
+def floor_of(spectrum: np.ndarray, *, samples: int = 20000) -> NoiseFloor:
+    count = len(spectrum)
+    return noise_floor_of(
+        spectrum,
+        samples=samples,
+        freedom=np.full(count, 200.0),
+        method=("periods",) * count,
+        upper_bound=np.zeros(count, dtype=np.bool_),
+        scale=np.ones(count),
+    )
+
+
+def spectrum_of(coefficients: np.ndarray, variance: float, lines: int = 1025) -> np.ndarray:
+    z = np.exp(-2j * np.pi * np.linspace(0, 0.5, lines))
+    return np.asarray(variance / np.abs(np.polyval(coefficients[::-1], z)) ** 2)
+
+
+def test_an_autoregressive_spectrum_gives_back_its_coefficients() -> None:
+    poles = 0.9 * np.exp(1j * np.array([0.7, -0.7, 2.0, -2.0]))
+    coefficients = np.poly(poles).real
+    floor = floor_of(np.array([spectrum_of(coefficients, 0.25)]))
+    np.testing.assert_allclose(floor.whitening[0, :5], coefficients, atol=1e-6)
+    assert floor.innovation_rms[0] == pytest.approx(0.5, rel=1e-6)
+    # The spectrum at its own lines comes back, and its mean is the mean square.
+    lines = np.linspace(0, 1, 4096, endpoint=False)
+    assert np.mean(floor.density(lines)[0]) == pytest.approx(floor.rms[0] ** 2, rel=1e-6)
+
+
+def test_white_noise_is_its_own_innovation_and_outputs_keep_their_sizes() -> None:
+    floor = floor_of(np.array([np.full(513, 4.0), spectrum_of(np.array([1.0, -0.8]), 1.0, 513)]))
+    np.testing.assert_allclose(floor.rms, [2.0, 1 / np.sqrt(1 - 0.64)], rtol=1e-6)
+    np.testing.assert_allclose(floor.innovation_rms, [2.0, 1.0], rtol=1e-6)
+    np.testing.assert_array_equal(floor.whitening[0, 1:], 0.0)
+    np.testing.assert_allclose(floor.std, 1 / np.sqrt(400))
+
+
+def test_whitening_makes_the_noise_white_of_unit_variance() -> None:
+    coefficients = np.array([1.0, -1.2, 0.8])
+    noise = lfilter([0.3], coefficients, np.random.default_rng(1).standard_normal((1, 50000)))
+    floor = floor_of(np.array([spectrum_of(coefficients, 0.09)]))
+    white = floor.whitened(noise)[0, 10:]
+    assert white.std() == pytest.approx(1.0, rel=5 / np.sqrt(2 * white.size))
+    assert abs(np.mean(white[1:] * white[:-1])) < 5 / np.sqrt(white.size)
+
+
+def test_the_order_grows_with_the_samples_that_vouch_for_it() -> None:
+    rng = np.random.default_rng(2)
+    rough = np.array([1 + 0.05 * rng.standard_normal(513)])
+    assert floor_of(rough, samples=50).whitening.shape[1] == 1
+    assert floor_of(np.abs(rough), samples=10**9).whitening.shape[1] > 1
+
+
+def test_no_noise_at_all_still_gives_a_filter() -> None:
+    floor = floor_of(np.zeros((2, 513)))
+    assert np.all(floor.rms == 1e-9)
+    assert np.all(np.isfinite(floor.whitened(np.ones((2, 10)))))

@@ -1,0 +1,240 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import chladni
+from chladni.gap.comparison.measuring import measurement_of
+from chladni.models.core.model import Model
+from chladni.signals.channel import Channel
+from chladni.signals.errors import LogError, ModelError
+from chladni.signals.time_series import TimeSeries
+
+ARM = """
+format = "chladni.model/1"
+name = "arm"
+kind = "structure"
+body = [{ name = "column", mass = 12.0 }, { name = "wrist", mass = 2.5 }]
+joint = [
+  { name = "shoulder", between = ["ground", "column"], stiffness = 1.2e6, damping = 200.0 },
+  { name = "elbow", between = ["column", "wrist"], stiffness = 6e5, damping = 90.0 },
+]
+input = [{ name = "hammer", at = "wrist", channel = "/hammer.force" }]
+output = [
+  { name = "acc_column", measures = "acceleration", at = "column", channel = "/column.accel" },
+  { name = "acc_wrist", measures = "acceleration", at = "wrist", channel = "/wrist.accel" },
+]
+"""
+LOOP = """
+format = "chladni.model/1"
+name = "axis"
+kind = "structure"
+body = [{ name = "carriage", mass = 95.0 }]
+joint = [{ name = "guide", between = ["ground", "carriage"], stiffness = 0.0, damping = 300.0 }]
+input = [{ name = "motor", at = "carriage", channel = "/axis.effort" }]
+output = [{ name = "position", measures = "displacement", at = "carriage", channel = "/axis.position" }]
+
+[[controller]]
+name = "loop"
+reference = "/command.position"
+feedback = "position"
+law = "p-p"
+gains = { kp = 160.0, kv = 243.0 }
+drives = "motor"
+gain = "35.15 N/V"
+"""
+SAMPLES, RATE_HZ = 1000, 1000.0
+
+
+def model_of(folder: Path, text: str = ARM) -> Model:
+    path = folder / "model.toml"
+    path.write_text(text, encoding="utf-8")
+    return chladni.load_model(path)
+
+
+def recording(units: dict[str, str], *, samples: int = SAMPLES, rate_hz: float = RATE_HZ) -> TimeSeries:
+    rng = np.random.default_rng(3)
+    return TimeSeries(
+        values=rng.standard_normal((len(units), samples)),
+        sample_rate_hz=rate_hz,
+        channels=tuple(Channel(name=name, unit=unit) for name, unit in units.items()),
+    )
+
+
+WHOLE = {"/wrist.accel": "m/s^2", "/other": "V", "/hammer.force": "N", "/column.accel": "m/s^2"}
+
+
+def with_gap(series: TimeSeries, channel: str, lost: slice) -> TimeSeries:
+    valid = np.ones(series.values.shape, dtype=bool)
+    valid[series.index(channel), lost] = False
+    return TimeSeries(
+        values=series.values, sample_rate_hz=series.sample_rate_hz, channels=series.channels, valid=valid
+    )
+
+
+def test_channels_go_to_the_terminals_that_name_them(tmp_path: Path) -> None:
+    series = recording(WHOLE)
+    found, remarks = measurement_of(model_of(tmp_path), series, log="log.mcap")
+    assert found.log == "log.mcap"
+    assert found.sample_rate_hz == RATE_HZ
+    assert found.input_names == ("hammer",)
+    assert found.output_names == ("acc_column", "acc_wrist")
+    assert found.output_units == ("m/s^2", "m/s^2")
+    np.testing.assert_array_equal(found.inputs, series.values[[2]])
+    np.testing.assert_array_equal(found.outputs, series.values[[3, 0]])
+    assert remarks == ()
+
+
+def test_a_channel_with_the_terminals_own_name_will_do(tmp_path: Path) -> None:
+    series = recording({"hammer": "N", "acc_wrist": "m/s^2", "/column.accel": "m/s^2"})
+    found, _ = measurement_of(model_of(tmp_path), series, log="log.mcap")
+    np.testing.assert_array_equal(found.inputs[0], series.values[0])
+    np.testing.assert_array_equal(found.outputs[1], series.values[1])
+
+
+def test_a_channel_without_unit_is_taken_and_others_are_converted(tmp_path: Path) -> None:
+    series = recording({"/hammer.force": "1", "/wrist.accel": "g", "/column.accel": "m/s2"})
+    found, _ = measurement_of(model_of(tmp_path), series, log="log.mcap")
+    np.testing.assert_array_equal(found.inputs[0], series.values[0])
+    np.testing.assert_allclose(found.outputs[1], 9.80665 * series.values[1], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("channel", "terminal", "wanted"),
+    [("/hammer.force", "input 'hammer'", "N"), ("/wrist.accel", "acc_wrist", "m/s^2")],
+)
+def test_units_that_do_not_fit_name_both_sides(tmp_path: Path, channel: str, terminal: str, wanted: str) -> None:
+    with pytest.raises(ModelError, match="in rad/s") as error:
+        measurement_of(model_of(tmp_path), recording({**WHOLE, channel: "rad/s"}), log="log.mcap")
+    for part in ("log.mcap", channel, terminal, wanted):
+        assert part in str(error.value)
+
+
+def test_an_input_that_the_log_lacks_is_an_error_that_says_what_it_holds(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="input 'hammer'") as error:
+        measurement_of(model_of(tmp_path), recording({"/wrist.accel": "m/s^2", "/b": "V"}), log="log.mcap")
+    for part in ("log.mcap", "/hammer.force", "/wrist.accel, /b"):
+        assert part in str(error.value)
+
+
+def test_a_model_that_names_no_channel_of_an_input_is_an_error(tmp_path: Path) -> None:
+    text = ARM.replace(', channel = "/hammer.force"', "")
+    with pytest.raises(ModelError, match="no input names a channel"):
+        measurement_of(model_of(tmp_path, text), recording({"/wrist.accel": "m/s^2"}), log="log.mcap")
+
+
+def test_a_second_input_without_channel_is_zero_and_told(tmp_path: Path) -> None:
+    text = ARM.replace("input = [", 'input = [{ name = "fan", at = "column" }, ')
+    found, remarks = measurement_of(model_of(tmp_path, text), recording(WHOLE), log="log.mcap")
+    assert found.input_names == ("fan", "hammer")
+    assert not found.inputs[0].any()
+    assert found.inputs[1].any()
+    assert any("fan" in remark for remark in remarks)
+
+
+def test_outputs_that_the_log_lacks_are_left_out_and_told(tmp_path: Path) -> None:
+    found, remarks = measurement_of(
+        model_of(tmp_path), recording({"/hammer.force": "N", "/wrist.accel": "m/s^2"}), log="log.mcap"
+    )
+    assert found.output_names == ("acc_wrist",)
+    assert [remark for remark in remarks if "'acc_column'" in remark and "/column.accel" in remark]
+
+
+def test_a_stuck_channel_and_one_that_is_mostly_missing_are_left_out(tmp_path: Path) -> None:
+    series = recording(WHOLE)
+    values = series.values.copy()
+    values[series.index("/wrist.accel")] = 3.5
+    stuck = TimeSeries(values=values, sample_rate_hz=RATE_HZ, channels=series.channels)
+    found, remarks = measurement_of(model_of(tmp_path), stuck, log="log.mcap")
+    assert found.output_names == ("acc_column",)
+    assert any("never changes from 3.5" in remark for remark in remarks)
+    lost = with_gap(series, "/wrist.accel", slice(100, 700))
+    found, remarks = measurement_of(model_of(tmp_path), lost, log="log.mcap")
+    assert found.output_names == ("acc_column",)
+    assert found.samples == SAMPLES
+    assert any("misses 60%" in remark for remark in remarks)
+
+
+def test_no_output_at_all_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="nothing to compare") as error:
+        measurement_of(model_of(tmp_path), recording({"/hammer.force": "N"}), log="log.mcap")
+    assert "/column.accel" in str(error.value)
+
+
+@pytest.mark.parametrize("how", ["valid", "nan", "infinite"])
+def test_gaps_leave_the_longest_stretch_and_are_told(tmp_path: Path, how: str) -> None:
+    series = recording(WHOLE)
+    row, lost = series.index("/hammer.force"), slice(300, 320)
+    if how == "valid":
+        gappy = with_gap(series, "/hammer.force", lost)
+    else:
+        values = series.values.copy()
+        values[row, lost] = np.nan if how == "nan" else np.inf
+        gappy = TimeSeries(values=values, sample_rate_hz=RATE_HZ, channels=series.channels)
+    found, remarks = measurement_of(model_of(tmp_path), gappy, log="log.mcap")
+    np.testing.assert_array_equal(found.inputs[0], series.values[row, 320:])
+    assert [remark for remark in remarks if "20 samples are missing" in remark and "0.32 s to 1 s" in remark]
+
+
+def test_a_gap_in_a_channel_that_is_not_used_does_not_matter(tmp_path: Path) -> None:
+    found, remarks = measurement_of(
+        model_of(tmp_path), with_gap(recording(WHOLE), "/other", slice(300, 320)), log="log.mcap"
+    )
+    assert found.samples == SAMPLES
+    assert remarks == ()
+
+
+def test_gaps_all_over_are_an_error_that_names_the_worst_channel(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="longest stretch") as error:
+        measurement_of(
+            model_of(tmp_path), with_gap(recording(WHOLE), "/hammer.force", slice(0, SAMPLES, 100)), log="log.mcap"
+        )
+    assert "10 are missing in '/hammer.force'" in str(error.value)
+
+
+def test_short_logs_are_told_and_very_short_ones_refused(tmp_path: Path) -> None:
+    model = model_of(tmp_path)
+    _, remarks = measurement_of(model, recording(WHOLE, samples=150, rate_hz=4000.0), log="log.mcap")
+    assert any("150 samples" in remark for remark in remarks)
+    assert any("cycles of the lowest mode" in remark for remark in remarks)
+    with pytest.raises(LogError, match="32 samples"):
+        measurement_of(model, recording(WHOLE, samples=20), log="log.mcap")
+
+
+def test_a_rate_too_low_for_the_modes_is_told(tmp_path: Path) -> None:
+    _, remarks = measurement_of(model_of(tmp_path), recording(WHOLE, rate_hz=100.0), log="log.mcap")
+    assert any("modes lie above 40 Hz" in remark for remark in remarks)
+
+
+def test_a_closed_loop_is_driven_by_its_reference_and_gives_its_command(tmp_path: Path) -> None:
+    series = recording({"/axis.position": "m", "/axis.effort": "N", "/command.position": "m"})
+    found, _ = measurement_of(model_of(tmp_path, LOOP), series, log="log.mcap")
+    assert found.input_names == ("loop",)
+    assert found.output_names == ("position", "motor")
+    np.testing.assert_array_equal(found.inputs[0], series.values[2])
+    np.testing.assert_array_equal(found.outputs, series.values[:2])
+    without = series.select(["/axis.position", "/command.position"])
+    found, remarks = measurement_of(model_of(tmp_path, LOOP), without, log="log.mcap")
+    assert found.output_names == ("position",)
+    assert any("'motor'" in remark for remark in remarks)
+
+
+def test_an_input_that_never_moves_is_told(tmp_path: Path) -> None:
+    series = recording(WHOLE)
+    values = series.values.copy()
+    values[series.index("/hammer.force")] = 0.0
+    still = TimeSeries(values=values, sample_rate_hz=RATE_HZ, channels=series.channels)
+    _, remarks = measurement_of(model_of(tmp_path), still, log="log.mcap")
+    assert any("no input moves" in remark for remark in remarks)
+
+
+def test_measured_axis(shared_data: Path) -> None:
+    with chladni.open_log(shared_data / "emps.mcap") as log:
+        series = log.read()
+    found, remarks = measurement_of(
+        chladni.load_model(shared_data / "models" / "emps_closed_loop.toml"), series, log="emps.mcap"
+    )
+    assert (found.input_names, found.output_names) == (("axis",), ("position", "motor"))
+    assert found.output_units == ("m", "N")
+    assert found.samples == 24841
+    assert remarks == ()
