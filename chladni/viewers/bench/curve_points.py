@@ -58,10 +58,9 @@ def thinned(x: Matrix, y: Matrix) -> tuple[Matrix, Matrix]:
     whole = len(x) // size * size
     rows = y[:whole].reshape(-1, size)
     first = np.arange(0, whole, size)
-    rest = np.arange(whole, len(x))
-    kept = np.unique(
-        np.concatenate([[0, len(x) - 1], first + rows.argmin(axis=1), first + rows.argmax(axis=1), rest])
-    )
+    kept = np.zeros(len(x), dtype=bool)
+    kept[[0, -1]] = kept[first + rows.argmin(axis=1)] = kept[first + rows.argmax(axis=1)] = True
+    kept[whole:] = True
     return x[kept], y[kept]
 
 
