@@ -3,6 +3,9 @@
 import re
 from math import floor, isfinite, log10
 
+import numpy as np
+from numpy.typing import NDArray
+
 from chladni.viewers.labels import printed_unit
 
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 3: "k", 6: "M", 9: "G", 12: "T"}
@@ -36,6 +39,18 @@ def engineering(value: float, std: float | None, unit: str) -> str:
     number = _number(value / scale, None if std is None else std / scale)
     # An exponent would read as that of the uncertainty alone, and a bare sum as divided by the unit's last part.
     return f"({number}) {shown}" if "e" in number and "±" in number and shown else f"{number} {shown}".rstrip()
+
+
+def axis_scale(values: NDArray[np.float64], unit: str) -> tuple[float, str]:
+    """Give the scale of an axis and its printed unit, so that the largest of its numbers is easily read.
+
+    Examples
+    --------
+    >>> axis_scale(np.array([0.0, -2.1e-4]), "m")
+    (1e-06, 'µm')
+    """
+    scale, prefix = _prefix(float(np.max(np.abs(values), initial=0.0)), unit)
+    return scale, f"{prefix}{printed_unit(unit)}"
 
 
 def percent(share: float) -> str:

@@ -22,7 +22,7 @@ def channel_table(found: Diagnosis) -> Table:
 def band_table(found: Diagnosis, *, least: float = 0.0) -> Table:
     """Share of the gap's power in each band, those with `least` and more, by frequency."""
     rows = [
-        (f"{one.low_hz:.4g} – {one.high_hz:.4g}", percent(one.share))
+        (f"{one.low_hz:.4g} to {one.high_hz:.4g}", percent(one.share))
         for one in found.where.bands
         if one.share >= least
     ]
@@ -39,7 +39,7 @@ def regime_table(found: Diagnosis, *, least: float = 0.0) -> Table:
     """Share of the gap's power in each regime, those with `least` and more; the largest first."""
     rows = sorted(found.where.regimes, key=lambda one: -one.share)
     return ("While", "is between", "Share"), [
-        (one.variable, f"{one.low:.3g} – {one.high:.3g}", percent(one.share)) for one in rows if one.share >= least
+        (one.variable, f"{one.low:.3g} to {one.high:.3g}", percent(one.share)) for one in rows if one.share >= least
     ]
 
 

@@ -1,0 +1,70 @@
+"""What the pictures of a diagnosis need: spectra of the errors, and where the nominal model errs most."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.apps.spectra import psd
+from chladni.gap.records.diagnosis import Diagnosis, GapSignals
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError
+from chladni.signals.time_series import TimeSeries
+from chladni.viewers.gap_evidence import GapEvidence, GapSpectra
+
+Matrix = NDArray[np.float64]
+
+# Cycles of the gap's typical frequency that can be told apart in a picture, and the fewest samples that make one.
+CYCLES, FEWEST_SAMPLES = 12.0, 60
+NAMES = ("measured", "before", "after")
+
+
+def gap_evidence(found: Diagnosis) -> GapEvidence:
+    """Prepare the pictures of a diagnosis."""
+    signals = found.signals
+    if signals is None:
+        return GapEvidence(found=found)
+    spectra = _spectra(signals)
+    return GapEvidence(found=found, spectra=spectra, telling_s=_telling_stretch(signals, spectra))
+
+
+def _spectra(signals: GapSignals) -> GapSpectra | None:
+    outputs = len(signals.output_names)
+    stacked = np.vstack([signals.measured, signals.measured - signals.before, signals.measured - signals.after])
+    channels = tuple(
+        Channel(name=f"{what} {row}", unit=unit) for what in NAMES for row, unit in enumerate(signals.output_units)
+    )
+    series = TimeSeries(values=stacked, sample_rate_hz=signals.sample_rate_hz, channels=channels)
+    try:
+        density = psd(series, window="hann")
+    except EstimateError:
+        # Too short a log for a spectrum is no reason to show nothing of it.
+        return None
+    measured, before, after = density.values.reshape(len(NAMES), outputs, -1)
+    return GapSpectra(
+        frequency_hz=density.frequency_hz,
+        measured=measured,
+        before=before,
+        after=after,
+        noise=signals.noise_rms**2 / (signals.sample_rate_hz / 2),
+    )
+
+
+def _telling_stretch(signals: GapSignals, spectra: GapSpectra | None) -> tuple[float, float]:
+    """Where the error that was found to have a cause is largest, all outputs by their own RMS."""
+    rms = np.sqrt(np.mean(signals.measured**2, axis=1, keepdims=True))
+    errors = (signals.measured - signals.before) / np.where(rms > 0, rms, 1.0)
+    samples = errors.shape[1]
+    wanted = samples if spectra is None else round(CYCLES / _typical_hz(spectra) * signals.sample_rate_hz)
+    length = min(max(wanted, FEWEST_SAMPLES), samples)
+    total = np.concatenate([[0.0], np.cumsum(np.sum(errors**2, axis=0))])
+    first = int(np.argmax(total[length:] - total[:-length]))
+    return first / signals.sample_rate_hz, (first + length) / signals.sample_rate_hz
+
+
+def _typical_hz(spectra: GapSpectra) -> float:
+    """Mean frequency of the gap, weighted by power; of what was measured where there is no gap at all."""
+    for powers in (spectra.before, spectra.measured):
+        power = powers / np.maximum(powers.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+        if power.sum() > 0:
+            mean_hz = float((power.mean(axis=0) * spectra.frequency_hz).sum() / power.mean(axis=0).sum())
+            return max(mean_hz, float(spectra.frequency_hz[1]))
+    return float(spectra.frequency_hz[1])

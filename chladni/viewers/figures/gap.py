@@ -1,0 +1,23 @@
+"""Figures of a diagnosis, by section."""
+
+from chladni.viewers.figures.album import Album
+from chladni.viewers.figures.gap_map import gap_map_figures
+from chladni.viewers.figures.gap_shares import share_figures
+from chladni.viewers.figures.gap_signals import error_figures, signal_figures
+from chladni.viewers.figures.gap_spectra import spectrum_figures
+from chladni.viewers.figures.restoring_force import restoring_force_figures
+from chladni.viewers.gap_evidence import GapEvidence
+
+
+def gap_album(evidence: GapEvidence) -> Album:
+    """Draw every figure that the diagnosis has data for."""
+    return Album(
+        {
+            "signals": signal_figures(evidence),
+            "errors": error_figures(evidence),
+            "spectra": spectrum_figures(evidence),
+            "map": gap_map_figures(evidence),
+            "force": restoring_force_figures(evidence),
+            "shares": share_figures(evidence),
+        }
+    )

@@ -1,0 +1,81 @@
+"""The gap over band and time, before and after on one scale of colours."""
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+
+from chladni.gap.records.diagnosis import GapSignals
+from chladni.viewers.drawing import Floats, block_maximum, decibels_of_power
+from chladni.viewers.figures.sheet import look, sheet
+from chladni.viewers.gap_evidence import GapEvidence
+
+PIXELS = 1500
+DYNAMIC_RANGE_DB = 50.0
+HEIGHT_IN = 1.6
+HELD, ROOM = 0.99, 1.2
+
+
+def gap_map_figures(evidence: GapEvidence) -> dict[str, Figure]:
+    """Draw the density of the gap over band and time, by name; none without a map."""
+    signals = evidence.found.signals
+    if signals is None or signals.gap_map.size == 0:
+        return {}
+    with look():
+        return {"gap map": _figure(signals)}
+
+
+def _figure(signals: GapSignals) -> Figure:
+    figure, stack = sheet([HEIGHT_IN] * 2, sharex=True, sharey=True)
+    levels = [decibels_of_power(_shortened(one)) for one in (signals.gap_map, signals.gap_map_after)]
+    known = np.concatenate([level[np.isfinite(level)] for level in levels])
+    high = float(known.max()) if known.size else 0.0
+    image = None
+    for axes, level, title in zip(stack, levels, ("Gap before", "Gap after"), strict=True):
+        image = _draw(axes, signals, level, high)
+        axes.set_title(title, loc="left", pad=2)
+        axes.set_ylabel("Frequency [Hz]")
+    stack[-1].set_ylim(0, _shown_hz(signals))
+    stack[-1].set_xlabel("Time [s]")
+    if image is not None:
+        bar = figure.colorbar(image, ax=stack, aspect=36, pad=0.02)
+        bar.set_label("Density [dB re 1/Hz]")
+        bar.outline.set_linewidth(0.0)
+    return figure
+
+
+def _shown_hz(signals: GapSignals) -> float:
+    """Frequency under which nearly all of the gap lies, and some room above it."""
+    power = np.nan_to_num(signals.gap_map).sum(axis=0)
+    lines = signals.map_frequency_hz
+    if not power.sum() > 0:
+        return float(lines[-1])
+    last = int(np.searchsorted(np.cumsum(power), HELD * power.sum()))
+    return float(min(ROOM * lines[last] + lines[1], lines[-1]))
+
+
+def _shortened(density: Floats) -> Floats:
+    for axis in (0, 1):
+        density, _ = block_maximum(density, axis=axis, limit=PIXELS)
+    return density
+
+
+def _draw(axes: Axes, signals: GapSignals, level: Floats, high: float) -> AxesImage:
+    times, lines = signals.map_time_s, signals.map_frequency_hz
+    hop, step = _half_step(times), _half_step(lines)
+    axes.grid(visible=False)
+    return axes.imshow(
+        level.T,
+        origin="lower",
+        aspect="auto",
+        extent=(times[0] - hop, times[-1] + hop, max(lines[0] - step, 0.0), lines[-1] + step),
+        cmap=mpl.colormaps["magma"].with_extremes(bad="black"),
+        vmin=high - DYNAMIC_RANGE_DB,
+        vmax=high,
+        interpolation="nearest",
+    )
+
+
+def _half_step(axis: Floats) -> float:
+    return float(axis[1] - axis[0]) / 2 if axis.size > 1 else 0.5

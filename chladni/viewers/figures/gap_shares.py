@@ -1,0 +1,66 @@
+"""Where the gap lies, as bars: which site can explain it, which band and regime hold it."""
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from chladni.gap.records.diagnosis import Diagnosis
+from chladni.viewers.engineering import percent
+from chladni.viewers.figures.sheet import WIDTH_IN, look, paint, plain
+from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, GapEvidence
+
+Bar = tuple[str, float]
+
+BAR_HEIGHT_IN = 0.19
+BARS = 10
+NAMED, OTHERS = paint(AFTER_ON_LIGHT), "#b9c4cf"
+
+
+def share_figures(evidence: GapEvidence) -> dict[str, Figure]:
+    """Draw the shares of sites, bands and regimes as bars, by name; none without any."""
+    parts = [(title, bars) for title, bars in _parts(evidence.found) if bars]
+    if not parts:
+        return {}
+    named = {cause.site for cause in evidence.found.causes}
+    with look():
+        heights = [0.3 + BAR_HEIGHT_IN * len(bars) for _, bars in parts]
+        figure = Figure(figsize=(WIDTH_IN, sum(heights) + 0.3), layout="constrained")
+        stack = figure.subplots(len(parts), 1, squeeze=False, height_ratios=heights, sharex=True)[:, 0]
+        for axes, (title, bars) in zip(stack, parts, strict=True):
+            draw_shares(axes, bars, named=named)
+            axes.set_title(title, loc="left", pad=2)
+        stack[-1].set_xlabel("Share of the gap [%]")
+        return {"where": figure}
+
+
+def site_bars(found: Diagnosis) -> Sequence[Bar]:
+    """Shares that an unknown force at each site explains, the largest first."""
+    rows = sorted(found.where.sites, key=lambda one: -one.share)[:BARS]
+    return [(one.name, one.share) for one in rows]
+
+
+def draw_shares(axes: Axes, bars: Sequence[Bar], *, named: set[str]) -> None:
+    """Draw bars from top to bottom, those that are named in colour."""
+    places = range(len(bars))
+    colours = [NAMED if name in named else OTHERS for name, _ in bars]
+    axes.barh(places, [100 * share for _, share in bars], height=0.7, color=colours)
+    for place, (_, share) in enumerate(bars):
+        axes.text(100 * share, place, f" {percent(share)}", va="center", fontsize=6.5)
+    axes.set_yticks(places, [plain(name) for name, _ in bars], fontsize=7)
+    axes.set_ylim(len(bars) - 0.4, -0.6)
+    axes.set_xlim(0, 112)
+    axes.grid(visible=False, axis="y")
+
+
+def _parts(found: Diagnosis) -> list[tuple[str, Sequence[Bar]]]:
+    bands = [(f"{one.low_hz:.4g} to {one.high_hz:.4g} Hz", one.share) for one in found.where.bands]
+    regimes = sorted(found.where.regimes, key=lambda one: -one.share)[:BARS]
+    return [
+        ("What one site alone can explain", site_bars(found)),
+        ("In which band it lies", bands if len(bands) <= BARS else sorted(bands, key=lambda bar: -bar[1])[:BARS]),
+        (
+            "While which variable is where",
+            [(f"{one.variable} {one.low:.3g} to {one.high:.3g}", one.share) for one in regimes],
+        ),
+    ]

@@ -1,0 +1,116 @@
+"""One sheet with the answer of a diagnosis and its evidence."""
+
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
+
+from chladni.gap.records.diagnosis import Diagnosis, RestoringForce
+from chladni.io.atomic import atomic_write
+from chladni.viewers.figures.gap_shares import BAR_HEIGHT_IN, draw_shares, site_bars
+from chladni.viewers.figures.gap_signals import LEGEND, draw_zoom
+from chladni.viewers.figures.gap_spectra import draw_spectrum
+from chladni.viewers.figures.rendering import rendered
+from chladni.viewers.figures.restoring_force import draw_surfaces
+from chladni.viewers.figures.sheet import WIDTH_IN, look, plain
+from chladni.viewers.gap_evidence import GapEvidence
+from chladni.viewers.gap_summary import summary
+
+# Of the summary; the rest is in the report.
+SENTENCES, LETTERS = 2, 94
+LINE_IN = 0.16
+Part = tuple[float, Callable[[Figure, SubplotSpec], None]]
+
+
+def gap_sheet(evidence: GapEvidence) -> Figure:
+    """Draw the answer as a title over the output that errs most, in time and frequency, the force and the sites."""
+    with look():
+        parts = _parts(evidence)
+        lines = [line for one in summary(evidence.found)[:SENTENCES] for line in textwrap.wrap(one, LETTERS)]
+        heights = [height for height, _ in parts]
+        above = 0.2 + LINE_IN * len(lines)
+        figure = Figure(figsize=(WIDTH_IN * 1.25, sum(heights) + above), layout="constrained")
+        figure.suptitle("\n".join(map(plain, lines)), fontsize=8.5, x=0.02, ha="left")
+        grid = figure.add_gridspec(len(parts), 1, height_ratios=heights)
+        for place, (_, draw) in enumerate(parts):
+            draw(figure, grid[place])
+        return figure
+
+
+def save_gap_sheet(evidence: GapEvidence, path: Path) -> Path:
+    """Write the sheet as PNG, SVG or PDF, by the name's ending.
+
+    Raises
+    ------
+    LogError
+        When the file can't be written.
+    """
+    content = rendered(gap_sheet(evidence), path.suffix.lower().removeprefix("."))
+    with atomic_write(path) as file:
+        file.write(content)
+    return path
+
+
+def _parts(evidence: GapEvidence) -> list[Part]:
+    found = evidence.found
+    surface, bars = found.restoring_force, site_bars(found)
+    parts: list[Part] = []
+    if found.signals is not None:
+        parts += [(1.4, lambda figure, place: _zoom(figure, place, evidence))]
+    if evidence.spectra is not None:
+        parts += [(1.4, lambda figure, place: _spectrum(figure, place, evidence))]
+    if surface is not None and surface.force.size:
+        parts += [(2.6, lambda figure, place: _force(figure, place, surface))]
+    if bars:
+        parts += [(0.4 + BAR_HEIGHT_IN * len(bars), lambda figure, place: _sites(figure, place, found))]
+    return parts
+
+
+def _worst(found: Diagnosis) -> int:
+    """Row of the output that errs most, over its own RMS."""
+    if found.signals is None:
+        return 0
+    gaps = {one.name: one.gap for one in found.where.channels}
+    names = found.signals.output_names
+    return max(range(len(names)), key=lambda row: gaps.get(names[row], 0.0))
+
+
+def _zoom(figure: Figure, place: SubplotSpec, evidence: GapEvidence) -> None:
+    signals, telling_s = evidence.found.signals, evidence.telling_s
+    if signals is None or telling_s is None:
+        return
+    axes, row = figure.add_subplot(place), _worst(evidence.found)
+    draw_zoom(axes, signals, row, telling_s)
+    axes.set_title(plain(signals.output_names[row]), loc="right", pad=2)
+    axes.set_xlabel("Time [s]")
+    _legend(axes)
+
+
+def _spectrum(figure: Figure, place: SubplotSpec, evidence: GapEvidence) -> None:
+    signals, spectra = evidence.found.signals, evidence.spectra
+    if signals is None or spectra is None:
+        return
+    axes = figure.add_subplot(place)
+    draw_spectrum(axes, signals, spectra, _worst(evidence.found))
+    axes.set_xlabel("Frequency [Hz]")
+    _legend(axes)
+
+
+def _legend(axes: Axes) -> None:
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, **LEGEND)
+
+
+def _force(figure: Figure, place: SubplotSpec, surface: RestoringForce) -> None:
+    inner = place.subgridspec(1, 2)
+    first = figure.add_subplot(inner[0])
+    draw_surfaces(figure, first, figure.add_subplot(inner[1], sharey=first), surface)
+
+
+def _sites(figure: Figure, place: SubplotSpec, found: Diagnosis) -> None:
+    axes = figure.add_subplot(place)
+    draw_shares(axes, site_bars(found), named={cause.site for cause in found.causes})
+    axes.set_title("What one site alone can explain", loc="left", pad=2)
+    axes.set_xlabel("Share of the gap [%]")

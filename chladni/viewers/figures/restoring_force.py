@@ -1,0 +1,81 @@
+"""The restoring-force surface: the force that the model lacks, over displacement and over velocity."""
+
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+
+from chladni.gap.records.diagnosis import RestoringForce
+from chladni.viewers.engineering import axis_scale
+from chladni.viewers.figures.sheet import WIDTH_IN, look, plain
+from chladni.viewers.gap_evidence import GapEvidence
+from chladni.viewers.restoring_force import (
+    SIGNED,
+    Over,
+    force_range,
+    motion,
+    motion_reach,
+    motion_unit,
+    other,
+    signed_colours,
+    spread_out,
+)
+
+HEIGHT_IN = 2.7
+_COLOURS = LinearSegmentedColormap.from_list("signed", SIGNED / 255)
+
+
+def restoring_force_figures(evidence: GapEvidence) -> dict[str, Figure]:
+    """Draw the recovered force over displacement and over velocity, by name; none where none was recovered."""
+    surface = evidence.found.restoring_force
+    if surface is None or surface.force.size == 0:
+        return {}
+    with look():
+        figure = Figure(figsize=(WIDTH_IN, HEIGHT_IN), layout="constrained")
+        over_displacement, over_velocity = figure.subplots(1, 2, sharey=True)
+        draw_surfaces(figure, over_displacement, over_velocity, surface)
+        figure.suptitle(plain(f"Force that the model lacks at {surface.site}"), fontsize=8.5, x=0.02, ha="left")
+        return {"restoring force": figure}
+
+
+def draw_surfaces(figure: Figure, over_displacement: Axes, over_velocity: Axes, surface: RestoringForce) -> None:
+    """Draw the force twice, on axes that share the force."""
+    _draw(figure, over_displacement, surface, "displacement")
+    _draw(figure, over_velocity, surface, "velocity")
+    over_velocity.set_ylabel("")
+    over_velocity.tick_params(labelleft=False)
+    if surface.law_force is not None:
+        over_velocity.legend(loc="lower right", markerscale=4, frameon=False)
+
+
+def _draw(figure: Figure, axes: Axes, surface: RestoringForce, over: Over) -> None:
+    """Draw the force over one motion, coloured by the other, and the law in black."""
+    rows, shade = spread_out(surface), motion(surface, other(over))
+    across, x_unit = axis_scale(motion(surface, over), motion_unit(surface, over))
+    up, force_unit = axis_scale(surface.force, surface.force_unit)
+    x, reach = motion(surface, over)[rows] / across, motion_reach(surface, other(over))
+    # As paths so many dots would make a file of megabytes.
+    axes.scatter(
+        x,
+        surface.force[rows] / up,
+        c=signed_colours(shade[rows] / reach) / 255,
+        s=3.0,
+        linewidths=0.0,
+        rasterized=True,
+    )
+    if surface.law_force is not None:
+        law = surface.law_force[rows] / up
+        axes.plot(x, law, ".", color="black", markersize=1.6, markeredgewidth=0, label="law", rasterized=True)
+    axes.set_ylim(*(end / up for end in force_range(surface)))
+    axes.set_xlabel(f"{over.capitalize()} [{x_unit}]")
+    axes.set_ylabel(f"Force [{force_unit}]")
+    _colour_bar(figure, axes, surface, other(over))
+
+
+def _colour_bar(figure: Figure, axes: Axes, surface: RestoringForce, shown: Over) -> None:
+    scale, unit = axis_scale(motion(surface, shown), motion_unit(surface, shown))
+    reach = motion_reach(surface, shown) / scale
+    colours = ScalarMappable(norm=Normalize(-reach, reach), cmap=_COLOURS)
+    bar = figure.colorbar(colours, ax=axes, location="top", aspect=25, pad=0.02)
+    bar.set_label(f"{shown} [{unit}]", fontsize=7.5)
+    bar.outline.set_linewidth(0.0)

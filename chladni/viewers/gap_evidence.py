@@ -1,0 +1,65 @@
+"""A diagnosis with what its pictures need beside it: spectra of what is left, and the stretch that tells most."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.records.diagnosis import Diagnosis
+from chladni.signals.value import Value, require_shape
+from chladni.viewers.style import ON_DARK, ON_LIGHT, Colour
+
+Matrix = NDArray[np.float64]
+
+# The same in every picture: what was measured, the error of the nominal model, the error with what was found.
+MEASURED_ON_LIGHT: Colour = (120, 120, 120)
+MEASURED_ON_DARK: Colour = (190, 190, 190)
+BEFORE_ON_LIGHT, AFTER_ON_LIGHT = ON_LIGHT[1], ON_LIGHT[0]
+BEFORE_ON_DARK, AFTER_ON_DARK = ON_DARK[1], ON_DARK[0]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GapSpectra(Value):
+    """Power spectral densities of what was measured and of the errors, in each output's unit^2/Hz.
+
+    Attributes
+    ----------
+    frequency_hz
+        ``[line]``.
+    measured, before, after
+        ``[output, line]``: the signal, the error of the nominal model, the error with what was found.
+    noise
+        ``[output]``: what the noise's RMS would be as a density if it were white.
+    """
+
+    frequency_hz: Matrix
+    measured: Matrix
+    before: Matrix
+    after: Matrix
+    noise: Matrix
+
+    def __post_init__(self) -> None:
+        shape = (self.noise.size, self.frequency_hz.size)
+        for name in ("measured", "before", "after"):
+            require_shape(name, getattr(self, name), shape, "outputs and lines")
+        self._freeze()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GapEvidence:
+    """What pictures of a diagnosis are drawn from.
+
+    Attributes
+    ----------
+    found
+        The diagnosis.
+    spectra
+        None when the diagnosis holds no signals, or too few samples for a spectrum.
+    telling_s
+        Start and end of the stretch in which the nominal model errs most, a few cycles long, seconds from the start
+        of the log; None without signals.
+    """
+
+    found: Diagnosis
+    spectra: GapSpectra | None = None
+    telling_s: tuple[float, float] | None = None

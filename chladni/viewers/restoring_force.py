@@ -1,0 +1,61 @@
+"""What all pictures of a restoring-force surface share: which samples, which range, which colours."""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.records.diagnosis import RestoringForce
+from chladni.viewers.drawing import Floats
+
+Over = Literal["displacement", "velocity"]
+
+# Enough to see a surface, few enough that dots can be told apart.
+POINTS = 3000
+# A few wild samples of a recovered force must not flatten all others.
+SHOWN, ROOM = 99.5, 1.15
+# Blue against orange, grey in the middle: seen on paper and on black, told apart with any colour vision.
+SIGNED = np.array([(0, 114, 178), (158, 158, 158), (213, 94, 0)], dtype=np.float64)
+
+
+def spread_out(surface: RestoringForce) -> NDArray[np.intp]:
+    """Samples to draw, evenly over time."""
+    return np.unique(np.linspace(0, surface.force.size - 1, min(POINTS, surface.force.size)).astype(np.intp))
+
+
+def motion(surface: RestoringForce, over: Over) -> Floats:
+    """``[sample]`` of the displacement or the velocity."""
+    return surface.displacement if over == "displacement" else surface.velocity
+
+
+def motion_unit(surface: RestoringForce, over: Over) -> str:
+    """Unit of the displacement or the velocity."""
+    return surface.displacement_unit if over == "displacement" else f"{surface.displacement_unit}/s"
+
+
+def other(over: Over) -> Over:
+    """Give the velocity for the displacement, and the reverse."""
+    return "velocity" if over == "displacement" else "displacement"
+
+
+def force_range(surface: RestoringForce) -> tuple[float, float]:
+    """Forces that a picture shows, as much below zero as above."""
+    reach = ROOM * _reach(surface.force)
+    return -reach, reach
+
+
+def motion_reach(surface: RestoringForce, over: Over) -> float:
+    """Motion that has full colour."""
+    return _reach(motion(surface, over))
+
+
+def signed_colours(share: Floats) -> NDArray[np.uint8]:
+    """Give ``[..., rgb]`` of shares from -1 to 1; what lies outside has the colour of the end."""
+    place = np.clip(np.nan_to_num(share), -1, 1) + 1
+    parts = [np.interp(place, np.arange(len(SIGNED)), SIGNED[:, part]) for part in range(3)]
+    return np.stack(parts, axis=-1).astype(np.uint8)
+
+
+def _reach(values: Floats) -> float:
+    # Something must be left of a force that is zero nearly always, and of one that is zero throughout.
+    return float(np.percentile(np.abs(values), SHOWN)) or float(np.abs(values).max()) or 1.0

@@ -1,0 +1,179 @@
+"""Figures of a diagnosis: what they draw is what was found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from chladni.apps.gap_evidence import gap_evidence
+from chladni.signals.errors import EstimateError
+from chladni.viewers.figures.campaign import ReliabilityBin, calibration_figure, confusion_figure
+from chladni.viewers.figures.gap import gap_album
+from chladni.viewers.figures.gap_sheet import LETTERS, SENTENCES, gap_sheet
+from chladni.viewers.figures.rendering import rendered
+from chladni.viewers.gap_evidence import GapEvidence
+from chladni.viewers.gap_summary import summary
+from chladni.viewers.restoring_force import POINTS, SIGNED, force_range, signed_colours, spread_out
+from tests import made_diagnosis as made
+
+
+@pytest.fixture(scope="module")
+def evidence() -> GapEvidence:
+    return gap_evidence(made.diagnosis())
+
+
+@pytest.fixture(scope="module")
+def figures(evidence: GapEvidence) -> dict[str, Figure]:
+    return gap_album(evidence).figures
+
+
+def test_there_is_a_figure_of_everything_that_was_found(figures: dict[str, Figure]) -> None:
+    assert set(figures) == {"signals", "errors", "spectra", "gap map", "restoring force", "where"}
+
+
+def test_signals_are_those_of_the_telling_stretch(figures: dict[str, Figure], evidence: GapEvidence) -> None:
+    signals, telling_s = made.signals(), evidence.telling_s
+    assert telling_s is not None
+    first, last = (round(end * made.RATE_HZ) for end in telling_s)
+    for row, axes in enumerate(figures["signals"].axes):
+        assert [line.get_label() for line in axes.lines] == ["measured", "simulated before", "after"]
+        for line, values in zip(axes.lines, (signals.measured, signals.before, signals.after), strict=True):
+            np.testing.assert_array_equal(line.get_ydata(), values[row, first:last])
+        assert axes.get_title(loc="left") == signals.output_names[row]
+
+
+def test_errors_keep_their_extremes(figures: dict[str, Figure]) -> None:
+    before = made.measured() - made.nominal_run().outputs.values
+    for row, axes in enumerate(figures["errors"].axes):
+        drawn = np.asarray(axes.lines[0].get_ydata())
+        assert (drawn.max(), drawn.min()) == (before[row].max(), before[row].min())
+
+
+def test_spectra_are_roots_of_densities(figures: dict[str, Figure], evidence: GapEvidence) -> None:
+    assert evidence.spectra is not None
+    axes = figures["spectra"].axes[1]
+    np.testing.assert_allclose(axes.lines[1].get_ydata(), np.sqrt(evidence.spectra.before[1]))
+    noise = np.sqrt(evidence.spectra.noise[1])
+    np.testing.assert_allclose(axes.lines[3].get_ydata(), noise)
+    assert axes.get_ylim()[0] < noise
+
+
+def test_both_maps_have_one_scale_of_colours(figures: dict[str, Figure]) -> None:
+    before, after = (axes.images[0] for axes in figures["gap map"].axes[:2])
+    assert before.get_clim() == after.get_clim()
+    assert before.get_array().max() == pytest.approx(10 * np.log10(made.signals().gap_map.max()))
+
+
+def test_the_force_is_drawn_over_both_motions_with_the_law(figures: dict[str, Figure]) -> None:
+    surface = made.restoring_force()
+    rows = spread_out(surface)
+    over_displacement, over_velocity = figures["restoring force"].axes[:2]
+    dots = np.asarray(over_velocity.collections[0].get_offsets())
+    np.testing.assert_allclose(dots[:, 0], surface.velocity[rows])
+    np.testing.assert_allclose(dots[:, 1], surface.force[rows])
+    assert "[mm]" in over_displacement.get_xlabel()
+    np.testing.assert_allclose(
+        np.asarray(over_displacement.collections[0].get_offsets())[:, 0], 1e3 * surface.displacement[rows]
+    )
+    assert surface.law_force is not None
+    np.testing.assert_allclose(over_velocity.lines[0].get_ydata(), surface.law_force[rows])
+
+
+def test_bars_are_the_shares_and_the_named_site_is_in_colour(figures: dict[str, Figure]) -> None:
+    bars = figures["where"].axes[0].patches
+    assert [bar.get_width() for bar in bars] == pytest.approx([93, 31, 28, 12])
+    colours = [bar.get_facecolor() for bar in bars]
+    assert colours[0] != colours[1] == colours[2]
+
+
+def test_many_outputs_are_divided_over_figures() -> None:
+    signals, several = made.signals(), 6
+    wide = replace(
+        signals,
+        output_names=tuple(f"out_{row}" for row in range(several)),
+        output_units=("m/s^2",) * several,
+        **{name: np.repeat(getattr(signals, name)[:1], several, axis=0) for name in ("measured", "before", "after")},
+        noise_rms=np.repeat(signals.noise_rms[:1], several),
+    )
+    drawn = gap_album(gap_evidence(replace(made.diagnosis(), signals=wide))).figures
+    assert {"signals 1–3", "signals 4–6", "spectra 1–3"} <= set(drawn)
+
+
+@pytest.mark.parametrize("kind", made.every_kind())
+def test_a_sheet_can_be_drawn_of_every_answer(kind: str) -> None:
+    found = made.every_kind()[kind]
+    title = gap_sheet(gap_evidence(found)).get_suptitle()
+    assert title.replace("\n", " ") == " ".join(summary(found)[:SENTENCES])
+    assert max(map(len, title.splitlines())) <= LETTERS
+
+
+def test_a_diagnosis_without_signals_still_has_its_bars() -> None:
+    bare = replace(made.diagnosis(), signals=None, restoring_force=None)
+    assert set(gap_album(gap_evidence(bare)).figures) == {"where"}
+    assert len(gap_sheet(gap_evidence(bare)).axes) == 1
+
+
+def test_nothing_at_all_is_drawn_as_nothing() -> None:
+    where = replace(made.diagnosis().where, sites=(), bands=(), regimes=())
+    bare = replace(made.diagnosis(), signals=None, restoring_force=None, where=where)
+    assert gap_album(gap_evidence(bare)).figures == {}
+
+
+def test_the_sheet_is_the_same_bytes_every_time(evidence: GapEvidence) -> None:
+    assert rendered(gap_sheet(evidence), "svg") == rendered(gap_sheet(evidence), "svg")
+
+
+def test_a_name_with_markup_is_drawn_as_it_is() -> None:
+    signals = replace(made.signals(), output_names=("$a_b$", "\u9b3c_<b>"))
+    drawn = gap_album(gap_evidence(replace(made.diagnosis(), signals=signals)))
+    assert b"<svg" in drawn.rendered("signals", "svg")
+
+
+def test_surfaces_are_drawn_evenly_and_in_range() -> None:
+    surface = made.restoring_force()
+    rows = spread_out(surface)
+    assert rows.size == POINTS
+    assert (rows[0], rows[-1]) == (0, surface.force.size - 1)
+    low, high = force_range(surface)
+    assert low == -high
+    assert high > np.percentile(np.abs(surface.force), 99)
+    silent = replace(surface, force=np.zeros(3), displacement=np.zeros(3), velocity=np.zeros(3), law_force=None)
+    assert force_range(silent)[1] > 0
+
+
+def test_colours_run_from_blue_over_grey_to_orange() -> None:
+    np.testing.assert_array_equal(signed_colours(np.array([-2.0, 0.0, 1.0])), SIGNED.astype(np.uint8))
+
+
+BINS = (
+    ReliabilityBin(low=0.5, high=0.6, said=0.55, right=0.5, interval=(0.3, 0.7), cases=10),
+    ReliabilityBin(low=0.6, high=0.7, said=0.0, right=0.0, interval=(0.0, 1.0), cases=0),
+    ReliabilityBin(low=0.9, high=1.0, said=0.97, right=1.0, interval=(0.93, 1.0), cases=50),
+)
+
+
+def test_the_reliability_diagram_shows_what_was_said_against_what_was_right() -> None:
+    figure = calibration_figure(BINS, error=0.031)
+    reliability, counts = figure.axes
+    (points,) = (line for line in reliability.lines if line.get_marker() == "o")
+    # An empty bin says nothing.
+    np.testing.assert_array_equal(points.get_xdata(), [0.55, 0.97])
+    np.testing.assert_array_equal(points.get_ydata(), [0.5, 1.0])
+    assert [bar.get_height() for bar in counts.patches] == [10, 50]
+    assert "0.031" in reliability.get_title(loc="left")
+    assert b"<svg" in rendered(figure, "svg")
+
+
+def test_the_confusion_matrix_is_blue_where_it_is_right_and_orange_where_not() -> None:
+    words = ["delay", "lag"]
+    figure = confusion_figure(np.array([[9, 1, 0], [0, 5, 2]]), truths=words, answers=[*words, "unknown"])
+    (axes,) = figure.axes
+    assert [text.get_text() for text in axes.texts] == ["9", "1", "5", "2"]
+    colours = axes.images[0].get_array()
+    blue, orange, white = colours[0, 0], colours[0, 1], colours[0, 2]
+    assert blue[2] > blue[0]
+    assert orange[0] > orange[2]
+    np.testing.assert_array_equal(white, 1.0)
+    with pytest.raises(EstimateError, match="counts of shape"):
+        confusion_figure(np.zeros((2, 2), dtype=np.int64), truths=words, answers=["delay"])
