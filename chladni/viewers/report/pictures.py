@@ -12,7 +12,7 @@ def pictures(album: Album) -> dict[str, str]:
     """Give the figures as HTML, by the heading of their section; sections without figures are left out."""
     return {
         heading: element(
-            "div", "".join(_picture(album, name, caption) for name, caption in captioned), class_="figures"
+            "div", "".join(picture(album, name, caption) for name, caption in captioned), class_="figures"
         )
         for heading, captioned in _sections(album).items()
         if captioned
@@ -44,7 +44,8 @@ def _sections(album: Album) -> dict[str, list[tuple[str, str]]]:
     }
 
 
-def _picture(album: Album, name: str, caption: str) -> str:
+def picture(album: Album, name: str, caption: str) -> str:
+    """Give one figure with its caption."""
     # A picture in an <img> can't run scripts, whatever it holds, and its ids don't clash with those of another.
     data = base64.b64encode(album.rendered(name, "svg")).decode("ascii")
     image = f'<img alt="{escaped(name)}" src="data:image/svg+xml;base64,{data}">'

@@ -1,0 +1,135 @@
+"""The report of a diagnosis: one HTML file that needs nothing else."""
+
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from chladni.gap.records.diagnosis import Diagnosis
+from chladni.io.atomic import atomic_write
+from chladni.viewers import gap_tables as tables
+from chladni.viewers.effect_words import cause_law
+from chladni.viewers.figures.album import Album
+from chladni.viewers.figures.gap import gap_album
+from chladni.viewers.gap_evidence import GapEvidence
+from chladni.viewers.gap_summary import naive_sentence, summary
+from chladni.viewers.report.markup import PAGE, element, escaped, table
+from chladni.viewers.report.pictures import picture
+
+_CAPTIONS = {
+    "signals": "Where the model errs most: measured, simulated before, and after with what was found.",
+    "errors": "What is left of the whole log, before and after.",
+    "spectra": "Spectra of the errors between what was measured and the noise.",
+    "map": "Density of the gap over band and time, outputs over their RMS.",
+    "force": "Force that the model lacks, recovered without assuming a law; black: the law that was named.",
+    "shares": "In colour: the site that was named.",
+}
+RANKED = 12
+
+
+def write_gap_report(evidence: GapEvidence, path: str | os.PathLike[str], *, album: Album | None = None) -> Path:
+    """Write the report of a diagnosis as one HTML file, whole or not at all.
+
+    Parameters
+    ----------
+    evidence
+        What to report.
+    path
+        File to write; one that exists is replaced.
+    album
+        The figures, when they are drawn already.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    LogError
+        When the file can't be written.
+    """
+    target = Path(path)
+    with atomic_write(target) as file:
+        file.write(gap_report_html(evidence, album=album).encode())
+    return target
+
+
+def gap_report_html(evidence: GapEvidence, *, album: Album | None = None) -> str:
+    """Give the report as HTML: the answer, its evidence in tables and figures, no script and nothing to fetch."""
+    title = f"{evidence.found.model}: the gap to {', '.join(evidence.found.logs)}"
+    body = "\n".join(_body(title, evidence.found, album or gap_album(evidence)))
+    return PAGE.substitute(title=escaped(title), body=body)
+
+
+def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
+    yield element("h1", escaped(title))
+    yield _section("Answer", _answer(found))
+    yield _section("Causes", _causes(found))
+    yield _section("Evidence", _pictures(album, "signals", "errors", "spectra", "force"))
+    yield _section("Where it lies", _where(found) + _pictures(album, "shares", "map"))
+    yield _section(
+        "What was weighed", _tables((tables.ranking_table(found, count=RANKED), (2, 3, 4))) + _naive(found)
+    )
+    yield _section(
+        "Parameters that moved, or that this log doesn't determine",
+        _tables((tables.parameter_table(found), (1, 2, 3))),
+    )
+    yield _section("Linear, even, odd and noise", _tables((tables.distortion_table(found), (1, 2, 3, 4))))
+    yield _section("Limits", _list((*found.levels, *found.remarks, *_held_out(found))))
+
+
+def _where(found: Diagnosis) -> str:
+    shown = _tables(
+        (tables.channel_table(found), (1, 2)),
+        (tables.site_table(found), (1,)),
+        (tables.band_table(found), (1,)),
+        (tables.regime_table(found), (2,)),
+    )
+    # Side by side where there is room for it.
+    return element("div", shown, class_="figures") if shown else ""
+
+
+def _section(heading: str, content: str) -> str:
+    return element("section", element("h2", escaped(heading)) + content) if content else ""
+
+
+def _answer(found: Diagnosis) -> str:
+    first, *rest = summary(found)
+    told = element("p", element("strong", escaped(first))) + "".join(element("p", escaped(one)) for one in rest)
+    if found.next_measurement is None:
+        return told
+    return told + element("p", element("strong", "Measure next: ") + escaped(found.next_measurement))
+
+
+def _causes(found: Diagnosis) -> str:
+    laws = [law for law in map(cause_law, found.causes) if law]
+    return _tables((tables.cause_table(found), (3,))) + _list(laws)
+
+
+def _naive(found: Diagnosis) -> str:
+    told = naive_sentence(found)
+    return "" if told is None else element("p", escaped(told), class_="note")
+
+
+def _held_out(found: Diagnosis) -> tuple[str, ...]:
+    stretches = found.gap.held_out
+    if not stretches:
+        return ()
+    seconds = sum(one.end_s - one.start_s for one in stretches)
+    return (f"The closing was measured on {seconds:.4g} s that no fit saw, in {len(stretches)} of its stretches.",)
+
+
+def _tables(*several: tuple[tables.Table, Sequence[int]]) -> str:
+    """Tables with the places of their columns of numbers."""
+    return "".join(table(headings, rows, numbers=numbers) for (headings, rows), numbers in several)
+
+
+def _pictures(album: Album, *sections: str) -> str:
+    shown = [
+        picture(album, name, _CAPTIONS[section]) for section in sections for name in album.sections.get(section, {})
+    ]
+    return element("div", "".join(shown), class_="figures") if shown else ""
+
+
+def _list(sentences: Sequence[str]) -> str:
+    return element("ul", "".join(element("li", escaped(one)) for one in sentences)) if sentences else ""
