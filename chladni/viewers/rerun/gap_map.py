@@ -1,0 +1,51 @@
+"""The gap over band and time, before and after on one scale of colours."""
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from chladni.gap.records.diagnosis import GapSignals
+from chladni.viewers.drawing import Floats, block_maximum, decibels_of_power
+from chladni.viewers.rerun.entities import folder
+
+# Graphics cards take images of 8192 pixels a side.
+PIXELS = 4096
+DYNAMIC_RANGE_DB = 50.0
+
+
+def draw_gap_maps(recording: rr.RecordingStream, signals: GapSignals | None) -> list[rrb.View]:
+    """Write both maps as tensors in decibels and give a view of each; none without a map."""
+    if signals is None or signals.gap_map.size == 0:
+        return []
+    levels = {"before": _level(signals.gap_map), "after": _level(signals.gap_map_after)}
+    known = np.concatenate([level[np.isfinite(level)] for level in levels.values()])
+    high = float(np.ceil(known.max())) if known.size else 0.0
+    return [_draw(recording, signals, what, level, high) for what, level in levels.items()]
+
+
+def _level(density: Floats) -> Floats:
+    for axis in (0, 1):
+        density, _ = block_maximum(density, axis=axis, limit=PIXELS)
+    return decibels_of_power(density)
+
+
+def _draw(recording: rr.RecordingStream, signals: GapSignals, what: str, level: Floats, high: float) -> rrb.View:
+    path, low = folder("gap map", what), high - DYNAMIC_RANGE_DB
+    picture = np.where(np.isnan(level), low, level).astype(np.float32)
+    names = (f"time {_span(signals.map_time_s)} s", f"frequency {_span(signals.map_frequency_hz)} Hz")
+    recording.log(path, rr.Tensor(picture, dim_names=names, value_range=(low, high)), static=True)
+    return rrb.TensorView(
+        origin=path,
+        name=f"Gap {what} [dB re 1/Hz], {low:.0f} to {high:.0f}, outputs over their RMS",
+        slice_selection=rrb.TensorSliceSelection(
+            width=rr.TensorDimensionSelection(dimension=0),
+            # Low frequencies at the bottom, as everywhere else; images start at the top.
+            height=rr.TensorDimensionSelection(dimension=1, invert=True),
+        ),
+        scalar_mapping=rrb.TensorScalarMapping(colormap="magma", mag_filter="Nearest"),
+        view_fit="fill",
+    )
+
+
+def _span(axis: Floats) -> str:
+    return f"{axis[0]:.4g}–{axis[-1]:.4g}" if axis.size else "none"

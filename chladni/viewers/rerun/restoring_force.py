@@ -1,0 +1,91 @@
+"""The restoring-force surface: the recovered force over displacement, velocity and time, the law over it."""
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from chladni.gap.records.diagnosis import RestoringForce
+from chladni.signals.time_series import NS_PER_S
+from chladni.viewers.drawing import Floats, thin
+from chladni.viewers.engineering import axis_scale
+from chladni.viewers.gap_evidence import AFTER_ON_DARK, MEASURED_ON_DARK
+from chladni.viewers.rerun.canvas import Canvas
+from chladni.viewers.rerun.entities import folder
+from chladni.viewers.rerun.timelines import send_scalars, time_axis, time_index
+from chladni.viewers.restoring_force import (
+    Over,
+    force_range,
+    motion,
+    motion_reach,
+    motion_unit,
+    other,
+    signed_colours,
+    spread_out,
+)
+from chladni.viewers.style import Colour
+
+PATH = folder("restoring force")
+WIDTH, HEIGHT, MARGIN = 800.0, 560.0, 0.05
+# For the force's name over its axis.
+ABOVE = 100.0
+LAW_COLOUR = (255, 255, 255)
+ROWS = 500_000
+
+
+def draw_surfaces(recording: rr.RecordingStream, surface: RestoringForce) -> list[rrb.View]:
+    """Write the force over displacement and over velocity, each coloured by the other, and give a view of each."""
+    return [_draw(recording, surface, "displacement"), _draw(recording, surface, "velocity")]
+
+
+def _draw(recording: rr.RecordingStream, surface: RestoringForce, over: Over) -> rrb.View:
+    rows, path = spread_out(surface), f"{PATH}/{over}"
+    across, x_unit = axis_scale(motion(surface, over), motion_unit(surface, over))
+    up, force_unit = axis_scale(surface.force, surface.force_unit)
+    x = motion(surface, over)[rows] / across
+    low, high = force_range(surface)
+    canvas = Canvas(width=WIDTH, height=HEIGHT, x_range=_padded(x), y_range=(low / up, high / up))
+    canvas.draw_axes(recording, f"{path}/axes", x_name=f"{over} [{x_unit}]", y_name=f"force [{force_unit}]")
+    shade = motion(surface, other(over))[rows] / motion_reach(surface, other(over))
+    _dots(recording, f"{path}/force", canvas.places(x, surface.force[rows] / up), signed_colours(shade), points=1.6)
+    if surface.law_force is not None:
+        law = canvas.places(x, surface.law_force[rows] / up)
+        _dots(recording, f"{path}/law", law, np.array([LAW_COLOUR], dtype=np.uint8), points=0.8)
+    return canvas.view(
+        path, f"Force lacking at {surface.site} over {over}; blue to orange: {other(over)}; white: law"
+    )
+
+
+def _dots(
+    recording: rr.RecordingStream, path: str, places: Floats, colours: NDArray[np.uint8], *, points: float
+) -> None:
+    recording.log(path, rr.Points2D(places, colors=colours, radii=rr.Radius.ui_points(points)), static=True)
+
+
+def _padded(x: Floats) -> tuple[float, float]:
+    low, high = float(x.min()), float(x.max())
+    room = MARGIN * (high - low) or 1.0
+    return low - room, high + room
+
+
+def draw_force_over_time(recording: rr.RecordingStream, surface: RestoringForce) -> rrb.View:
+    """Write the recovered force and the law's over time and give their view."""
+    _line(recording, surface.time_s, surface.force, "recovered", MEASURED_ON_DARK)
+    if surface.law_force is not None:
+        _line(recording, surface.time_s, surface.law_force, "law", AFTER_ON_DARK)
+    start_ns, end_ns = (round(float(end) * NS_PER_S) for end in surface.time_s[[0, -1]])
+    return rrb.TimeSeriesView(
+        origin=f"{PATH}/time",
+        name=f"Force lacking at {surface.site} [{surface.force_unit}]",
+        axis_x=time_axis(end_ns, start_ns=start_ns),
+        plot_legend=rrb.PlotLegend(visible=True, corner=rrb.Corner2D.LeftTop),
+    )
+
+
+def _line(recording: rr.RecordingStream, time_s: Floats, values: Floats, name: str, colour: Colour) -> None:
+    path = f"{PATH}/time/{name}"
+    # The default averages neighbours when zoomed out, which makes a vibration look like silence.
+    look = rr.SeriesLines(names=name, colors=[colour], widths=1.2, aggregation_policy="MinMax")
+    recording.log(path, look, static=True)
+    chosen, _ = thin(values, limit=ROWS)
+    send_scalars(recording, path, time_index(np.rint(time_s[chosen] * NS_PER_S).astype(np.int64)), values[chosen])
