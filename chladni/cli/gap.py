@@ -13,6 +13,7 @@ from chladni.cli.output import Output
 if TYPE_CHECKING:
     from chladni.gap.records.diagnosis import Diagnosis
     from chladni.models.core.model import Model
+    from chladni.viewers.gap_evidence import GapEvidence
 
 FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
 
@@ -108,30 +109,40 @@ def _draw(
     save: Path | None,
 ) -> None:
     """Write the pictures that were asked for, and say where they are."""
+    if not any((report, figure, figures, save)):
+        return
+    from chladni.apps.gap_evidence import gap_evidence
+
+    evidence = gap_evidence(found)
     if report is not None or figures is not None:
-        from chladni.viewers.figures.gap import gap_album
-
-        album = gap_album(found)
-        if figures is not None:
-            from chladni.viewers.figures.saving import save_album
-
-            for path in save_album(album, figures):
-                out.line(f"figure: {path}")
-        if report is not None:
-            from chladni.viewers.report.gap import write_gap_report
-
-            write_gap_report(found, report, album=album)
-            out.line(f"report: {report}")
+        _draw_album(out, evidence, report=report, figures=figures)
     if figure is not None:
-        from chladni.viewers.figures.gap import save_gap_sheet
+        from chladni.viewers.figures.gap_sheet import save_gap_sheet
 
-        save_gap_sheet(found, figure)
+        save_gap_sheet(evidence, figure)
         out.line(f"figure: {figure}")
     if save is not None:
+        from chladni.apps.gap_structure import structure_sketch
         from chladni.viewers.rerun.gap import write_gap_rrd
 
-        write_gap_rrd(found, save, model=model)
+        write_gap_rrd(evidence, save, sketch=structure_sketch(model, found.where))
         out.line(f"recording: {save}")
+
+
+def _draw_album(out: Output, evidence: "GapEvidence", *, report: Path | None, figures: Path | None) -> None:
+    from chladni.viewers.figures.gap import gap_album
+
+    album = gap_album(evidence)
+    if figures is not None:
+        from chladni.viewers.figures.saving import save_album
+
+        for path in save_album(album, figures):
+            out.line(f"figure: {path}")
+    if report is not None:
+        from chladni.viewers.report.gap import write_gap_report
+
+        write_gap_report(evidence, report, album=album)
+        out.line(f"report: {report}")
 
 
 def _write_model(out: Output, model: "Model", found: "Diagnosis", path: Path) -> None:

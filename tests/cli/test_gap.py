@@ -32,7 +32,7 @@ def test_the_summary_reads_as_an_answer(run: Run, engine: StandIn, files: tuple[
         "It explains 93 % of the gap; adding it brings the error from 28 % to 1.0 %, noise 1.0 %."
     )
     for words in (
-        "acc_wrist", "8 – 16", "elbow.velocity", "hysteresis", "-130.2", "held: not determined", "Measure next",
+        "acc_wrist", "8 to 16", "elbow.velocity", "hysteresis", "-130.2", "held: not determined", "Measure next",
         "Repeat at half the level", "alone would have named hysteresis at elbow", "was held.",
     ):  # fmt: skip
         assert words in outcome.out
@@ -98,3 +98,19 @@ def test_a_file_that_is_not_there_is_told(run: Run, engine: StandIn, files: tupl
     outcome = run("gap", *given)
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert "absent.toml" in outcome.err
+
+
+def test_pictures_are_written_where_they_were_asked_for(
+    run: Run, engine: StandIn, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    outcome = run(
+        "gap", *files, "--html", tmp_path / "gap.html", "--save", tmp_path / "gap.rrd",
+        "--figure", tmp_path / "gap.svg", "--figures", tmp_path / "figures",
+    )  # fmt: skip
+    assert outcome.code == 0, outcome.err
+    assert "Most likely Coulomb friction" in (tmp_path / "gap.html").read_text(encoding="utf-8")
+    assert (tmp_path / "gap.rrd").stat().st_size > 0
+    assert (tmp_path / "gap.svg").read_bytes().startswith(b"<?xml")
+    assert {path.name for path in (tmp_path / "figures").iterdir()} >= {"restoring-force.png", "signals.svg"}
+    for name in ("gap.html", "gap.rrd", "gap.svg", "restoring-force.png"):
+        assert name in outcome.out.replace("\n", "")
