@@ -105,7 +105,7 @@ class FreeRun:
         ModelError
             When parameters are impossible or the model diverges.
         """
-        found = [integration.outputs[self.rows] for _, integration in self._integrations(z, effects, initial)]
+        found = [integration.outputs[self.rows] for _, integration in self.integrations(z, effects, initial)]
         return found[0] if len(found) == 1 else np.hstack(found)
 
     def motion(
@@ -127,14 +127,15 @@ class FreeRun:
         port = compiled.port_index(site)
         parts = [
             _port_motion(compiled, port, integration, self._columns(compiled, window))
-            for window, integration in self._integrations(z, effects, initial)
+            for window, integration in self.integrations(z, effects, initial)
         ]
         displacement, velocity, force = np.concatenate(parts, axis=1)
         return SiteMotion(site=site, displacement=displacement, velocity=velocity, force=force)
 
-    def _integrations(
+    def integrations(
         self, z: Matrix | None, effects: Sequence[AttachedEffect], initial: Matrix | None
     ) -> list[tuple[tuple[int, int], Integration]]:
+        """Give each window with its run; arguments and errors are those of `outputs`."""
         compiled, integrator = self._integrator(z, effects)
         starts = initial_states(initial, len(self.windows), len(compiled.states))
         return [

@@ -1,12 +1,14 @@
 """An output-error fit as a least-squares problem: what it costs at a point, and how that changes around it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.plant.free_run import FreeRun, initial_states
+from chladni.gap.plant.law_plant import LawRunResult, Setting, coarse_run, fine_run, slopes_of
+from chladni.gap.plant.law_run import can_run
 from chladni.gap.tuning.decay import decay
 from chladni.gap.tuning.effect_scale import EffectNumber, with_numbers
 from chladni.gap.tuning.residual import Residual, Whitening, likelihood_cost, weights
@@ -31,12 +33,13 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """A free run at a point, its residual, and the cost in nats."""
+    """A free run at a point, its residual, and the cost in nats; what its slopes need when the model has laws."""
 
     point: Point
     outputs: Matrix
     residual: Residual
     cost: float
+    made: LawRunResult | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +108,10 @@ class FitProblem:
         self.high = np.concatenate([limit, [number.high for number in numbers]])
         self._prior = np.concatenate([np.ones(self.tuned), np.zeros(len(numbers))])
         self._decay = self._wide = np.zeros(0)
-        self.has_laws = bool(run.compiled(start_z, self.effects).laws)
+        compiled = run.compiled(start_z, self.effects)
+        self.has_laws = bool(compiled.laws)
+        self.has_slopes = can_run(compiled)
+        self.coarse = self.has_slopes
 
     def start(self) -> Point:
         """Where the fit begins: at rest, moved into the bounds."""
@@ -123,10 +129,14 @@ class FitProblem:
 
     def evaluate(self, point: Point) -> Evaluation:
         """Run freely and judge; `ModelError` when the run diverges."""
-        outputs = self._outputs(point.x, point.initial)
+        made = None
+        if self.has_slopes:
+            self.evaluations += 1
+            made = (coarse_run if self.coarse else fine_run)(self.run, self._setting(point.x), point.initial)
+        outputs = self._outputs(point.x, point.initial) if made is None else made.outputs
         residual = self.whitening.residual(self.run.measurement.outputs - outputs)
         cost = likelihood_cost(residual.power, self.whitening.samples) + self.prior_cost(point)
-        return Evaluation(point, outputs, residual, cost)
+        return Evaluation(point, outputs, residual, cost, made)
 
     def prior_cost(self, point: Point) -> float:
         """Half the squares of what is believed beforehand, in nats."""
@@ -138,7 +148,8 @@ class FitProblem:
         """Gauss and Newton's equations around a point, each output weighed by what it misses."""
         root = np.sqrt(weights(here.residual.power))[:, None]
         residual = here.residual.white * root
-        columns = np.concatenate([self.whitening.seen(self._columns(here)), self.whitening.constants()]) * root
+        own, starts = self._columns(here)
+        columns = np.concatenate([self.whitening.seen(own), self.whitening.constants()]) * root
         curvature, gradient = _products(columns, columns), -_products(columns, residual[None])[:, 0]
         unknowns = here.point.x.size
         curvature[:unknowns, :unknowns] += np.diag(self._prior)
@@ -147,7 +158,7 @@ class FitProblem:
         sure = np.where(spread > 0, spread, 1.0) ** -2.0
         back = []
         for place, (start, stop) in enumerate(self.run.windows):
-            seen, local = self._seen(start, stop), self._local(start, stop) * root[None]
+            seen, local = self._seen(start, stop), starts(start, stop) * root
             local[spread == 0] = 0.0
             slope = sure * here.point.initial[place] - _products(local, residual[None, :, seen])[:, 0]
             cross = _products(local, columns[..., seen])
@@ -168,7 +179,20 @@ class FitProblem:
         self.evaluations += 1
         return self.run.outputs(self.z(x), self.effects_at(x), initial)
 
-    def _columns(self, here: Evaluation) -> Matrix:
+    def _columns(self, here: Evaluation) -> tuple[Matrix, Callable[[int, int], Matrix]]:
+        """Slopes ``[unknown, output, sample]``, and whitened ``[state, output, training sample]`` of each window."""
+        if here.made is None:
+            return self._differences(here), self._local
+        steps = self._steps(here.point.x, _APART)
+        changed = [(self._setting(here.point.x + row), by) for row, by in zip(np.diag(steps), steps, strict=True)]
+        own, starts = slopes_of(self.run, here.made, changed)
+        white = self.whitening.whitened(starts)
+        return own, lambda start, stop: white[..., start:stop][..., self.training[start:stop]]
+
+    def _setting(self, x: Matrix) -> Setting:
+        return Setting(self.z(x), self.effects_at(x))
+
+    def _differences(self, here: Evaluation) -> Matrix:
         """``[unknown, output, sample]``: change of the outputs, by differences."""
         apart = _APART_WITH_LAWS if self.has_laws else _APART
         columns = np.empty((here.point.x.size, *here.outputs.shape))

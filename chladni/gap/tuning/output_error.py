@@ -18,11 +18,17 @@ from chladni.signals.value import Value, require_shape
 
 Matrix = NDArray[np.float64]
 #: A step that promises less than this, in nats, changes no decision.
-_ENOUGH = 0.02
+_ENOUGH = 0.1
+#: A fit that can't get what its slopes promise has still converged when that is less.
+_STUCK = 2.0
+#: The same for a coarse run, for each sample: its power falls by less than two per cent.
+_COARSE = 0.01
 #: Most that one step may change an unknown: sigmas of a parameter, factors of e of an effect's.
 _LONGEST = 2.0
 #: An unknown that a log leaves as uncertain as it was.
 _UNDETERMINED = 0.9
+#: Iterations that are left for fine runs at least.
+_FINE = 4
 _DAMPINGS = (0.0, 1e-2, 1e-1, 1.0, 10.0, 100.0)
 
 
@@ -158,22 +164,38 @@ def fit_output_error(
     start = problem.start()
     if start_initial is not None:
         start = Point(start.x, np.array(start_initial, dtype=np.float64).reshape(start.initial.shape))
-    here, slopes, converged, iterations = _descend(problem, problem.evaluate(start), max_iterations)
+    here, slopes, converged, iterations = _fit(problem, start, max_iterations)
     return _report(problem, here, slopes, converged=converged, iterations=iterations)
 
 
-def _descend(problem: FitProblem, here: Evaluation, most: int) -> tuple[Evaluation, Slopes, bool, int]:
+def _fit(problem: FitProblem, start: Point, most: int) -> tuple[Evaluation, Slopes, bool, int]:
+    """Coarsely first where that is quicker, then as finely as runs are made."""
+    spent = 0
+    if problem.coarse:
+        # What a coarse run is wrong by is no reason to follow it further than this.
+        enough = _COARSE * problem.whitening.samples * problem.run.rows.size
+        try:
+            found, _, _, spent = _descend(problem, problem.evaluate(start), most, enough)
+            start = found.point
+        except ModelError:
+            spent = 0
+        problem.coarse = False
+    here, slopes, converged, more = _descend(problem, problem.evaluate(start), max(most - spent, _FINE), _ENOUGH)
+    return here, slopes, converged, spent + more
+
+
+def _descend(problem: FitProblem, here: Evaluation, most: int, enough: float) -> tuple[Evaluation, Slopes, bool, int]:
     level, iterations = 0, 0
     slopes = problem.slopes(here)
     while iterations < most:
         iterations += 1
         found, promised, level = _search(problem, here, slopes, level)
         if found is None:
-            return here, slopes, promised < 50 * _ENOUGH, iterations
+            return here, slopes, promised < _STUCK, iterations
         gained, here = here.cost - found.cost, found
-        slopes = problem.slopes(here)
-        if max(promised, gained) < _ENOUGH:
+        if max(promised, gained) < enough:
             return here, slopes, True, iterations
+        slopes = problem.slopes(here)
     return here, slopes, False, iterations
 
 

@@ -1,0 +1,329 @@
+"""Kernels: one step between samples with laws at ports, and how it changes with parameters and starts.
+
+A step takes ``v = [x0, row, f0, f1]`` to ``[x1, m1] = B v``: states and motions at the ports. Between its ends the
+port forces run along straight lines, as the inputs do; f1 is what the laws say of m1. Law states follow their own
+equation, linearised in themselves at the middle of the step, exactly: bristles that bend within a step neither ring
+nor lag.
+"""
+
+from collections.abc import Callable
+from math import expm1
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.integrator.machine_code import call_law, inlined_code, machine_code, part_code
+
+Matrix = NDArray[np.float64]
+Integers = NDArray[np.int64]
+# In a kernel it takes no context.
+_CALL: Callable[..., float] = call_law
+_ITERATIONS = 40
+_HALVINGS = 12
+#: Forces agree with their laws to this share of the largest so far; a step that misses by more has failed.
+_MET = 1e-9
+_NEARLY = 1e-6
+#: Share of the largest motion so far below which a difference is taken on that, not on the motion itself.
+_SMALL = 1e-2
+#: Differences of motions for the slope of a force; of law states inside, whose own differences must be far below.
+FINE, _LARGE = 1e-6, 1e-3
+
+
+class Laws(NamedTuple):
+    """Laws as the kernels read them, and room to ask them.
+
+    Attributes
+    ----------
+    table
+        ``[law, 3]`` address of the function, address of its parameters, place of its first state.
+    counts
+        ``[law]`` states of each.
+    first
+        ``[port + 1]`` first law of each port.
+    trial, rates
+        ``[law state]`` where laws read states and write rates.
+    address
+        Of trial, of rates, of the states at the end.
+    scale
+        ``[4 port + law state]`` size of each argument, so that differences are taken on it.
+    """
+
+    table: Integers
+    counts: Integers
+    first: Integers
+    trial: Matrix
+    rates: Matrix
+    address: Integers
+    scale: Matrix
+
+
+class Room(NamedTuple):
+    """What one step works on.
+
+    Attributes
+    ----------
+    given
+        ``[4 port + law state]``: what forces depend on. Displacements and velocities after the step, then before it,
+        then the law states before it.
+    state, force
+        Law states and forces after it.
+    base
+        ``[2 port]`` motions after it, without those forces.
+    missed, tried, slope, matrix, inverse
+        Of Newton's iteration.
+    """
+
+    given: Matrix
+    state: Matrix
+    force: Matrix
+    base: Matrix
+    missed: Matrix
+    tried: Matrix
+    slope: Matrix
+    matrix: Matrix
+    inverse: Matrix
+
+
+class March(NamedTuple):
+    """Tables of one march, and what it fills.
+
+    Attributes
+    ----------
+    table
+        B ``[state + 2 port, state + width + 2 port]``.
+    ends
+        ``[2 port, port]``: the part of B that takes f1 to m1.
+    start, through
+        ``[2 port, state + width]``, ``[2 port, port]``: motions at the start, of state and row and of forces.
+    rows
+        ``[step, width]``.
+    x, motion, force, state
+        ``[step, ...]`` states, motions and forces at the ports, law states; of x and state the first row is given.
+    """
+
+    table: Matrix
+    ends: Matrix
+    start: Matrix
+    through: Matrix
+    rows: Matrix
+    x: Matrix
+    motion: Matrix
+    force: Matrix
+    state: Matrix
+
+
+@inlined_code
+def _bend(laws: Laws, law: int, room: Room, port: int, h: float, t: float) -> None:
+    """States of a law at the end of the step."""
+    p = room.force.size
+    first, parameters = laws.table[law, 2], laws.table[law, 1]
+    d = 0.5 * (room.given[port] + room.given[2 * p + port])
+    s = 0.5 * (room.given[p + port] + room.given[3 * p + port])
+    middle = t - 0.5 * h
+    trial, rates = laws.address[0] + 8 * first, laws.address[1] + 8 * first
+    for place in range(first, first + laws.counts[law]):
+        laws.trial[place] = room.given[4 * p + place]
+    for place in range(first, first + laws.counts[law]):
+        here = room.given[4 * p + place]
+        by = _LARGE * (abs(here) + _SMALL)
+        laws.trial[place] = here + by
+        _CALL(laws.table[law, 0], d, s, middle, parameters, trial, rates)
+        there = laws.rates[place]
+        laws.trial[place] = here
+        _CALL(laws.table[law, 0], d, s, middle, parameters, trial, rates)
+        rate = laws.rates[place]
+        e = min(h * (there - rate) / by, 30.0)
+        share = expm1(e) / e if abs(e) > 1e-6 else 1.0 + 0.5 * e
+        room.state[place] = here + h * share * rate
+
+
+@inlined_code
+def force_of(laws: Laws, room: Room, port: int, h: float, t: float) -> float:
+    """Force of all laws at a port, at the motion after the step; sets their states."""
+    p = room.force.size
+    total = 0.0
+    for law in range(laws.first[port], laws.first[port + 1]):
+        if laws.counts[law] > 0:
+            _bend(laws, law, room, port, h, t)
+        first = laws.table[law, 2]
+        total += _CALL(
+            laws.table[law, 0], room.given[port], room.given[p + port], t, laws.table[law, 1],
+            laws.address[2] + 8 * first, laws.address[1] + 8 * first,
+        )  # fmt: skip
+    return total
+
+
+@part_code
+def missed_by(laws: Laws, room: Room, through: Matrix, force: Matrix, h: float, t: float) -> float:
+    """Largest difference between the forces and what the laws say of the motion that they make."""
+    p = room.force.size
+    for row in range(2 * p):
+        value = room.base[row]
+        for port in range(p):
+            value += through[row, port] * force[port]
+        room.given[row] = value
+    largest = 0.0
+    for port in range(p):
+        room.missed[port] = force[port] - force_of(laws, room, port, h, t)
+        largest = max(largest, abs(room.missed[port]))
+    return largest
+
+
+@part_code
+def slope_of(laws: Laws, room: Room, port: int, argument: int, here: float, h: float, t: float) -> float:
+    """Change of a port's force with one of its arguments; leaves the law states as they are there."""
+    kept = room.given[argument]
+    by = FINE * max(abs(kept), laws.scale[argument])
+    room.given[argument] = kept + by
+    slope = (force_of(laws, room, port, h, t) - here) / by
+    room.given[argument] = kept
+    return slope
+
+
+@inlined_code
+def equations(room: Room, through: Matrix) -> None:
+    """Matrix of ``df - slope dm``, m moved by the forces themselves."""
+    p = room.force.size
+    for row in range(p):
+        for column in range(p):
+            value = 1.0 if row == column else 0.0
+            value -= room.slope[row] * through[row, column] + room.slope[p + row] * through[p + row, column]
+            room.matrix[row, column] = value
+
+
+@inlined_code
+def invert(room: Room) -> None:
+    """Invert the matrix of the equations, by Gauss and Jordan without exchange: laws that resist make it dominant."""
+    p = room.matrix.shape[0]
+    for row in range(p):
+        for column in range(p):
+            room.inverse[row, column] = 1.0 if row == column else 0.0
+    for pivot in range(p):
+        factor = 1.0 / room.matrix[pivot, pivot] if room.matrix[pivot, pivot] != 0.0 else 0.0
+        for column in range(p):
+            room.matrix[pivot, column] *= factor
+            room.inverse[pivot, column] *= factor
+        for row in range(p):
+            if row != pivot:
+                share = room.matrix[row, pivot]
+                for column in range(p):
+                    room.matrix[row, column] -= share * room.matrix[pivot, column]
+                    room.inverse[row, column] -= share * room.inverse[pivot, column]
+
+
+@inlined_code
+def _newton_change(laws: Laws, room: Room, through: Matrix, h: float, t: float) -> None:
+    """Newton's change of the forces, in `slope`."""
+    p = room.force.size
+    for port in range(p):
+        here = force_of(laws, room, port, h, t)
+        for row in (port, p + port):
+            room.slope[row] = slope_of(laws, room, port, row, here, h, t)
+    equations(room, through)
+    invert(room)
+    for row in range(p):
+        change = 0.0
+        for column in range(p):
+            change -= room.inverse[row, column] * room.missed[column]
+        room.slope[row] = change
+
+
+@part_code
+def meet(laws: Laws, room: Room, through: Matrix, h: float, t: float, size: float) -> int:
+    """Forces at the end of the step that agree with the laws: Newton, halved while it makes things worse."""
+    p = room.force.size
+    missed = missed_by(laws, room, through, room.force, h, t)
+    for _ in range(_ITERATIONS):
+        if missed <= _MET * size:
+            return 0
+        _newton_change(laws, room, through, h, t)
+        share, best = 1.0, missed
+        for _ in range(_HALVINGS):
+            for row in range(p):
+                room.tried[row] = room.force[row] + share * room.slope[row]
+            best = missed_by(laws, room, through, room.tried, h, t)
+            if best < missed:
+                break
+            share *= 0.5
+        if not best < missed:
+            break
+        missed = best
+        for row in range(p):
+            room.force[row] = room.tried[row]
+    missed = missed_by(laws, room, through, room.force, h, t)
+    return 0 if missed <= _NEARLY * size else 1
+
+
+@part_code
+def begin(march: March, laws: Laws, room: Room, t: float) -> int:
+    """Motions and forces at the start of a window, which make each other at once."""
+    n, p = march.x.shape[1], room.force.size
+    for row in range(2 * p):
+        value = 0.0
+        for column in range(n):
+            value += march.start[row, column] * march.x[0, column]
+        for column in range(march.rows.shape[1]):
+            value += march.start[row, n + column] * march.rows[0, column]
+        room.base[row] = value
+        room.given[2 * p + row] = value
+    for place in range(room.state.size):
+        room.given[4 * p + place] = march.state[0, place]
+    for port in range(p):
+        room.force[port] = 0.0
+    missed = missed_by(laws, room, march.through, room.force, 0.0, t)
+    return meet(laws, room, march.through, 0.0, t, max(missed, 1e-300))
+
+
+@inlined_code
+def _record(march: March, laws: Laws, room: Room, step: int) -> None:
+    """Keep what a step ended with, and begin the next one from it."""
+    p = room.force.size
+    for row in range(2 * p):
+        march.motion[step, row] = room.given[row]
+        laws.scale[row] = max(laws.scale[row], _SMALL * abs(room.given[row]))
+        laws.scale[2 * p + row] = laws.scale[row]
+        room.given[2 * p + row] = room.given[row]
+    for place in range(room.state.size):
+        march.state[step, place] = room.state[place]
+        room.given[4 * p + place] = room.state[place]
+    for port in range(p):
+        march.force[step, port] = room.force[port]
+
+
+@inlined_code
+def _advance(march: March, room: Room, step: int) -> None:
+    """States and motions after the step, without its last forces."""
+    n, p, width = march.x.shape[1], room.force.size, march.rows.shape[1]
+    for row in range(n + 2 * p):
+        value = 0.0
+        for column in range(n):
+            value += march.table[row, column] * march.x[step, column]
+        for column in range(width):
+            value += march.table[row, n + column] * march.rows[step, column]
+        for port in range(p):
+            value += march.table[row, n + width + port] * march.force[step, port]
+        if row < n:
+            march.x[step + 1, row] = value
+        else:
+            room.base[row - n] = value
+
+
+@machine_code
+def law_march(march: March, laws: Laws, room: Room, h: float, begin_s: float) -> int:
+    """March through one window; gives how many steps did not meet their laws."""
+    n, p, width = march.x.shape[1], room.force.size, march.rows.shape[1]
+    failed = begin(march, laws, room, begin_s)
+    size = 1e-300
+    for step in range(march.rows.shape[0]):
+        _record(march, laws, room, step)
+        for port in range(p):
+            size = max(size, abs(room.force[port]))
+        if step == march.rows.shape[0] - 1:
+            break
+        _advance(march, room, step)
+        failed += meet(laws, room, march.ends, h, begin_s + (step + 1) * h, size)
+        for row in range(n):
+            for port in range(p):
+                march.x[step + 1, row] += march.table[row, n + width + p + port] * room.force[port]
+    return failed

@@ -1,0 +1,185 @@
+"""Free runs of a model with laws in steps of the log's own rate: quick, for fits that ask a hundred times."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.plant.law_kernel import Laws, March, Room, law_march
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.integrator.exponential import responses
+from chladni.models.integrator.hold import Hold, hold_of
+from chladni.models.integrator.input_rows import input_rows
+from chladni.models.integrator.port_plan import LawTable, PortPlan, law_table, port_plan
+from chladni.signals.errors import ModelError
+
+Matrix = NDArray[np.float64]
+Windows = Sequence[tuple[int, int]]
+#: Share of steps whose forces may miss their laws.
+_MAY_FAIL = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Equations:
+    """A compiled model with laws as a recursion of steps between samples.
+
+    Attributes
+    ----------
+    step, ends, start, through
+        See `March`; `start` with the columns of the forces too: ``[2 port, state + width + port]``.
+    output
+        ``[output, state + width + port]``.
+    rows
+        ``[step, width]`` inputs of all steps of the record.
+    laws
+        Addresses, parameters and first states.
+    parts
+        Steps between samples.
+    """
+
+    step: Matrix
+    ends: Matrix
+    start: Matrix
+    through: Matrix
+    output: Matrix
+    rows: Matrix
+    laws: LawTable
+    plan: PortPlan
+    parts: int
+
+
+def can_run(compiled: CompiledModel) -> bool:
+    """Whether a model is one for these kernels: laws, and nothing that looks back or reads between samples."""
+    return bool(compiled.laws) and not compiled.delays and not any(compiled.output_offsets_s)
+
+
+def equations(
+    compiled: CompiledModel, signals: Matrix, sample_rate_hz: float, rows: NDArray[np.int64], parts: int
+) -> Equations:
+    """Make the tables of a compiled model.
+
+    Parameters
+    ----------
+    signals
+        ``[input, sample]`` of the whole record.
+    rows
+        Outputs that are wanted.
+    parts
+        Steps between samples.
+    """
+    hold = hold_of(compiled, sample_rate_hz)
+    plan = port_plan(compiled, hold)
+    p, m = len(plan.ports), hold.columns
+    response = responses(
+        plan.a, plan.b, plan.g, hold,
+        step_s=1.0 / (sample_rate_hz * parts), kink_at=hold.kink_at, fractions=np.ones(1),
+    )[0]  # fmt: skip
+    early, late = response.force[0] - response.force[1], response.force[1]
+    at_once = plan.through.reshape(2 * p, p)
+    moved = plan.motion_state @ response.state + plan.motion_column @ response.column
+    ends = plan.motion_state @ late + at_once
+    padding = np.zeros((2 * p, hold.width - m))
+    none = np.zeros((rows.size, hold.width - m))
+    return Equations(
+        step=np.block([[response.state, early, late], [moved, plan.motion_state @ early, ends]]),
+        ends=np.ascontiguousarray(ends),
+        start=np.hstack([plan.motion_state, plan.motion_column, padding, at_once]),
+        through=np.ascontiguousarray(at_once),
+        output=np.hstack([plan.c[rows], plan.d[rows], none, plan.h[rows]]),
+        rows=_finer(input_rows(compiled, hold, signals, sample_rate_hz, extra=0), hold, parts),
+        laws=law_table(compiled, plan),
+        plan=plan,
+        parts=parts,
+    )
+
+
+def _finer(rows: Matrix, hold: Hold, parts: int) -> Matrix:
+    """Rows of steps that are a part of the interval between samples."""
+    if parts == 1:
+        return rows
+    if np.any(hold.rate >= 0) or hold.kinked.size:
+        raise ModelError("an input with rates or a kink can't be divided")
+    m = hold.columns
+    share = np.arange(parts) / parts
+    finer = np.repeat(rows, parts, axis=0)
+    finer[:, hold.straight] += np.tile(share, len(rows))[:, None] * finer[:, m : m + hold.straight.size]
+    finer[:, m : m + hold.straight.size] /= parts
+    # The last row is the value at the end, with nothing after it.
+    return finer[: (len(rows) - 1) * parts + 1]
+
+
+@dataclass(frozen=True, slots=True)
+class Marched:
+    """What a march gives: the records of each window, and outputs ``[output, sample]``."""
+
+    records: tuple[March, ...]
+    outputs: Matrix
+
+
+def run_laws(equation: Equations, windows: Windows, initial: Matrix, sample_rate_hz: float) -> Marched:
+    """March through all windows.
+
+    Raises
+    ------
+    ModelError
+        When the model diverges, or laws can't be met by these steps.
+    """
+    room = kernel_room(equation)
+    laws = kernel_laws(equation, room)
+    h = 1.0 / (sample_rate_hz * equation.parts)
+    records, failed = [], 0
+    for (start, stop), first in zip(windows, initial, strict=True):
+        record = new_record(equation, start, stop, first)
+        failed += law_march(record, laws, room, h, start / sample_rate_hz)
+        if not np.all(np.isfinite(record.x[-1])):
+            raise ModelError(f"the model diverges between {start / sample_rate_hz:g} and {stop / sample_rate_hz:g} s")
+        records.append(record)
+    if failed > _MAY_FAIL * len(equation.rows):
+        raise ModelError(f"laws are missed by {failed} of {len(equation.rows)} steps")
+    parts = [_outputs(equation, record) for record in records]
+    return Marched(tuple(records), parts[0] if len(parts) == 1 else np.hstack(parts))
+
+
+def _outputs(equation: Equations, record: March) -> Matrix:
+    every = slice(None, None, equation.parts)
+    n, width = record.x.shape[1], record.rows.shape[1]
+    output = equation.output
+    found = output[:, :n] @ record.x[every].T + output[:, n : n + width] @ record.rows[every].T
+    return np.asarray(found + output[:, n + width :] @ record.force[every].T)
+
+
+def new_record(equation: Equations, start: int, stop: int, first: Matrix) -> March:
+    """Room for the march through one window from its first state."""
+    steps = (stop - start - 1) * equation.parts + 1
+    rows = equation.rows[start * equation.parts :][:steps]
+    n, p, count = first.size, len(equation.plan.ports), equation.laws.state.size
+    x, state = np.zeros((steps, n)), np.zeros((steps, count))
+    x[0], state[0] = first, equation.laws.state
+    width = n + equation.rows.shape[1]
+    return March(
+        equation.step, equation.ends, np.ascontiguousarray(equation.start[:, :width]), equation.through, rows,
+        x, np.zeros((steps, 2 * p)), np.zeros((steps, p)), state,
+    )  # fmt: skip
+
+
+def kernel_laws(equation: Equations, room: Room) -> Laws:
+    """Laws for the kernels, which write their states into `room`."""
+    laws, p = equation.laws, len(equation.plan.ports)
+    count = laws.state.size
+    # A law without states is given an address too, which it doesn't read.
+    trial, rates = np.zeros(count + 1), np.zeros(count + 1)
+    address = np.array([trial.ctypes.data, rates.ctypes.data, room.state.ctypes.data], dtype=np.int64)
+    return Laws(
+        laws.table.copy(), np.array([len(law.state) for law in laws.laws], dtype=np.int64), laws.first,
+        trial, rates, address, np.concatenate([np.full(4 * p, 1e-300), np.full(count, 1e-3)]),
+    )  # fmt: skip
+
+
+def kernel_room(equation: Equations) -> Room:
+    """Room for one step."""
+    p, count = len(equation.plan.ports), equation.laws.state.size
+    return Room(
+        np.zeros(4 * p + count), np.zeros(count), np.zeros(p), np.zeros(2 * p),
+        np.zeros(p), np.zeros(p), np.zeros(2 * p), np.zeros((p, p)), np.zeros((p, p)),
+    )  # fmt: skip

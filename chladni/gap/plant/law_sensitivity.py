@@ -1,0 +1,170 @@
+"""How the outputs of a run with laws change with parameters and with where it starts."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.plant.law_kernel import March
+from chladni.gap.plant.law_run import Equations, Windows, kernel_laws, kernel_room, new_record
+from chladni.gap.plant.law_slopes import Change, Unknowns, law_slopes
+from chladni.models.integrator.integrator import Integration
+from chladni.signals.errors import ModelError
+
+Matrix = NDArray[np.float64]
+#: Modal coordinates worse conditioned than this (a double integrator has none) are not taken.
+_CONDITION = 1e7
+
+
+def recorded(equation: Equations, windows: Windows, runs: Sequence[Integration]) -> tuple[March, ...]:
+    """Records of runs that were made by an `Integrator`; `equation` has one step a sample."""
+    records = []
+    for (start, stop), run in zip(windows, runs, strict=True):
+        record = new_record(equation, start, stop, run.states[:, 0])
+        motion = np.vstack([run.displacement, run.velocity])
+        records.append(
+            record._replace(
+                x=np.ascontiguousarray(run.states.T),
+                motion=np.ascontiguousarray(motion.T),
+                force=np.ascontiguousarray(run.force.T),
+            )
+        )
+    return tuple(records)
+
+
+def sensitivities(
+    equation: Equations, records: Sequence[March], windows: Windows, changed: Sequence[tuple[Equations, float]],
+    sample_rate_hz: float,
+) -> tuple[Matrix, Matrix]:  # fmt: skip
+    """Slopes of the outputs along a run.
+
+    The linear part is carried in modal coordinates, where a step costs two products a state.
+
+    Parameters
+    ----------
+    equation
+        With one step a sample.
+    records
+        Of the run, by window.
+    changed
+        Equations with each parameter changed, and by how much.
+
+    Returns
+    -------
+    parameters, starts
+        ``[parameter, output, sample]``, ``[state, output, sample]``; each window from its own start.
+
+    Raises
+    ------
+    ModelError
+        When a change gives equations of another form.
+    """
+    room = kernel_room(equation)
+    laws = kernel_laws(equation, room)
+    for record in records:
+        largest = 1e-2 * np.abs(record.motion).max(axis=0)
+        size = 2 * largest.size
+        laws.scale[:size] = np.maximum(laws.scale[:size], np.tile(largest, 2))
+    for one, _ in changed:
+        _require_same_form(equation, one)
+    to_modal, from_modal = modal_coordinates(equation.step[: len(equation.plan.a), : len(equation.plan.a)])
+    fixed = _fixed(equation, changed, to_modal, from_modal)
+    q = len(changed) + len(to_modal)
+    found = np.zeros((windows[-1][1], equation.output.shape[0], q))
+    for (start, stop), record in zip(windows, records, strict=True):
+        lead, lead_start, outputs = _leads(equation, record, changed, start, to_modal)
+        found[start:stop, :, : len(changed)] = outputs
+        unknowns = fixed._replace(lead=lead, lead_start=lead_start)
+        law_slopes(
+            record, laws, room, _change(equation, q), unknowns, found[start:stop],
+            1.0 / sample_rate_hz, start / sample_rate_hz,
+        )  # fmt: skip
+    slopes = np.ascontiguousarray(found.transpose(2, 1, 0))
+    return slopes[: len(changed)], slopes[len(changed) :]
+
+
+def modal_coordinates(matrix: Matrix) -> tuple[Matrix, Matrix]:
+    """``(T^-1, T)`` with ``T^-1 matrix T`` in real blocks of one or two; the identity where there are none."""
+    values, vectors = np.linalg.eig(matrix)
+    columns = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        if abs(value.imag) <= 0:
+            columns.append(vector.real)
+        elif value.imag > 0:
+            columns += [vector.real, vector.imag]
+    basis = np.array(columns, dtype=np.float64).T.reshape(matrix.shape)
+    size = np.linalg.norm(basis, axis=1, keepdims=True)
+    size[size == 0] = 1.0
+    # States are in m and in m/s: their sizes say nothing of whether the modes are independent.
+    if not matrix.size or np.linalg.cond(basis / size) > _CONDITION:
+        return np.eye(len(matrix)), np.eye(len(matrix))
+    return np.asarray(np.linalg.inv(basis), dtype=np.float64), basis
+
+
+def _fixed(
+    equation: Equations, changed: Sequence[tuple[Equations, float]], to_modal: Matrix, from_modal: Matrix
+) -> Unknowns:
+    """What doesn't depend on the window."""
+    n, width = len(to_modal), equation.rows.shape[1]
+    table = np.hstack([equation.step[:, :n] @ from_modal, equation.step[:, n + width :]])
+    table[:n] = to_modal @ table[:n]
+    own = table[:n, :n]
+    own[np.abs(own) < 1e-12 * np.abs(own).max(initial=0.0)] = 0.0
+    other, by = [], []
+    for place, (one, size) in enumerate(changed):
+        for law, (mine, its) in enumerate(zip(equation.laws.laws, one.laws.laws, strict=True)):
+            if mine.parameters != its.parameters:
+                other.append((place, law, int(one.laws.table[law, 1])))
+                by.append(size)
+    empty = np.zeros((1, 0, len(changed)))
+    return Unknowns(
+        table=np.ascontiguousarray(table), ends=equation.ends,
+        start=np.ascontiguousarray(equation.start[:, :n] @ from_modal), through=equation.through,
+        output=np.ascontiguousarray(equation.output[:, :n] @ from_modal),
+        force_output=np.ascontiguousarray(equation.output[:, n + width :]),
+        lead=empty, lead_start=empty[0], initial=to_modal,
+        other=np.array(other, dtype=np.int64).reshape(-1, 3), by=np.array(by, dtype=np.float64),
+    )  # fmt: skip
+
+
+def _leads(
+    equation: Equations, record: March, changed: Sequence[tuple[Equations, float]], start: int, to_modal: Matrix
+) -> tuple[Matrix, Matrix, Matrix]:
+    """What changed tables and inputs add: to each step, to the start, to the outputs; the parameter last."""
+    n, width, q = len(to_modal), equation.rows.shape[1], len(changed)
+    steps = len(record.x)
+    tables = np.array([(one.step - equation.step) / by for one, by in changed]).reshape(q, *equation.step.shape)
+    tables[:, :n] = to_modal @ tables[:, :n]
+    outputs = np.array([(one.output - equation.output) / by for one, by in changed]).reshape(
+        q, *equation.output.shape
+    )
+    here = np.hstack([record.x, record.rows, record.force])
+    ends = np.hstack([here[:-1], record.force[1:]])
+    lead = (ends @ tables.transpose(2, 1, 0).reshape(ends.shape[1], -1)).reshape(steps - 1, -1, q)
+    seen = (here @ outputs.transpose(2, 1, 0).reshape(here.shape[1], -1)).reshape(steps, -1, q)
+    first = np.array([(one.start - equation.start) @ here[0] / by for one, by in changed]).reshape(q, -1).T
+    for place, (one, by) in enumerate(changed):
+        if not np.array_equal(one.rows, equation.rows):
+            rows = (one.rows[start : start + steps] - record.rows) / by
+            moved = equation.step[:, n : n + width].copy()
+            moved[:n] = to_modal @ moved[:n]
+            lead[..., place] += rows[:-1] @ moved.T
+            seen[..., place] += rows @ equation.output[:, n : n + width].T
+            first[:, place] += equation.start[:, n : n + width] @ rows[0]
+    return lead, np.ascontiguousarray(first), seen
+
+
+def _require_same_form(equation: Equations, other: Equations) -> None:
+    mine, its = ([law.function for law in one.laws.laws] for one in (equation, other))
+    if equation.step.shape != other.step.shape or mine != its or equation.plan.ports != other.plan.ports:
+        raise ModelError("a small change of a parameter gives a model of another form; start from another value")
+
+
+def _change(equation: Equations, q: int) -> Change:
+    n, p, count = len(equation.plan.a), len(equation.plan.ports), equation.laws.state.size
+    arguments = 4 * p + count
+    x, after, given, force, fresh, own, own_state = (
+        np.zeros((rows, q)) for rows in (n, n + 2 * p, arguments, p, p, p, count)
+    )
+    slope, bend, level = np.zeros((p, arguments)), np.zeros((count, arguments)), np.zeros(count)
+    return Change(x, after, given, force, fresh, own, own_state, slope, bend, level)

@@ -1,0 +1,297 @@
+"""Kernel: how a march with laws changes with parameters and with where it starts, along the march itself."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.plant.law_kernel import (
+    FINE,
+    Laws,
+    March,
+    Room,
+    begin,
+    equations,
+    force_of,
+    invert,
+    slope_of,
+)
+from chladni.models.integrator.machine_code import inlined_code, machine_code, part_code
+
+Matrix = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Unknowns(NamedTuple):
+    """What acts on the changes, the unknown last, so that all are done side by side.
+
+    Parameters come first among the unknowns, then the states at the start.
+
+    Attributes
+    ----------
+    table, ends, start, through
+        Of the march, its states in any coordinates, see `March`.
+    output
+        ``[output, state]``, and ``force_output`` ``[output, port]``.
+    lead
+        ``[step, state + 2 port, parameter]``: what changed tables and inputs add to a step.
+    lead_start
+        ``[2 port, parameter]`` the same at the start.
+    initial
+        ``[state, state at the start]``.
+    other
+        ``[which, 3]`` parameter, law, address of the law's parameters when that parameter is changed.
+    by
+        ``[which]`` that change.
+    """
+
+    table: Matrix
+    ends: Matrix
+    start: Matrix
+    through: Matrix
+    output: Matrix
+    force_output: Matrix
+    lead: Matrix
+    lead_start: Matrix
+    initial: Matrix
+    other: Integers
+    by: Matrix
+
+
+class Change(NamedTuple):
+    """What changes with each unknown, ``[..., unknown]``, and the slopes of forces and law states.
+
+    Attributes
+    ----------
+    x, next
+        ``[state]`` before the step, ``[state + 2 port]`` after it.
+    given
+        ``[4 port + law state]``, see `Room`.
+    force, fresh
+        ``[port]`` before and after.
+    own, own_state
+        ``[port]``, ``[law state]``: by a law's own parameters.
+    slope, bend
+        ``[port, argument]``, ``[law state, argument]``, no unknown.
+    level
+        ``[law state]`` the law states themselves.
+    """
+
+    x: Matrix
+    next: Matrix
+    given: Matrix
+    force: Matrix
+    fresh: Matrix
+    own: Matrix
+    own_state: Matrix
+    slope: Matrix
+    bend: Matrix
+    level: Matrix
+
+
+@part_code
+def _slopes(laws: Laws, room: Room, change: Change, h: float, t: float) -> None:
+    """Slopes of all forces and law states over what they depend on."""
+    p, count = room.force.size, room.state.size
+    for port in range(p):
+        for argument in range(4 * p + count):
+            change.slope[port, argument] = 0.0
+    for place in range(count):
+        for argument in range(4 * p + count):
+            change.bend[place, argument] = 0.0
+    for port in range(p):
+        here = force_of(laws, room, port, h, t)
+        low, high = _states_of(laws, port)
+        for place in range(low, high):
+            change.level[place] = room.state[place]
+        for argument in range(4 * p + count if high > low else 2 * p):
+            mine = argument % p == port if argument < 4 * p else low <= argument - 4 * p < high
+            if not mine:
+                continue
+            change.slope[port, argument] = slope_of(laws, room, port, argument, here, h, t)
+            by = FINE * max(abs(room.given[argument]), laws.scale[argument])
+            for place in range(low, high):
+                change.bend[place, argument] = (room.state[place] - change.level[place]) / by
+        for place in range(low, high):
+            room.state[place] = change.level[place]
+
+
+@inlined_code
+def _states_of(laws: Laws, port: int) -> tuple[int, int]:
+    low = high = 0
+    for law in range(laws.first[port], laws.first[port + 1]):
+        if laws.counts[law] > 0:
+            if high == low:
+                low = laws.table[law, 2]
+            high = laws.table[law, 2] + laws.counts[law]
+    return low, high
+
+
+@part_code
+def _own(laws: Laws, room: Room, change: Change, unknowns: Unknowns, h: float, t: float) -> None:
+    """What the laws' own parameters add to forces and law states."""
+    p, count, q = room.force.size, room.state.size, change.x.shape[1]
+    for row in range(p):
+        for unknown in range(q):
+            change.own[row, unknown] = 0.0
+    for row in range(count):
+        for unknown in range(q):
+            change.own_state[row, unknown] = 0.0
+    for which in range(unknowns.by.size):
+        unknown, law, by = unknowns.other[which, 0], unknowns.other[which, 1], unknowns.by[which]
+        port = 0
+        while laws.first[port + 1] <= law:
+            port += 1
+        here = force_of(laws, room, port, h, t)
+        low, high = _states_of(laws, port)
+        for place in range(low, high):
+            change.level[place] = room.state[place]
+        kept = laws.table[law, 1]
+        laws.table[law, 1] = unknowns.other[which, 2]
+        change.own[port, unknown] += (force_of(laws, room, port, h, t) - here) / by
+        laws.table[law, 1] = kept
+        for place in range(low, high):
+            change.own_state[place, unknown] += (room.state[place] - change.level[place]) / by
+            room.state[place] = change.level[place]
+
+
+@inlined_code
+def _clear(matrix: Matrix) -> None:
+    for row in range(matrix.shape[0]):
+        for unknown in range(matrix.shape[1]):
+            matrix[row, unknown] = 0.0
+
+
+@inlined_code
+def _add(target: Matrix, row: int, share: float, source: Matrix, place: int) -> None:
+    """Add a share of the changes of one quantity to those of another."""
+    if share != 0.0:
+        for unknown in range(target.shape[1]):
+            target[row, unknown] += share * source[place, unknown]
+
+
+@inlined_code
+def _copy(target: Matrix, row: int, source: Matrix, place: int) -> None:
+    for unknown in range(target.shape[1]):
+        target[row, unknown] = source[place, unknown]
+
+
+@part_code
+def _settle(room: Room, change: Change, through: Matrix, first: int) -> None:
+    """Changes of forces, motions and law states after a step, from those of the motions without these forces."""
+    p, count = room.force.size, room.state.size
+    for port in range(p):
+        room.slope[port], room.slope[p + port] = change.slope[port, port], change.slope[port, p + port]
+    equations(room, through)
+    invert(room)
+    _clear(change.fresh)
+    for row in range(2 * p):
+        _copy(change.given, row, change.next, first + row)
+    for port in range(p):
+        for argument in range(4 * p + count):
+            _add(change.own, port, change.slope[port, argument], change.given, argument)
+    for port in range(p):
+        for other in range(p):
+            _add(change.fresh, port, room.inverse[port, other], change.own, other)
+    for row in range(2 * p):
+        for port in range(p):
+            _add(change.given, row, through[row, port], change.fresh, port)
+    for place in range(count):
+        for argument in range(4 * p + count):
+            _add(change.own_state, place, change.bend[place, argument], change.given, argument)
+
+
+@part_code
+def _pass_on(room: Room, change: Change) -> None:
+    """What was after the step is before the next."""
+    p = room.force.size
+    for row in range(2 * p):
+        _copy(change.given, 2 * p + row, change.given, row)
+    for place in range(room.state.size):
+        _copy(change.given, 4 * p + place, change.own_state, place)
+    for port in range(p):
+        _copy(change.force, port, change.fresh, port)
+
+
+@part_code
+def _carry(change: Change, unknowns: Unknowns, step: int) -> None:
+    """Changes of states and motions after a step, without those of its last forces."""
+    n, p, known = change.x.shape[0], change.force.shape[0], unknowns.lead.shape[2]
+    for row in range(n + 2 * p):
+        for unknown in range(known):
+            change.next[row, unknown] = unknowns.lead[step, row, unknown]
+        for unknown in range(known, change.x.shape[1]):
+            change.next[row, unknown] = 0.0
+        for column in range(n):
+            _add(change.next, row, unknowns.table[row, column], change.x, column)
+        for port in range(p):
+            _add(change.next, row, unknowns.table[row, n + port], change.force, port)
+
+
+@part_code
+def _write(change: Change, unknowns: Unknowns, found: Matrix, step: int) -> None:
+    """Add the changes of the outputs at a sample."""
+    q = change.x.shape[1]
+    for row in range(found.shape[1]):
+        for column in range(change.x.shape[0]):
+            share = unknowns.output[row, column]
+            for unknown in range(q):
+                found[step, row, unknown] += share * change.x[column, unknown]
+        for port in range(change.force.shape[0]):
+            share = unknowns.force_output[row, port]
+            if share != 0.0:
+                for unknown in range(q):
+                    found[step, row, unknown] += share * change.force[port, unknown]
+
+
+@part_code
+def _open(march: March, laws: Laws, room: Room, change: Change, unknowns: Unknowns, t: float) -> None:
+    """Changes at the start of a window: of the state itself, and of the motions and forces that it makes at once."""
+    n, p, known = change.x.shape[0], room.force.size, unknowns.lead.shape[2]
+    begin(march, laws, room, t)
+    _clear(change.x)
+    _clear(change.next)
+    _clear(change.given)
+    for row in range(n):
+        for column in range(n):
+            change.x[row, known + column] = unknowns.initial[row, column]
+    for row in range(2 * p):
+        for unknown in range(known):
+            change.next[row, unknown] = unknowns.lead_start[row, unknown]
+        for column in range(n):
+            _add(change.next, row, unknowns.start[row, column], change.x, column)
+    _slopes(laws, room, change, 0.0, t)
+    _own(laws, room, change, unknowns, 0.0, t)
+    _settle(room, change, unknowns.through, 0)
+
+
+@machine_code
+def law_slopes(
+    march: March, laws: Laws, room: Room, change: Change, unknowns: Unknowns, found: Matrix, h: float, begin_s: float
+) -> None:
+    """Add to ``found [sample, output, unknown]`` what changes along a march that was made.
+
+    The march is differentiated as it was made, step by step, laws that switch included.
+    """
+    n, p = change.x.shape[0], room.force.size
+    _open(march, laws, room, change, unknowns, begin_s)
+    for step in range(march.rows.shape[0]):
+        _pass_on(room, change)
+        _write(change, unknowns, found, step)
+        if step == march.rows.shape[0] - 1:
+            break
+        _carry(change, unknowns, step)
+        t = begin_s + (step + 1) * h
+        for row in range(2 * p):
+            room.given[2 * p + row] = march.motion[step, row]
+            room.given[row] = march.motion[step + 1, row]
+        for place in range(room.state.size):
+            room.given[4 * p + place] = room.state[place]
+        _slopes(laws, room, change, h, t)
+        _own(laws, room, change, unknowns, h, t)
+        _settle(room, change, unknowns.ends, n)
+        for row in range(n):
+            for unknown in range(change.x.shape[1]):
+                change.x[row, unknown] = change.next[row, unknown]
+            for port in range(p):
+                _add(change.x, row, unknowns.table[row, n + p + port], change.fresh, port)
