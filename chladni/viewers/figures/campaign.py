@@ -1,19 +1,22 @@
-"""How good a campaign of diagnoses was: reliability of its probabilities, and what was taken for what."""
+"""How good a campaign of diagnoses was: how reliable its probabilities, what was taken for what, what was noticed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from chladni.signals.errors import EstimateError
 from chladni.viewers.figures.sheet import look, paint, plain, sheet
 from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, BEFORE_ON_LIGHT
+from chladni.viewers.style import ON_LIGHT
 
-SQUARE_IN, COUNTS_IN = 3.4, 0.8
+SQUARE_IN, COUNTS_IN, DETECTION_IN = 3.4, 0.8, 2.2
 CELL_IN, MARGIN_IN, LETTER_IN = 0.24, 0.5, 0.065
 RIGHT, WRONG = paint(AFTER_ON_LIGHT), paint(BEFORE_ON_LIGHT)
 # White where nothing was, darker the more of a row is there.
@@ -89,6 +92,54 @@ def _draw_reliability(axes: Axes, bins: Sequence[ReliabilityBin]) -> None:
     axes.set_ylim(-0.02, 1.04)
     axes.set_ylabel("Share that was right")
     axes.legend(loc="upper left", frameon=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detection:
+    """How often effects of about one severity were noticed, or named.
+
+    Attributes
+    ----------
+    low, high
+        What the effect moves the outputs by, over the noise.
+    share, interval
+        Of the cases, with its 95 % interval.
+    what
+        ``noticed`` or ``named``.
+    """
+
+    low: float
+    high: float
+    share: float
+    interval: tuple[float, float]
+    what: str
+
+
+def detection_figure(steps: Sequence[Detection]) -> Figure:
+    """Draw the detection curve: shares over severity, one line for each thing that was counted."""
+    kinds = list(dict.fromkeys(one.what for one in steps))
+    with look():
+        figure, (axes,) = sheet([DETECTION_IN])
+        for place, kind in enumerate(kinds):
+            _draw_detection(axes, [one for one in steps if one.what == kind], place)
+        edges = sorted({edge for one in steps for edge in (one.low, one.high)})
+        axes.set_xscale("log")
+        axes.set_xticks(edges, [f"{edge:g}" for edge in edges])
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.set_ylim(-0.02, 1.04)
+        axes.set_xlabel("Effect over noise")
+        axes.set_ylabel("Share of the cases")
+        axes.legend(loc="lower right", frameon=False)
+    return figure
+
+
+def _draw_detection(axes: Axes, steps: Sequence[Detection], place: int) -> None:
+    # A little apart, so that the intervals don't cover each other.
+    middles = [sqrt(one.low * one.high) * (1.0 + 0.03 * place) for one in steps]
+    below = [max(one.share - one.interval[0], 0.0) for one in steps]
+    above = [max(one.interval[1] - one.share, 0.0) for one in steps]
+    axes.errorbar(middles, [one.share for one in steps], yerr=[below, above], marker="o", markersize=4, capsize=2,
+                  linewidth=1.0, color=paint(ON_LIGHT[place]), label=steps[0].what)  # fmt: skip
 
 
 def confusion_figure(counts: NDArray[np.int64], *, truths: Sequence[str], answers: Sequence[str]) -> Figure:
