@@ -12,7 +12,7 @@ from chladni.gap.comparison.periodicity import periods_of
 from chladni.gap.records.diagnosis import DistortionShare
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.value import Value
-from chladni.spectral.excitation import excited_lines
+from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
 
 Matrix = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -70,7 +70,9 @@ def distortion_of(measurement: Measurement) -> Distortion | None:
     spectra = period_spectra(measurement)
     if spectra is None or len(names) != 1 or measurement.period_samples is None:
         return None
-    excited = excited_lines(spectra, names)[0]
+    power = spectra.density[spectra.index(names[0]), spectra.index(names[0])].real
+    # Of a sine all other lines are rounding errors, which repeat too.
+    excited = excited_lines(spectra, names)[0] & (power > DYNAMIC_RANGE * power.max())
     if not np.any(excited):
         return None
     odd_only = not np.any(excited[::2])
@@ -125,9 +127,10 @@ def _split(u: Complex, periods: Matrix, excited: Mask, *, odd_only: bool) -> _Sp
     told = _detected(repeated, excited, step=2 if odd_only else 1)
     if told is None:
         told = _roughness(u[excited], y[excited], scatter[excited] / count, line[excited])
-    on_excited = min(max(told or 0.0, 0.0), float(repeated[excited].sum()))
+    answered = max(float(repeated[excited].sum()), 0.0)
+    on_excited = min(max(told or 0.0, 0.0), answered)
     return _Split(
-        linear=float(repeated[excited].sum()) - on_excited,
+        linear=answered - on_excited,
         even=max(even, 0.0),
         odd=max(beside, 0.0) + on_excited,
         noise=float(scatter.sum()),

@@ -162,8 +162,9 @@ def _nonlinear(measurement: Measurement) -> tuple[float, ...]:
     spectra = local_fit(measurement.inputs, measurement.outputs)
     if spectra is None:
         return (0.0,) * len(measurement.output_names)
-    power = spectra.densities().mean(axis=1) / np.var(measurement.outputs, axis=1)
-    return tuple(float(share) for share in np.sqrt(power))
+    power, whole = spectra.densities().mean(axis=1), np.var(measurement.outputs, axis=1)
+    shares = np.divide(power, whole, out=np.zeros_like(power), where=whole > 0)
+    return tuple(float(share) for share in np.sqrt(shares))
 
 
 def _nonlinear_of(output: str, level: LevelResponse) -> float:

@@ -183,9 +183,13 @@ def _mode_edges_hz(modes_hz: Sequence[float], frequency_hz: Matrix) -> Matrix:
 
 
 def _log_edges_hz(gap: Matrix, whole: Matrix, frequency_hz: Matrix) -> Matrix:
-    power = gap / max(gap.sum(), np.finfo(float).tiny) + whole / max(whole.sum(), np.finfo(float).tiny)
-    rising = np.cumsum(power[1:]) / max(float(power[1:].sum()), np.finfo(float).tiny)
-    low_hz, high_hz = (float(frequency_hz[1 + int(np.searchsorted(rising, at))]) for at in (TAIL, 1 - TAIL))
+    power = sum((one[1:] / one[1:].sum() for one in (gap, whole) if one[1:].sum() > 0), np.zeros(gap.size - 1))
+    if not power.any():
+        return np.array([0.0, frequency_hz[-1]])
+    rising = np.cumsum(power) / power.sum()
+    # Rounding may leave the last sum below 1.
+    first, last = (min(int(np.searchsorted(rising, at)), power.size - 1) for at in (TAIL, 1 - TAIL))
+    low_hz, high_hz = float(frequency_hz[1 + first]), float(frequency_hz[1 + last])
     top_hz, apart_hz = float(frequency_hz[-1]), FEWEST_LINES * float(frequency_hz[1])
     return _spaced(np.geomspace(max(low_hz, apart_hz), max(high_hz, 2 * apart_hz), BANDS + 1), top_hz, apart_hz)
 
