@@ -32,6 +32,8 @@ class Stride(NamedTuple):
         ``[state + stages of motion]`` rows of `SchemeTables.advance`: all that is linear.
     ahead
         ``[state]`` working memory.
+    inner
+        ``[2 port]`` motion at the ports at an inner stage: the middle, or the second of Radau's nodes.
     grown
         ``[1]`` whether a state is about to leave its scale.
     """
@@ -43,6 +45,7 @@ class Stride(NamedTuple):
     coming: Numbers1
     lines: Numbers1
     ahead: Numbers1
+    inner: Numbers1
     grown: Integers1
 
 
@@ -119,6 +122,9 @@ def explicit_step(tables: SchemeTables, ports: Ports, stride: Stride, level: int
         row = n + 2 * count * (stage // 2)
         place_stage(tables, ports, stride, ports.channels, _WEIGHTS, level, stage, row, step_s)
         port_forces(ports, t + (0.5 if stage < 2 else 1.0) * step_s, stage + 1, np.int64(1))
+        if stage == 1:
+            for place in range(2 * count):
+                stride.inner[place] = ports.motion[place]
     add_forces(tables, ports, stride, ports.channels, level)
     keep_end(ports, stride, n)
 

@@ -215,6 +215,9 @@ def _linearise(
 ) -> None:
     for stage in range(STAGES):
         _ask_at(tables, ports, stride, newton.value, level, stage, step_s)
+        if stage == 1:
+            for place in range(ports.motion.size):
+                stride.inner[place] = ports.motion[place]
         _law_slopes(ports, stride, newton, stage, t + NODES[stage] * step_s)
     _fill_matrix(tables, ports, newton, level, step_s)
 
@@ -365,9 +368,15 @@ def implicit_error(judge: Judge, ports: Ports, newton: Newton) -> float:
         missed = ports.channels[0, channel]
         for stage in range(STAGES):
             missed -= LAGRANGE[0, stage] * ports.channels[1 + stage, channel]
-        least = max(0.0, min(newton.stiffness[0, channel], newton.stiffness[1, channel]))
-        total += judge.weight[channel] * GAMMA * abs(missed) / (1 + GAMMA * least)
+        total += judge.weight[channel] * GAMMA * abs(missed) / (1 + GAMMA * least_stiffness(newton, channel))
     return total
+
+
+@part_code
+def least_stiffness(newton: Newton, channel: int) -> float:
+    """How strongly a channel acts back on itself at the start and at every stage, at the least."""
+    least: float = max(0.0, min(newton.stiffness[0, channel], newton.stiffness[1, channel]))
+    return least
 
 
 @part_code

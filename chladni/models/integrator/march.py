@@ -18,6 +18,7 @@ from chladni.models.integrator.machine_code import (
 from chladni.models.integrator.plane import Integers1, Numbers2, opener
 from chladni.models.integrator.port_kernel import Ports
 from chladni.models.integrator.step_tables import DEEPEST, SchemeTables
+from chladni.models.integrator.turn_kernel import explicit_error_at_turns
 
 Matrix = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -138,6 +139,7 @@ def march(book: int, step_s: float, stop: int, automatic: int, most: int, inside
             look_ahead(tables.advance, drive, ports, stride, cursor[SAMPLE], step_s)
         weigh(judge, stride, ports, level, length_s)
         error = explicit_error(judge, ports, level, cursor[PREVIOUS])
+        error += explicit_error_at_turns(judge, ports, stride, t, length_s)
         cursor[TRIED] += 1
         if error <= judge.tolerance[0] or (level == DEEPEST and error <= LAST_RESORT):
             if inside != 0:

@@ -2,7 +2,14 @@
 
 from chladni.models.integrator.drive_kernel import Drive, fill_inputs
 from chladni.models.integrator.explicit_kernel import Stride
-from chladni.models.integrator.implicit_kernel import CALL_STEP, IMPLICIT_RECORDS, Newton, implicit_error, is_soft
+from chladni.models.integrator.implicit_kernel import (
+    CALL_STEP,
+    IMPLICIT_RECORDS,
+    Newton,
+    implicit_error,
+    is_soft,
+    least_stiffness,
+)
 from chladni.models.integrator.judge_kernel import Judge, look_ahead, weigh
 from chladni.models.integrator.machine_code import machine_code, part_code
 from chladni.models.integrator.march import (
@@ -33,8 +40,9 @@ from chladni.models.integrator.march import (
 )  # fmt: skip
 from chladni.models.integrator.plane import opener
 from chladni.models.integrator.port_kernel import Ports
-from chladni.models.integrator.radau import LAGRANGE
+from chladni.models.integrator.radau import GAMMA, LAGRANGE
 from chladni.models.integrator.step_tables import DEEPEST, SchemeTables
+from chladni.models.integrator.turn_kernel import missed_at_turns
 
 _OPEN = opener(*IMPLICIT_RECORDS)
 
@@ -60,6 +68,7 @@ def march_implicit(book: int, step_s: float, stop: int, automatic: int, most: in
         _weigh_ahead(explicit, ports, stride, drive, course, judge, step_s)
         cursor[TRIED] += 1
         error = implicit_error(judge, ports, newton)
+        error += _error_at_turns(judge, ports, stride, newton, t, length_s)
         if solved and (error <= judge.tolerance[0] or (level == DEEPEST and error <= LAST_RESORT)):
             if inside != 0:
                 CALL_INSIDE(inside, (book, INSIDE, 1, t, length_s))
@@ -113,6 +122,16 @@ def _weigh_ahead(
         cursor[LOOKED] = cursor[SAMPLE]
         look_ahead(explicit.advance, drive, ports, stride, cursor[SAMPLE], step_s)
     weigh(judge, stride, ports, cursor[LEVEL], step_s / (1 << cursor[LEVEL]))
+
+
+@part_code
+def _error_at_turns(judge: Judge, ports: Ports, stride: Stride, newton: Newton, t: float, step_s: float) -> float:
+    """What the stages missed at turns, damped as the error of the step is."""
+    total = 0.0
+    for port in range(ports.first.size - 1):
+        missed = missed_at_turns(judge, ports, stride, port, 1, t, step_s)
+        total += GAMMA * missed / (1 + GAMMA * least_stiffness(newton, port))
+    return total
 
 
 @part_code

@@ -328,6 +328,7 @@ def _stride(plan: PortPlan, hold: Hold, laws: LawTable, start: Matrix) -> Stride
         coming=np.zeros(hold.width),
         lines=np.zeros(n + 2 * STAGES * count),
         ahead=np.zeros(n),
+        inner=np.zeros(2 * count),
         grown=np.zeros(1, dtype=np.int64),
     )
 
