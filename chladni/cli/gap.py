@@ -1,17 +1,21 @@
 """``chladni gap``: where a model and a log disagree, what was left out, and how far the gap closes."""
 
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from chladni.cli import options
-from chladni.cli.gap_rows import print_diagnosis
+from chladni.cli.gap_rows import print_comparison, print_diagnosis
 from chladni.cli.output import Output
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from chladni.gap.records.diagnosis import Diagnosis
+    from chladni.io.log import Log
     from chladni.models.core.model import Model
     from chladni.viewers.gap_evidence import GapEvidence
 
@@ -19,14 +23,22 @@ FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
 
 
 def gap(
-    model: Annotated[
-        Path, typer.Argument(metavar="MODEL", help="A model file: what the simulation believes.", show_default=False)
-    ],
-    logs: Annotated[
+    files: Annotated[
         list[Path],
-        typer.Argument(metavar="LOG...", help="Logs of the machine; several levels tell more.", show_default=False),
+        typer.Argument(
+            metavar="MODEL LOG...",
+            help="A model file, then logs of the machine; several levels tell more.",
+            show_default=False,
+        ),
     ],
     *,
+    simulated: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="LOG", help="What a simulator of your own wrote, in place of MODEL: only tells where.",
+            show_default=False,
+        ),
+    ] = None,
     without: Annotated[
         list[str] | None,
         typer.Option(metavar="EFFECT", help="Leave this effect out; may be repeated.", show_default=False),
@@ -61,75 +73,145 @@ def gap(
     ] = None,
 ) -> None:  # fmt: skip
     """Where a model and a log disagree, which effect was left out, and how far the gap closes with it."""
+    from chladni.io.log import open_log
+
+    out = Output(json)
+    wanted = _Wanted(report=report, figure=figure, figures=figures, save=save, write_model=write_model)
+    with ExitStack() as opened:
+
+        def opening(path: Path) -> "Log":
+            return opened.enter_context(open_log(path, setup=setup, stamp=stamp))
+
+        if simulated is not None:
+            _require_one_log(files, wanted, without)
+            _compare(out, opening(files[0]), opening(simulated), start_s=start, end_s=end)
+            return
+        model, logs = _model_and_logs(files)
+        # A diagnosis takes its time: it shouldn't be lost to a misspelt folder.
+        wanted.require_places()
+        _diagnose(out, model, [opening(log) for log in logs], wanted, without=without or (), seed=seed,
+                  start_s=start, end_s=end)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Wanted:
+    """Files that were asked for."""
+
+    report: Path | None
+    figure: Path | None
+    figures: Path | None
+    save: Path | None
+    write_model: Path | None
+
+    def require_places(self) -> None:
+        """Refuse files that can't be written, before anything is computed."""
+        from chladni.signals.errors import LogError, SetupError
+
+        if self.figure is not None and self.figure.suffix.lower() not in FIGURE_SUFFIXES:
+            raise SetupError(f"{self.figure}: a figure is one of {', '.join(FIGURE_SUFFIXES)}; give such a name")
+        for path in (self.figure, self.report, self.save, self.write_model):
+            if path is not None and not path.resolve().parent.is_dir():
+                raise LogError(f"{path}: there is no folder {path.parent}; make it, or name another")
+
+    def named(self) -> list[str]:
+        """Options that ask for a file."""
+        given = {"--html": self.report, "--figure": self.figure, "--figures": self.figures, "--save": self.save,
+                 "--write-model": self.write_model}  # fmt: skip
+        return [name for name, path in given.items() if path is not None]
+
+
+def _model_and_logs(files: "Sequence[Path]") -> "tuple[Model, Sequence[Path]]":
+    """Read the model; `SetupError` when there's no log beside it, or a log in its place."""
+    from chladni.models.files.model_file import load_model
+    from chladni.signals.errors import SetupError
+
+    first, *logs = files
+    if first.suffix.lower() == ".mcap":
+        raise SetupError(f"{first}: is a log; give a model file first, or --simulated {first} for a comparison alone")
+    if not logs:
+        raise SetupError(f"{first}: no log to hold against the model; give one behind it")
+    return load_model(first), logs
+
+
+def _require_one_log(files: "Sequence[Path]", wanted: _Wanted, without: "Sequence[str] | None") -> None:
+    """Refuse what takes a model."""
+    from chladni.signals.errors import SetupError
+
+    if len(files) != 1:
+        raise SetupError(f"--simulated takes one measured log, {len(files)} files are given; no model belongs there")
+    given = [*wanted.named(), *(["--without"] if without else [])]
+    if given:
+        raise SetupError(f"{', '.join(given)}: takes a model; --simulated only tells where two logs disagree")
+
+
+def _diagnose(
+    out: Output,
+    model: "Model",
+    logs: "Sequence[Log]",
+    wanted: _Wanted,
+    *,
+    without: "Sequence[str]",
+    seed: int,
+    start_s: float | None,
+    end_s: float | None,
+) -> None:
     from chladni.apps.diagnose import diagnose_gap
     from chladni.apps.gap_document import gap_document
-    from chladni.io.log import open_log
-    from chladni.models.files.model_file import load_model
 
-    # A diagnosis takes its time: it shouldn't be lost to a misspelt folder.
-    _require_places(figure, report, save, write_model)
-    out = Output(json)
-    believed = load_model(model)
-    with ExitStack() as opened, out.progress(believed.name) as progress:
+    with out.progress(model.name) as progress:
         found = diagnose_gap(
-            believed,
-            [opened.enter_context(open_log(log, setup=setup, stamp=stamp)) for log in logs],
-            leave_out=without or (),
+            model,
+            logs,
+            leave_out=without,
             seed=seed,
-            start_s=start,
-            end_s=end,
+            start_s=start_s,
+            end_s=end_s,
             progress=lambda step, share: progress(share, step),
         )
     print_diagnosis(out, found)
-    _draw(out, found, believed, report=report, figure=figure, figures=figures, save=save)
-    if write_model is not None:
-        _write_model(out, believed, found, write_model)
+    _draw(out, found, model, wanted)
+    if wanted.write_model is not None:
+        from chladni.apps.explained_model import explained_model
+        from chladni.models.files.model_file import write_model
+
+        write_model(explained_model(model, found), wanted.write_model)
+        out.line(f"model: {wanted.write_model}")
     out.json(gap_document(found))
 
 
-def _require_places(figure: Path | None, *others: Path | None) -> None:
-    """Refuse files that can't be written, before anything is computed."""
-    from chladni.signals.errors import LogError, SetupError
+def _compare(out: Output, measured: "Log", simulated: "Log", *, start_s: float | None, end_s: float | None) -> None:
+    from chladni.apps.gap_comparison import compare_with_simulated, comparison_document
 
-    if figure is not None and figure.suffix.lower() not in FIGURE_SUFFIXES:
-        raise SetupError(f"{figure}: a figure is one of {', '.join(FIGURE_SUFFIXES)}; give such a name")
-    for path in (figure, *others):
-        if path is not None and not path.resolve().parent.is_dir():
-            raise LogError(f"{path}: there is no folder {path.parent}; make it, or name another")
+    with out.progress(simulated.path.name):
+        found = compare_with_simulated(measured, simulated, start_s=start_s, end_s=end_s)
+    print_comparison(out, found)
+    out.json(comparison_document(found))
 
 
-def _draw(
-    out: Output,
-    found: "Diagnosis",
-    model: "Model",
-    *,
-    report: Path | None,
-    figure: Path | None,
-    figures: Path | None,
-    save: Path | None,
-) -> None:
+def _draw(out: Output, found: "Diagnosis", model: "Model", wanted: _Wanted) -> None:
     """Write the pictures that were asked for, and say where they are."""
-    if not any((report, figure, figures, save)):
+    if not any((wanted.report, wanted.figure, wanted.figures, wanted.save)):
         return
     from chladni.apps.gap_evidence import gap_evidence
 
     evidence = gap_evidence(found)
-    if report is not None or figures is not None:
-        _draw_album(out, evidence, report=report, figures=figures)
-    if figure is not None:
+    _draw_album(out, evidence, report=wanted.report, figures=wanted.figures)
+    if wanted.figure is not None:
         from chladni.viewers.figures.gap_sheet import save_gap_sheet
 
-        save_gap_sheet(evidence, figure)
-        out.line(f"figure: {figure}")
-    if save is not None:
+        save_gap_sheet(evidence, wanted.figure)
+        out.line(f"figure: {wanted.figure}")
+    if wanted.save is not None:
         from chladni.apps.gap_structure import structure_sketch
         from chladni.viewers.rerun.gap import write_gap_rrd
 
-        write_gap_rrd(evidence, save, sketch=structure_sketch(model, found.where))
-        out.line(f"recording: {save}")
+        write_gap_rrd(evidence, wanted.save, sketch=structure_sketch(model, found.where))
+        out.line(f"recording: {wanted.save}")
 
 
 def _draw_album(out: Output, evidence: "GapEvidence", *, report: Path | None, figures: Path | None) -> None:
+    if report is None and figures is None:
+        return
     from chladni.viewers.figures.gap import gap_album
 
     album = gap_album(evidence)
@@ -143,11 +225,3 @@ def _draw_album(out: Output, evidence: "GapEvidence", *, report: Path | None, fi
 
         write_gap_report(evidence, report, album=album)
         out.line(f"report: {report}")
-
-
-def _write_model(out: Output, model: "Model", found: "Diagnosis", path: Path) -> None:
-    from chladni.apps.explained_model import explained_model
-    from chladni.models.files.model_file import write_model
-
-    write_model(explained_model(model, found), path)
-    out.line(f"model: {path}")

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from chladni.gap.records.diagnosis import Diagnosis, FittedNumber
+from chladni.gap.records.diagnosis import Diagnosis, FittedNumber, Where
 from chladni.viewers.effect_words import effect_heading
 from chladni.viewers.engineering import chance, engineering, percent
 
@@ -13,31 +13,29 @@ RANKED = 5
 MOVED = 1e-3
 
 
-def channel_table(found: Diagnosis) -> Table:
+def channel_table(where: Where) -> Table:
     """Gap and noise of each output, over its own RMS; the largest first."""
-    rows = sorted(found.where.channels, key=lambda one: -one.gap)
+    rows = sorted(where.channels, key=lambda one: -one.gap)
     return ("Output", "Gap", "Noise"), [(one.name, percent(one.gap), percent(one.noise)) for one in rows]
 
 
-def band_table(found: Diagnosis, *, least: float = 0.0) -> Table:
+def band_table(where: Where, *, least: float = 0.0) -> Table:
     """Share of the gap's power in each band, those with `least` and more, by frequency."""
     rows = [
-        (f"{one.low_hz:.4g} to {one.high_hz:.4g}", percent(one.share))
-        for one in found.where.bands
-        if one.share >= least
+        (f"{one.low_hz:.4g} to {one.high_hz:.4g}", percent(one.share)) for one in where.bands if one.share >= least
     ]
     return ("Band [Hz]", "Share"), rows
 
 
-def site_table(found: Diagnosis) -> Table:
+def site_table(where: Where) -> Table:
     """Share of the gap that an unknown force at each site explains; the largest first."""
-    rows = sorted(found.where.sites, key=lambda one: -one.share)
+    rows = sorted(where.sites, key=lambda one: -one.share)
     return ("Site", "Explains"), [(one.name, percent(one.share)) for one in rows]
 
 
-def regime_table(found: Diagnosis, *, least: float = 0.0) -> Table:
+def regime_table(where: Where, *, least: float = 0.0) -> Table:
     """Share of the gap's power in each regime, those with `least` and more; the largest first."""
-    rows = sorted(found.where.regimes, key=lambda one: -one.share)
+    rows = sorted(where.regimes, key=lambda one: -one.share)
     return ("While", "is between", "Share"), [
         (one.variable, f"{one.low:.3g} to {one.high:.3g}", percent(one.share)) for one in rows if one.share >= least
     ]

@@ -1,7 +1,9 @@
 """``chladni gap``: its answer, its files, its refusals."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from chladni.io.mcap.writer import write_mcap
@@ -80,6 +82,7 @@ def test_the_explained_model_is_written(run: Run, engine: StandIn, files: tuple[
         (["--write-model", "none/gap.toml"], "there is no folder none"),
         (["--seed", "-1"], "--seed"),
         (["--start", "9"], "9"),
+        (["--simulated", "x.mcap"], "--simulated takes one measured log, 2 files are given"),
     ],
 )
 def test_mistakes_are_told_in_one_line_before_anything_is_diagnosed(
@@ -114,3 +117,32 @@ def test_pictures_are_written_where_they_were_asked_for(
     assert {path.name for path in (tmp_path / "figures").iterdir()} >= {"restoring-force.png", "signals.svg"}
     for name in ("gap.html", "gap.rrd", "gap.svg", "restoring-force.png"):
         assert name in outcome.out.replace("\n", "")
+
+
+def test_a_simulated_log_takes_the_place_of_a_model(run: Run, files: tuple[Path, Path], tmp_path: Path) -> None:
+    nominal = made.nominal_run()
+    series = replace(made.log_series(), values=np.vstack([nominal.inputs.values, nominal.outputs.values]))
+    write_mcap(series, tmp_path / "theirs.mcap")
+    outcome = run("gap", "--simulated", tmp_path / "theirs.mcap", files[1], "--json", "-")
+    assert outcome.code == 0, outcome.err
+    assert outcome.document["format"] == "chladni.gap-comparison/1"
+    assert "theirs.mcap is 28 % from arm.mcap" in outcome.err
+    assert "taken for inputs: /shaker.wrench.force.x" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["{model}"], "no log to hold against the model"),
+        (["{log}", "{log}"], "is a log; give a model file first, or --simulated"),
+        (["--simulated", "{log}", "{log}", "--save", "a.rrd"], "--save: takes a model"),
+        (["--simulated", "{log}", "{log}", "--without", "lag"], "--without: takes a model"),
+    ],
+)
+def test_models_and_logs_in_the_wrong_place_are_told(
+    run: Run, engine: StandIn, files: tuple[Path, Path], arguments: list[str], words: str
+) -> None:
+    model, log = files
+    outcome = run("gap", *(one.format(model=model, log=log) for one in arguments))
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert words in outcome.err

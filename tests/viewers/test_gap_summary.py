@@ -130,12 +130,12 @@ def test_the_naive_answer_is_told_only_when_it_differs() -> None:
 
 def test_tables_are_in_the_order_that_one_reads() -> None:
     found = made.diagnosis()
-    assert [row[0] for row in tables.channel_table(found)[1]] == ["acc_column", "acc_wrist"]
-    assert [row[1] for row in tables.channel_table(found)[1]] == sorted(
+    assert [row[0] for row in tables.channel_table(found.where)[1]] == ["acc_column", "acc_wrist"]
+    assert [row[1] for row in tables.channel_table(found.where)[1]] == sorted(
         (percent(one.gap) for one in found.where.channels), reverse=True
     )
-    assert [row[0] for row in tables.site_table(found)[1]] == ["elbow", "shoulder", "shaker", "acc_wrist"]
-    assert len(tables.band_table(found, least=0.15)[1]) == 2
+    assert [row[0] for row in tables.site_table(found.where)[1]] == ["elbow", "shoulder", "shaker", "acc_wrist"]
+    assert len(tables.band_table(found.where, least=0.15)[1]) == 2
     assert len(tables.ranking_table(found)[1]) == tables.RANKED
     assert tables.ranking_table(found, count=9)[1][-1] == ("delay", "shaker", "under 1 %", "–", "–")
 

@@ -80,10 +80,10 @@ def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
 
 def _where(found: Diagnosis) -> str:
     shown = _tables(
-        (tables.channel_table(found), (1, 2)),
-        (tables.site_table(found), (1,)),
-        (tables.band_table(found), (1,)),
-        (tables.regime_table(found), (2,)),
+        (tables.channel_table(found.where), (1, 2)),
+        (tables.site_table(found.where), (1,)),
+        (tables.band_table(found.where), (1,)),
+        (tables.regime_table(found.where), (2,)),
     )
     # Side by side where there is room for it.
     return element("div", shown, class_="figures") if shown else ""

@@ -27,8 +27,8 @@ def _page(found: Diagnosis) -> Iterator[str]:
     yield from (f"{escaped(sentence)}\n" for sentence in rest)
     if found.next_measurement is not None:
         yield f"**Measure next:** {escaped(found.next_measurement)}\n"
-    yield from _table("Where it lies", tables.channel_table(found))
-    yield from _table("What one site alone can explain", tables.site_table(found))
+    yield from _table("Where it lies", tables.channel_table(found.where))
+    yield from _table("What one site alone can explain", tables.site_table(found.where))
     yield from _table("Causes", tables.cause_table(found))
     yield from _table("What was weighed", tables.ranking_table(found))
     if (naive := naive_sentence(found)) is not None:

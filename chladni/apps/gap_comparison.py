@@ -1,0 +1,148 @@
+"""A log that any simulator wrote, held against a measured one: where they disagree, without a model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from chladni.apps.findings import damage_sentences
+from chladni.apps.gap_document import Document, where_document
+from chladni.apps.sources import Span
+from chladni.gap.comparison.log_against_log import GapView, compare_logs
+from chladni.gap.records.diagnosis import Where
+from chladni.gap.records.measurement import Measurement
+from chladni.io.log import Log
+from chladni.io.log_info import some_of
+from chladni.signals.errors import LogError
+from chladni.signals.time_series import TimeSeries
+
+COMPARISON_FORMAT: Final = "chladni.gap-comparison/1"
+# What differs by less than this share of its RMS was played back, not simulated: single precision, and no more.
+PLAYED_BACK = 1e-6
+NAMES_TOLD = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GapComparison:
+    """Where a simulated and a measured log disagree.
+
+    Attributes
+    ----------
+    simulated, measured
+        Names of the logs.
+    gap, noise
+        RMS of (measured - simulated), and of the noise, over RMS of measured, outputs pooled.
+    where
+        Channels, bands; no sites, which only a model has.
+    inputs
+        Channels that are the same in both logs: what drove them.
+    remarks
+        What limits the comparison.
+    """
+
+    simulated: str
+    measured: str
+    gap: float
+    noise: float
+    where: Where
+    inputs: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
+
+
+def compare_with_simulated(
+    measured: Log, simulated: Log, *, start_s: float | None = None, end_s: float | None = None
+) -> GapComparison:
+    """Say where two logs of one experiment disagree: one measured, one written by any simulator.
+
+    Channels are matched by their names, and both logs begin with the same sample. Channels that are the same in both
+    are taken for inputs.
+
+    Raises
+    ------
+    LogError
+        When a log can't be read, the logs share no channel that differs, rates or units differ, or samples are
+        missing.
+    """
+    span, logs = Span(start_s=start_s, end_s=end_s), (measured, simulated)
+    names = _shared(measured, simulated)
+    first, second = (_read(log, names, span) for log in logs)
+    inputs = _played_back(first, second)
+    outputs = [name for name in names if name not in inputs]
+    if not outputs:
+        raise LogError(f"{simulated.path.name}: every channel that it shares with {measured.path.name} is the same")
+    ours, theirs = (
+        _measurement(series, inputs, outputs, log.path.name)
+        for series, log in zip((first, second), logs, strict=True)
+    )
+    view = compare_logs(ours, theirs)
+    return GapComparison(
+        simulated=theirs.log,
+        measured=ours.log,
+        gap=view.gap,
+        noise=_pooled_noise(view),
+        where=view.where,
+        inputs=inputs,
+        remarks=(*(told for log in logs for told in damage_sentences(log.damage)), *view.remarks),
+    )
+
+
+def comparison_document(found: GapComparison) -> Document:
+    """Document of ``chladni gap --simulated``: `where` as in a diagnosis, and the gap with its noise."""
+    return {
+        "format": COMPARISON_FORMAT,
+        "simulated": found.simulated,
+        "logs": [found.measured],
+        "inputs": list(found.inputs),
+        "where": where_document(found.where),
+        "gap": {"before": float(found.gap), "noise": float(found.noise)},
+        "remarks": list(found.remarks),
+    }
+
+
+def _shared(ours: Log, theirs: Log) -> list[str]:
+    held = {channel.name for channel in theirs.channels}
+    names = [channel.name for channel in ours.channels if channel.name in held]
+    if not names:
+        told = (some_of([channel.name for channel in log.channels], count=NAMES_TOLD) for log in (ours, theirs))
+        raise LogError(
+            f"{ours.path.name} and {theirs.path.name} share no channel: {' against '.join(told)}; give the simulated "
+            "log the names of the measured one"
+        )
+    return names
+
+
+def _read(log: Log, names: Sequence[str], span: Span) -> TimeSeries:
+    series = log.read(names, start_s=span.start_s, end_s=span.end_s)
+    if not (series.all_valid() and np.isfinite(series.values).all()):
+        raise LogError(f"{log.path.name}: samples are missing; choose a part without gaps with --start and --end")
+    return series
+
+
+def _played_back(first: TimeSeries, second: TimeSeries) -> tuple[str, ...]:
+    """Channels that are the same in both logs, sample by sample."""
+    samples = min(first.samples, second.samples)
+    same = []
+    for row, channel in enumerate(first.channels):
+        ours, theirs = first.values[row, :samples], second.values[row, :samples]
+        if np.sqrt(np.mean((ours - theirs) ** 2)) <= PLAYED_BACK * np.sqrt(np.mean(ours**2)):
+            same.append(channel.name)
+    return tuple(same)
+
+
+def _measurement(series: TimeSeries, inputs: Sequence[str], outputs: Sequence[str], log: str) -> Measurement:
+    return Measurement(
+        log=log,
+        sample_rate_hz=series.sample_rate_hz,
+        inputs=np.asarray(
+            series.select(inputs).values if inputs else np.empty((0, series.samples)), dtype=np.float64
+        ),
+        outputs=np.asarray(series.select(outputs).values, dtype=np.float64),
+        input_names=tuple(inputs),
+        output_names=tuple(outputs),
+        output_units=tuple(channel.unit for channel in series.select(outputs).channels),
+    )
+
+
+def _pooled_noise(view: GapView) -> float:
+    return float(np.sqrt(np.mean([channel.noise**2 for channel in view.where.channels])))
