@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 
 from chladni.models.core.instrument import Instrument, Option
 from chladni.models.core.parameter import Parameter, Parameters
@@ -38,6 +39,11 @@ def arm_model(structure: Structure | None = None) -> StructureModel:
     )
 
 
+@cache
+def _nominal() -> StructureModel:
+    return arm_model()
+
+
 def _with_damper(structure: Structure, joint: str, damping: float) -> Structure:
     joints = tuple(
         replace(one, damping=one.damping + damping) if one.name == joint else one for one in structure.joints
@@ -47,7 +53,7 @@ def _with_damper(structure: Structure, joint: str, damping: float) -> Structure:
 
 def _build(values: Mapping[str, float], options: Mapping[str, str]) -> StructureModel:
     numbers = {name: value for name, value in values.items() if name != DAMPER.name}
-    model = arm_model().with_values(numbers)
+    model = _nominal().with_values(numbers)
     if options["damper_at"] == NO_DAMPER:
         return model
     return arm_model(_with_damper(model.structure, options["damper_at"], values[DAMPER.name]))

@@ -9,6 +9,7 @@ prescribed has no state either: its displacement, velocity and acceleration are 
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +23,14 @@ from chladni.models.structures.structure_output import StructureOutput, measure_
 Matrix = NDArray[np.float64]
 
 
+# One setting is compiled for its charts and for its flags.
+@lru_cache(maxsize=2)
 def compile_plant(
     structure: Structure,
-    inputs: Sequence[StructureInput],
-    outputs: Sequence[StructureOutput],
+    inputs: tuple[StructureInput, ...],
+    outputs: tuple[StructureOutput, ...],
     *,
-    fed_back: Sequence[str] = (),
+    fed_back: tuple[str, ...] = (),
 ) -> CompiledModel:
     """Compile a structure with its inputs and outputs, all loops open.
 
@@ -43,7 +46,7 @@ def compile_plant(
     States are displacement and velocity of each body that is free to move; ports are of kind ``joint``, ``body``,
     ``ground``, ``actuation`` for each force, and ``output`` for each of `fed_back`.
     """
-    return _Plant(structure, tuple(inputs), tuple(outputs), tuple(fed_back)).compiled()
+    return _Plant(structure, inputs, outputs, fed_back).compiled()
 
 
 def force_pattern(structure: Structure, at: str) -> Matrix:

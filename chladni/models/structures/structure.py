@@ -57,6 +57,7 @@ class Joint:
     damping: float
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "between", tuple(self.between))
         for what, number in (("stiffness", self.stiffness), ("damping", self.damping)):
             if not (np.isfinite(number) and number >= 0):
                 raise ModelError(f"joint {self.name!r}: {what} {number} must be finite and not negative")
@@ -108,6 +109,9 @@ class Structure:
     joints: tuple[Joint, ...]
 
     def __post_init__(self) -> None:
+        # A structure is the key of its equations, which a list can't be.
+        for name in ("bodies", "joints"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
         taken = {GROUND}
         for name in [*(body.name for body in self.bodies), *(joint.name for joint in self.joints)]:
             if name in taken:

@@ -94,7 +94,7 @@ class StructureModel:
             raise ModelError(f"model {self.name!r}: {mistake.part} {mistake.name!r}: {mistake.text}")
         for name in self.tolerances:
             self.parameters.require(name)
-        if self.declared is not None and self.declared.numbers() != replace(self, declared=None).parameters.numbers():
+        if self.declared is not None and self.declared.numbers() != self._own_parameters().numbers():
             raise ModelError(f"model {self.name!r}: the declared parameters have other values than its parts")
 
     @property
@@ -105,8 +105,9 @@ class StructureModel:
     @property
     def parameters(self) -> Parameters:
         """Every number: ``wrist.mass``, ``elbow.stiffness``, ``axis.kp``."""
-        if self.declared is not None:
-            return self.declared
+        return self._own_parameters() if self.declared is None else self.declared
+
+    def _own_parameters(self) -> Parameters:
         return structure_parameters(
             self.structure,
             [(controller, self._controller_units(controller)) for controller in self.controllers],
@@ -189,8 +190,8 @@ class StructureModel:
     def _open_loop(self) -> CompiledModel:
         return compile_plant(
             self.structure,
-            [one for one in self.inputs if one.kind != "disturbance"],
-            self.outputs,
+            tuple(one for one in self.inputs if one.kind != "disturbance"),
+            tuple(self.outputs),
             fed_back=tuple(dict.fromkeys(controller.feedback for controller in self.controllers)),
         )
 
