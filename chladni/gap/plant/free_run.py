@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.plant.law_run import Marched, can_run, equations, run_laws
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.compiled_model import CompiledModel
@@ -22,6 +23,8 @@ Matrix = NDArray[np.float64]
 Windows = Sequence[tuple[int, int]]
 #: Integrators kept; a fit asks for the same model again when it draws, never for more than a few.
 _KEPT = 8
+#: Steps between samples where windows of a model with laws are marched through.
+PARTS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -105,8 +108,25 @@ class FreeRun:
         ModelError
             When parameters are impossible or the model diverges.
         """
+        marched = self.marched(z, effects, initial)
+        if marched is not None:
+            return mapped_outputs(
+                self.compiled(z, effects), self.rows, marched.outputs, self.measurement.sample_rate_hz
+            )
         found = [integration.outputs[self.rows] for _, integration in self.integrations(z, effects, initial)]
         return found[0] if len(found) == 1 else np.hstack(found)
+
+    def marched(self, z: Matrix | None, effects: Sequence[AttachedEffect], initial: Matrix | None) -> Marched | None:
+        """Windows of a model with laws, outputs before maps of samples; None where `integrations` does it better."""
+        compiled = self.compiled(z, effects)
+        rate = self.measurement.sample_rate_hz
+        hold = hold_of(compiled, rate)
+        # An integrator counts time from the start of its own window; a law may want the log's.
+        if len(self.windows) == 1 or not can_run(compiled) or hold.kinked.size or np.any(hold.rate >= 0):
+            return None
+        equation = equations(compiled, self.measurement.inputs, rate, self.rows, PARTS)
+        starts = initial_states(initial, len(self.windows), len(compiled.states))
+        return run_laws(equation, self.windows, starts, rate)
 
     def motion(
         self,
@@ -165,6 +185,19 @@ class FreeRun:
         known = hold.source >= 0
         columns[:, hold.source[known]] = rows[:, : hold.columns][:, known]
         return columns
+
+
+def mapped_outputs(
+    compiled: CompiledModel, rows: NDArray[np.int64], outputs: Matrix, sample_rate_hz: float
+) -> Matrix:
+    """``[output, sample]`` of the outputs `rows` behind the model's maps of samples."""
+    if not compiled.output_maps:
+        return outputs
+    mapped = outputs.copy()
+    for place, sample_map in compiled.output_maps:
+        for row in np.flatnonzero(rows == place):
+            mapped[row] = sample_map(mapped[row], sample_rate_hz)
+    return mapped
 
 
 def effect_key(effect: AttachedEffect) -> tuple[object, ...]:

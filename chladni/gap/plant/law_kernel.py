@@ -176,7 +176,7 @@ def slope_of(laws: Laws, room: Room, port: int, argument: int, here: float, h: f
     kept = room.given[argument]
     by = FINE * max(abs(kept), laws.scale[argument])
     room.given[argument] = kept + by
-    slope = (force_of(laws, room, port, h, t) - here) / by
+    slope: float = (force_of(laws, room, port, h, t) - here) / by
     room.given[argument] = kept
     return slope
 

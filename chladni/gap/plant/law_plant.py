@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.plant.free_run import FreeRun, initial_states
+from chladni.gap.plant.free_run import PARTS, FreeRun, initial_states, mapped_outputs
 from chladni.gap.plant.law_kernel import March
-from chladni.gap.plant.law_run import Equations, equations, run_laws
+from chladni.gap.plant.law_run import Equations, equations, new_record, run_laws
 from chladni.gap.plant.law_sensitivity import recorded, sensitivities
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.effects.attached_effect import AttachedEffect
@@ -51,16 +51,32 @@ def coarse_run(run: FreeRun, setting: Setting, initial: Matrix) -> LawRunResult:
 def fine_run(run: FreeRun, setting: Setting, initial: Matrix) -> LawRunResult:
     """Run as `FreeRun` does."""
     compiled = run.compiled(setting.z, setting.effects)
-    made = run.integrations(setting.z, setting.effects, initial)
-    outputs = np.hstack([integration.outputs[run.rows] for _, integration in made])
     equation = _equations(run, compiled)
-    records = recorded(equation, run.windows, [integration for _, integration in made])
-    before = (
-        np.hstack([equation.output @ np.hstack([record.x, record.rows, record.force]).T for record in records])
-        if compiled.output_maps
-        else outputs
-    )
+    marched = run.marched(setting.z, setting.effects, initial)
+    if marched is not None:
+        pairs = zip(run.windows, marched.records, strict=True)
+        records = tuple(_at_samples(equation, window, record) for window, record in pairs)
+        return LawRunResult(
+            _mapped(run, compiled, marched.outputs), marched.outputs, setting, compiled, equation, records
+        )
+    made = [integration for _, integration in run.integrations(setting.z, setting.effects, initial)]
+    outputs = np.hstack([integration.outputs[run.rows] for integration in made])
+    records = recorded(equation, run.windows, made)
+    before = outputs
+    if compiled.output_maps:
+        seen = [np.hstack([record.x, record.rows, record.force]) for record in records]
+        before = np.hstack([equation.output @ one.T for one in seen])
     return LawRunResult(outputs, before, setting, compiled, equation, records)
+
+
+def _at_samples(equation: Equations, window: tuple[int, int], record: March) -> March:
+    """A march in finer steps, seen at the samples."""
+    every = slice(None, None, PARTS)
+    return new_record(equation, *window, record.x[0])._replace(
+        x=np.ascontiguousarray(record.x[every]),
+        motion=np.ascontiguousarray(record.motion[every]),
+        force=np.ascontiguousarray(record.force[every]),
+    )
 
 
 def slopes_of(run: FreeRun, result: LawRunResult, changed: Sequence[tuple[Setting, float]]) -> tuple[Matrix, Matrix]:
@@ -86,13 +102,7 @@ def _through_maps(run: FreeRun, result: LawRunResult, other: CompiledModel, slop
 
 
 def _mapped(run: FreeRun, compiled: CompiledModel, outputs: Matrix) -> Matrix:
-    if not compiled.output_maps:
-        return outputs
-    mapped = outputs.copy()
-    for place, sample_map in compiled.output_maps:
-        for row in np.flatnonzero(run.rows == place):
-            mapped[row] = sample_map(mapped[row], run.measurement.sample_rate_hz)
-    return mapped
+    return mapped_outputs(compiled, run.rows, outputs, run.measurement.sample_rate_hz)
 
 
 def _equations(run: FreeRun, compiled: CompiledModel) -> Equations:

@@ -33,7 +33,7 @@ def bounded_step(curvature: Matrix, gradient: Matrix, low: Matrix, high: Matrix,
     if not (np.all(np.isfinite(curvature)) and np.all(np.isfinite(gradient))):
         raise EstimateError("the slopes of the fit are not finite; start from other values")
     # An unknown that does nothing stays where it is.
-    size = np.sqrt(np.diag(curvature))
+    size = np.sqrt(np.maximum(np.diag(curvature), 0.0))
     moving = size > 0
     step = np.zeros(gradient.size)
     if not moving.any():

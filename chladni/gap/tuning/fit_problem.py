@@ -1,7 +1,7 @@
 """An output-error fit as a least-squares problem: what it costs at a point, and how that changes around it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,15 @@ from chladni.gap.tuning.decay import decay
 from chladni.gap.tuning.effect_scale import EffectNumber, with_numbers
 from chladni.gap.tuning.residual import Residual, Whitening, likelihood_cost, weights
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.models.integrator.integrator import Integrator
 
 Matrix = NDArray[np.float64]
 #: How far apart the two runs of a difference are, in ln(value) of a parameter.
 _APART = 1e-5
 #: The same for laws, whose runs carry the errors of their steps.
 _APART_WITH_LAWS = 1e-3
+#: Precision of an effect's parameter before a log is seen: none, but for what keeps the equations regular.
+_UNKNOWN = 1e-6
 #: One sigma of an initial state is what alone would make the outputs this many times what was measured.
 _WIDE = 10.0
 
@@ -106,7 +109,7 @@ class FitProblem:
         limit = _limits(run.tunables.names, z_limit)[: self.tuned]
         self.low = np.concatenate([-limit, [number.low for number in numbers]])
         self.high = np.concatenate([limit, [number.high for number in numbers]])
-        self._prior = np.concatenate([np.ones(self.tuned), np.zeros(len(numbers))])
+        self._prior = np.concatenate([np.ones(self.tuned), np.full(len(numbers), _UNKNOWN)])
         self._decay = self._wide = np.zeros(0)
         compiled = run.compiled(start_z, self.effects)
         self.has_laws = bool(compiled.laws)
@@ -118,6 +121,23 @@ class FitProblem:
         states = len(self.run.compiled(self.start_z, self.effects).states)
         x = np.concatenate([self.start_z[: self.tuned], np.zeros(len(self.numbers))])
         return Point(np.clip(x, self.low, self.high), initial_states(None, len(self.run.windows), states))
+
+    def start_of_windows(self) -> Point:
+        """Where the fit begins, each window at the state that the linear part alone would begin with.
+
+        A law that sticks forgets where it began: from rest no slope would tell that a window starts in motion.
+        """
+        start = self.start()
+        z, effects = self.z(start.x), self.effects_at(start.x)
+        linear = replace(self.run.compiled(z, effects), laws=())
+        rate, windows = self.run.measurement.sample_rate_hz, self.run.windows
+        integrator = Integrator(linear, rate)
+        parts = [integrator.run(self.run.measurement.inputs[:, slice(*window)]) for window in windows]
+        outputs = np.hstack([part.outputs[self.run.rows] for part in parts])
+        residual = self.whitening.residual(self.run.measurement.outputs - outputs)
+        here = Evaluation(start, outputs, residual, 0.0)
+        step = self._equations(here, np.zeros((0, *outputs.shape)), self._local).initial_step(np.zeros(0))
+        return Point(start.x, step)
 
     def z(self, x: Matrix) -> Matrix:
         """``[parameter]`` of the model."""
@@ -146,14 +166,16 @@ class FitProblem:
 
     def slopes(self, here: Evaluation) -> Slopes:
         """Gauss and Newton's equations around a point, each output weighed by what it misses."""
+        return self._equations(here, *self._columns(here))
+
+    def _equations(self, here: Evaluation, own: Matrix, starts: Callable[[int, int], Matrix]) -> Slopes:
         root = np.sqrt(weights(here.residual.power))[:, None]
         residual = here.residual.white * root
-        own, starts = self._columns(here)
         columns = np.concatenate([self.whitening.seen(own), self.whitening.constants()]) * root
         curvature, gradient = _products(columns, columns), -_products(columns, residual[None])[:, 0]
-        unknowns = here.point.x.size
-        curvature[:unknowns, :unknowns] += np.diag(self._prior)
-        gradient[:unknowns] += self._prior * here.point.x
+        unknowns = len(own)
+        curvature[:unknowns, :unknowns] += np.diag(self._prior[:unknowns])
+        gradient[:unknowns] += (self._prior * here.point.x)[:unknowns]
         spread = self._spread(here.point)
         sure = np.where(spread > 0, spread, 1.0) ** -2.0
         back = []

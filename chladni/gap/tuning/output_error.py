@@ -161,7 +161,7 @@ def fit_output_error(
         run, Whitening(noise, training, offsets=offsets), training,
         effects=effects, numbers=effect_numbers(effects, fitted), tune=tune, z_limit=z_limit, start_z=z,
     )  # fmt: skip
-    start = problem.start()
+    start = problem.start_of_windows() if problem.has_laws and len(run.windows) > 1 else problem.start()
     if start_initial is not None:
         start = Point(start.x, np.array(start_initial, dtype=np.float64).reshape(start.initial.shape))
     here, slopes, converged, iterations = _fit(problem, start, max_iterations)
@@ -233,7 +233,7 @@ def _report(
 ) -> OutputErrorFit:
     x, run = here.point.x, problem.run
     z = problem.z(x)
-    covariance = np.asarray(np.linalg.pinv(slopes.curvature, rcond=1e-14, hermitian=True), dtype=np.float64)
+    covariance = _inverse(slopes.curvature)
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     values = run.tunables.values(z)
     own = np.concatenate([std[: problem.tuned], np.zeros(z.size - problem.tuned)])
@@ -265,6 +265,14 @@ def _report(
         ),
         covariance=covariance,
     )
+
+
+def _inverse(curvature: Matrix) -> Matrix:
+    """Inverse of a matrix whose rows have very different units."""
+    size = np.sqrt(np.maximum(np.diag(curvature), np.finfo(np.float64).tiny))
+    scaled = curvature / np.multiply.outer(size, size)
+    found = np.linalg.pinv(scaled, rcond=1e-15, hermitian=True) / np.multiply.outer(size, size)
+    return np.asarray(found, dtype=np.float64)
 
 
 def _effect_std(problem: FitProblem, x: Matrix, std: Matrix) -> tuple[Mapping[str, float], ...]:

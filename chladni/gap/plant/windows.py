@@ -1,0 +1,84 @@
+"""Windows for models that a free run leaves behind: free axes drift, unstable ones run away."""
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.records.measurement import Measurement
+from chladni.models.core.model import Model
+
+#: How many of its slowest times a window lasts.
+_TIMES = 3.0
+#: Seconds of a window when nothing in the model has a time of its own.
+_USUAL_S = 1.0
+#: Shortest window, in samples; most of a record that one may take.
+_SHORTEST, _LARGEST_SHARE = 20, 0.25
+
+
+def windows_for(model: Model, measurement: Measurement) -> tuple[tuple[int, int], ...] | None:
+    """Give windows ``(start, stop)`` in samples that together are the record, or None when one free run will do.
+
+    A pole that is not damped within the record (a rigid-body motion, an integrator, one that grows) makes a free run
+    depend on its start for ever: what is predicted then is a window, from an estimated initial state. It lasts three
+    times the slowest of the model's other times, at most three times that in which a growing motion grows by e.
+
+    Examples
+    --------
+    A carriage of 95 kg with 300 N s/m on a free guide: three times 0.32 s.
+
+    >>> from chladni.models.structures.structure import Body, Joint, Structure
+    >>> from chladni.models.structures.structure_model import StructureModel
+    >>> from chladni.models.structures.structure_input import StructureInput
+    >>> from chladni.models.structures.structure_output import StructureOutput
+    >>> model = StructureModel(
+    ...     name="axis",
+    ...     structure=Structure(
+    ...         bodies=(Body(name="carriage", mass=95.0),),
+    ...         joints=(Joint(name="guide", between=("ground", "carriage"), stiffness=0.0, damping=300.0),),
+    ...     ),
+    ...     inputs=(StructureInput(name="motor", at="carriage"),),
+    ...     outputs=(StructureOutput(name="position", measures="displacement", at="carriage"),),
+    ... )
+    >>> log = Measurement(
+    ...     log="log", sample_rate_hz=1000.0, inputs=np.zeros((1, 10000)), outputs=np.zeros((1, 10000)),
+    ...     input_names=("motor",), output_names=("position",), output_units=("m",),
+    ... )
+    >>> windows = windows_for(model, log)
+    >>> len(windows), windows[0], windows[-1]
+    (11, (0, 909), (9091, 10000))
+    >>> round(horizon_s(windows, log.sample_rate_hz), 2)
+    0.91
+    """
+    poles = np.asarray(np.linalg.eigvals(model.compile().a), dtype=np.complex128)
+    lasting = _lasting(poles, measurement.duration_s)
+    if not lasting.any():
+        return None
+    rate, samples = measurement.sample_rate_hz, measurement.samples
+    length = _horizon_s(poles, lasting) * rate
+    length = np.clip(length, _SHORTEST, max(_SHORTEST, _LARGEST_SHARE * samples))
+    count = max(1, round(samples / float(length)))
+    edges = np.round(np.linspace(0, samples, count + 1)).astype(int).tolist()
+    return tuple(pairwise(edges))
+
+
+def horizon_s(windows: tuple[tuple[int, int], ...], sample_rate_hz: float) -> float:
+    """Mean length of the windows in seconds: how far ahead the model is asked to predict."""
+    return float(np.mean([stop - start for start, stop in windows]) / sample_rate_hz)
+
+
+def _lasting(poles: NDArray[np.complex128], duration_s: float) -> NDArray[np.bool_]:
+    """Poles that stay still within the record, or grow; a mode that rings as long is damped all the same."""
+    slow = np.abs(poles) * duration_s < 1.0
+    grows = poles.real > 1e-9 * np.maximum(np.abs(poles), 1.0 / duration_s)
+    return np.asarray(slow | grows)
+
+
+def _horizon_s(poles: NDArray[np.complex128], lasting: NDArray[np.bool_]) -> float:
+    own = poles[~lasting]
+    times = np.maximum(-1.0 / np.minimum(own.real, -1e-300), 0.0)
+    # Of what oscillates a few cycles show all there is, however long it rings.
+    times = np.where(np.abs(own.imag) > 0, np.minimum(times, 2 * np.pi / np.maximum(np.abs(own.imag), 1e-300)), times)
+    horizon = _TIMES * float(times.max()) if own.size else _USUAL_S
+    growth = float(poles.real.max())
+    return min(horizon, _TIMES / growth) if growth > 0 and lasting.any() else horizon
