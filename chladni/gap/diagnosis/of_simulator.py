@@ -37,9 +37,11 @@ from chladni.gap.records.diagnosis import (
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.simulators.signal_model import SignalModel
 from chladni.gap.simulators.simulator import Simulator
-from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
+from chladni.models.effects.attached_effect import AttachedEffect, attached
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.effects.effect_kind import EffectKind
+from chladni.models.files.site_units import compiled_site_units
 from chladni.signals.time_series import TimeSeries
 
 Matrix = NDArray[np.float64]
@@ -110,6 +112,39 @@ def diagnose_simulator(
     # What is left in the end is an upper bound too, and where a linear fit took distortion for noise, the lower one.
     left = noise_of_residual(measurement.outputs - found.best.outputs, sample_rate_hz=measurement.sample_rate_hz)
     return _Told(search=found, noise=smaller_floor(noise, left), remarks=remarks, seed=seed).diagnosis()
+
+
+def explained_simulator(
+    simulator: Simulator, diagnosis: Diagnosis, *, own_effects: Sequence[EffectKind] = ()
+) -> WrappedSimulator:
+    """Give the simulator as a diagnosis says that the machine is: tuned, and with the causes that it names.
+
+    Parameters
+    ----------
+    simulator, diagnosis
+        What was diagnosed, and what came of it.
+    own_effects
+        Those that took part.
+
+    Raises
+    ------
+    ModelError
+        When the diagnosis is another simulator's.
+    """
+    own = {kind.name: kind for kind in own_effects}
+    effects = [
+        attached(
+            own.get(cause.effect, cause.effect),
+            cause.site,
+            {name: number.value for name, number in cause.parameters.items()},
+            variant=cause.variant,
+            source=cause.source,
+        )
+        for cause in diagnosis.causes
+        if cause.effect != "parameter"
+    ]
+    values = {name: number.value for name, number in diagnosis.tuned_parameters.items()}
+    return WrappedSimulator(simulator=simulator, values=values, effects=tuple(effects))
 
 
 def _silent(_doing: str, _share: float) -> None:
@@ -209,6 +244,7 @@ class _Told:
     def cause(self, place: int, effect: AttachedEffect) -> Cause:
         close = self.close_to(effect)
         sites = [each.site for each in close if each.effect == effect.effect]
+        units = compiled_site_units(SignalModel(simulator=self.search.runs.wrapped.simulator).compile())[effect.site]
         names = effect.kind.parameters_of(effect.variant)
         return Cause(
             effect=effect.effect,
@@ -217,7 +253,9 @@ class _Told:
             group=(effect.site, *sites),
             alternatives=tuple(each for each in close if each.effect != effect.effect),
             parameters={
-                name: FittedNumber(value=effect.values[name], std=self.search.best.std(place, name), unit=one.unit)
+                name: FittedNumber(
+                    value=effect.values[name], std=self.search.best.std(place, name), unit=units.of(one.unit)
+                )
                 for name, one in names.items()
             },
             variant=effect.variant,

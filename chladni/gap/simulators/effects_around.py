@@ -92,10 +92,10 @@ def lone_joint(joint: Port) -> CompiledModel:
     return _equations(d=np.zeros((0, 0)), inputs=(), outputs=(), ports=(joint,))
 
 
-def through(inputs: Sequence[Terminal], outputs: Sequence[Terminal]) -> CompiledModel:
-    """Give equations that hold inputs and outputs, and no way from one to the other."""
+def unconnected(inputs: Sequence[Terminal], outputs: Sequence[Terminal], joints: Sequence[Port]) -> CompiledModel:
+    """Give equations that hold inputs, outputs and joints, and no way from one to the other."""
     d = np.zeros((len(outputs), len(inputs)))
-    return _equations(d=d, inputs=tuple(inputs), outputs=tuple(outputs), ports=())
+    return _equations(d=d, inputs=tuple(inputs), outputs=tuple(outputs), ports=tuple(joints))
 
 
 def _equations(

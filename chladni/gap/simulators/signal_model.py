@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
-from chladni.gap.simulators.effects_around import through
+from chladni.gap.simulators.effects_around import unconnected
 from chladni.gap.simulators.simulator import Simulator
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Effect, ModelKind
@@ -54,8 +54,8 @@ class SignalModel:
         return self
 
     def compile(self) -> CompiledModel:
-        """Give the terminals, with nothing in between."""
-        return through(self.simulator.inputs, self.simulator.outputs)
+        """Give inputs, outputs and joints, with nothing in between."""
+        return unconnected(self.simulator.inputs, self.simulator.outputs, self.simulator.joints)
 
     def flags(self, simulation: Simulation) -> tuple[str, ...]:  # noqa: ARG002 - what a model offers
         """None."""
