@@ -12,7 +12,7 @@ from chladni.gap.blind.draft import Scene
 from chladni.gap.blind.drive_draw import draw_drive_bench
 from chladni.gap.blind.excitation_draw import Drive, draw_drive
 from chladni.gap.blind.noise import SensorNoise, draw_noise
-from chladni.gap.blind.performance import measured, perform, pooled_change, rms, settled_steps
+from chladni.gap.blind.performance import measured, perform, pooled_change, rms, settled
 from chladni.gap.blind.plan import Bench, Hidden
 from chladni.gap.blind.severity import converted, sized
 from chladni.gap.blind.site_draw import draw_draft, draw_numbers
@@ -135,11 +135,10 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case | None:
         return None
     effects, changes = found
     numbers |= {name: bench.plan.numbers[name] * (1 + z * bench.plan.tolerance[name]) for name, z in off.items()}
-    steps = settled_steps(bench, numbers, drive, effects, within=_SETTLED_SHARE * share)
-    if steps is None:
+    still = settled(bench, numbers, drive, effects, within=_SETTLED_SHARE * share)
+    if still is None:
         return None
-    names = measured(bench)
-    moved = perform(bench, numbers, drive, effects, steps=steps)
+    (steps, moved), names = still, measured(bench)
     after = converted(moved, effects, names)
     change = pooled_change(bench, clean, after) if effects or off else None
     if change is not None and not _fits(order, change, share):

@@ -4,6 +4,7 @@ from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
 
 from chladni.gap.blind.assembly import Assembly, fastest
 from chladni.signals.errors import EstimateError
@@ -52,3 +53,26 @@ def integrate(assembly: Assembly, signals: Matrix, interval: float, *, start_s: 
     if not fine:
         raise EstimateError("the hidden motion grows without bound; draw the case again")
     return y
+
+
+def respond(assembly: Assembly, signals: Matrix, interval: float) -> Matrix:
+    """Give what `integrate` gives for a machine without laws and shifts, exactly and many times faster.
+
+    Inputs that run along straight lines make the step from sample to sample a matrix (G. F. Franklin, J. D. Powell,
+    M. Workman, Digital Control of Dynamic Systems, section 4.3: the triangle hold).
+    """
+    from chladni.gap.blind.kernel import recur
+
+    arrays = assembly.arrays(interval, 1)
+    a, b, inputs = arrays.system
+    n = a.shape[0]
+    block = np.zeros((n + 2 * inputs, n + 2 * inputs))
+    block[:n, :n], block[:n, n : n + inputs] = a * interval, b * interval
+    block[n : n + inputs, n + inputs :] = np.eye(inputs)
+    powers = expm(block)
+    now, slope = powers[:n, n : n + inputs], powers[:n, n + inputs :]
+    states = np.zeros((signals.shape[1], n))
+    driven = np.ascontiguousarray(signals, dtype=np.float64)
+    recur(np.ascontiguousarray(powers[:n, :n]), now - slope, np.ascontiguousarray(slope), driven, states)
+    c, d, _ = arrays.observed
+    return np.asarray(c @ states.T + d @ driven)

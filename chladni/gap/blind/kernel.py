@@ -130,3 +130,16 @@ def march(signals: Any, interval: float, steps: int, start: Any, system: Any, la
         if not largest < 1e12:
             return False
     return True
+
+
+@compiled
+def recur(transition: Any, now: Any, after: Any, signals: Any, states: Any) -> None:
+    """Write ``x[k+1] = T x[k] + N u[k] + A u[k+1]`` to `states`, ``[sample, state]``; its first row is given."""
+    for k in range(states.shape[0] - 1):
+        for i in range(states.shape[1]):
+            total = 0.0
+            for j in range(states.shape[1]):
+                total += transition[i, j] * states[k, j]
+            for j in range(signals.shape[0]):
+                total += now[i, j] * signals[j, k] + after[i, j] * signals[j, k + 1]
+            states[k + 1, i] = total

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from chladni.gap.blind.building import built, unseen_signals
 from chladni.gap.blind.equations import FLOOR
 from chladni.gap.blind.excitation_draw import Drive
-from chladni.gap.blind.integration import MOST_STEPS, integrate, steps_for
+from chladni.gap.blind.integration import MOST_STEPS, integrate, respond, steps_for
 from chladni.gap.blind.plan import Bench, Hidden
 from chladni.signals.errors import EstimateError
 
@@ -35,13 +35,12 @@ def perform(bench: Bench, numbers: Mapping[str, float], drive: Drive, effects: S
     interval, count = 1.0 / bench.rate_hz, drive.signals.shape[1]
     rows = [_unseen(effects, name, bench, drive) for name in unseen_signals(effects)]
     signals = np.vstack([drive.signals, *rows]) if rows else drive.signals
-    y = integrate(
-        machine.assembly,
-        signals,
-        interval,
-        start_s=-drive.before * interval,
-        steps=steps_for(machine.assembly, interval) if steps is None else steps,
-    )
+    assembly = machine.assembly
+    if not effects and not assembly.laws:
+        y = respond(assembly, signals, interval)
+    else:
+        steps = steps_for(assembly, interval) if steps is None else steps
+        y = integrate(assembly, signals, interval, start_s=-drive.before * interval, steps=steps)
     if count != drive.before + bench.samples and np.isnan(y[:, -1]).all():
         raise EstimateError("the hidden motion was not simulated to its end")
     # A clock that is late shows the machine at rest before its start.
@@ -55,19 +54,21 @@ def measured(bench: Bench) -> list[str]:
     return [*([] if loop is None else [loop.drives]), *(one.name for one in bench.plan.outputs)]
 
 
-def settled_steps(bench: Bench, numbers: Mapping[str, float], drive: Drive, effects: Sequence[Hidden], *,
-                  within: float) -> int | None:  # fmt: skip
-    """Steps a sample at which twice as many change the outputs by less than `within`, pooled RMS; None when none do.
+def settled(bench: Bench, numbers: Mapping[str, float], drive: Drive, effects: Sequence[Hidden], *,
+            within: float) -> tuple[int, dict[str, Matrix]] | None:  # fmt: skip
+    """Simulate with twice as many steps again and again, until the outputs change by less than `within`, pooled RMS.
 
-    A motion that depends on the last digit of everything can't be compared with any simulation.
+    Gives the last number of steps a sample and what came of it; None when it never settles: a motion that depends on
+    the last digit of everything can't be compared with any simulation.
     """
-    steps = max(32, steps_for(built(bench.plan, numbers, effects).assembly, 1.0 / bench.rate_hz))
+    steps = steps_for(built(bench.plan, numbers, effects).assembly, 1.0 / bench.rate_hz)
     coarse = _tried(bench, numbers, drive, effects, steps)
     while steps < MOST_STEPS:
-        fine = _tried(bench, numbers, drive, effects, 2 * steps)
+        steps *= 2
+        fine = _tried(bench, numbers, drive, effects, steps)
         if coarse is not None and fine is not None and pooled_change(bench, coarse, fine) < within:
-            return steps
-        steps, coarse = 2 * steps, fine
+            return steps, fine
+        coarse = fine
     return None
 
 

@@ -1,0 +1,208 @@
+import json
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import chladni
+from chladni.gap.blind.case_draw import Order, draw_case
+from chladni.gap.blind.case_folder import case_folders, truth_of_case
+from chladni.gap.blind.composition import DEFAULT, counts, orders
+from chladni.gap.blind.draft import Scene
+from chladni.gap.blind.excitation_draw import BEYOND, draw_drive
+from chladni.gap.blind.make import make_cases
+from chladni.gap.blind.noise import SensorNoise, draw_noise
+from chladni.gap.blind.performance import measured, perform, pooled_change, rms
+from chladni.gap.blind.severity import converted
+from chladni.gap.blind.site_draw import draw_draft, draw_numbers
+from chladni.gap.blind.structure_draw import draw_structure
+from chladni.gap.blind.vocabulary import FAMILIES, OUTSIDE, WORDS
+from chladni.models.effects.catalogue import CATALOGUE
+from chladni.models.effects.catalogue import FAMILIES as CATALOGUE_FAMILIES
+from chladni.signals.errors import SetupError
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("campaign")
+    made = make_cases(directory, count=4, seed=5, composition={"effect": 2, "none": 1, "parameters": 1})
+    assert made == 4
+    return directory
+
+
+def test_a_case_tells_nothing_of_what_it_hides(campaign):
+    for case in case_folders(campaign):
+        folder = campaign / "cases" / case.name
+        assert sorted(path.name for path in folder.iterdir()) == ["case.json", "log.mcap", "model.toml"]
+        truth = truth_of_case(campaign, case)
+        model = (folder / "model.toml").read_text()
+        log = (folder / "log.mcap").read_bytes()
+        assert "[[effect]]" not in model
+        for hidden in truth["effects"]:
+            assert hidden["effect"] not in model
+            assert hidden["effect"].encode() not in log
+        assert b"truth" not in log
+        assert sorted(json.loads((folder / "case.json").read_text())) == ["format", "leave_out", "seal"]
+
+
+def test_model_and_log_fit_each_other(campaign):
+    for case in case_folders(campaign):
+        model = chladni.load_model(case.model)
+        with chladni.open_log(case.log) as log:
+            series = log.read()
+        names = {channel.name for channel in series.channels}
+        compiled = model.compile()
+        assert {terminal.channel for terminal in (*compiled.inputs, *compiled.outputs)} == names
+        units = {terminal.channel: terminal.unit for terminal in (*compiled.inputs, *compiled.outputs)}
+        assert {channel.name: channel.unit for channel in series.channels} == units
+        assert 8000 <= series.samples <= 25000
+        assert np.isfinite(series.values).all()
+
+
+def test_true_numbers_are_as_near_as_the_tolerances_say(campaign):
+    for case in case_folders(campaign):
+        truth, model = truth_of_case(campaign, case), chladni.load_model(case.model)
+        for name, value in truth["parameters"].items():
+            nominal = model.parameters[name]
+            sigmas = (value / nominal.value - 1) / nominal.tolerance if nominal.tolerance else 0.0
+            if name in truth["off"]:
+                assert sigmas == pytest.approx(truth["off"][name])
+                assert 4 <= abs(sigmas) <= 8
+            else:
+                assert abs(sigmas) < 2 + 1e-9
+
+
+def test_a_campaign_is_resumed_and_made_again_the_same(campaign, tmp_path):
+    assert make_cases(campaign, count=4, seed=5, composition={"effect": 2, "none": 1, "parameters": 1}) == 0
+    again = tmp_path / "again"
+    (again / "cases" / "case-0001").mkdir(parents=True)
+    for name in ("case-0001", "case-0002", "case-0004"):
+        (again / "cases" / name).mkdir(parents=True, exist_ok=True)
+        (again / "cases" / name / "case.json").write_text("{}")
+    assert make_cases(again, count=4, seed=5, composition={"effect": 2, "none": 1, "parameters": 1}) == 1
+    for file in ("model.toml", "log.mcap"):
+        path = f"cases/case-0003/{file}"
+        assert (again / path).read_bytes() == (campaign / path).read_bytes()
+    truths = [json.loads((one / "truth" / "case-0003.json").read_text()) for one in (again, campaign)]
+    salts = [truth.pop("salt") for truth in truths]
+    assert truths[0] == truths[1]
+    assert salts[0] != salts[1]
+
+
+@pytest.mark.parametrize(("count", "seed", "told"), [(0, 1, "count 0"), (3, -1, "seed -1")])
+def test_impossible_campaigns_are_refused(tmp_path, count, seed, told):
+    with pytest.raises(SetupError, match=told):
+        make_cases(tmp_path, count=count, seed=seed)
+
+
+def test_the_vocabulary_is_the_catalogues():
+    assert set(WORDS) == set(CATALOGUE)
+    assert len(WORDS) == 26
+    assert {family: set(words) for family, words in FAMILIES.items()} == {
+        family: set(words) for family, words in CATALOGUE_FAMILIES.items()
+    }
+    assert not set(OUTSIDE) & set(WORDS)
+
+
+def test_the_default_campaign_asks_for_everything():
+    made = orders(200, np.random.default_rng(1))
+    assert Counter(order.kind for order in made) == DEFAULT
+    words = Counter(word for order in made if order.kind == "effect" for word in order.words)
+    assert set(words) == set(WORDS)
+    assert min(words.values()) >= 3
+    quiet = [order for order in made if order.kind in ("none", "parameters")]
+    assert len(quiet) >= 60
+    assert abs(sum(order.coloured for order in quiet) - len(quiet) / 2) <= 1
+    for order in made:
+        assert (order.kind == "leave_out") == (bool(order.words) and set(order.words) <= set(order.leave_out))
+    # Words are left out in ordinary cases too, so that a list says nothing.
+    assert sum(bool(order.leave_out) for order in made if order.kind == "none") > 5
+    assert len([order for order in made if order.kind == "two" and len(order.words) == 2]) == DEFAULT["two"]
+
+
+@pytest.mark.parametrize("count", [1, 7, 80, 199])
+def test_all_cases_are_shared_out(count):
+    assert sum(counts(count).values()) == count
+
+
+@pytest.mark.parametrize("word", [*WORDS, *OUTSIDE])
+def test_every_draft_moves_the_outputs_the_more_the_larger(word):
+    rng = np.random.default_rng([3, len(word)])
+    for _ in range(40):
+        bench = draw_structure(rng, "grounded")
+
+        bench = replace(bench, samples=500)
+        drive = draw_drive(rng, bench)
+        numbers = draw_numbers(rng, bench.plan)
+        clean = perform(bench, numbers, drive, watched=True)
+        scene = Scene(bench=bench, numbers=numbers, rng=rng, moving={name: rms(row) for name, row in clean.items()})
+        draft = draw_draft(scene, word)
+        if draft is not None:
+            break
+    assert draft is not None
+    assert drive.signals.shape[1] == drive.before + bench.samples + BEYOND
+    names = measured(bench)
+
+    def change(size):
+        hidden = draft.hidden(size)
+        assert hidden.effect == word
+        moved = perform(bench, numbers, drive, [hidden], steps=64)
+        return pooled_change(bench, {name: clean[name] for name in names}, converted(moved, (hidden,), names))
+
+    middle = min(max(1.0, draft.least), draft.most)
+    assert change(middle) > 1e-6
+    small = max(0.3 * middle, draft.least)
+    if small < 0.9 * middle and word != "held_samples":
+        assert change(small) < 1.02 * change(middle)
+
+
+@pytest.mark.parametrize("kind", ["effect", "faint"])
+def test_an_effect_has_the_severity_that_was_asked_for(kind):
+    case = draw_case(Order(kind=kind, words=("coulomb_friction",)), np.random.default_rng(2))
+    low, high = (3.0, 1 / case.noise_share) if kind == "effect" else (0.3, 3.0)
+    assert low <= case.ratio <= high
+    names = measured(case.bench)
+    still = perform(case.bench, case.numbers, case.drive)
+    # What the truth says is what the log's clean signals show.
+    assert case.ratio * case.noise_share == pytest.approx(pooled_change(case.bench, still, case.clean), rel=1e-9)
+    for name in names:
+        noise = case.recorded[name] - case.clean[name]
+        assert rms(noise) == pytest.approx(case.noise[name].share * rms(case.clean[name]), rel=1e-9)
+    if kind == "effect":
+        assert case.ratio_tuned >= 1.0
+
+
+def test_a_case_with_two_effects_has_both_at_different_sites():
+    case = draw_case(Order(kind="two", words=("quadratic_damping", "gain_error")), np.random.default_rng(4))
+    assert [one.effect for one in case.effects] == ["quadratic_damping", "gain_error"]
+    assert len({one.site for one in case.effects}) == 2
+    assert min(case.ratios) >= 2.8
+
+
+@pytest.mark.parametrize("colour", ["white", "pink", "low_pass", "resonant"])
+def test_noise_has_unit_size_and_its_colour(colour):
+    noise = SensorNoise(share=0.01, colour=colour, corner=0.1).samples(1 << 16, np.random.default_rng(0))
+    assert rms(noise) == pytest.approx(1.0)
+    power = np.abs(np.fft.rfft(noise)) ** 2
+    share = np.fft.rfftfreq(noise.size)
+
+    def level(low, high):
+        return float(np.mean(power[(share > low) & (share < high)]))
+
+    # Bands hold hundreds of lines: their mean power is known to a tenth.
+    low, middle, high = level(0.004, 0.02), level(0.09, 0.11), level(0.4, 0.5)
+    expected = {
+        "white": (1.0, 1.0), "pink": (0.09, 0.021), "low_pass": (0.5, 0.047), "resonant": (17.0, 0.085),
+    }[colour]  # fmt: skip
+    assert_allclose((middle / low, high / low), expected, rtol=0.3)
+
+
+def test_noise_differs_between_channels():
+    rng = np.random.default_rng(1)
+    drawn = [draw_noise(rng, coloured=True) for _ in range(200)]
+    assert min(one.share for one in drawn) >= 0.003
+    assert max(one.share for one in drawn) <= 0.03
+    assert {one.colour for one in drawn} == {"pink", "low_pass", "resonant"}
+    assert {draw_noise(rng, coloured=False).colour for _ in range(10)} == {"white"}

@@ -1,0 +1,160 @@
+"""Marks and figures on answers made up for the purpose."""
+
+import pytest
+
+from chladni.gap.blind.intervals import Share, calibration_error, reliability
+from chladni.gap.blind.marking import mark
+from chladni.gap.blind.score import scored
+from chladni.gap.blind.score_table import HEADER, confusion_rows, detection_rows, markdown, score_rows
+from chladni.signals.errors import SetupError
+
+
+def answered(kind, hidden, named, *, verdict="effect", p=0.9, ratio=10.0, closed=0.99, coloured=False, off=None,
+             naive=None):  # fmt: skip
+    """Mark of one case; `hidden` and `named` are ``word@site``, `named` with a group as ``word@site,other``."""
+    truth = {
+        "kind": kind, "ratio": ratio if hidden or off else None, "coloured": coloured,
+        "off": {off: 5.0} if off else {},
+        "effects": [dict(zip(("effect", "site"), one.split("@"), strict=True)) for one in hidden.split()],
+    }  # fmt: skip
+    causes = []
+    for one in named.split():
+        effect, sites = one.split("@")
+        causes.append({"effect": effect, "site": sites.split(",")[0], "group": sites.split(","), "probability": p})
+    result = {
+        "format": "chladni.gap/1",
+        "verdict": verdict,
+        "causes": causes,
+        "gap": {"closed": closed},
+        "ranking": [{"effect": "lag", "site": "m", "gap": 0.2}, {"effect": "delay", "site": "m", "gap": 0.1}],
+    }
+    if naive:
+        result["naive"] = dict(zip(("effect", "site"), naive.split("@"), strict=True))
+    return mark("x", truth, result)
+
+
+def test_first_place_counts():
+    marks = [
+        answered("effect", "delay@m", "delay@m"),
+        answered("effect", "delay@m", "lag@m delay@m"),
+        answered("effect", "delay@m", "saturation@other,m"),
+        answered("effect", "delay@m", "clipping@y"),
+        answered("effect", "delay@m", "", verdict="unknown"),
+        # Too faint to be asked for.
+        answered("effect", "delay@m", "", verdict="none", ratio=2.0),
+    ]
+    score = scored(marks)
+    assert (score["effect"]["right"], score["effect"]["count"]) == (1, 5)
+    assert score["family"]["right"] == 3
+    assert score["site"]["right"] == 3
+    assert score["effect_naive"]["right"] == 5
+    assert score["unknown_in_catalogue"]["right"] == 1
+    assert score["group_sizes"] == {"1": 3, "2": 1}
+    assert score["confusion"] == {"delay": {"clipping": 1, "delay": 1, "lag": 1, "saturation": 1, "unknown": 1}}
+    assert score["confusion_family"] == {"actuator": {"actuator": 3, "sensor": 1, "unknown": 1}}
+
+
+def test_the_naive_pick_may_be_told():
+    marks = [answered("effect", "delay@m", "delay@m", naive="lag@m")]
+    assert scored(marks)["effect_naive"]["right"] == 0
+
+
+def test_false_alarms_are_effects_named_where_there_are_none():
+    marks = [
+        answered("none", "", "", verdict="none"),
+        answered("none", "", "delay@m", coloured=True),
+        answered("none", "", "", verdict="unknown", coloured=True),
+        answered("parameters", "", "parameter@k", verdict="parameters", off="k"),
+        answered("parameters", "", "added_mass@b", off="k"),
+    ]
+    score = scored(marks)
+    assert (score["false_alarm"]["right"], score["false_alarm"]["count"]) == (2, 5)
+    assert (score["false_alarm_coloured"]["right"], score["false_alarm_coloured"]["count"]) == (1, 2)
+    assert score["false_unknown"]["right"] == 1
+    assert (score["parameter_named"]["right"], score["parameter_named"]["count"]) == (1, 2)
+
+
+def test_what_is_strange_is_unknown_or_a_sibling():
+    marks = [
+        answered("leave_out", "delay@m", "lag@m"),
+        answered("leave_out", "delay@m", "clipping@y"),
+        answered("leave_out", "delay@m", "", verdict="none"),
+        answered("outside", "viscoelastic@j", "", verdict="unknown"),
+        answered("outside", "viscoelastic@j", "hysteresis@j"),
+        answered("outside", "periodic_stiffness@j", "varying_stiffness@j"),
+    ]
+    score = scored(marks)
+    assert (score["left_out_recognised"]["right"], score["left_out_recognised"]["count"]) == (1, 3)
+    assert (score["outside_recognised"]["right"], score["outside_recognised"]["count"]) == (2, 3)
+
+
+def test_two_effects_are_found_in_any_order_at_their_sites():
+    marks = [
+        answered("two", "delay@m clipping@y", "clipping@y delay@m"),
+        answered("two", "delay@m clipping@y", "clipping@z delay@m"),
+        answered("two", "delay@m clipping@y", "lag@m"),
+    ]
+    two = scored(marks)["two"]
+    assert (two["both"]["right"], two["at_least_one"]["right"]) == (1, 2)
+
+
+def test_faint_effects_make_a_detection_curve():
+    marks = [
+        answered("faint", "delay@m", "", verdict="none", ratio=0.4),
+        answered("faint", "delay@m", "delay@m", ratio=1.2),
+        answered("faint", "delay@m", "lag@m", ratio=1.3, p=0.85),
+        answered("faint", "delay@m", "lag@m", ratio=2.9, p=0.5),
+    ]
+    faint = scored(marks)["faint"]
+    assert [one["noticed"]["right"] for one in faint["curve"]] == [0, 0, 2, 1]
+    assert [one["named"]["right"] for one in faint["curve"]] == [0, 0, 1, 0]
+    assert (faint["confidently_wrong"]["right"], faint["confidently_wrong"]["count"]) == (1, 4)
+
+
+def test_the_share_closed_is_that_of_the_true_law():
+    marks = [answered("effect", "delay@m", "delay@m", closed=one) for one in (0.5, 0.98, 1.0, None)]
+    closed = scored(marks)["closed"]
+    assert closed["median"] == pytest.approx(0.98)
+    # Linear between the order statistics 0.5 and 0.98, a fifth of the way.
+    assert closed["tenth_percentile"] == pytest.approx(0.5 + 0.2 * 0.48)
+    assert (closed["count"], closed["without"]) == (3, 1)
+
+
+def test_wilsons_interval_has_its_published_values():
+    # Newcombe, Statistics in Medicine 17 (1998), table I: 81 of 263 and 15 of 148.
+    for right, count, low, high in ((81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605)):
+        share = Share(right=right, count=count)
+        assert (share.low, share.high) == pytest.approx((low, high), abs=5e-5)
+    assert (Share(right=0, count=5).low, Share(right=5, count=5).high) == (0.0, 1.0)
+
+
+def test_calibration_error_is_the_weighted_distance():
+    table = reliability([0.9, 0.9, 0.9, 0.9, 0.3], [True, True, True, False, True])
+    assert calibration_error(table) == pytest.approx((4 * abs(0.9 - 0.75) + 0.7) / 5)
+    assert calibration_error([]) is None
+
+
+@pytest.mark.parametrize(
+    ("result", "told"),
+    [
+        ({"verdict": "perhaps"}, "verdict 'perhaps'"),
+        ({"verdict": "effect", "causes": [{"site": "m"}]}, "break the format"),
+        ({"verdict": "effect", "causes": [3]}, "break the format"),
+    ],
+)
+def test_an_answer_that_breaks_its_format_is_told(result, told):
+    with pytest.raises(SetupError, match=told):
+        mark("x", {"kind": "none", "effects": []}, {"format": "chladni.gap/1", **result})
+
+
+def test_tables_say_what_must_be_met():
+    marks = [answered("effect", "delay@m", "delay@m") for _ in range(9)] + [answered("effect", "delay@m", "lag@m")]
+    score = scored(marks)
+    rows = {row[0]: row for row in score_rows(score)}
+    assert all(len(row) == len(HEADER) for row in rows.values())
+    assert rows["right effect, first place"][1:] == ["90.0 % (9)", "59.6 to 98.2 %", "10", "at least 92%", "no"]
+    assert rows["right family"][5] == "yes"
+    assert rows["two effects: both named"][1] == "-"
+    header, confusion = confusion_rows(score["confusion"])
+    assert markdown(header, confusion).splitlines()[2] == "| delay | 9 | 1 |"
+    assert len(detection_rows(score)[1]) == 4
