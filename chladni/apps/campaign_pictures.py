@@ -50,6 +50,7 @@ def _calibration(told: Mapping[str, Any]) -> Figure | None:
 
 
 def _bin(one: Mapping[str, Any]) -> ReliabilityBin:
+    # Scores keep the share alone; of whole numbers the product is whole but for rounding.
     share = Share(right=round(one["right"] * one["count"]), count=one["count"])
     return ReliabilityBin(
         low=one["low"],

@@ -79,8 +79,10 @@ def diagnose_gap(
     >>> found.verdict, found.causes[0].effect, found.causes[0].site  # doctest: +SKIP
     ('effect', 'coulomb_friction', 'elbow')
     """
+    # Here, because it compiles what it simulates with, which a look at the façade shouldn't pay for.
     from chladni.gap.diagnosis.diagnose import diagnose
 
+    # Before anything is read: a misspelt word would leave nothing out, in silence.
     left_out = known_effects(leave_out, own_effects)
     chosen = load_model(model) if isinstance(model, Path | str) else model
     read = list(_measured(chosen, _several(logs), Span(start_s=start_s, end_s=end_s)))
@@ -92,6 +94,7 @@ def diagnose_gap(
         seed=seed,
         progress=progress,
     )
+    # What limits the logs comes first, it limits everything after; several logs may say the same.
     remarks = [remark for one in read for remark in one.remarks]
     return replace(found, remarks=tuple(dict.fromkeys([*remarks, *found.remarks])))
 
@@ -139,6 +142,7 @@ def _measured(model: Model, logs: Sequence[Recording], span: Span) -> Iterator[_
 
 
 def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
+    # Only those: a log may hold a hundred other channels, at rates of their own.
     held = [channel.name for channel in log.channels]
     wanted = _listened_to(model)
     chosen = [channel for channel in held if channel in wanted]

@@ -31,6 +31,7 @@ def explained_model(model: Model, found: Diagnosis, *, own_effects: Sequence[Eff
     values = {cause.site: _only_value(cause) for cause in found.causes if _is_value(cause)}
     values |= {name: number.value for name, number in found.tuned_parameters.items()}
     own = {kind.name: kind for kind in own_effects}
+    # An effect of one's own is known by its record alone: no catalogue holds its word.
     added: list[Effect] = [
         attached(
             own.get(cause.effect, cause.effect),

@@ -65,10 +65,12 @@ def compare_with_simulated(
         missing.
     """
     span, logs = Span(start_s=start_s, end_s=end_s), (measured, simulated)
+    # One list for both, so that rows are the same channels.
     names = _shared(measured, simulated)
     first, second = (_read(log, names, span) for log in logs)
     inputs = _played_back(first, second)
     outputs = [name for name in names if name not in inputs]
+    # Somebody compared a log with itself, or with a copy that holds inputs alone.
     if not outputs:
         raise LogError(f"{simulated.path.name}: every channel that it shares with {measured.path.name} is the same")
     ours, theirs = (

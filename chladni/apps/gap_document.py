@@ -75,6 +75,7 @@ def where_document(where: Where) -> Document:
 
 def closing_document(gap: Closing) -> Document:
     """Give how far the gap closes; ``by`` and ``horizon_s`` only when it wasn't by free run."""
+    # A free run is what everyone expects; the key warns of anything else.
     document: Document = {
         "before": _known(gap.before),
         "tuned": _known(gap.tuned),

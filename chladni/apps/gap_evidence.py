@@ -32,7 +32,14 @@ def _spectra(signals: GapSignals) -> GapSpectra | None:
     channels = tuple(
         Channel(name=f"{what} {row}", unit=unit) for what in NAMES for row, unit in enumerate(signals.output_units)
     )
-    series = TimeSeries(values=stacked, sample_rate_hz=signals.sample_rate_hz, channels=channels)
+    # A model that diverges leaves samples that are no numbers; segments that hold some are left out.
+    finite = np.isfinite(stacked)
+    series = TimeSeries(
+        values=stacked,
+        sample_rate_hz=signals.sample_rate_hz,
+        channels=channels,
+        valid=None if finite.all() else finite,
+    )
     try:
         density = psd(series, window="hann")
     except EstimateError:
@@ -51,10 +58,11 @@ def _spectra(signals: GapSignals) -> GapSpectra | None:
 def _telling_stretch(signals: GapSignals, spectra: GapSpectra | None) -> tuple[float, float]:
     """Where the error that was found to have a cause is largest, all outputs by their own RMS."""
     rms = np.sqrt(np.mean(signals.measured**2, axis=1, keepdims=True))
-    errors = (signals.measured - signals.before) / np.where(rms > 0, rms, 1.0)
+    errors = np.nan_to_num((signals.measured - signals.before) / np.where(rms > 0, rms, 1.0), posinf=0.0, neginf=0.0)
     samples = errors.shape[1]
     wanted = samples if spectra is None else round(CYCLES / _typical_hz(spectra) * signals.sample_rate_hz)
     length = min(max(wanted, FEWEST_SAMPLES), samples)
+    # Sums over every stretch of that length at once, as differences of the running sum.
     total = np.concatenate([[0.0], np.cumsum(np.sum(errors**2, axis=0))])
     first = int(np.argmax(total[length:] - total[:-length]))
     return first / signals.sample_rate_hz, (first + length) / signals.sample_rate_hz

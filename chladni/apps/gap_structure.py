@@ -32,6 +32,7 @@ def structure_sketch(model: Model, where: Where) -> StructureSketch | None:
     places = _body_places(structure)
     size = float(np.linalg.norm(np.ptp(np.array(list(places.values())), axis=0))) or 1.0
     joints = {joint.name: _ends(joint, places, size) for joint in structure.joints}
+    # Names of inputs and outputs are unique over both.
     at = {one.name: one.at for one in model.inputs} | {one.name: one.at for one in model.outputs}
     signals = _signal_places(at, places, joints, size)
     shares = {one.name: one.share for one in where.sites}

@@ -139,6 +139,7 @@ def _require_one_log(files: "Sequence[Path]", wanted: _Wanted, without: "Sequenc
 
     if len(files) != 1:
         raise SetupError(f"--simulated takes one measured log, {len(files)} files are given; no model belongs there")
+    # Rather refused than ignored: a picture that was asked for and never comes is looked for.
     given = [*wanted.named(), *(["--without"] if without else [])]
     if given:
         raise SetupError(f"{', '.join(given)}: takes a model; --simulated only tells where two logs disagree")
@@ -214,6 +215,7 @@ def _draw_album(out: Output, evidence: "GapEvidence", *, report: Path | None, fi
         return
     from chladni.viewers.figures.gap import gap_album
 
+    # Drawn once for both.
     album = gap_album(evidence)
     if figures is not None:
         from chladni.viewers.figures.saving import save_album

@@ -65,6 +65,7 @@ def _print_where(out: Output, where: "Where") -> None:
 
 def _print(out: Output, title: str, table: "Table") -> None:
     headings, rows = table
+    # A heading over nothing asks what is missing.
     if not rows:
         return
     out.table(title, headings, rows[:MOST_ROWS])

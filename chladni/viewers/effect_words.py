@@ -82,6 +82,7 @@ def cause_phrase(cause: Cause) -> str:
         return said
     if len(telling) == 1:
         (number,) = telling.values()
+        # A bare number says nothing without its name: "a gain error of 0.92" could be a loss of 8 or of 92 %.
         if number.unit != "1":
             head = effect_name(cause.effect)
             return f"{head} of {_printed(number)}{said.removeprefix(head)}"
@@ -92,6 +93,7 @@ def cause_phrase(cause: Cause) -> str:
 def cause_law(cause: Cause) -> str:
     """Give the law of a cause in one line, with its variant's name; the effect's meaning where there's no law."""
     kind = CATALOGUE.get(cause.effect)
+    # Of effects that aren't ours the record isn't here; their word must do.
     if kind is None:
         return ""
     form = kind.variant(cause.variant)
@@ -105,6 +107,7 @@ def _telling(cause: Cause) -> Mapping[str, FittedNumber]:
     if cause.effect == PARAMETER:
         return {}
     kind = CATALOGUE.get(cause.effect)
+    # What may be left out (an asymmetry, the width over which a sign is made smooth) isn't its size.
     needed = cause.parameters if kind is None else kind.required
     return {name: cause.parameters[name] for name in needed if name in cause.parameters}
 

@@ -15,6 +15,8 @@ PLAIN_FROM, PLAIN_TO = 0.1, 1e4
 _FIRST = re.compile(r"(m|s|N|Hz|V|A|Pa|rad|W|J)(?![A-Za-z^])")
 SURE = 0.99
 NOTHING = 5e-8
+# Such as the error of a model that diverges.
+UNKNOWN = "not known"
 
 
 def engineering(value: float, std: float | None, unit: str) -> str:
@@ -61,6 +63,8 @@ def percent(share: float) -> str:
     >>> percent(0.4123), percent(0.00998), percent(0.00123), percent(0.9953), percent(0.0)
     ('41 %', '1.0 %', '0.12 %', '99.5 %', '0 %')
     """
+    if not isfinite(share):
+        return UNKNOWN
     if abs(share) < NOTHING:
         return "0 %"
     value = 100 * share
@@ -90,6 +94,7 @@ def _prefix(value: float, unit: str) -> tuple[float, str]:
     size = abs(value)
     if not _FIRST.match(unit) or not isfinite(size) or size == 0 or PLAIN_FROM <= size < PLAIN_TO:
         return 1.0, ""
+    # In steps of thousands, so that one to three digits stand before the point.
     power = min(max(3 * floor(log10(size) / 3 + 1e-9), min(_PREFIXES)), max(_PREFIXES))
     return (10.0**power, _PREFIXES[power]) if power else (1.0, "")
 

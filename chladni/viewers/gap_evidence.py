@@ -39,6 +39,7 @@ class GapSpectra(Value):
     noise: Matrix
 
     def __post_init__(self) -> None:
+        # Outputs in another order would be drawn against the wrong noise.
         shape = (self.noise.size, self.frequency_hz.size)
         for name in ("measured", "before", "after"):
             require_shape(name, getattr(self, name), shape, "outputs and lines")

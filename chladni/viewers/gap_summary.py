@@ -33,6 +33,7 @@ def headline(diagnosis: Diagnosis) -> str:
 def naive_sentence(found: Diagnosis) -> str | None:
     """Say what the largest drop of the error alone would have named, where that is something else."""
     naive = found.naive
+    # Where it agrees there is nothing to warn of.
     if naive is None or (naive.effect, naive.site) in {(cause.effect, cause.site) for cause in found.causes}:
         return None
     return f"The largest drop of the error alone would have named {effect_at(naive.effect, naive.site)}."
@@ -49,6 +50,7 @@ def _sentences(found: Diagnosis) -> Iterator[str]:
             yield from _moved(found)
         case "unknown":
             yield from _unknown(found)
+    # Where nothing was named, nothing closes.
     if found.verdict in ("effect", "parameters"):
         yield from _closed(found.gap)
     yield from _how(found.gap)
@@ -62,6 +64,7 @@ def _effects(found: Diagnosis) -> Iterator[str]:
         (cause,) = causes
         yield f"{_certainty(cause)} {cause_phrase(cause)} ({chance(cause.probability)})."
     else:
+        # Two names are as sure as the less sure one.
         least = min(causes, key=lambda cause: cause.probability)
         told = _listed([f"{cause_phrase(cause)} ({chance(cause.probability)})" for cause in causes])
         yield f"{_certainty(least)} {_COUNT.get(len(causes), 'several')} causes at once: {told}."
@@ -84,6 +87,7 @@ def _certainty(cause: Cause) -> str:
 def _closing(found: Diagnosis) -> str:
     gap, shares = found.gap, [cause.share for cause in found.causes if cause.share is not None]
     subject = "It explains" if len(found.causes) == 1 else "Together they explain"
+    # Shares of causes that explain some of the gap twice may add up to more than all of it.
     explained = f"{subject} {percent(min(sum(shares), 1.0))} of the gap; " if shares else ""
     adding = "adding it brings" if len(found.causes) == 1 else "adding them brings"
     brings = f"{adding} the error from {percent(gap.before)} to {percent(gap.after)}"
@@ -113,6 +117,7 @@ def _parameters(found: Diagnosis) -> Iterator[str]:
 
 
 def _wrong_value(cause: Cause, found: Diagnosis) -> str:
+    # The tuned value knows its nominal one, the cause's own may not.
     number = found.tuned_parameters.get(cause.site) or next(iter(cause.parameters.values()), None)
     if number is None:
         return f"{cause.site} has another value ({chance(cause.probability)})"

@@ -8,6 +8,7 @@ from chladni.viewers.engineering import chance, engineering, percent
 
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 
+# As many as one reads; the document holds all.
 RANKED = 5
 # A parameter that moved by less than its own sigma, and by less than this, didn't move.
 MOVED = 1e-3
@@ -96,6 +97,7 @@ def _has_moved(number: FittedNumber) -> bool:
     if number.nominal is None:
         return True
     change = abs(number.value - number.nominal)
+    # A sigma of nearly zero, or one as wide as the value, must not decide alone.
     return change > min(MOVED * abs(number.nominal), number.std or 0.0)
 
 

@@ -66,3 +66,14 @@ def test_no_gap_and_no_signals_are_fine() -> None:
     assert silent.telling_s is not None
     bare = gap_evidence(replace(made.diagnosis(), signals=None))
     assert (bare.spectra, bare.telling_s) == (None, None)
+
+
+def test_a_model_that_diverges_is_drawn_as_far_as_it_goes() -> None:
+    measured = np.sin(2 * np.pi * 10 * T)
+    before = np.where(T > 15, np.nan, 0.9 * measured)
+    before[2500] = np.inf
+    evidence = gap_evidence(found_with(measured, before, measured))
+    assert evidence.spectra is not None
+    assert np.isfinite(evidence.spectra.before).all()
+    assert evidence.telling_s is not None
+    assert evidence.telling_s[0] < 15

@@ -12,8 +12,10 @@ from chladni.viewers.figures.sheet import look, sheet
 from chladni.viewers.gap_evidence import GapEvidence
 
 PIXELS = 1500
+# Less than a spectrum's usual 80 dB: what lies further below the worst of the gap doesn't matter to anyone.
 DYNAMIC_RANGE_DB = 50.0
 HEIGHT_IN = 1.6
+# The band that is shown holds this share of the gap; above it there is some room to see that nothing comes.
 HELD, ROOM = 0.99, 1.2
 
 
@@ -29,6 +31,7 @@ def gap_map_figures(evidence: GapEvidence) -> dict[str, Figure]:
 def _figure(signals: GapSignals) -> Figure:
     figure, stack = sheet([HEIGHT_IN] * 2, sharex=True, sharey=True)
     levels = [decibels_of_power(_shortened(one)) for one in (signals.gap_map, signals.gap_map_after)]
+    # One scale, so that the colours of both can be compared.
     known = np.concatenate([level[np.isfinite(level)] for level in levels])
     high = float(known.max()) if known.size else 0.0
     image = None
@@ -63,6 +66,7 @@ def _shortened(density: Floats) -> Floats:
 
 def _draw(axes: Axes, signals: GapSignals, level: Floats, high: float) -> AxesImage:
     times, lines = signals.map_time_s, signals.map_frequency_hz
+    # Pixels reach half a step to both sides of the slice and line that they show.
     hop, step = _half_step(times), _half_step(lines)
     axes.grid(visible=False)
     return axes.imshow(

@@ -13,6 +13,7 @@ from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, GapEvidence
 Bar = tuple[str, float]
 
 BAR_HEIGHT_IN = 0.19
+# More bars than this don't tell where to look first.
 BARS = 10
 NAMED, OTHERS = paint(AFTER_ON_LIGHT), "#b9c4cf"
 
@@ -49,6 +50,7 @@ def draw_shares(axes: Axes, bars: Sequence[Bar], *, named: set[str]) -> None:
         axes.text(100 * share, place, f" {percent(share)}", va="center", fontsize=6.5)
     axes.set_yticks(places, [plain(name) for name, _ in bars], fontsize=7)
     axes.set_ylim(len(bars) - 0.4, -0.6)
+    # Room for the number behind a full bar.
     axes.set_xlim(0, 112)
     axes.grid(visible=False, axis="y")
 
@@ -58,6 +60,7 @@ def _parts(found: Diagnosis) -> list[tuple[str, Sequence[Bar]]]:
     regimes = sorted(found.where.regimes, key=lambda one: -one.share)[:BARS]
     return [
         ("What one site alone can explain", site_bars(found)),
+        # In the order of frequency, unless there are too many to show all.
         ("In which band it lies", bands if len(bands) <= BARS else sorted(bands, key=lambda bar: -bar[1])[:BARS]),
         (
             "While which variable is where",

@@ -57,6 +57,7 @@ def save_gap_sheet(evidence: GapEvidence, path: Path) -> Path:
 def _parts(evidence: GapEvidence) -> list[Part]:
     found = evidence.found
     surface, bars = found.restoring_force, site_bars(found)
+    # Heights in inches; what isn't there takes none.
     parts: list[Part] = []
     if found.signals is not None:
         parts += [(1.4, lambda figure, place: _zoom(figure, place, evidence))]
@@ -84,6 +85,7 @@ def _zoom(figure: Figure, place: SubplotSpec, evidence: GapEvidence) -> None:
         return
     axes, row = figure.add_subplot(place), _worst(evidence.found)
     draw_zoom(axes, signals, row, telling_s)
+    # On the other side of the legend.
     axes.set_title(plain(signals.output_names[row]), loc="right", pad=2)
     axes.set_xlabel("Time [s]")
     _legend(axes)

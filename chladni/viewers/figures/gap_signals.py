@@ -14,6 +14,7 @@ from chladni.viewers.figures.sheet import look, paint, plain, sheet
 from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, BEFORE_ON_LIGHT, MEASURED_ON_LIGHT, GapEvidence
 from chladni.viewers.labels import printed_unit
 
+# Two a pixel at 300 dots an inch: what is left out can't be seen.
 POINTS = 3000
 OUTPUTS_A_FIGURE = 4
 HEIGHT_IN = 1.15
@@ -66,6 +67,7 @@ def draw_zoom(axes: Axes, signals: GapSignals, row: int, span_s: tuple[float, fl
     first, last = (round(end * signals.sample_rate_hz) for end in span_s)
     time_s = np.arange(first, last) / signals.sample_rate_hz
     for values, colour, width, label in (
+        # Wide and behind, so that a simulation that follows it doesn't hide it.
         (signals.measured, MEASURED, 2.4, "measured"),
         (signals.before, BEFORE, 0.9, "simulated before"),
         (signals.after, AFTER, 0.9, "after"),

@@ -41,6 +41,7 @@ def draw_spectrum(axes: Axes, signals: GapSignals, spectra: GapSpectra, row: int
     noise = float(np.sqrt(spectra.noise[row]))
     axes.axhline(noise, color="black", linewidth=0.8, linestyle=(0, (4, 2)), label="noise, if white")
     high = max(float(values.max()) for values, *_ in lines)
+    # A channel that is zero has no place on a logarithmic axis.
     if high > 0:
         logarithmic(axes, max(BELOW_NOISE * noise, high / 10**DECADES), 2 * high)
     axes.set_xlim(0, float(spectra.frequency_hz[-1]))

@@ -42,6 +42,7 @@ def draw_surfaces(figure: Figure, over_displacement: Axes, over_velocity: Axes, 
     """Draw the force twice, on axes that share the force."""
     _draw(figure, over_displacement, surface, "displacement")
     _draw(figure, over_velocity, surface, "velocity")
+    # The axis is the neighbour's; its numbers stand there.
     over_velocity.set_ylabel("")
     over_velocity.tick_params(labelleft=False)
     if surface.law_force is not None:

@@ -23,6 +23,7 @@ _CAPTIONS = {
     "force": "Force that the model lacks, recovered without assuming a law; black: the law that was named.",
     "shares": "In colour: the site that was named.",
 }
+# More than in a terminal: the page can be scrolled.
 RANKED = 12
 
 
@@ -102,6 +103,7 @@ def _answer(found: Diagnosis) -> str:
 
 
 def _causes(found: Diagnosis) -> str:
+    # Effects of somebody's own have no law here.
     laws = [law for law in map(cause_law, found.causes) if law]
     return _tables((tables.cause_table(found), (3,))) + _list(laws)
 

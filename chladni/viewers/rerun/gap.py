@@ -16,6 +16,7 @@ from chladni.viewers.rerun.gap_text import draw_answer
 from chladni.viewers.rerun.restoring_force import draw_force_over_time, draw_surfaces
 from chladni.viewers.structure_sketch import StructureSketch
 
+# More plots than this above one another are too flat to read; all of them go behind tabs.
 STACKED = 3
 
 
@@ -45,6 +46,7 @@ def write_gap_rrd(
     """
     target = Path(path)
     recording = new_recording()
+    # Not rerun's own file sink: on a full disk it only logs the loss, and a later flush waits for ever.
     stream = rr.binary_stream(recording)
     with atomic_write(target) as file:
         draw_gap(recording, evidence, sketch)

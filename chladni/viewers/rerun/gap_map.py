@@ -31,6 +31,7 @@ def _level(density: Floats) -> Floats:
 
 def _draw(recording: rr.RecordingStream, signals: GapSignals, what: str, level: Floats, high: float) -> rrb.View:
     path, low = folder("gap map", what), high - DYNAMIC_RANGE_DB
+    # Tensors have no colour for what isn't known; the lowest marks it.
     picture = np.where(np.isnan(level), low, level).astype(np.float32)
     names = (f"time {_span(signals.map_time_s)} s", f"frequency {_span(signals.map_frequency_hz)} Hz")
     recording.log(path, rr.Tensor(picture, dim_names=names, value_range=(low, high)), static=True)

@@ -28,6 +28,7 @@ def draw_structure(recording: rr.RecordingStream, sketch: StructureSketch) -> rr
         dots = rr.Points3D(places, labels=_labels(names, share), colors=_colours(share), radii=radius * size,
                            show_labels=True)  # fmt: skip
         recording.log(f"{PATH}/{name}", dots, static=True)
+    # Joints are where most effects sit: lines thick enough to carry their colour.
     joints = rr.LineStrips3D(
         list(sketch.joints),
         labels=_labels(sketch.joint_names, sketch.joint_share),

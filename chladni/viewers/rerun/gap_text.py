@@ -21,6 +21,7 @@ def draw_answer(recording: rr.RecordingStream, found: Diagnosis) -> rrb.View:
 
 
 def _page(found: Diagnosis) -> Iterator[str]:
+    # Every text is made inert: names and remarks come from files.
     first, *rest = summary(found)
     yield f"# {escaped(found.model)}\n"
     yield f"**{escaped(first)}**\n"

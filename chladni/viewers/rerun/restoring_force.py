@@ -30,6 +30,7 @@ WIDTH, HEIGHT, MARGIN = 800.0, 560.0, 0.05
 # For the force's name over its axis.
 ABOVE = 100.0
 LAW_COLOUR = (255, 255, 255)
+# Two lines of this many rows weigh a few tens of megabytes in the viewer.
 ROWS = 500_000
 
 
@@ -63,6 +64,7 @@ def _dots(
 
 
 def _padded(x: Floats) -> tuple[float, float]:
+    # Dots on the frame would be cut in half.
     low, high = float(x.min()), float(x.max())
     room = MARGIN * (high - low) or 1.0
     return low - room, high + room
