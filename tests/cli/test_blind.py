@@ -1,0 +1,78 @@
+from pathlib import Path
+
+import pytest
+
+from chladni.apps import blind
+from chladni.gap.blind.seal import seal_case
+from chladni.signals.errors import EstimateError, SetupError
+from tests.cli.conftest import Run
+
+
+@pytest.fixture
+def campaign(tmp_path: Path) -> Path:
+    """Two cases whose models nobody can read."""
+    for name in ("case-0001", "case-0002"):
+        folder = tmp_path / "cases" / name
+        folder.mkdir(parents=True)
+        (folder / "model.toml").write_text("")
+        (folder / "log.mcap").write_bytes(b"")
+        hidden = {"effect": "delay", "site": "motor"}
+        seal_case(tmp_path, name, {"kind": "effect", "effects": [hidden], "ratio": 4.0})
+    return tmp_path
+
+
+def diagnosis(model: Path, _logs: object, *, leave_out: frozenset[str], seed: int) -> dict[str, object]:
+    """Right once, no answer once."""
+    if model.parent.name == "case-0002":
+        raise EstimateError("too short")
+    cause = {"effect": "delay", "site": "motor", "probability": 0.9, "group": ["motor", "piston"]}
+    return {"format": "chladni.gap/1", "verdict": "effect", "causes": [cause], "ranking": [], "gap": {"closed": 1.0}}
+
+
+def test_run_and_score(run: Run, campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(blind, "diagnosis_json", diagnosis)
+    done = run("blind", "run", campaign, "--jobs", 1, "--json", "-")
+    assert done.code == 0
+    assert done.document == {"format": "chladni.blind-run/1", "done": 2, "there": 0, "failed": ["case-0002"]}
+    assert "no answer for case-0002" in done.err
+    score = run("blind", "score", campaign, "--json", "-")
+    assert score.code == 0
+    assert score.document["effect"]["right"] == 1
+    assert score.document["group_sizes"] == {"2": 1}
+    assert "right effect, first place" in score.err
+    assert "no" in score.err
+
+
+def test_a_broken_seal_is_one_line(run: Run, campaign: Path) -> None:
+    path = campaign / "truth" / "case-0001.json"
+    path.write_text(path.read_text().replace("delay", "lag"))
+    done = run("blind", "score", campaign)
+    assert done.code == 2
+    assert "doesn't fit the seal of case-0001" in done.err
+    assert done.err.count("\n") == 1
+
+
+def test_nothing_to_run_is_one_line(run: Run, tmp_path: Path) -> None:
+    done = run("blind", "run", tmp_path)
+    assert done.code == 2
+    assert done.err.strip().endswith(f"holds no case; make some with chladni blind make {tmp_path}")
+
+
+def test_make_writes_cases_and_truths(run: Run, tmp_path: Path) -> None:
+    done = run("blind", "make", tmp_path, "--count", 1, "--seed", 2, "--jobs", 1, "--json", "-")
+    assert done.code == 0
+    assert done.document["made"] == 1
+    assert sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()) == [
+        "cases/case-0001/case.json", "cases/case-0001/log.mcap", "cases/case-0001/model.toml", "truth/case-0001.json",
+    ]  # fmt: skip
+    assert run("blind", "make", tmp_path, "--count", 1, "--seed", 2, "--jobs", 1).code == 0
+
+
+def test_jobs_below_one_are_refused() -> None:
+    with pytest.raises(SetupError, match="jobs 0"), blind.workers(0):
+        pass
+
+
+def test_one_job_is_this_process() -> None:
+    with blind.workers(1) as executor:
+        assert executor is None
