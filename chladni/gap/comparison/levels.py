@@ -8,6 +8,7 @@ import numpy as np
 from chladni.gap.comparison.distortion import distortion_of
 from chladni.gap.comparison.linear_approximation import best_linear_approximation, moving_inputs
 from chladni.gap.comparison.local_rational import local_fit
+from chladni.gap.comparison.outside_band import ProductsOutside, products_outside
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
@@ -38,12 +39,15 @@ class LevelResponse:
         From every input that moves to every output.
     nonlinear
         By output: RMS of what no linear system gives (noise aside where the input is periodic) over RMS of it.
+    outside
+        What the distortion above a wholly excited band follows; None where there is no such band.
     """
 
     log: str
     level: float
     response: FrequencyResponse
     nonlinear: tuple[float, ...]
+    outside: ProductsOutside | None = None
 
 
 def level_responses(measurements: Sequence[Measurement]) -> tuple[LevelResponse, ...]:
@@ -59,6 +63,7 @@ def level_responses(measurements: Sequence[Measurement]) -> tuple[LevelResponse,
             level=_level(one, name),
             response=best_linear_approximation(one),
             nonlinear=_nonlinear(one),
+            outside=products_outside(one),
         )
         for one in moving
         if name in moving_inputs(one)
@@ -91,7 +96,16 @@ def compare_levels(measurements: Sequence[Measurement]) -> tuple[str, ...]:
         return (f"the levels differ by less than {LEAST_RATIO - 1:.0%}: they tell nothing about nonlinearity",)
     outputs = [channel.name for channel in levels[0].response.responses]
     told = [_of_output(output, levels) for output in outputs if _everywhere(output, levels)]
-    return tuple(sentence for sentences in told for sentence in sentences)
+    return (*(sentence for sentences in told for sentence in sentences), *_parity(levels))
+
+
+def _parity(levels: Sequence[LevelResponse]) -> list[str]:
+    """Sentences on distortion above the band at the lowest and the highest level."""
+    return [
+        f"at {one.level:.3g} RMS {one.outside.sentence()}"
+        for one in (levels[0], levels[-1])
+        if one.outside is not None
+    ]
 
 
 def _everywhere(output: str, levels: Sequence[LevelResponse]) -> bool:

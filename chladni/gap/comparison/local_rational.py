@@ -55,7 +55,7 @@ def local_fit(inputs: Matrix, outputs: Matrix) -> ResidualSpectra | None:
     y = spectra_out.reshape(-1, blocks, lines).transpose(1, 2, 0)
     r = np.linspace(-1, 1, lines)
     signals = np.concatenate([u, np.ones((*u.shape[:2], 1))], axis=2)
-    plain = _beside(_regressors(signals, r), y)
+    plain = unreached(_regressors(signals, r), y)
     shaped = np.stack([output_error(signals, y[:, :, place], r) for place in range(len(outputs))], axis=2)
     free = lines - unknowns
     # Where little but noise answers, poles are fitted to noise. All outputs go together, so that what they share
@@ -85,9 +85,9 @@ def output_error(signals: Complex, y: Complex, r: Matrix) -> Complex:
     """
     regressors, target = _regressors(signals, r), y[:, :, None]
     shifted = target * _powers(r, 1, 1 + POLES)
-    d = _solved(_beside(regressors, shifted), _beside(regressors, target))
+    d = _solved(unreached(regressors, shifted), unreached(regressors, target))
     denominator = 1 - _powers(r, 1, 1 + POLES) @ d
-    return np.asarray(_beside(regressors / denominator, target)[:, :, 0])
+    return np.asarray(unreached(regressors / denominator, target)[:, :, 0])
 
 
 def _regressors(signals: Complex, r: Matrix) -> Complex:
@@ -101,8 +101,8 @@ def _powers(r: Matrix, first: int, end: int) -> Complex:
     return np.asarray(r[..., None] ** np.arange(first, end), dtype=np.complex128)
 
 
-def _beside(regressors: Complex, targets: Complex) -> Complex:
-    """Part of the targets ``[block, line, target]`` that the regressors don't reach."""
+def unreached(regressors: Complex, targets: Complex) -> Complex:
+    """Give the part of targets ``[block, line, target]`` that regressors ``[block, line, term]`` don't reach."""
     q, _ = np.linalg.qr(regressors)
     return np.asarray(targets - q @ (q.conj().transpose(0, 2, 1) @ targets))
 

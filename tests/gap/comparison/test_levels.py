@@ -94,6 +94,10 @@ def test_measured_aircraft_softens_and_damps_with_level(shared_data: Path) -> No
     for part in ("7.324 to 7.227 Hz", "gives way", "0.258 to 0.0749", "damping grows", "12.4 to 97.8"):
         assert part in payload
     assert "no linear system" in grows
+    # The connection rattles at high level: odd, with an even part, between wing and payload.
+    assert told[-1].startswith("at 97.8 RMS")
+    assert "between wing_rail and payload_rail" in told[-1]
+    assert "(odd and even told" in told[-1]
 
 
 @pytest.mark.parametrize("share", [0.0, 1e-3])

@@ -1,0 +1,155 @@
+"""Even or odd, and of which motion: what a nonlinearity puts beside the band that is excited."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from chladni.gap.comparison.linear_approximation import moving_inputs, period_spectra
+from chladni.gap.comparison.local_rational import unreached
+from chladni.gap.comparison.periodicity import periods_of
+from chladni.gap.records.measurement import Measurement
+from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
+
+Matrix = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
+
+# Sums of three excited frequencies reach three times as far as the band.
+FARTHEST = 3.0
+# What the basis answers with is taken for smooth over so many lines: a straight line over them.
+LINES = 60
+TERMS = 2
+FEWEST_BLOCKS = 4
+# Blocks whose power isn't so many times that of the noise tell about the noise.
+LEAST_RATIO = 4.0
+# Dead zones of the basis, over the RMS of the motion.
+ZONES = (1.0, 2.0)
+# Shares below this come about by chance: three sigma for fifteen blocks of three outputs.
+LEAST_SHARE = 0.03
+INTEGRATIONS = {"m/s^2": 2, "rad/s^2": 2, "m/s": 1, "rad/s": 1}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProductsOutside:
+    """What explains the power above the excited band best.
+
+    Attributes
+    ----------
+    motion
+        Names of one output, or of two between which the motion is.
+    even, odd
+        Shares of that power, over all outputs, that even functions of the motion explain beyond odd ones, and odd
+        ones beyond even ones. In a finite record each imitates the other a little.
+    both
+        Share that they explain together.
+    """
+
+    motion: tuple[str, ...]
+    even: float
+    odd: float
+    both: float
+
+    def sentence(self) -> str:
+        """Say it."""
+        where = f"between {self.motion[0]} and {self.motion[1]}" if len(self.motion) > 1 else f"of {self.motion[0]}"
+        kinds = [kind for kind, share in (("odd", self.odd), ("even", self.even)) if share >= LEAST_SHARE]
+        return (
+            f"{max(self.both, 0.0):.0%} of the distortion above the excited band follows the motion {where}: "
+            f"{max(self.odd, 0.0):.0%} only by odd functions of it, {max(self.even, 0.0):.0%} only by even ones "
+            f"({' and '.join(kinds) or 'neither'} told from chance)"
+        )
+
+
+def products_outside(measurement: Measurement) -> ProductsOutside | None:
+    """Tell even from odd distortion where all lines of a band are excited.
+
+    Above the band a linear machine is still; all power there was made by a nonlinearity. To a force f(d) of a
+    motion d the outputs answer linearly, Y(k) = H(k) F(k) with a smooth H. Of every output and every difference of
+    two the displacement d is taken as measured on the excited lines. Even functions of it (abs(d), d^2, abs(d)
+    beyond a dead zone) and odd ones (the same with the sign of d, d^3, the sign of the velocity) are fitted to Y,
+    each with an H that is straight over 60 lines, and the motion that explains most is given.
+
+    Returns
+    -------
+    ProductsOutside or None
+        None without a period or with several inputs, where the band leaves no room below half the sample rate, or
+        where noise is all there is.
+    """
+    names = moving_inputs(measurement)
+    spectra = period_spectra(measurement)
+    if spectra is None or len(names) != 1:
+        return None
+    power = spectra.density[spectra.index(names[0]), spectra.index(names[0])].real
+    excited = excited_lines(spectra, names)[0] & (power > DYNAMIC_RANGE * power.max())
+    index = _blocks(excited)
+    if index is None:
+        return None
+    period = int(measurement.period_samples or 1)
+    periods = fft.rfft(periods_of(measurement.outputs, period)[:, measurement.transient_periods :], axis=2)
+    mean = periods.mean(axis=1)
+    noise = np.mean(np.abs(periods - mean[:, None]) ** 2, axis=1) / (periods.shape[1] - 1)
+    loud = (np.abs(mean[:, index]) ** 2).mean(axis=2) > LEAST_RATIO * noise[:, index].mean(axis=2)
+    if np.sum(np.all(loud, axis=0)) < FEWEST_BLOCKS:
+        return None
+    index = index[np.all(loud, axis=0)]
+    motions = _motions(measurement, mean, excited, period)
+    found = [_explained(name, motion, mean, index) for name, motion in motions]
+    return max(found, key=lambda one: one.both, default=None)
+
+
+def _blocks(excited: Mask) -> NDArray[np.intp] | None:
+    """``[block, line]`` indices of the lines above the band; None where there are few."""
+    highest = int(np.flatnonzero(excited)[-1]) if np.any(excited) else 0
+    first = highest + 1
+    last = min(excited.size - 1, int(FARTHEST * highest))
+    count = (last - first) // LINES
+    if highest == 0 or count < FEWEST_BLOCKS:
+        return None
+    return (first + np.arange(count * LINES)).reshape(count, LINES)
+
+
+def _motions(
+    measurement: Measurement, mean: Complex, excited: Mask, period: int
+) -> Iterator[tuple[tuple[str, ...], tuple[Matrix, Matrix]]]:
+    """Displacement and velocity ``[sample]`` of outputs and of differences of two, of unit RMS."""
+    omega = 2 * np.pi * np.arange(excited.size)
+    names, units = measurement.output_names, measurement.output_units
+    inside = np.where(excited, mean, 0.0)
+    candidates: list[tuple[tuple[str, ...], Complex, str]]
+    candidates = [((name,), row, unit) for name, row, unit in zip(names, inside, units, strict=True)]
+    for one, other in combinations(range(len(names)), 2):
+        if units[one] == units[other]:
+            candidates.append(((names[one], names[other]), inside[other] - inside[one], units[one]))
+    for name, row, unit in candidates:
+        order = INTEGRATIONS.get(unit, 0)
+        spectrum = np.divide(row, (1j * omega) ** order, out=np.zeros_like(row), where=excited)
+        displacement, velocity = (fft.irfft(one, period) for one in (spectrum, 1j * omega * spectrum))
+        if displacement.std() > 0:
+            yield name, (displacement / displacement.std(), velocity / velocity.std())
+
+
+def _explained(
+    name: tuple[str, ...], motion: tuple[Matrix, Matrix], mean: Complex, index: NDArray[np.intp]
+) -> ProductsOutside:
+    d, s = motion
+    size = np.abs(d)
+    beyond = [np.maximum(size - zone, 0.0) for zone in ZONES]
+    even = fft.rfft(np.array([size, d**2, *beyond]), axis=1)
+    odd = fft.rfft(np.array([d * size, d**3, *(np.sign(d) * one for one in beyond), np.sign(s)]), axis=1)
+    targets = mean[:, index].transpose(1, 2, 0)
+    shares = [_share(basis[:, index], targets) for basis in (even, odd, np.concatenate([even, odd]))]
+    return ProductsOutside(motion=name, even=shares[2] - shares[1], odd=shares[2] - shares[0], both=shares[2])
+
+
+def _share(basis: Complex, targets: Complex) -> float:
+    """Share of the power of ``[block, line, output]`` that ``[function, block, line]`` explain beyond chance."""
+    powers = np.linspace(-1, 1, LINES)[:, None] ** np.arange(TERMS)
+    terms = basis.transpose(1, 2, 0)[:, :, :, None] * powers[:, None, :]
+    regressors = terms.reshape(*terms.shape[:2], -1)
+    left = np.sum(np.abs(unreached(regressors, targets)) ** 2, axis=(0, 1))
+    whole = np.sum(np.abs(targets) ** 2, axis=(0, 1))
+    return float(1 - np.mean(left / whole) * LINES / (LINES - regressors.shape[2]))
