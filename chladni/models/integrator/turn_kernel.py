@@ -33,19 +33,18 @@ def missed_at_turns(
             return 0.0
     count, inner_at = ports.first.size - 1, NODES[1] if hard == 1 else 0.5
     motion = stride.here.size - 2 * count + port
-    d, s = stride.here[motion], stride.here[motion + count]
-    inner_d, inner_s = stride.inner[port], stride.inner[count + port]
-    end_d, end_s = stride.there[motion], stride.there[motion + count]
     missed: float = 0.0
-    if s * inner_s < 0.0:
-        x = _turn(d, s, inner_d, inner_s, inner_at * step_s)
-        turned = _cubic(d, s, inner_d, inner_s, inner_at * step_s, x)
-        missed += _missed(ports, stride, port, hard, turned, inner_at * x, t, step_s)
-    if inner_s * end_s < 0.0:
-        rest = 1.0 - inner_at
-        x = _turn(inner_d, inner_s, end_d, end_s, rest * step_s)
-        turned = _cubic(inner_d, inner_s, end_d, end_s, rest * step_s, x)
-        missed += _missed(ports, stride, port, hard, turned, inner_at + rest * x, t, step_s)
+    d, s = stride.here[motion], stride.here[motion + count]
+    begin, length = 0.0, inner_at
+    # One loop, since each call is compiled in its own place.
+    for part in range(2):
+        end_d = stride.inner[port] if part == 0 else stride.there[motion]
+        end_s = stride.inner[count + port] if part == 0 else stride.there[motion + count]
+        if s * end_s < 0.0:
+            x = _turn(d, s, end_d, end_s, length * step_s)
+            turned = _cubic(d, s, end_d, end_s, length * step_s, x)
+            missed += _missed(ports, stride, port, hard, turned, begin + length * x, t, step_s)
+        d, s, begin, length = end_d, end_s, inner_at, 1.0 - inner_at
     missed *= judge.weight[port]
     return missed
 
