@@ -24,7 +24,7 @@ ABOVE = 0.07
 def structure_sketch(model: Model, where: Where) -> StructureSketch | None:
     """Sketch a structure; None for drives, schemes and other models, which have no bodies.
 
-    Bodies without positions stand in a row, in the order of the file.
+    Bodies without positions stand on an arc, in the order of the file.
     """
     if not isinstance(model, StructureModel) or not model.structure.bodies:
         return None
@@ -52,8 +52,11 @@ def structure_sketch(model: Model, where: Where) -> StructureSketch | None:
 def _body_places(structure: Structure) -> Places:
     bodies = structure.bodies
     if len({body.position for body in bodies}) < len(bodies):
-        # Not said, or not said of all: in one place nothing could be told apart.
-        return {body.name: np.array([float(row), 0.0, 0.0]) for row, body in enumerate(bodies)}
+        # Not said, or not said of all: in one place nothing could be told apart. On an arc a joint between any two
+        # passes by all others, where in a row it would hide them.
+        angles = np.pi * (1 - (np.arange(len(bodies)) + 0.5) / len(bodies))
+        arc = np.stack([np.cos(angles), 0 * angles, np.sin(angles)], axis=1)
+        return {body.name: place for body, place in zip(bodies, arc, strict=True)}
     return {body.name: np.array(body.position, dtype=np.float64) for body in bodies}
 
 

@@ -23,14 +23,16 @@ def channel_table(where: Where) -> Table:
 def band_table(where: Where, *, least: float = 0.0) -> Table:
     """Share of the gap's power in each band, those with `least` and more, by frequency."""
     rows = [
-        (f"{one.low_hz:.4g} to {one.high_hz:.4g}", percent(one.share)) for one in where.bands if one.share >= least
+        (f"{one.low_hz:.4g} to {one.high_hz:.4g}", percent(one.share))
+        for one in sorted(where.bands, key=lambda one: one.low_hz)
+        if one.share >= least
     ]
     return ("Band [Hz]", "Share"), rows
 
 
-def site_table(where: Where) -> Table:
-    """Share of the gap that an unknown force at each site explains; the largest first."""
-    rows = sorted(where.sites, key=lambda one: -one.share)
+def site_table(where: Where, *, count: int | None = None) -> Table:
+    """Share of the gap that an unknown force at each site explains; the largest first, at most `count`."""
+    rows = sorted(where.sites, key=lambda one: -one.share)[:count]
     return ("Site", "Explains"), [(one.name, percent(one.share)) for one in rows]
 
 

@@ -40,13 +40,18 @@ def test_signals_stand_above_their_bodies_and_apart() -> None:
     np.testing.assert_array_equal(places["acc_wrist"][:2], wrist[:2])
 
 
-def test_bodies_without_places_stand_in_a_row() -> None:
+def test_bodies_without_places_stand_so_that_no_joint_hides_another_body() -> None:
     model = made.arm_model()
-    bodies = tuple(replace(body, position=(0.0, 0.0, 0.0)) for body in model.structure.bodies)
-    sketch = structure_sketch(replace(model, structure=replace(model.structure, bodies=bodies)), WHERE)
+    bodies = tuple(replace(model.structure.bodies[0], name=name, position=(0.0, 0.0, 0.0)) for name in "abcde")
+    joints = tuple(replace(model.structure.joints[0], name=f"{a}{b}", between=(a, b)) for a, b in ("ab", "be", "ae"))
+    structure = replace(model.structure, bodies=bodies, joints=joints)
+    sketch = structure_sketch(replace(model, structure=structure, inputs=(), outputs=()), WHERE)
     assert sketch is not None
-    np.testing.assert_array_equal(sketch.bodies, [[0, 0, 0], [1, 0, 0]])
-    assert sketch.size > 0
+    for ends in sketch.joints:
+        along = ends[1] - ends[0]
+        apart = [np.linalg.norm(np.cross(along, place - ends[0])) / np.linalg.norm(along) for place in sketch.bodies]
+        # Two bodies are its own ends; all others are well aside of the line.
+        assert sorted(apart)[2] > 0.15
 
 
 def test_a_drive_has_no_sketch() -> None:

@@ -136,6 +136,9 @@ def test_tables_are_in_the_order_that_one_reads() -> None:
     )
     assert [row[0] for row in tables.site_table(found.where)[1]] == ["elbow", "shoulder", "shaker", "acc_wrist"]
     assert len(tables.band_table(found.where, least=0.15)[1]) == 2
+    mixed = replace(found.where, bands=found.where.bands[::-1])
+    assert [row[0] for row in tables.band_table(mixed)[1]] == ["0.5 to 8", "8 to 16", "16 to 30"]
+    assert [row[0] for row in tables.site_table(found.where, count=2)[1]] == ["elbow", "shoulder"]
     assert len(tables.ranking_table(found)[1]) == tables.RANKED
     assert tables.ranking_table(found, count=9)[1][-1] == ("delay", "shaker", "under 1 %", "–", "–")
 

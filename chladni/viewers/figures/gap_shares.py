@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chladni.gap.records.diagnosis import Diagnosis
+from chladni.gap.records.diagnosis import BandShare, Diagnosis
 from chladni.viewers.engineering import percent
 from chladni.viewers.figures.sheet import WIDTH_IN, look, paint, plain
 from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, GapEvidence
@@ -56,14 +56,19 @@ def draw_shares(axes: Axes, bars: Sequence[Bar], *, named: set[str]) -> None:
 
 
 def _parts(found: Diagnosis) -> list[tuple[str, Sequence[Bar]]]:
-    bands = [(f"{one.low_hz:.4g} to {one.high_hz:.4g} Hz", one.share) for one in found.where.bands]
+    shown = sorted(found.where.bands, key=lambda one: -one.share)[:BARS]
+    # In the order of frequency, as in a spectrum.
+    bands = [(f"{one.low_hz:.4g} to {one.high_hz:.4g} Hz", one.share) for one in sorted(shown, key=_low_hz)]
     regimes = sorted(found.where.regimes, key=lambda one: -one.share)[:BARS]
     return [
         ("What one site alone can explain", site_bars(found)),
-        # In the order of frequency, unless there are too many to show all.
-        ("In which band it lies", bands if len(bands) <= BARS else sorted(bands, key=lambda bar: -bar[1])[:BARS]),
+        ("In which band it lies", bands),
         (
             "While which variable is where",
             [(f"{one.variable} {one.low:.3g} to {one.high:.3g}", one.share) for one in regimes],
         ),
     ]
+
+
+def _low_hz(band: BandShare) -> float:
+    return band.low_hz

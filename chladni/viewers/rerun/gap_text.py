@@ -11,6 +11,8 @@ from chladni.viewers.gap_summary import naive_sentence, summary
 from chladni.viewers.rerun.findings import escaped, markdown_table
 
 PATH = "/answer"
+# The page of the structure shows all.
+SITES = 6
 
 
 def draw_answer(recording: rr.RecordingStream, found: Diagnosis) -> rrb.View:
@@ -28,12 +30,12 @@ def _page(found: Diagnosis) -> Iterator[str]:
     yield from (f"{escaped(sentence)}\n" for sentence in rest)
     if found.next_measurement is not None:
         yield f"**Measure next:** {escaped(found.next_measurement)}\n"
-    yield from _table("Where it lies", tables.channel_table(found.where))
-    yield from _table("What one site alone can explain", tables.site_table(found.where))
     yield from _table("Causes", tables.cause_table(found))
     yield from _table("What was weighed", tables.ranking_table(found))
     if (naive := naive_sentence(found)) is not None:
         yield f"\n{escaped(naive)}"
+    yield from _table("Where it lies", tables.channel_table(found.where))
+    yield from _table("What one site alone can explain", tables.site_table(found.where, count=SITES))
     yield from _table("Parameters that moved, or that this log doesn't determine", tables.parameter_table(found))
     remarks = (*found.levels, *found.remarks)
     if remarks:
