@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.plant.law_run import Marched, can_run, equations, run_laws
+from chladni.gap.plant.linear_run import LinearRuns, is_plain
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.compiled_model import CompiledModel
@@ -78,6 +79,7 @@ class FreeRun:
         self.tunables = Tunables.of(model)
         compiled = model.compile()
         self.rows = _rows(compiled, measurement)
+        self._linear = LinearRuns(measurement.inputs, measurement.sample_rate_hz)
         self._kept: OrderedDict[object, tuple[CompiledModel, Integrator]] = OrderedDict()
 
     def compiled(self, z: Matrix | None = None, effects: Sequence[Effect] = ()) -> CompiledModel:
@@ -108,13 +110,16 @@ class FreeRun:
         ModelError
             When parameters are impossible or the model diverges.
         """
+        compiled, rate = self.compiled(z, effects), self.measurement.sample_rate_hz
+        if is_plain(compiled):
+            starts = initial_states(initial, len(self.windows), len(compiled.states))
+            found = self._linear.outputs(compiled, self.rows, self.windows, starts)
+            return mapped_outputs(compiled, self.rows, found, rate)
         marched = self.marched(z, effects, initial)
         if marched is not None:
-            return mapped_outputs(
-                self.compiled(z, effects), self.rows, marched.outputs, self.measurement.sample_rate_hz
-            )
-        found = [integration.outputs[self.rows] for _, integration in self.integrations(z, effects, initial)]
-        return found[0] if len(found) == 1 else np.hstack(found)
+            return mapped_outputs(compiled, self.rows, marched.outputs, rate)
+        parts = [integration.outputs[self.rows] for _, integration in self.integrations(z, effects, initial)]
+        return parts[0] if len(parts) == 1 else np.hstack(parts)
 
     def marched(self, z: Matrix | None, effects: Sequence[AttachedEffect], initial: Matrix | None) -> Marched | None:
         """Windows of a model with laws, outputs before maps of samples; None where `integrations` does it better."""

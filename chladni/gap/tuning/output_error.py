@@ -18,7 +18,7 @@ from chladni.signals.value import Value, require_shape
 
 Matrix = NDArray[np.float64]
 #: A step that promises less than this, in nats, changes no decision.
-_ENOUGH = 0.1
+PRECISION = 0.1
 #: A fit that can't get what its slopes promise has still converged when that is less.
 _STUCK = 2.0
 #: The same for a coarse run, for each sample: its power falls by less than two per cent.
@@ -113,6 +113,7 @@ def fit_output_error(
     tune: bool = True,
     offsets: bool = True,
     max_iterations: int = 12,
+    precision: float = PRECISION,
 ) -> OutputErrorFit:
     """Fit parameters, effects and initial states to a log.
 
@@ -144,6 +145,8 @@ def fit_output_error(
         Whether each output may have an unknown constant.
     max_iterations
         Of the fit.
+    precision
+        Nats; a step that promises less ends the fit.
 
     Raises
     ------
@@ -164,11 +167,11 @@ def fit_output_error(
     start = problem.start_of_windows() if problem.has_laws and len(run.windows) > 1 else problem.start()
     if start_initial is not None:
         start = Point(start.x, np.array(start_initial, dtype=np.float64).reshape(start.initial.shape))
-    here, slopes, converged, iterations = _fit(problem, start, max_iterations)
+    here, slopes, converged, iterations = _fit(problem, start, max_iterations, precision)
     return _report(problem, here, slopes, converged=converged, iterations=iterations)
 
 
-def _fit(problem: FitProblem, start: Point, most: int) -> tuple[Evaluation, Slopes, bool, int]:
+def _fit(problem: FitProblem, start: Point, most: int, precision: float) -> tuple[Evaluation, Slopes, bool, int]:
     """Coarsely first where that is quicker, then as finely as runs are made."""
     spent = 0
     if problem.coarse:
@@ -180,7 +183,7 @@ def _fit(problem: FitProblem, start: Point, most: int) -> tuple[Evaluation, Slop
         except ModelError:
             spent = 0
         problem.coarse = False
-    here, slopes, converged, more = _descend(problem, problem.evaluate(start), max(most - spent, _FINE), _ENOUGH)
+    here, slopes, converged, more = _descend(problem, problem.evaluate(start), max(most - spent, _FINE), precision)
     return here, slopes, converged, spent + more
 
 
@@ -209,7 +212,9 @@ def _search(
         expected = _expected(slopes, step)
         promised = min(promised, expected) if np.isfinite(promised) else expected
         try:
-            found = problem.evaluate(Point(here.point.x + step, here.point.initial + slopes.initial_step(step)))
+            # Initial states were eliminated without damping: they are held back as much.
+            start = here.point.initial + slopes.initial_step(step) / (1.0 + _DAMPINGS[place])
+            found = problem.evaluate(Point(here.point.x + step, start))
         except ModelError:
             continue
         if found.cost < here.cost:

@@ -1,0 +1,79 @@
+"""Free runs of a model on which no law acts, in windows or as one: the exact recursion, and nothing around it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.integrator.exponential import responses
+from chladni.models.integrator.hold import Hold, hold_of
+from chladni.models.integrator.input_rows import input_rows
+from chladni.models.integrator.linear_kernel import linear_march
+from chladni.signals.errors import ModelError
+
+Matrix = NDArray[np.float64]
+
+
+def is_plain(compiled: CompiledModel) -> bool:
+    """Whether a model is a recursion from sample to sample: no laws, nothing that looks back or reads in between."""
+    return not (compiled.laws or compiled.delays or any(compiled.output_offsets_s))
+
+
+class LinearRuns:
+    """Linear free runs under the inputs of one log.
+
+    Rows of inputs are laid out once: most effects and all parameters leave the inputs as they are.
+
+    Parameters
+    ----------
+    signals
+        ``[input, sample]``.
+    sample_rate_hz
+        Of the log.
+    """
+
+    def __init__(self, signals: Matrix, sample_rate_hz: float) -> None:
+        self._signals, self._rate_hz = signals, sample_rate_hz
+        self._kept: tuple[object, Matrix] | None = None
+
+    def outputs(
+        self, compiled: CompiledModel, rows: NDArray[np.int64], windows: Sequence[tuple[int, int]], initial: Matrix
+    ) -> Matrix:
+        """Give ``[output, sample]`` of the outputs `rows`, before maps of samples.
+
+        Parameters
+        ----------
+        initial
+            ``[window, state]``.
+
+        Raises
+        ------
+        ModelError
+            When the model diverges.
+        """
+        hold = hold_of(compiled, self._rate_hz)
+        inputs = self._inputs(compiled, hold)
+        b, g = hold.spread(compiled.b), np.zeros((len(compiled.states), 0))
+        step = responses(
+            compiled.a, b, g, hold,
+            step_s=1.0 / self._rate_hz, kink_at=hold.kink_at, fractions=np.ones(1),
+        )[0].state  # fmt: skip
+        advance = np.ascontiguousarray(step.T)
+        state = np.zeros((len(inputs), len(compiled.states)))
+        for (start, stop), first in zip(windows, initial, strict=True):
+            state[start] = first
+            linear_march(advance, inputs[start:stop], state[start:stop])
+        ends = state[[stop - 1 for _, stop in windows]]
+        if not np.all(np.isfinite(ends)):
+            raise ModelError("the model diverges within the log; a loop is unstable, or a parameter is impossible")
+        through = hold.spread(compiled.d[rows])
+        return np.asarray(compiled.c[rows] @ state.T + through @ inputs[:, : hold.columns].T)
+
+    def _inputs(self, compiled: CompiledModel, hold: Hold) -> Matrix:
+        if compiled.input_maps or compiled.generated or any(compiled.input_delays_s):
+            return input_rows(compiled, hold, self._signals, self._rate_hz, extra=0)
+        layout = compiled.inputs
+        if self._kept is None or self._kept[0] != layout:
+            self._kept = layout, input_rows(compiled, hold, self._signals, self._rate_hz, extra=0)
+        return self._kept[1]
