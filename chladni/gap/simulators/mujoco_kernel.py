@@ -23,6 +23,7 @@ _ROOT_STEPS = 60
 # Relative to the change of velocity that the law makes; far below what a step's own error leaves.
 _ROOT = 1e-9
 _RUNAWAY = 1e8
+_LARGEST_ACCELERATION = 1e9
 
 
 class Simulated(NamedTuple):
@@ -109,7 +110,7 @@ class Record(NamedTuple):
 
 @part_code
 def advanced_force(laws: Laws, joint: int, d: float, s: float, t: float, step_s: float) -> float:
-    """Force of a joint's laws at the end of a step that ends with this motion; `trial` takes the states there.
+    """Force of a joint's laws when a step ends with this motion; `trial` takes the states there.
 
     States move by one linearly implicit step each: bristles bend within microns.
     """
@@ -146,15 +147,17 @@ def implicit_force(
 ) -> float:
     """Force F of the motion that follows: ``s+ = s + step_s (free - mobility F(s+))``, so that friction sticks.
 
+    The displacement stays that of the step's start, as MuJoCo's own springs have it: the step takes no energy.
+
     By regula falsi with Illinois' halving (Dahlquist & Björck, *Numerical Methods*, section 6.2).
     """
     drop = step_s * mobility
     high = s + step_s * free
-    force = advanced_force(laws, joint, d + step_s * high, high, t, step_s)
+    force = advanced_force(laws, joint, d, high, t, step_s)
     over = drop * force
     # A force that rises with speed has its root between the free velocity and the one that its force there gives.
     low = high - over
-    force = advanced_force(laws, joint, d + step_s * low, low, t, step_s)
+    force = advanced_force(laws, joint, d, low, t, step_s)
     under = low - s - step_s * free + drop * force
     size = abs(over)
     if over * under >= 0.0:
@@ -163,7 +166,7 @@ def implicit_force(
     side = 0
     for _ in range(_ROOT_STEPS):
         middle = (low * over - high * under) / (over - under)
-        force = advanced_force(laws, joint, d + step_s * middle, middle, t, step_s)
+        force = advanced_force(laws, joint, d, middle, t, step_s)
         left = middle - s - step_s * free + drop * force
         if abs(left) <= _ROOT * size:
             break
@@ -180,8 +183,8 @@ def implicit_force(
 
 
 @part_code
-def resist(mujoco: Simulated, laws: Laws, t: float, step_s: float) -> None:
-    """Set the generalised forces of the laws for the step that begins, joint after joint."""
+def resist(mujoco: Simulated, laws: Laws, t: float, step_s: float) -> bool:
+    """Set the generalised forces of the laws for the step that begins, joint after joint; False when they explode."""
     _STEP(mujoco.address[3], (mujoco.address[0], mujoco.address[1]))
     _STEP(mujoco.address[4], (mujoco.address[0], mujoco.address[1]))
     for joint in range(laws.dof.size):
@@ -220,6 +223,10 @@ def resist(mujoco: Simulated, laws: Laws, t: float, step_s: float) -> None:
         mujoco.applied[dof] = -force
         for other in range(mujoco.smooth.size):
             mujoco.smooth[other] -= mujoco.column[other] * force
+        # Beyond 1e10 MuJoCo would start anew by itself.
+        if not abs(mujoco.smooth[dof]) < _LARGEST_ACCELERATION:
+            return False
+    return True
 
 
 @part_code
@@ -269,8 +276,8 @@ def run(
             for joint in range(laws.dof.size):
                 mujoco.applied[laws.dof[joint]] = 0.0
             _STEP(mujoco.address[2], (mujoco.address[0], mujoco.address[1]))
-            if busy:
-                resist(mujoco, laws, (sample * steps + step) * step_s, step_s)
+            if busy and not resist(mujoco, laws, (sample * steps + step) * step_s, step_s):
+                return sample
             _STEP(mujoco.address[6], (mujoco.address[0], mujoco.address[1]))
             if step == 0:
                 keep(mujoco, laws, record, sample)

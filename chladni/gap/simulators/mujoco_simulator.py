@@ -25,6 +25,8 @@ from chladni.signals.errors import ModelError
 Matrix = NDArray[np.float64]
 #: MuJoCo's integrators that step in two halves, between which laws can act.
 _INTEGRATORS = {0: "Euler", 2: "implicit", 3: "implicitfast"}
+#: MuJoCo takes larger numbers for a mistake, and begins anew.
+_LARGEST = 1e10
 _FUNCTIONS = ("mj_step1", "mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM", "mj_step2")
 #: Units of what sensors give, by MuJoCo's name; two where it depends on whether the joint turns or slides.
 _SENSOR_UNITS = {
@@ -109,6 +111,7 @@ class MujocoSimulator:
             mujoco.mj_setConst(model, data)
         _start(mujoco, model, data, self.keyframe)
         steps = _steps(float(model.opt.timestep), sample_rate_hz)
+        _require_commands(self, inputs)
         return _run(self, model, data, np.ascontiguousarray(inputs, dtype=np.float64), steps, joint_laws)
 
 
@@ -330,6 +333,16 @@ def _steps(step_s: float, sample_rate_hz: float) -> int:
     return round(steps)
 
 
+def _require_commands(simulator: MujocoSimulator, inputs: Matrix) -> None:
+    """Refuse what MuJoCo would take for zero, with a word on a file that nobody reads."""
+    for terminal, row in zip(simulator.inputs, inputs, strict=True):
+        if not np.all(np.abs(row) < _LARGEST):
+            raise ModelError(
+                f"MuJoCo model {simulator.name!r}: input {terminal.name!r} reaches {np.max(np.abs(row)):g}; every "
+                f"sample must be finite and below {_LARGEST:g}"
+            )
+
+
 def _run(
     simulator: MujocoSimulator,
     model: Any,
@@ -354,10 +367,10 @@ def _run(
         force=np.zeros((joints, samples)),
     )
     done = run(_memory(Simulated, model, data), tables, record, inputs, rows, steps, step_s)
-    if done < samples:
+    if done < samples or _restarted(data):
         raise ModelError(
-            f"MuJoCo model {simulator.name!r} diverges after {done * steps * step_s:.3g} s; shorten its timestep, or "
-            "check the inputs' units"
+            f"MuJoCo model {simulator.name!r} diverges within {min(done + 1, samples) * steps * step_s:.3g} s; "
+            "shorten its timestep, or check the inputs' units"
         )
     return SimulatorResponse(
         outputs=record.outputs,
@@ -372,6 +385,14 @@ def _run(
             for row, port in enumerate(simulator.joints)
             if port.name in joint_laws
         ),
+    )
+
+
+def _restarted(data: Any) -> bool:
+    """Whether MuJoCo met numbers that aren't finite, and silently began anew from the reference pose."""
+    kinds = _mujoco().mjtWarning
+    return any(
+        data.warning[int(each)].number for each in (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
     )
 
 
