@@ -146,3 +146,12 @@ def test_models_and_logs_in_the_wrong_place_are_told(
     outcome = run("gap", *(one.format(model=model, log=log) for one in arguments))
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert words in outcome.err
+
+
+def test_the_step_is_shown_while_one_waits(
+    run: Run, engine: StandIn, files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("chladni.cli.output.PROGRESS_AFTER_S", -1.0)
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    assert "arm: explaining" in run("gap", *files).err
