@@ -27,8 +27,9 @@ def delay(scene: Scene, site: str) -> Draft:
 
 
 def lag(scene: Scene, site: str) -> Draft:
-    """An actuator of second order."""
-    slow, ratio = 1.0 / (2 * pi * 8.0 * scene.bench.modes_hz[-1]), scene.between(0.5, 1.3)
+    """An actuator of second order, springy or sluggish: near 0.7 it would be a dead time but for terms of s^4."""
+    slow = 1.0 / (2 * pi * 8.0 * scene.bench.modes_hz[-1])
+    ratio = scene.between(0.4, 0.55) if scene.rng.random() < 0.4 else scene.between(0.9, 1.4)
     return _draft("lag", site, "second_order", lambda size: {
         "time_constant": size * slow, "damping_ratio": ratio}, least=0.05, most=60.0)  # fmt: skip
 

@@ -1,0 +1,67 @@
+"""What tuning leaves of a change."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chladni.gap.blind.distinction import left_after_tuning
+from chladni.gap.blind.excitation_draw import draw_drive
+from chladni.gap.blind.noise import SensorNoise
+from chladni.gap.blind.performance import measured, perform, rms
+from chladni.gap.blind.structure_draw import draw_structure
+
+
+@pytest.fixture(scope="module")
+def scene():
+    rng = np.random.default_rng(8)
+    bench = replace(draw_structure(rng, "grounded"), samples=4000)
+    drive = draw_drive(rng, bench)
+    numbers = dict(bench.plan.numbers)
+    clean = perform(bench, numbers, drive)
+    noise = {name: SensorNoise(share=0.01) for name in measured(bench)}
+    return bench, numbers, drive, clean, noise
+
+
+def left(scene, change):
+    bench, numbers, drive, clean, noise = scene
+    return left_after_tuning(bench, numbers, drive, change, clean, noise)
+
+
+def moved(scene, sigmas):
+    """Change of the outputs when the first joint's stiffness moves by so many sigma."""
+    bench, numbers, drive, clean, _ = scene
+    name = "joint1.stiffness"
+    value = numbers[name] * (1 + sigmas * bench.plan.tolerance[name])
+    after = perform(bench, {**numbers, name: value}, drive)
+    return {each: after[each] - clean[each] for each in measured(bench)}
+
+
+def size(scene, change):
+    _, _, _, clean, noise = scene
+    return float(
+        np.sqrt(np.mean([(rms(change[name]) / (noise[name].share * rms(clean[name]))) ** 2 for name in noise]))
+    )
+
+
+def test_a_number_inside_its_tolerance_is_tuned_away(scene):
+    change = moved(scene, 0.3)
+    assert size(scene, change) > 1
+    assert left(scene, change) < 0.02 * size(scene, change)
+
+
+def test_a_number_far_beyond_its_tolerance_is_not(scene):
+    near, far = moved(scene, 3.0), moved(scene, 8.0)
+    assert left(scene, far) > 0.3 * (size(scene, far) - size(scene, near))
+
+
+def test_what_no_number_imitates_stays(scene):
+    _, _, _, clean, noise = scene
+    rng = np.random.default_rng(0)
+    change = {
+        name: noise[name].share * rms(clean[name]) * 5 * rng.standard_normal(row.size)
+        for name, row in clean.items()
+        if name in noise
+    }
+    # A dozen numbers fit a dozen of thousands of random samples.
+    assert left(scene, change) == pytest.approx(5.0, rel=0.05)
