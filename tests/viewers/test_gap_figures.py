@@ -68,7 +68,8 @@ def test_both_maps_have_one_scale_of_colours(figures: dict[str, Figure]) -> None
 def test_the_force_is_drawn_over_both_motions_with_the_law(figures: dict[str, Figure]) -> None:
     surface = made.restoring_force()
     rows = spread_out(surface)
-    over_displacement, over_velocity = figures["restoring force"].axes[:2]
+    named = {axes.get_xlabel().split(" [")[0]: axes for axes in figures["restoring force"].axes}
+    over_displacement, over_velocity, over_time = (named[name] for name in ("Displacement", "Velocity", "Time"))
     dots = np.asarray(over_velocity.collections[0].get_offsets())
     np.testing.assert_allclose(dots[:, 0], surface.velocity[rows])
     np.testing.assert_allclose(dots[:, 1], surface.force[rows])
@@ -78,6 +79,9 @@ def test_the_force_is_drawn_over_both_motions_with_the_law(figures: dict[str, Fi
     )
     assert surface.law_force is not None
     np.testing.assert_allclose(over_velocity.lines[0].get_ydata(), surface.law_force[rows])
+    assert [line.get_label() for line in over_time.lines] == ["recovered", "law"]
+    shown = np.isin(surface.time_s, over_time.lines[1].get_xdata())
+    np.testing.assert_array_equal(over_time.lines[1].get_ydata(), surface.law_force[shown])
 
 
 def test_bars_are_the_shares_and_the_named_site_is_in_colour(figures: dict[str, Figure]) -> None:

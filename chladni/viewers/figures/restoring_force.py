@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 
 from chladni.gap.records.diagnosis import RestoringForce
 from chladni.viewers.engineering import axis_scale
-from chladni.viewers.figures.sheet import WIDTH_IN, look, plain
-from chladni.viewers.gap_evidence import GapEvidence
+from chladni.viewers.figures.sheet import WIDTH_IN, look, paint, plain
+from chladni.viewers.gap_evidence import MEASURED_ON_LIGHT, GapEvidence
 from chladni.viewers.restoring_force import (
     SIGNED,
     Over,
@@ -21,19 +21,22 @@ from chladni.viewers.restoring_force import (
     spread_out,
 )
 
-HEIGHT_IN = 2.7
+HEIGHT_IN, TIME_IN = 2.6, 1.2
 _COLOURS = LinearSegmentedColormap.from_list("signed", SIGNED / 255)
 
 
 def restoring_force_figures(evidence: GapEvidence) -> dict[str, Figure]:
-    """Draw the recovered force over displacement and over velocity, by name; none where none was recovered."""
+    """Draw the recovered force over displacement, velocity and time, by name; none where none was recovered."""
     surface = evidence.found.restoring_force
     if surface is None or surface.force.size == 0:
         return {}
     with look():
-        figure = Figure(figsize=(WIDTH_IN, HEIGHT_IN), layout="constrained")
-        over_displacement, over_velocity = figure.subplots(1, 2, sharey=True)
+        figure = Figure(figsize=(WIDTH_IN, HEIGHT_IN + TIME_IN), layout="constrained")
+        grid = figure.add_gridspec(2, 2, height_ratios=(HEIGHT_IN, TIME_IN))
+        over_displacement = figure.add_subplot(grid[0, 0])
+        over_velocity = figure.add_subplot(grid[0, 1], sharey=over_displacement)
         draw_surfaces(figure, over_displacement, over_velocity, surface)
+        _draw_over_time(figure.add_subplot(grid[1, :]), surface, evidence.telling_s)
         figure.suptitle(plain(f"Force that the model lacks at {surface.site}"), fontsize=8.5, x=0.02, ha="left")
         return {"restoring force": figure}
 
@@ -71,6 +74,21 @@ def _draw(figure: Figure, axes: Axes, surface: RestoringForce, over: Over) -> No
     axes.set_xlabel(f"{over.capitalize()} [{x_unit}]")
     axes.set_ylabel(f"Force [{force_unit}]")
     _colour_bar(figure, axes, surface, other(over))
+
+
+def _draw_over_time(axes: Axes, surface: RestoringForce, telling_s: tuple[float, float] | None) -> None:
+    """Draw force and law where the model errs most; a whole log would be one dark band."""
+    start_s, end_s = telling_s or (float(surface.time_s[0]), float(surface.time_s[-1]))
+    rows = (surface.time_s >= start_s) & (surface.time_s <= end_s)
+    up, force_unit = axis_scale(surface.force, surface.force_unit)
+    axes.plot(surface.time_s[rows], surface.force[rows] / up, color=paint(MEASURED_ON_LIGHT), linewidth=2.0,
+              label="recovered")  # fmt: skip
+    if surface.law_force is not None:
+        axes.plot(surface.time_s[rows], surface.law_force[rows] / up, color="black", linewidth=0.8, label="law")
+    axes.set_ylim(*(end / up for end in force_range(surface)))
+    axes.set_xlim(start_s, end_s)
+    axes.set_xlabel("Time [s]")
+    axes.set_ylabel(f"Force [{force_unit}]")
 
 
 def _colour_bar(figure: Figure, axes: Axes, surface: RestoringForce, shown: Over) -> None:
