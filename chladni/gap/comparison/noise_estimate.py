@@ -27,6 +27,8 @@ SHARED = 0.1
 # A block is quiet where the response stands out of what is left by less than this in power.
 QUIET = 3.0
 LEAST_QUIET = 0.05
+# Scatter between periods is noise, unless a fit leaves less than this share of it: then something moved between them.
+MOVED = 0.85
 # Residuals in loud bands that exceed the quiet ones by this power ratio may hold distortion.
 LOUDER = 1.5
 # Top of the band that a log too short for anything else is judged by.
@@ -54,11 +56,19 @@ def estimate_noise(measurement: Measurement) -> NoiseFloor:
     NoiseFloor
         `std` is the relative standard deviation of `rms` by its degrees of freedom; bias by distortion isn't in it.
     """
-    outputs = measurement.outputs
+    fitted = _of_fit(measurement)
     steady = _steady_periods(measurement)
     spectra = None if steady is None else _between_periods(steady)
-    if spectra is not None:
-        return _floor(spectra, outputs, "periods", np.zeros(len(outputs), dtype=np.bool_))
+    if spectra is None:
+        return fitted
+    outputs = measurement.outputs
+    floor = _floor(spectra, outputs, "periods", np.zeros(len(outputs), dtype=np.bool_))
+    # A machine that changes, or is disturbed, between periods makes their scatter a poor bound.
+    return _chosen(fitted.rms < MOVED * floor.rms, floor, fitted)
+
+
+def _of_fit(measurement: Measurement) -> NoiseFloor:
+    outputs = measurement.outputs
     spectra = local_fit(measurement.inputs, outputs)
     if spectra is None:
         return _of_top_quarter(outputs)
@@ -108,7 +118,11 @@ def _line_edges(length: int) -> Matrix:
 
 def smaller_floor(first: NoiseFloor, second: NoiseFloor) -> NoiseFloor:
     """Give, output by output, the floor that is lower; both hold the same outputs."""
-    lower = second.rms < first.rms
+    return _chosen(second.rms < first.rms, first, second)
+
+
+def _chosen(lower: Mask, first: NoiseFloor, second: NoiseFloor) -> NoiseFloor:
+    """Give the second floor for the outputs marked, else the first."""
     lags = max(first.whitening.shape[1], second.whitening.shape[1])
     padded = [np.pad(one.whitening, ((0, 0), (0, lags - one.whitening.shape[1]))) for one in (first, second)]
     methods = zip(lower, first.method, second.method, strict=True)
@@ -171,21 +185,23 @@ def _floor(spectra: ResidualSpectra, outputs: Matrix, method: str, upper_bound: 
     )
 
 
+def _responses(spectra: ResidualSpectra, outputs: Matrix) -> Matrix:
+    """``[output, block]`` power density of the outputs themselves."""
+    blocks, lines = spectra.residual.shape[:2]
+    power = np.abs(fft.rfft(outputs, axis=1)[:, 1 : 1 + blocks * lines]) ** 2 / outputs.shape[1]
+    return np.asarray(power.reshape(len(outputs), blocks, lines).mean(axis=2))
+
+
 def _louder_than_quiet(spectra: ResidualSpectra, outputs: Matrix) -> Mask:
     """Whether each residual is louder where the machine responds: then it may hold distortion."""
-    samples = outputs.shape[1]
-    left = spectra.densities()
-    blocks, lines = left.shape[1], spectra.residual.shape[1]
-    power = np.abs(fft.rfft(outputs, axis=1)[:, 1 : 1 + blocks * lines]) ** 2 / samples
-    response = power.reshape(len(outputs), blocks, lines).mean(axis=2)
-    own = spectra.incoherent_densities()
-    answer = np.ones(len(outputs), dtype=np.bool_)
-    for place in range(len(outputs)):
-        quiet = response[place] < QUIET * left[place]
-        if LEAST_QUIET < quiet.mean() < 1:
-            loud = float(min(left[place, ~quiet].mean(), own[place, ~quiet].mean()))
-            answer[place] = loud > LOUDER * left[place, quiet].mean()
-    return answer
+    left, own = spectra.densities(), spectra.incoherent_densities()
+    answers = _responses(spectra, outputs) >= QUIET * left
+    verdict = np.ones(len(outputs), dtype=np.bool_)
+    for place, loud in enumerate(answers):
+        if LEAST_QUIET < np.mean(~loud) < 1:
+            loudness = float(min(left[place, loud].mean(), own[place, loud].mean()))
+            verdict[place] = loudness > LOUDER * left[place, ~loud].mean()
+    return verdict
 
 
 def _of_top_quarter(outputs: Matrix) -> NoiseFloor:

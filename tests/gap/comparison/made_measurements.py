@@ -1,9 +1,14 @@
 """Measurements of discrete linear systems, whose noise and distortion are known exactly."""
 
+from functools import cache
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+import chladni
+from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.records.measurement import Measurement
 
 RATE_HZ = 500.0
@@ -61,3 +66,23 @@ def multisine(rng: np.random.Generator, period: int, lines: NDArray[np.intp]) ->
     spectrum[lines] = np.exp(2j * np.pi * rng.random(lines.size))
     one = np.fft.irfft(spectrum, period)
     return np.asarray(one / one.std())
+
+
+@cache
+def aircraft(shared_data: Path, level: int) -> Measurement:
+    """A measured ground vibration test: shaker force, three accelerations, nine periods, first one transient."""
+    names = ("excitation", "wing_rail", "payload_rail")
+    with chladni.open_log(shared_data / f"f16_level{level}.mcap") as log:
+        series = log.read(["/shaker.wrench.force.z", *(f"/{name}.accel.linear.z" for name in names)])
+    values = series.values.astype(float)
+    return with_period(
+        Measurement(
+            log=f"level {level}",
+            sample_rate_hz=series.sample_rate_hz,
+            inputs=values[:1],
+            outputs=values[1:],
+            input_names=("shaker",),
+            output_names=names,
+            output_units=("m/s^2",) * 3,
+        )
+    )

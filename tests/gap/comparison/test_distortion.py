@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-import chladni
 from chladni.gap.comparison.distortion import Distortion, distortion_of
 from chladni.gap.comparison.periodicity import with_period
 from tests.gap.comparison import made_measurements as made
@@ -104,13 +103,7 @@ def test_no_answer_without_periods_or_with_several_inputs() -> None:
 
 
 def test_measured_aircraft_grows_nonlinear_with_level(shared_data: Path) -> None:
-    names = [f"/{name}.accel.linear.z" for name in ("excitation", "wing_rail", "payload_rail")]
-    found = []
-    for level in (1, 7):
-        with chladni.open_log(shared_data / f"f16_level{level}.mcap") as log:
-            values = log.read(["/shaker.wrench.force.z", *names]).values.astype(float)
-        found.append(distortion_of(with_period(made.measurement(values[:1], values[1:], rate_hz=400.0))))
-    low, high = found
+    low, high = (distortion_of(made.aircraft(shared_data, level)) for level in (1, 7))
     assert low is not None
     assert high is not None
     assert low.shares == ()

@@ -4,7 +4,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import chladni
 from chladni.gap.comparison.levels import compare_levels, followed_peak, level_responses
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.records.measurement import Measurement
@@ -65,25 +64,7 @@ def test_outputs_that_are_silent_or_missing_in_a_log_are_passed_over() -> None:
 
 
 def test_measured_aircraft_softens_and_damps_with_level(shared_data: Path) -> None:
-    outputs = ("excitation", "wing_rail", "payload_rail")
-    runs = []
-    for level in (7, 1, 3, 5):
-        with chladni.open_log(shared_data / f"f16_level{level}.mcap") as log:
-            series = log.read(["/shaker.wrench.force.z", *(f"/{name}.accel.linear.z" for name in outputs)])
-        values = series.values.astype(float)
-        runs.append(
-            with_period(
-                Measurement(
-                    log=f"level {level}",
-                    sample_rate_hz=400.0,
-                    inputs=values[:1],
-                    outputs=values[1:],
-                    input_names=("shaker",),
-                    output_names=outputs,
-                    output_units=("m/s^2",) * 3,
-                )
-            )
-        )
+    runs = [made.aircraft(shared_data, level) for level in (7, 1, 3, 5)]
     peaks = followed_peak("payload_rail", level_responses(runs))
     assert peaks is not None
     # Published for the payload, read at lines of 400/8192 Hz.

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-import chladni
 from chladni.gap.comparison.outside_band import products_outside
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.records.measurement import Measurement
@@ -70,12 +69,7 @@ def test_outputs_of_different_units_are_not_subtracted() -> None:
 
 @pytest.mark.parametrize("level", [5, 7])
 def test_measured_aircraft_is_odd_and_even_between_wing_and_payload(shared_data: Path, level: int) -> None:
-    outputs = ("excitation", "wing_rail", "payload_rail")
-    with chladni.open_log(shared_data / f"f16_level{level}.mcap") as log:
-        series = log.read(["/shaker.wrench.force.z", *(f"/{name}.accel.linear.z" for name in outputs)])
-    values = series.values.astype(float)
-    made_of = made.measurement(values[:1], values[1:], rate_hz=400.0)
-    found = products_outside(with_period(replace(made_of, output_names=outputs)))
+    found = products_outside(made.aircraft(shared_data, level))
     assert found is not None
     assert found.motion == ("wing_rail", "payload_rail")
     assert found.odd > found.even > 0.03

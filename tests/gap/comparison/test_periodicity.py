@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.signal import chirp
 
-import chladni
 from chladni.gap.comparison.periodicity import find_repetition, periods_of, transient_periods, with_period
 from tests.gap.comparison import made_measurements as made
 
@@ -141,10 +140,6 @@ def test_the_measurement_carries_what_was_found() -> None:
 
 @pytest.mark.parametrize("level", [1, 3, 5, 7])
 def test_measured_multisine_has_nine_periods_of_which_the_first_is_transient(shared_data: Path, level: int) -> None:
-    names = [f"/{name}.accel.linear.z" for name in ("excitation", "wing_rail", "payload_rail")]
-    with chladni.open_log(shared_data / f"f16_level{level}.mcap") as log:
-        series = log.read(["/shaker.wrench.force.z", *names])
-    values = series.values.astype(float)
-    found = find_repetition(made.measurement(values[:1], values[1:], rate_hz=400.0))
+    found = find_repetition(made.aircraft(shared_data, level))
     assert found is not None
     assert (found.period_samples, found.periods, found.transient_periods) == (8192, 9, 1)
