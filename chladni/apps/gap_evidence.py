@@ -14,6 +14,8 @@ Matrix = NDArray[np.float64]
 
 # Cycles of the gap's typical frequency that can be told apart in a picture, and the fewest samples that make one.
 CYCLES, FEWEST_SAMPLES = 12.0, 60
+# Finer than spectra for the eye: a gap often sits in the flank of one resonance.
+SEGMENTS, SHORTEST_SEGMENT, MOST_LINES = 8, 16, 4096
 NAMES = ("measured", "before", "after")
 
 
@@ -27,7 +29,10 @@ def gap_evidence(found: Diagnosis) -> GapEvidence:
 
 
 def _spectra(signals: GapSignals) -> GapSpectra | None:
-    outputs = len(signals.output_names)
+    outputs, samples = signals.measured.shape
+    # Too short a log for a spectrum is no reason to show nothing of it.
+    if samples < SEGMENTS * SHORTEST_SEGMENT:
+        return None
     stacked = np.vstack([signals.measured, signals.measured - signals.before, signals.measured - signals.after])
     channels = tuple(
         Channel(name=f"{what} {row}", unit=unit) for what in NAMES for row, unit in enumerate(signals.output_units)
@@ -40,10 +45,11 @@ def _spectra(signals: GapSignals) -> GapSpectra | None:
         channels=channels,
         valid=None if finite.all() else finite,
     )
+    resolution_hz = max(SEGMENTS / series.duration_s, signals.sample_rate_hz / (2 * MOST_LINES))
     try:
-        density = psd(series, window="hann")
+        density = psd(series, window="hann", resolution_hz=resolution_hz)
     except EstimateError:
-        # Too short a log for a spectrum is no reason to show nothing of it.
+        # No segment is whole, as of a model that diverges again and again.
         return None
     measured, before, after = density.values.reshape(len(NAMES), outputs, -1)
     return GapSpectra(

@@ -15,8 +15,8 @@ from chladni.viewers.figures.sheet import look, plain
 from chladni.viewers.gap_evidence import GapEvidence, GapSpectra
 from chladni.viewers.labels import amplitude_density_unit
 
-# So much below the noise nothing is left to see; never more decades than these.
-BELOW_NOISE, DECADES = 0.2, 6.0
+# Down to what is left and a little below the noise; never more decades than these.
+BELOW_NOISE, ROOM, DECADES = 0.5, 0.7, 6.0
 
 
 def spectrum_figures(evidence: GapEvidence) -> dict[str, Figure]:
@@ -43,7 +43,9 @@ def draw_spectrum(axes: Axes, signals: GapSignals, spectra: GapSpectra, row: int
     high = max(float(values.max()) for values, *_ in lines)
     # A channel that is zero has no place on a logarithmic axis.
     if high > 0:
-        logarithmic(axes, max(BELOW_NOISE * noise, high / 10**DECADES), 2 * high)
+        left = lines[-1][0]
+        lowest = min(BELOW_NOISE * noise, ROOM * float(left[left > 0].min(initial=high)))
+        logarithmic(axes, max(lowest, high / 10**DECADES), 2 * high)
     axes.set_xlim(0, float(spectra.frequency_hz[-1]))
     axes.set_ylabel(f"[{plain(amplitude_density_unit(signals.output_units[row]))}]")
 
