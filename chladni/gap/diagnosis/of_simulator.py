@@ -181,9 +181,9 @@ class _Told:
     @property
     def verdict(self) -> Verdict:
         found, runs = self.search, self.search.runs
+        if self.loosened:
+            return "parameters"
         if found.best is found.tuned:
-            if self.loosened:
-                return "parameters"
             return "none" if runs.gap(found.tuned.outputs) < _NO_GAP * self.floor else "unknown"
         return "effect" if self.share_closed(found.best) >= _EXPLAINED else "unknown"
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.simulator_fit import SimulatorFit, fitted
-from chladni.gap.diagnosis.simulator_runs import SimulatorRuns, can_act
+from chladni.gap.diagnosis.simulator_runs import SimulatorRuns, can_act, log_likelihood
 from chladni.gap.diagnosis.simulator_screen import Screened, screen
 from chladni.gap.diagnosis.simulator_starts import SiteScales, starts
 from chladni.models.effects.attached_effect import AttachedEffect
@@ -24,10 +24,11 @@ _WORTH = 5.0
 _MOST_EFFECTS = 3
 #: Share of the gap beyond the noise that a further effect must close: no law is exact, and others dress its errors.
 _LEAST_CLOSING = 0.03
-#: Missed power over the noise's, under which nothing is left to explain.
-_AT_NOISE = 1.1
+#: Missed power over the noise's: under which nothing is left to explain, and too little for two effects at once.
+_AT_NOISE, _NEAR_NOISE = 1.1, 1.5
 #: Sigmas that parameters may go when nothing else is to explain the log.
 _LOOSE = 20.0
+_FAR_STARTS = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,11 +81,14 @@ def search(runs: SimulatorRuns, kinds: Sequence[EffectKind], *, progress: Progre
     nominal = runs.simulated(start, ())
     progress("tuning", 0.0)
     tuned = _required(fitted(runs, start, ()))
-    loose = _required(fitted(runs, tuned.z, (), bound=_LOOSE))
     if np.all(tuned.powers < _AT_NOISE):
-        return _result(runs, nominal, tuned, loose, (), ())
+        return _result(runs, nominal, tuned, tuned, (), ())
+    loose = _loosened(runs, tuned)
     screening = screen(runs, kinds, tuned.z, progress=partial(progress, "screening"))
     fits = _fits(runs, screening.singles[:_SINGLES], tuned, "fitting", progress)
+    small = np.all(tuned.powers < _NEAR_NOISE)
+    if small and _best([tuned, *fits]).log_evidence < tuned.log_evidence + _WORTH:
+        return _result(runs, nominal, tuned, loose, tuple(fits), screening.singles)
     if not np.all(_best([tuned, *fits]).powers < _AT_NOISE):
         fits += _fits(runs, screening.pairs[:_PAIRS], tuned, "fitting pairs", progress)
     if fits:
@@ -116,6 +120,23 @@ def _result(
         fits=fits,
         singles=singles,
     )
+
+
+def _loosened(runs: SimulatorRuns, tuned: SimulatorFit) -> SimulatorFit:
+    """Fit parameters alone without bounds, also from where a single one explains most: optima lie far apart."""
+    starts = [
+        move * each for each in np.eye(tuned.z.size) for move in (-_LOOSE / 2, -_LOOSE / 4, _LOOSE / 4, _LOOSE / 2)
+    ]
+    judged = sorted(starts, key=lambda z: _likelihood(runs, z), reverse=True)
+    fits = [fitted(runs, z, (), bound=_LOOSE) for z in (tuned.z, *judged[:_FAR_STARTS])]
+    return _best([tuned, *(fit for fit in fits if fit is not None)])
+
+
+def _likelihood(runs: SimulatorRuns, z: Matrix) -> float:
+    try:
+        return log_likelihood(runs.powers(runs.missed(z, ()), runs.training))
+    except ModelError:
+        return -np.inf
 
 
 def _required(fit: SimulatorFit | None) -> SimulatorFit:

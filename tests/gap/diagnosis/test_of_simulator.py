@@ -1,0 +1,199 @@
+"""Diagnosis of simulators without equations: a mass on a guide in MuJoCo, and what was done to it."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import chladni
+from chladni.gap.diagnosis.of_simulator import diagnose_simulator, explained_simulator
+from chladni.gap.simulators.mujoco_simulator import mujoco_simulator
+from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
+from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.catalogue import FAMILIES
+from chladni.models.effects.effect_kind import EffectKind, Variant
+from chladni.models.excitations.multisine import Multisine
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError, LogError, ModelError
+from chladni.signals.time_series import TimeSeries
+from tests.gap.simulators.slide import mjcf
+
+pytest.importorskip("mujoco", reason="needs the extra [mujoco]")
+
+RATE_HZ, SECONDS, NOISE = 200.0, 6.0, 0.01
+
+
+def sticky(_d, s, _t, parameters, _state, _rates):
+    """Friction that falls with speed by another law than the catalogue's."""
+    return parameters[0] * s / (0.01 + abs(s)) * (1.0 + 0.4 / (1.0 + 400.0 * s * s))
+
+
+def cubic(_d, s, _t, parameters, _state, _rates):
+    return parameters[0] * s * s * s
+
+
+def own_kind(name, law, unit, value):
+    return EffectKind(
+        name=name,
+        family="damping",
+        meaning="one's own",
+        sites=("joint",),
+        parameters=Parameters(
+            (Parameter(name="strength", value=value, unit=unit, low=0.0, high=1e4, minimum=0.0, maximum=1e12),)
+        ),
+        neutral={"strength": 0.0},
+        variants=(
+            Variant(
+                name="own",
+                attach=LawAtPort(law=law, numbers=lambda values, _port: (values["strength"],)),
+                formula="own",
+            ),
+        ),
+    )
+
+
+STICKY = own_kind("sticky", sticky, "N", 4.0)
+CUBIC_DAMPING = own_kind("cubic_damping", cubic, "N s^3/m^3", 50.0)
+
+
+def slide():
+    return mujoco_simulator(
+        mjcf(1 / RATE_HZ),
+        inputs={"push": None},
+        outputs=dict.fromkeys(["place", "speed", "acc.x"]),
+        joints=["guide"],
+        parameters={"guide.stiffness": 0.05, "guide.damping": 0.1},
+    )
+
+
+def log_of(effects, values, *, seed=2, seconds=SECONDS):
+    """What a machine with other numbers and effects would log; its steps are the simulator's, as nothing else is."""
+    rng = np.random.default_rng(seed)
+    drive = Multisine(rms=12.0, period_s=1.5, band_hz=(0.6, 9.0), lines="full")
+    force = drive.samples(round(seconds * RATE_HZ), RATE_HZ, rng)[None]
+    machine = WrappedSimulator(simulator=slide(), values=values, effects=tuple(effects))
+    outputs = machine.respond(force, RATE_HZ).outputs
+    noise = NOISE * outputs.std(axis=1, keepdims=True) * rng.normal(size=outputs.shape)
+    names = [("push", "N"), ("place", "m"), ("speed", "m/s"), ("acc.x", "m/s^2")]
+    return TimeSeries(
+        values=np.vstack([force, outputs + noise]),
+        sample_rate_hz=RATE_HZ,
+        channels=tuple(Channel(name=name, unit=unit) for name, unit in names),
+    )
+
+
+MOVED = {"guide.stiffness": 830.0, "guide.damping": 3.7}
+
+
+@cache
+def of_friction():
+    """One diagnosis that several tests look at, and the progress that was told."""
+    told = []
+    log = log_of([chladni.attached(STICKY, "guide", {"strength": 4.0})], MOVED)
+    found = diagnose_simulator(slide(), log, progress=lambda doing, share: told.append((doing, share)))
+    return found, told
+
+
+def test_friction_by_another_law_is_named():
+    found, _ = of_friction()
+    assert found.verdict == "effect"
+    (cause,) = found.causes
+    assert cause.effect in FAMILIES["friction"]
+    assert (cause.site, cause.group) == ("guide", ("guide",))
+    assert cause.probability > 0.5
+    assert found.gap.closed > 0.9
+    assert found.gap.before > found.gap.tuned > 5 * found.gap.after
+    # Tuning alone would have taken the friction for damping.
+    assert found.tuned_parameters["guide.stiffness"].value == pytest.approx(830.0, rel=0.01)
+    assert cause.parameters[next(iter(cause.parameters))].unit == "N"
+
+
+def test_what_was_found_is_simulated():
+    found, _ = of_friction()
+    signals = found.signals
+    again = explained_simulator(slide(), found).respond(
+        log_of([chladni.attached(STICKY, "guide", {"strength": 4.0})], MOVED).values[:1], RATE_HZ
+    )
+    assert np.allclose(again.outputs, signals.after, rtol=1e-9, atol=1e-12)
+
+
+def test_where_the_gap_lies():
+    where = of_friction()[0].where
+    assert [channel.name for channel in where.channels] == ["place", "speed", "acc.x"]
+    assert sum(band.share for band in where.bands) == pytest.approx(1.0)
+    assert where.sites[0].name == "guide"
+
+
+@pytest.mark.slow
+def test_same_log_same_answer():
+    log = log_of([chladni.attached("delay", "push", {"delay": 0.004})], MOVED)
+    first, second = (diagnose_simulator(slide(), log) for _ in range(2))
+    assert (first.causes, first.ranking, first.gap) == (second.causes, second.ranking, second.gap)
+
+
+def test_late_commands_are_named():
+    found = diagnose_simulator(slide(), log_of([chladni.attached("delay", "push", {"delay": 0.007})], MOVED))
+    (cause,) = found.causes
+    assert (cause.effect, cause.site) == ("delay", "push")
+    # A sample lasts 5 ms; held and joined by straight lines differ by a fraction of it.
+    assert cause.parameters["delay"].value == pytest.approx(0.007, abs=5e-4)
+
+
+@pytest.mark.slow
+def test_a_clipped_sensor_is_named():
+    limit = {"limit": 0.1}
+    found = diagnose_simulator(slide(), log_of([chladni.attached("clipping", "speed", limit)], MOVED))
+    (cause,) = found.causes
+    assert (cause.effect, cause.site) == ("clipping", "speed")
+    assert cause.parameters["limit"].value == pytest.approx(0.1, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_no_effect_where_only_parameters_are_off(seed):
+    found = diagnose_simulator(slide(), log_of([], MOVED, seed=seed))
+    assert (found.verdict, found.causes) == ("none", ())
+    assert found.gap.tuned < 1.1 * found.gap.noise < found.gap.before
+
+
+def test_a_parameter_far_beyond_its_tolerance_is_named():
+    found = diagnose_simulator(slide(), log_of([], {"guide.stiffness": 1200.0}))
+    assert found.verdict == "parameters"
+    assert [(cause.effect, cause.site) for cause in found.causes] == [("parameter", "guide.stiffness")]
+    assert found.tuned_parameters["guide.stiffness"].value == pytest.approx(1200.0, rel=0.01)
+
+
+def test_an_effect_of_ones_own_takes_part():
+    log = log_of([chladni.attached(CUBIC_DAMPING, "guide", {"strength": 900.0})], MOVED)
+    found = diagnose_simulator(slide(), log, own_effects=(CUBIC_DAMPING,))
+    assert [(cause.effect, cause.site) for cause in found.causes] == [("cubic_damping", "guide")]
+    assert found.causes[0].parameters["strength"].value == pytest.approx(900.0, rel=0.05)
+
+
+@pytest.mark.slow
+def test_what_no_effect_left_explains_is_unknown():
+    log = log_of([chladni.attached("time_offset", "speed", {"offset": 0.02})], MOVED)
+    out = ("time_offset", "mounting_resonance", "cross_axis", "ac_coupling")
+    found = diagnose_simulator(slide(), log, leave_out=out)
+    assert (found.verdict, found.causes) == ("unknown", ())
+    assert "explains the gap" in found.advice
+
+
+def test_progress_is_told():
+    _, told = of_friction()
+    assert told[0][0] == "tuning"
+    assert all(0 <= share <= 1 for _, share in told)
+
+
+def test_logs_that_do_not_fit_are_told():
+    log = log_of([], {})
+    with pytest.raises(EstimateError, match="too short"):
+        diagnose_simulator(slide(), log.window(end_s=2.0))
+    with pytest.raises(ModelError, match="none of their names"):
+        diagnose_simulator(slide(), log.select(["place", "speed"]), log="a.mcap")
+    with pytest.raises(LogError, match="nothing to compare"):
+        diagnose_simulator(slide(), log.select(["push"]), log="a.mcap")
+    other = replace(log, channels=(replace(log.channels[0], unit="m"), *log.channels[1:]))
+    with pytest.raises(ModelError, match="'push'"):
+        diagnose_simulator(slide(), other)
