@@ -13,6 +13,7 @@ from chladni.gap.plant.places import Site
 
 Matrix = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
+_TOLD = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,9 +90,11 @@ class Elimination:
     def unknowns(self, residual: Spectrum) -> tuple[Matrix, list[Spectrum]]:
         """Best transients ``[state, segment]`` and forces ``[segment, line]`` for a residual."""
         real = _real(np.moveaxis(self.away(residual), -2, -3))
-        size = np.linalg.norm(self._stacked, axis=1)
+        # What a force could print as well (a blow at the very start) is left to the force: of a transient that is
+        # told by a thousandth of itself, noise would make almost anything.
+        size = np.sqrt(np.sum(np.abs(self._transients) ** 2, axis=(1, 2, 3)))
         scale = np.where(size > 0, 1.0 / np.where(size > 0, size, 1.0), 0.0)
-        scaled = np.linalg.lstsq((self._stacked * scale[:, None]).T, real.T, rcond=1e-10)[0]
+        scaled = np.linalg.lstsq((self._stacked * scale[:, None]).T, real.T, rcond=_TOLD)[0]
         transient = np.asarray(scaled * scale[:, None], dtype=np.float64)
         if not len(self._patterns):
             return transient, []
@@ -140,7 +143,7 @@ def profiled(
     start: Matrix,
     *,
     iterations: int = 8,
-    limit: float = 3.0,
+    limit: float | Matrix = 3.0,
 ) -> Profile:
     """Refit the parameters and the transient while forces at `sites` may be anything.
 
@@ -162,7 +165,7 @@ def profiled(
     return best
 
 
-def _step(problem: LinearProblem, here: Profile, limit: float) -> tuple[Matrix, float]:
+def _step(problem: LinearProblem, here: Profile, limit: float | Matrix) -> tuple[Matrix, float]:
     """Solve the linearised problem within the bounds; give the step in z and the misfit that it promises."""
     z = here.z
     view = problem.view(z)
@@ -172,11 +175,11 @@ def _step(problem: LinearProblem, here: Profile, limit: float) -> tuple[Matrix, 
     slopes = problem.slopes(z, here.transient, list(zip(here.sites, here.forces, strict=True)))
     matrix, right = out.rest(slopes).T, out.rest(residual)
     normal = matrix.T @ matrix + np.eye(z.size) / 2.0
-    moved = _bounded(normal, matrix.T @ right - z / 2.0, -limit - z, limit - z)
+    moved = bounded_minimum(normal, matrix.T @ right - z / 2.0, -limit - z, limit - z)
     return moved, float(np.sum((right - matrix @ moved) ** 2))
 
 
-def _bounded(normal: Matrix, toward: Matrix, low: Matrix, high: Matrix) -> Matrix:
+def bounded_minimum(normal: Matrix, toward: Matrix, low: Matrix, high: Matrix) -> Matrix:
     """Minimise ``x'Nx/2 - x't`` within bounds."""
     if not toward.size:
         return toward

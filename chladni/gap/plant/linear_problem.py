@@ -53,6 +53,8 @@ class LinearProblem:
         changed: Callable[[Model], CompiledModel] | None = None,
     ) -> None:
         self.model, self.measurement, self.tunables, self.lines = model, measurement, tunables, lines
+        self.noise = noise
+        self._inputs: dict[tuple[float, ...], Spectrum] = {}
         self._compile = changed or _compiled
         compiled = self._compile(model)
         names = [terminal.name for terminal in compiled.outputs]
@@ -65,10 +67,18 @@ class LinearProblem:
         """Complex numbers on all lines and outputs together."""
         return int(self.measured.size)
 
+    def on(self, lines: RecordLines) -> "LinearProblem":
+        """Give the same problem on other lines."""
+        return LinearProblem(self.model, self.measurement, self.noise, self.tunables, lines, changed=self._compile)
+
+    def with_noise(self, noise: NoiseFloor) -> "LinearProblem":
+        """Give the same problem with another noise."""
+        return LinearProblem(self.model, self.measurement, noise, self.tunables, self.lines, changed=self._compile)
+
     def view(self, z: Matrix) -> LinearView:
         """Give the linear part at parameters z."""
         model = self.model.with_values(self.tunables.values(z)) if z.size else self.model
-        return LinearView(self._compile(model), self.lines, self.measurement.inputs, self.rows)
+        return LinearView(self._compile(model), self.lines, self.measurement.inputs, self.rows, known=self._inputs)
 
     def way(self, view: LinearView, site: Site) -> Way:
         """How a force at a site enters the equations of a view."""

@@ -54,9 +54,19 @@ class LinearView:
         ``[input, sample]`` of the log.
     rows
         Places of the outputs that are wanted.
+    known
+        Spectra of the inputs by dead times, shared by views of one record: they are the same for all parameters.
     """
 
-    def __init__(self, compiled: CompiledModel, lines: RecordLines, signals: Matrix, rows: tuple[int, ...]) -> None:
+    def __init__(
+        self,
+        compiled: CompiledModel,
+        lines: RecordLines,
+        signals: Matrix,
+        rows: tuple[int, ...],
+        *,
+        known: dict[tuple[float, ...], Spectrum] | None = None,
+    ) -> None:
         self.compiled, self.lines, self._rows = compiled, lines, list(rows)
         self._hold = hold_of(compiled, lines.sample_rate_hz)
         step = responses(
@@ -77,7 +87,7 @@ class LinearView:
         )
         self._kick = lines.z / np.sqrt(lines.samples)
         self._signals = signals
-        self._spectrum: Spectrum | None = None
+        self._known: dict[tuple[float, ...], Spectrum] = {} if known is None else known
 
     def forced(self) -> Spectrum:
         """``[output, segment, line]`` response to the log's inputs, but for the transients of the segments."""
@@ -168,10 +178,11 @@ class LinearView:
 
     def _inputs(self) -> Spectrum:
         """``[internal column, segment, line]`` of the rows that drive each step."""
-        if self._spectrum is None:
+        key = self.compiled.input_delays_s
+        if key not in self._known:
             rows = input_rows(self.compiled, self._hold, self._signals, self.lines.sample_rate_hz, 1)
-            self._spectrum = self.lines.spectrum(np.ascontiguousarray(rows[:-1].T))
-        return self._spectrum
+            self._known[key] = self.lines.spectrum(np.ascontiguousarray(rows[:-1].T))
+        return self._known[key]
 
     def _solved(self, drive: Spectrum) -> Spectrum:
         """``(z I - Phi)^-1 drive`` for ``[state, ..., line]``, by substitution in the triangular form."""

@@ -1,0 +1,79 @@
+"""One log beside one model, made ready: noise, training stretches, free runs, location."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.comparison.noise_estimate import estimate_noise
+from chladni.gap.comparison.periodicity import with_period
+from chladni.gap.explanation.contest import Contest, training_mask
+from chladni.gap.location.locate import Location, locate
+from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.windows import windows_for
+from chladni.gap.records.measurement import Measurement
+from chladni.models.core.model import Model
+from chladni.models.effects.effect_kind import EffectKind
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Study:
+    """What all steps of a diagnosis share.
+
+    Attributes
+    ----------
+    model, measurement
+        What is compared.
+    location
+        Where an unknown force explains the gap, with the noise behind it.
+    contest
+        In which hypotheses are fitted.
+    windows
+        ``(start, stop)`` samples, None in free run.
+    leave_out, own
+        Words that don't take part; the user's effects by name.
+    """
+
+    model: Model
+    measurement: Measurement
+    location: Location
+    contest: Contest
+    windows: tuple[tuple[int, int], ...] | None
+    leave_out: frozenset[str]
+    own: Mapping[str, EffectKind]
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """``[sample]`` that no fit sees."""
+        return ~self.contest.training
+
+    @property
+    def horizon_s(self) -> float | None:
+        """Length of a window, None in free run."""
+        if self.windows is None:
+            return None
+        return max(stop - start for start, stop in self.windows) / self.measurement.sample_rate_hz
+
+
+def study_of(
+    model: Model, measurement: Measurement, *, leave_out: frozenset[str], own: Mapping[str, EffectKind]
+) -> Study:
+    """Prepare the study of one log."""
+    measurement = with_period(measurement)
+    windows = windows_for(model, measurement)
+    run = FreeRun(model, measurement, windows=windows)
+    noise = estimate_noise(measurement)
+    location = locate(model, measurement, noise, run.tunables)
+    training = training_mask(measurement.samples, measurement.sample_rate_hz, measurement.period_samples)
+    return Study(
+        model=model,
+        measurement=measurement,
+        location=location,
+        contest=Contest(run, location.problem.noise, training),
+        windows=windows,
+        leave_out=leave_out,
+        own=own,
+    )

@@ -1,0 +1,61 @@
+"""Trials at bodies: more mass, an attached oscillator, a tone."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from chladni.gap.explanation.tones import strongest_tones
+from chladni.gap.explanation.trial import Force, Shape, Trial, logarithms, numbers
+from chladni.gap.location.recovered import Recovered
+
+
+def body_trials(motion: Recovered, band_hz: tuple[float, float]) -> Iterator[Trial]:
+    """Give the effects that act at a body.
+
+    Parameters
+    ----------
+    band_hz
+        Where the excitation has power: an attached mode is looked for there.
+    """
+    acceleration = motion.s * motion.spectrum(motion.velocity)
+    yield Trial(
+        effect="added_mass", site=motion.site, build=lambda _: Force.of(-acceleration),
+        values=lambda _, a: {"mass": float(a[0])} if a[0] > 0 else None, parameters=1,
+    )  # fmt: skip
+
+    def pull(shape: Shape) -> Force:
+        frequency, damping = numbers(shape)
+        omega, s = 2 * np.pi * frequency, motion.s
+        share = (omega**2 + 2 * damping * omega * s) / (s**2 + 2 * damping * omega * s + omega**2)
+        return Force.of(-acceleration * share)
+
+    yield Trial(
+        effect="extra_mode", site=motion.site, build=pull,
+        grid=logarithms(np.geomspace(max(band_hz[0], 0.5), band_hz[1], 40).tolist(), (0.005, 0.03)),
+        values=lambda shape, a: (
+            {"mass": float(a[0]), "frequency": numbers(shape)[0], "damping_ratio": numbers(shape)[1]}
+            if a[0] > 0 else None
+        ),
+        parameters=3,
+    )  # fmt: skip
+    yield from tone_trials(motion)
+
+
+def tone_trials(motion: Recovered) -> Iterator[Trial]:
+    """Give sines at the strongest lines of the recovered force, for a body or an output."""
+    tones = strongest_tones(motion.force, motion.lines.sample_rate_hz)
+    if not tones:
+        return
+
+    def build(shape: Shape) -> Force:
+        angle = 2 * np.pi * numbers(shape)[0] * motion.time_s
+        return Force.of(motion.spectrum(np.sin(angle)), motion.spectrum(np.cos(angle)))
+
+    yield Trial(
+        effect="tonal_disturbance", site=motion.site, build=build, grid=logarithms(tones),
+        values=lambda shape, a: {
+            "frequency": numbers(shape)[0], "amplitude": float(np.hypot(a[0], a[1])),
+            "phase": float(np.arctan2(a[1], a[0])),
+        },
+        parameters=3,
+    )  # fmt: skip

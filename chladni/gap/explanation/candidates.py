@@ -1,0 +1,64 @@
+"""Candidates: every effect of the catalogue at every plausible site, by the screen."""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from chladni.gap.explanation.body_trials import body_trials
+from chladni.gap.explanation.input_trials import input_trials
+from chladni.gap.explanation.joint_trials import joint_trials
+from chladni.gap.explanation.output_trials import output_trials
+from chladni.gap.explanation.ripple_trials import ripple_at_input
+from chladni.gap.explanation.screen import Screen, Screened
+from chladni.gap.explanation.trial import Trial
+from chladni.gap.location.locate import Located, Location, sites_at
+from chladni.gap.location.recovered import Recovered, recovered
+from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.places import Site
+
+#: Screened forms that are searched beyond their grid.
+_REFINED = 16
+
+
+def screened(location: Location, places: Iterable[Located], leave_out: frozenset[str]) -> list[Screened]:
+    """Weigh every effect at the sites of some places; the best of each form, by rising cost."""
+    problem = location.problem
+    band = excited_band_hz(problem)
+    found: list[tuple[Screened, Screen]] = []
+    for located in places:
+        for site, others in sites_at(located):
+            motion = recovered(problem, located.profile, site)
+            screen = Screen(problem, located.profile, site, others=others)
+            trials = (one for one in trials_at(problem, motion, site, band) if one.effect not in leave_out)
+            found += [(one, screen) for one in screen.run(trials)]
+    found.sort(key=lambda one: one[0].cost)
+    best: dict[tuple[str, str, str | None, str | None], tuple[Screened, Screen]] = {}
+    for one, screen in found:
+        best.setdefault((one.trial.effect, one.trial.site.name, one.trial.variant, one.trial.source), (one, screen))
+    refined = [screen.refined(one) if place < _REFINED else one for place, (one, screen) in enumerate(best.values())]
+    return sorted(refined, key=lambda one: one.cost)
+
+
+def trials_at(problem: LinearProblem, motion: Recovered, site: Site, band_hz: tuple[float, float]) -> Iterator[Trial]:
+    """Give the trials of a site."""
+    compiled = problem.view(np.zeros(len(problem.tunables.names))).compiled
+    if site.kind == "joint":
+        yield from joint_trials(motion, compiled.ports[compiled.port_index(site.name, "joint")])
+    elif site.kind == "body":
+        yield from body_trials(motion, band_hz)
+    elif site.kind == "input":
+        yield from input_trials(motion)
+        yield from ripple_at_input(problem, motion, site)
+    elif site.kind == "output":
+        yield from output_trials(motion, problem.measurement)
+
+
+def excited_band_hz(problem: LinearProblem) -> tuple[float, float]:
+    """Band that holds 99 % of the outputs' power."""
+    measurement = problem.measurement
+    signals = measurement.outputs / np.maximum(np.std(measurement.outputs, axis=1, keepdims=True), 1e-300)
+    power = np.sum(np.abs(np.fft.rfft(signals - signals.mean(axis=1, keepdims=True), axis=1)) ** 2, axis=0)
+    total = np.cumsum(power) / max(float(power.sum()), 1e-300)
+    low, high = np.searchsorted(total, (0.005, 0.995))
+    step = measurement.sample_rate_hz / measurement.samples
+    return float(max(low, 1) * step), float(max(high, 2) * step)

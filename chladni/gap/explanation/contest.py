@@ -1,0 +1,111 @@
+"""The contest: hypotheses fitted by output error on some stretches of a log, weighed on the others."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.gap.tuning.output_error import OutputErrorFit, fit_output_error
+from chladni.signals.errors import ModelError
+
+Matrix = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+#: Independent samples that a log is taken for, whatever its length: a model that is right but for details of its law
+#: must not be refuted by those details a million times over (see docs/methods/gap-explanation.md).
+EFFECTIVE_SAMPLES = 200.0
+#: Share of the noise's power that details of a law may leave without counting against it.
+SLACK = 0.3
+_BLOCK_S = 0.75
+#: Every so manieth block is held out.
+_EVERY = 3
+
+
+def training_mask(samples: int, sample_rate_hz: float, period_samples: int | None = None) -> Mask:
+    """Give ``[sample]``: True where fits may look, False in every third block of about 0.75 s.
+
+    Blocks alternate over the whole log, so that a drift is on both sides; they don't keep step with a period.
+    """
+    block = max(int(_BLOCK_S * sample_rate_hz), samples // 200, 1)
+    # At least four held-out blocks, or a bootstrap has nothing to draw from.
+    block = min(block, max(samples // (4 * _EVERY), 1))
+    if period_samples is not None and period_samples % (_EVERY * block) < block:
+        block += max(block // 7, 1)
+    return np.asarray((np.arange(samples) // block) % _EVERY != 1, dtype=np.bool_)
+
+
+class Contest:
+    """Fits hypotheses to one log.
+
+    Parameters
+    ----------
+    run
+        The model driven by the log.
+    noise
+        Of the outputs.
+    training
+        ``[sample]`` what fits may see.
+    """
+
+    def __init__(self, run: FreeRun, noise: NoiseFloor, training: Mask) -> None:
+        self.run, self.noise, self.training = run, noise, training
+
+    def enter(self, hypothesis: Hypothesis, *, max_iterations: int = 12) -> Contestant | None:
+        """Fit a hypothesis; None when its start already diverges."""
+        try:
+            fit = fit_output_error(
+                self.run, self.noise,
+                effects=hypothesis.effects, fitted=hypothesis.fitted or None, training=self.training,
+                start_z=np.clip(hypothesis.start_z, -3.0, 3.0) if not hypothesis.wide else hypothesis.start_z,
+                z_limit={name: hypothesis.wide.get(name, 3.0) for name in self.run.tunables.names},
+                max_iterations=max_iterations,
+            )  # fmt: skip
+        except ModelError:
+            return None
+        return self.judged(hypothesis, fit)
+
+    def judged(self, hypothesis: Hypothesis, fit: OutputErrorFit) -> Contestant:
+        """Weigh a fit on the samples that it didn't see."""
+        held = fit.held_by_output
+        # A parameter that may leave its tolerance pays for its freedom instead of its distance.
+        wide = [self.run.tunables.names.index(name) for name in hypothesis.wide]
+        prior = fit.prior_cost - float(np.sum(fit.z[wide] ** 2))
+        return Contestant(
+            hypothesis=hypothesis,
+            fit=fit,
+            held=held,
+            gap=held_gap(self.run.measurement.outputs, fit.outputs, ~self.training),
+            log_evidence=log_evidence(held, prior, hypothesis.freedom),
+        )
+
+    def enter_all(
+        self, hypotheses: Sequence[Hypothesis], progress: Callable[[float], None] | None = None
+    ) -> list[Contestant]:
+        """Fit hypotheses one after another; those that diverge are left out."""
+        found = []
+        for place, one in enumerate(hypotheses):
+            entered = self.enter(one)
+            if entered is not None:
+                found.append(entered)
+            if progress is not None:
+                progress((place + 1) / len(hypotheses))
+        return found
+
+
+def log_evidence(held: Matrix, prior: float, freedom: int) -> float:
+    """Held-out predictive log likelihood in nats, with prior and a penalty for freedom (Schwarz 1978).
+
+    ``-N/2 sum_j ln((m_j + slack)/(1 + slack)) - prior/2 - freedom/2 ln N`` with m_j the whitened mean square of
+    output j and N the effective number of samples.
+    """
+    likelihood = -0.5 * EFFECTIVE_SAMPLES * float(np.sum(np.log((held + SLACK) / (1.0 + SLACK))))
+    return likelihood - 0.5 * prior - 0.5 * freedom * float(np.log(EFFECTIVE_SAMPLES))
+
+
+def held_gap(measured: Matrix, simulated: Matrix, held: Mask) -> float:
+    """RMS of the residual over RMS of what was measured, outputs scaled by their own RMS; 1 when nothing fits."""
+    size = np.mean((measured - measured.mean(axis=1, keepdims=True))[:, held] ** 2, axis=1)
+    left = np.mean((measured - simulated)[:, held] ** 2, axis=1)
+    return float(np.sqrt(np.mean(left / np.maximum(size, 1e-300))))

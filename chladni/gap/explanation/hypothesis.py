@@ -1,0 +1,77 @@
+"""Hypotheses on what a model lacks, and what their fits say."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.records.diagnosis import Candidate
+from chladni.gap.tuning.output_error import OutputErrorFit
+from chladni.models.effects.attached_effect import AttachedEffect
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hypothesis:
+    """Effects at sites, or parameters that may leave their tolerance; nothing of either is "the model is right".
+
+    Attributes
+    ----------
+    effects
+        With the values that their fit starts from.
+    fitted
+        For each effect the names of the parameters that move.
+    wide
+        Parameters that may leave their tolerance, with their limit in sigmas.
+    start_z
+        Where the parameters start.
+    screened
+        Misfit over noise of the screen, None when it wasn't screened.
+    """
+
+    effects: tuple[AttachedEffect, ...] = ()
+    fitted: tuple[tuple[str, ...], ...] = ()
+    wide: Mapping[str, float] = field(default_factory=dict)
+    start_z: Matrix
+    screened: float | None = None
+
+    @property
+    def named(self) -> tuple[Candidate, ...]:
+        """What it names as causes."""
+        effects = [Candidate(effect=one.effect, site=one.site) for one in self.effects]
+        return (*effects, *(Candidate(effect="parameter", site=name) for name in self.wide))
+
+    @property
+    def freedom(self) -> int:
+        """Numbers that it adds to the tuned model."""
+        return sum(len(names) for names in self.fitted) + len(self.wide)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Contestant:
+    """A hypothesis that was fitted in free run.
+
+    Attributes
+    ----------
+    hypothesis, fit
+        What, and the result on the training samples.
+    held
+        ``[output]`` mean square of the whitened residual on the samples that the fit didn't see; 1 is noise.
+    gap
+        RMS of the residual over RMS of what was measured, on those samples, outputs scaled by their RMS.
+    log_evidence
+        Nats, but for a constant that all hypotheses on this log share.
+    """
+
+    hypothesis: Hypothesis
+    fit: OutputErrorFit
+    held: Matrix
+    gap: float
+    log_evidence: float
+
+    @property
+    def chi(self) -> float:
+        """Mean of `held` over the outputs."""
+        return float(np.mean(self.held))

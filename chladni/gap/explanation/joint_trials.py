@@ -1,0 +1,186 @@
+"""Trials at joints: friction, stiffness, damping, ripple, along the recovered displacement and velocity."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.explanation.trial import Force, Numbers, Shape, Spectrum, Trial, logarithms, numbers
+from chladni.gap.location.recovered import Recovered
+from chladni.models.core.port import Port
+from chladni.models.core.port_law import LawFunction, PortLaw
+from chladni.models.drives.known_motion import force_along_motion
+from chladni.models.effects.coulomb_friction import bristle
+from chladni.models.effects.hysteresis import bouc_wen
+
+Matrix = NDArray[np.float64]
+
+
+def joint_trials(motion: Recovered, port: Port) -> Iterator[Trial]:
+    """Give every effect of the catalogue that acts at a joint, on grids of what enters it nonlinearly."""
+    yield from _friction(motion)
+    yield _hysteresis(motion)
+    yield from _polynomials(motion)
+    if port.stiffness > 0:
+        yield _backlash(motion, port)
+        yield from _varying(motion, port)
+    yield from _stops(motion)
+    yield ripple_trial(motion, motion.displacement)
+
+
+def _friction(motion: Recovered) -> Iterator[Trial]:
+    s, speed, reach = motion.velocity, _rms(motion.velocity), _rms(motion.displacement)
+
+    def sliding(shape: Shape) -> Force:
+        return Force.of(motion.spectrum(np.tanh(s / numbers(shape)[0])))
+
+    def stribeck(shape: Shape) -> Force:
+        creep, at = numbers(shape)
+        unit = np.tanh(s / creep)
+        return Force.of(motion.spectrum(unit), motion.spectrum(unit * np.exp(-((s / at) ** 2))))
+
+    def bristles(shape: Shape) -> Force:
+        return Force.of(_along(bristle, (1.0, 0.0, *numbers(shape)), motion))
+
+    creeps = (0.003 * speed, 0.03 * speed, 0.15 * speed)
+    yield Trial(
+        effect="coulomb_friction", site=motion.site, variant="regularised", build=sliding, grid=logarithms(creeps),
+        values=lambda shape, a: _positive(a, force=a[0], creep_speed=numbers(shape)[0]), parameters=2,
+    )  # fmt: skip
+    yield Trial(
+        effect="coulomb_friction", site=motion.site, variant="bristle", build=bristles,
+        grid=logarithms((0.003 * reach, 0.02 * reach, 0.1 * reach)),
+        values=lambda shape, a: _positive(a, force=a[0], presliding=numbers(shape)[0]), parameters=2,
+    )  # fmt: skip
+    yield Trial(
+        effect="stribeck_friction", site=motion.site, variant="regularised", build=stribeck,
+        grid=logarithms(creeps[:2], (0.05 * speed, 0.15 * speed, 0.4 * speed, 1.0 * speed)),
+        values=_stribeck, parameters=4,
+    )  # fmt: skip
+
+
+def _hysteresis(motion: Recovered) -> Trial:
+    reach = _rms(motion.displacement)
+    return Trial(
+        effect="hysteresis", site=motion.site,
+        build=lambda shape: Force.of(_along(bouc_wen, (1.0, numbers(shape)[0], max(numbers(shape)[1], 1.0)), motion)),
+        grid=logarithms((0.1 * reach, 0.3 * reach, 0.7 * reach, 1.5 * reach), (1.0, 2.0)),
+        values=lambda shape, a: _positive(
+            a, force=a[0], **{"yield": numbers(shape)[0], "shape": max(numbers(shape)[1], 1.0)}
+        ),
+        parameters=3,
+    )  # fmt: skip
+
+
+def _polynomials(motion: Recovered) -> Iterator[Trial]:
+    d, s = motion.displacement, motion.velocity
+
+    def of(effect: str, signal: Matrix, name: str, sign: float) -> Trial:
+        spectrum = motion.spectrum(signal)
+        return Trial(
+            effect=effect, site=motion.site, build=lambda _: Force.of(spectrum),
+            values=lambda _, a: {name: float(a[0])} if sign * a[0] > 0 else None, parameters=1,
+        )  # fmt: skip
+
+    yield of("quadratic_damping", s * np.abs(s), "coefficient", 1.0)
+    yield of("hardening_stiffness", d**3, "cubic", 1.0)
+    yield of("softening_stiffness", d**3, "cubic", -1.0)
+
+
+def _backlash(motion: Recovered, port: Port) -> Trial:
+    d, reach = motion.displacement, _rms(motion.displacement)
+
+    def build(shape: Shape) -> Force:
+        half = numbers(shape)[0] / 2
+        return Force.known(motion.spectrum(-port.stiffness * np.clip(d, -half, half)))
+
+    # From hardly any play to one that the motion barely crosses.
+    gaps = 2 * reach * np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0])
+    return Trial(
+        effect="backlash", site=motion.site, build=build, grid=logarithms(gaps.tolist()),
+        values=lambda shape, _: {"gap": numbers(shape)[0]}, parameters=1,
+    )  # fmt: skip
+
+
+def _varying(motion: Recovered, port: Port) -> Iterator[Trial]:
+    d, t = motion.displacement, motion.time_s
+    length = float(t[-1])
+
+    def change(shape: Shape, amplitudes: Matrix) -> Numbers | None:
+        relative = float(amplitudes[0]) / port.stiffness
+        return {"relative_change": relative, "time": numbers(shape)[0]} if relative > -0.95 else None
+
+    yield Trial(
+        effect="varying_stiffness", site=motion.site, variant="drift",
+        build=lambda shape: Force.of(motion.spectrum(d * np.minimum(t / numbers(shape)[0], 1.0))),
+        grid=logarithms((0.4 * length, length)), values=change, parameters=2,
+    )  # fmt: skip
+    yield Trial(
+        effect="varying_stiffness", site=motion.site, variant="step",
+        build=lambda shape: Force.of(motion.spectrum(d * (t > numbers(shape)[0]))),
+        grid=logarithms(np.linspace(0.1 * length, 0.9 * length, 9).tolist()), values=change, parameters=2,
+    )  # fmt: skip
+
+
+def _stops(motion: Recovered) -> Iterator[Trial]:
+    for side in (1.0, -1.0):
+        yield _stop(motion, side)
+
+
+def _stop(motion: Recovered, side: float) -> Trial:
+    d = side * motion.displacement
+    # How much of the way to the furthest point is free, so that a search can't leave the motion.
+    low, high = float(np.quantile(d, 0.3)), float(np.max(d))
+
+    def clearance(shape: Shape) -> float:
+        return high - (high - low) * min(numbers(shape)[0], 1.0)
+
+    def build(shape: Shape) -> Force:
+        return Force.of(motion.spectrum(side * np.maximum(d - clearance(shape), 0.0)))
+
+    return Trial(
+        effect="one_sided_stop", site=motion.site, variant="spring", build=build,
+        grid=logarithms((0.08, 0.2, 0.35, 0.5, 0.7, 0.9)),
+        values=lambda shape, a: _positive(a, stiffness=a[0], clearance=clearance(shape), side=side), parameters=2,
+    )  # fmt: skip
+
+
+def ripple_trial(motion: Recovered, position: Matrix) -> Trial:
+    """Give the trial of a force periodic in a position ``[sample]``."""
+    span = float(np.quantile(position, 0.98) - np.quantile(position, 0.02)) or 1.0
+
+    def build(shape: Shape) -> Force:
+        angle = 2 * np.pi * position / numbers(shape)[0]
+        return Force.of(motion.spectrum(np.sin(angle)), motion.spectrum(np.cos(angle)))
+
+    def values(shape: Shape, a: Matrix) -> Numbers:
+        return {
+            "amplitude": float(np.hypot(a[0], a[1])),
+            "period": numbers(shape)[0],
+            "phase": float(np.arctan2(a[1], a[0])),
+        }
+
+    grid = logarithms(np.geomspace(0.03 * span, span, 32).tolist())
+    return Trial(effect="ripple", site=motion.site, build=build, grid=grid, values=values, parameters=3)
+
+
+def _positive(amplitudes: Matrix, **values: float) -> Numbers | None:
+    return {name: float(value) for name, value in values.items()} if amplitudes[0] > 0 else None
+
+
+def _stribeck(shape: Shape, amplitudes: Matrix) -> Numbers | None:
+    # Less friction at rest than in motion is no Stribeck curve.
+    if amplitudes[0] <= 0 or amplitudes[1] <= 0:
+        return None
+    creep, speed = numbers(shape)
+    coulomb, more = float(amplitudes[0]), float(amplitudes[1])
+    return {"coulomb": coulomb, "static": coulomb + more, "speed": speed, "creep_speed": creep}
+
+
+def _along(law: LawFunction, parameters: tuple[float, ...], motion: Recovered) -> Spectrum:
+    port_law = PortLaw(port=0, function=law, parameters=parameters, state=(0.0,))
+    return motion.spectrum(force_along_motion(port_law, motion.displacement, motion.velocity, motion.time_s))
+
+
+def _rms(signal: Matrix) -> float:
+    return float(np.sqrt(np.mean(signal**2))) or 1.0

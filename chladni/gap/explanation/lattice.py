@@ -1,0 +1,60 @@
+"""Coarse steps of a sensor, seen in its samples themselves: they stand on a lattice."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Matrix = NDArray[np.float64]
+#: ``abs(mean exp(2 pi i y/step))`` of a signal without steps stays far below; of a quantised one it's near 1.
+_CLEAR = 0.9
+_BINS = 1 << 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lattice:
+    """Steps found in a signal: their size, and how sharply the samples stand on them, 0 to 1."""
+
+    step: float
+    strength: float
+
+
+def lattice_of(signal: Matrix) -> Lattice | None:
+    """Find the step of a quantised signal, None when its samples stand on no lattice.
+
+    The transform of the histogram has a peak at the inverse of the step (Widrow and Kollar, *Quantization Noise*,
+    section 4.2: the characteristic function repeats).
+    """
+    low, high = float(np.min(signal)), float(np.max(signal))
+    if high <= low:
+        return None
+    counts = np.histogram(signal, bins=_BINS, range=(low, high))[0]
+    strength = np.abs(np.fft.rfft(counts)) / signal.size
+    span = high - low
+    # A step shows only when it's small against the signal: below some ten steps the shape of the signal is seen.
+    first = 6
+    usable = strength[first : _BINS // 16]
+    if not usable.size:
+        return None
+    # Multiples of the inverse step are peaks too: the first that is nearly as high as the highest is the step's.
+    high_enough = np.flatnonzero(usable > max(_CLEAR * float(usable.max()), 0.5))
+    if not high_enough.size:
+        return None
+    place = first + int(high_enough[0])
+    step, sharp = _sharpened(signal, span / place, span)
+    return Lattice(step=step, strength=sharp) if sharp > _CLEAR else None
+
+
+def _sharpened(signal: Matrix, step: float, span: float) -> tuple[float, float]:
+    """Search the step around a peak of the histogram's transform, whose lines are 1/span apart."""
+    best_step, best = step, 0.0
+    width = 1.0 / span
+    centre = 1.0 / step
+    for _ in range(4):
+        inverses = np.linspace(centre - width, centre + width, 41)
+        found = np.abs([np.mean(np.exp(2j * np.pi * one * signal)) for one in inverses])
+        place = int(np.argmax(found))
+        centre, best = float(inverses[place]), float(found[place])
+        best_step = 1.0 / centre
+        width /= 10.0
+    return best_step, best

@@ -1,0 +1,169 @@
+"""Screening: every trial along the recovered motion, weighed on all sensors by linear regression."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import minimize
+
+from chladni.gap.explanation.trial import Numbers, Shape, Trial
+from chladni.gap.location.profile import Elimination, Profile, bounded_minimum
+from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.places import Site
+
+Matrix = NDArray[np.float64]
+Spectrum = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Screened:
+    """A trial with its amplitudes.
+
+    Attributes
+    ----------
+    trial, shape, values
+        Which, and the effect's parameters.
+    misfit
+        ``sum |rest|^2`` whitened over outputs and lines, with parameters and transients refitted.
+    expected
+        What noise alone would leave.
+    z
+        Where the parameters go.
+    """
+
+    trial: Trial
+    shape: Shape
+    values: Numbers
+    misfit: float
+    expected: float
+    z: Matrix
+
+    @property
+    def chi(self) -> float:
+        """Misfit over what noise alone leaves."""
+        return self.misfit / self.expected
+
+    @property
+    def cost(self) -> float:
+        """Negative log likelihood with prior and a penalty for each number (Schwarz 1978), but for constants."""
+        return self.misfit + float(self.z @ self.z) / 2 + 0.5 * self.trial.parameters * float(np.log(self.expected))
+
+
+class Screen:
+    """Regression of a residual on the forces of trials at one site.
+
+    Parameters
+    ----------
+    problem
+        Of the whole record.
+    found
+        Profile of the place: its parameters, transient and force are where the linearisation is made.
+    site
+        Of the trials.
+    others
+        Sites whose force may be anything meanwhile.
+    limit
+        Bound on the parameters, in sigmas of their tolerances.
+    """
+
+    def __init__(
+        self, problem: LinearProblem, found: Profile, site: Site, *, others: Sequence[Site] = (), limit: float = 3.0
+    ) -> None:
+        view = problem.view(found.z)
+        self._problem, self._z = problem, found.z
+        self._pattern = problem.pattern(view, site)
+        self._out = Elimination([problem.pattern(view, one) for one in others], problem.transients(view))
+        residual = problem.measured * problem.weight - problem.response(found.z, np.zeros_like(found.transient), ())
+        forces = list(zip(found.sites, found.forces, strict=True))
+        slopes = self._out.rest(problem.slopes(found.z, found.transient, forces))
+        self._rest = self._out.rest(residual)
+        self._limit = limit
+        self._slopes = slopes
+        # Parameters with their prior are eliminated once; each trial then costs a few inner products.
+        self._factor = cho_factor(slopes @ slopes.T + np.eye(len(slopes)) / 2) if len(slopes) else None
+        self._to_slopes = slopes @ self._rest - found.z / 2
+
+    def nothing(self) -> float:
+        """Misfit and prior without any force."""
+        return self._solved(np.zeros((0, self._rest.size)), self._rest)[1]
+
+    def run(self, trials: Iterable[Trial]) -> list[Screened]:
+        """Weigh trials on their grids; those whose amplitudes make no such effect are left out."""
+        found = []
+        for trial in trials:
+            tried = [one for one in (self.weigh(trial, shape) for shape in trial.grid) if one is not None]
+            if tried:
+                found.append(min(tried, key=lambda one: one.cost))
+        return found
+
+    def refined(self, start: Screened) -> Screened:
+        """Search what enters nonlinearly from the best point of the grid (Nelder and Mead 1965)."""
+        if not start.shape:
+            return start
+
+        def cost(shape: Matrix) -> float:
+            found = self.weigh(start.trial, tuple(shape.tolist()))
+            return found.cost if found is not None else 2 * abs(start.cost) + 1e6
+
+        size = len(start.shape)
+        simplex = np.array([start.shape] * (size + 1))
+        simplex[1:] += 0.15 * np.eye(size)
+        best = minimize(
+            cost, np.array(start.shape), method="Nelder-Mead",
+            options={"initial_simplex": simplex, "maxfev": 18 * size + 12, "xatol": 1e-4, "fatol": 0.1},
+        )  # fmt: skip
+        found = self.weigh(start.trial, tuple(np.asarray(best.x).tolist()))
+        return found if found is not None and found.cost < start.cost else start
+
+    def weigh(self, trial: Trial, shape: Shape) -> Screened | None:
+        """Regress on one shape of a trial; None when no amplitudes make this effect."""
+        force = trial.build(shape)
+        basis = self._printed(force.basis)
+        rest = self._rest if force.fixed is None else self._rest - self._printed(force.fixed[None])[0]
+        # A law that ran away along the recovered motion prints nothing that could be weighed.
+        if not (np.all(np.isfinite(basis)) and np.all(np.isfinite(rest))):
+            return None
+        amplitudes, misfit, z = self._solved(basis, rest)
+        values = trial.values(shape, amplitudes)
+        if values is None or not np.all(np.isfinite(list(values.values()))):
+            return None
+        expected = float(self._problem.scale)
+        return Screened(trial=trial, shape=shape, values=values, misfit=misfit, expected=expected, z=z)
+
+    def _printed(self, spectra: Spectrum) -> Matrix:
+        """``[signal, number]``: what forces of these spectra ``[signal, line]`` print, without transients."""
+        if not len(spectra):
+            return np.zeros((0, self._rest.size))
+        return self._out.rest(np.asarray(self._pattern * spectra[:, None, None], dtype=np.complex128))
+
+    def _solved(self, basis: Matrix, rest: Matrix) -> tuple[Matrix, float, Matrix]:
+        size = np.linalg.norm(basis, axis=1)
+        unit = basis[size > 0] / size[size > 0, None]
+        own, to_slopes, cross = unit @ rest, self._slopes @ rest - self._z / 2, self._slopes @ unit.T
+        if self._factor is None:
+            shift, moved = np.zeros_like(cross), np.zeros(0)
+        else:
+            shift, moved = cho_solve(self._factor, cross), cho_solve(self._factor, to_slopes)
+        scaled = np.linalg.lstsq(unit @ unit.T - cross.T @ shift, own - cross.T @ moved, rcond=1e-10)[0]
+        step = moved - shift @ scaled
+        if np.any(np.abs(self._z + step) > self._limit):
+            scaled, step = self._bounded(unit, rest)
+        left = rest - scaled @ unit - step @ self._slopes
+        amplitudes = np.zeros(len(basis))
+        amplitudes[size > 0] = scaled / size[size > 0]
+        return amplitudes, float(left @ left), self._z + step
+
+    def _bounded(self, unit: Matrix, rest: Matrix) -> tuple[Matrix, Matrix]:
+        """Amplitudes and step of the parameters where these may not leave their tolerance."""
+        both = np.vstack([unit, self._slopes])
+        count, size = len(unit), len(self._slopes)
+        free = np.concatenate([np.zeros(count), np.full(size, 0.5)])
+        normal = both @ both.T + np.diag(free) + 1e-12 * np.eye(count + size)
+        toward = both @ rest
+        toward[count:] -= self._z / 2
+        low = np.concatenate([np.full(count, -np.inf), -self._limit - self._z])
+        high = np.concatenate([np.full(count, np.inf), self._limit - self._z])
+        found = bounded_minimum(normal, toward, low, high)
+        return found[:count], found[count:]

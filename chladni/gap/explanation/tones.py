@@ -1,0 +1,35 @@
+"""Tones in a signal: sharp lines that stand out of what is around them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Matrix = NDArray[np.float64]
+
+
+def strongest_tones(signal: Matrix, sample_rate_hz: float, count: int = 3) -> list[float]:
+    """Give frequencies in Hz of the strongest lines, to a fraction of a line.
+
+    By the Hann-windowed transform and a parabola through the logarithm of its peak (Gasior and Gonzalez 2004).
+    """
+    size = signal.size
+    power = np.abs(np.fft.rfft(signal * np.hanning(size))) ** 2
+    # Against its surroundings: a resonance that an unknown force excites is broad.
+    width = max(5, size // 400)
+    around = np.convolve(np.pad(power, width, mode="reflect"), np.full(2 * width + 1, 1 / (2 * width + 1)), "valid")
+    sharp = power / np.maximum(around, 1e-300)
+    sharp[: max(3, size // 5000)] = 0.0
+    found: list[float] = []
+    strength = sharp * (power > 1e-6 * power.max())
+    for place in np.argsort(strength)[::-1][: 20 * count]:
+        if len(found) == count:
+            break
+        if not 0 < place < power.size - 1 or power[place] < max(power[place - 1], power[place + 1]):
+            continue
+        found.append((place + _offset(power[place - 1 : place + 2])) * sample_rate_hz / size)
+    return found
+
+
+def _offset(three: Matrix) -> float:
+    low, mid, high = np.log(np.maximum(three, 1e-300))
+    bend = low - 2 * mid + high
+    return float(0.5 * (low - high) / bend) if bend < 0 else 0.0

@@ -1,0 +1,177 @@
+"""Where the gap comes from: every place profiled, the best ones to the end."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.location.noise_behind import noise_behind
+from chladni.gap.location.profile import Profile, profiled
+from chladni.gap.plant.linear_problem import LinearProblem, Scaled
+from chladni.gap.plant.places import Place, Site, placed, sites_of
+from chladni.gap.plant.record_lines import RecordLines, all_lines, segment_lines, telling_lines
+from chladni.gap.records.measurement import Measurement
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.models.core.model import Model
+
+Matrix = NDArray[np.float64]
+#: Lengths of the segments on which parameters are found, in periods of the lowest mode, one after another: short
+#: ones forgive a resonance that lies elsewhere, long ones tell it exactly.
+_SEGMENTS = (8.0, 24.0)
+_SEGMENT_LINES = 1500
+_RECORD_LINES = 1500
+#: Places that are followed to the end.
+_FOLLOWED = 6
+#: Patterns tell places apart only when there are more sensors than forces.
+_PAIR_SENSORS = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Located:
+    """One place (or a pair) with the profile of the whole record.
+
+    Attributes
+    ----------
+    places
+        One, or two that act together.
+    profile
+        On the record's lines.
+    """
+
+    places: tuple[Place, ...]
+    profile: Profile
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Location:
+    """What location found.
+
+    Attributes
+    ----------
+    problem
+        On the record's telling lines, with the noise as it shows behind the best place.
+    tuned
+        Profile without any force: the parameters alone.
+    ranked
+        The places that were followed, by rising misfit.
+    shares
+        Share of the misfit beyond noise that an unknown force at each site explains, by name.
+    """
+
+    problem: LinearProblem
+    tuned: Profile
+    ranked: tuple[Located, ...]
+    shares: dict[str, float]
+
+    @property
+    def best(self) -> Located | None:
+        """The place that explains most, None when there are too few sensors to tell."""
+        return self.ranked[0] if self.ranked else None
+
+
+def locate(model: Model, measurement: Measurement, noise: NoiseFloor, tunables: Scaled) -> Location:
+    """Profile an unknown force at every place of a model.
+
+    Parameters are refitted within their tolerance under each hypothesis, so that a tuning that swallowed part of an
+    effect can't mislead. With one sensor any force explains anything: then every place is handed on.
+    """
+    whole = LinearProblem(
+        model, measurement, noise, tunables, all_lines(measurement.samples, measurement.sample_rate_hz)
+    )
+    segments, tuned = _tuned_on_segments(model, whole)
+    view = segments.view(tuned.z)
+    places = placed(view, sites_of(view.compiled, measurement.output_names), measurement.output_names)
+    rough = _on_segments(segments, tuned, places)
+    record = whole.on(_telling(whole))
+    plain = profiled(record, (), tuned.z, iterations=6)
+    ranked = _followed(record, rough)
+    if ranked and ranked[0].profile.expected > 1 and _pays(plain, ranked[0].profile):
+        record = record.with_noise(noise_behind(record, ranked[0].profile))
+        ranked = _followed(record, [(one.profile, one.places[0]) for one in ranked])
+        plain = profiled(record, (), plain.z, iterations=4)
+    return Location(problem=record, tuned=plain, ranked=tuple(ranked), shares=_shares(tuned, rough))
+
+
+def located_pairs(location: Location, rough: int = 5) -> list[Located]:
+    """Profile forces at two of the followed places at a time; by rising misfit, none with too few sensors."""
+    problem = location.problem
+    if len(problem.measured) < _PAIR_SENSORS:
+        return []
+    found = []
+    places = list(location.ranked[:rough])
+    for place, first in enumerate(places):
+        for second in places[place + 1 :]:
+            sites = (first.places[0].sites[0], second.places[0].sites[0])
+            profile = profiled(problem, sites, first.profile.z, iterations=2)
+            found.append(Located(places=(first.places[0], second.places[0]), profile=profile))
+    return sorted(found, key=lambda one: one.profile.chi)
+
+
+def _tuned_on_segments(model: Model, whole: LinearProblem) -> tuple[LinearProblem, Profile]:
+    measurement = whole.measurement
+    period = measurement.sample_rate_hz / _lowest_hz(model, measurement)
+    z = np.zeros(len(whole.tunables.names))
+    problem, found = whole, None
+    for periods in _SEGMENTS:
+        length = int(np.clip(periods * period, 64, measurement.samples // 2))
+        lines = segment_lines(
+            length, samples=measurement.samples, sample_rate_hz=measurement.sample_rate_hz, count=_SEGMENT_LINES
+        )
+        problem = whole.on(lines)
+        found = profiled(problem, (), z, iterations=8)
+        z = found.z
+    return problem, found or profiled(problem, (), z)
+
+
+def _lowest_hz(model: Model, measurement: Measurement) -> float:
+    """Lowest frequency of an oscillation that the record holds several times."""
+    values = np.linalg.eigvals(model.compile().a)
+    turning = np.abs(values[np.abs(values.imag) > 1e-3 * np.abs(values)]) / (2 * np.pi)
+    heard = turning[turning > 4.0 / measurement.duration_s]
+    return float(heard.min()) if heard.size else 20.0 / measurement.duration_s
+
+
+def _on_segments(segments: LinearProblem, tuned: Profile, places: Sequence[Place]) -> list[tuple[Profile, Place]]:
+    if len(segments.measured) < 2:
+        return [(replace(tuned, sites=(place.sites[0],)), place) for place in places]
+    found = [(profiled(segments, (place.sites[0],), tuned.z, iterations=4), place) for place in places]
+    return sorted(found, key=lambda one: one[0].chi)
+
+
+def _followed(record: LinearProblem, rough: Sequence[tuple[Profile, Place]]) -> list[Located]:
+    # With one sensor all patterns are one place: nothing is known of it but that it explains all.
+    found = [
+        Located(places=(place,), profile=profiled(record, (place.sites[0],), profile.z, iterations=5))
+        for profile, place in rough[:_FOLLOWED]
+    ]
+    return sorted(found, key=lambda one: one.profile.chi)
+
+
+def _telling(whole: LinearProblem) -> RecordLines:
+    power = np.sum(np.abs(whole.measured * whole.weight) ** 2, axis=(0, 1))
+    measurement = whole.measurement
+    return telling_lines(
+        power, samples=measurement.samples, sample_rate_hz=measurement.sample_rate_hz, count=_RECORD_LINES
+    )
+
+
+def _pays(plain: Profile, found: Profile) -> bool:
+    return found.chi < 0.7 * plain.chi
+
+
+def _shares(tuned: Profile, rough: Sequence[tuple[Profile, Place]]) -> dict[str, float]:
+    gap = max(tuned.chi - 1.0, 1e-12)
+    return {
+        site.name: float(np.clip((tuned.chi - max(profile.chi, 1.0)) / gap, 0.0, 1.0))
+        for profile, place in rough
+        for site in place.sites
+    }
+
+
+def sites_at(located: Located) -> Sequence[tuple[Site, tuple[Site, ...]]]:
+    """Give each site with those of the other place, whose force is free while the site's laws are weighed."""
+    if len(located.places) == 1:
+        return [(site, ()) for site in located.places[0].sites]
+    first, second = located.places
+    return [(site, (second.sites[0],)) for site in first.sites] + [(site, (first.sites[0],)) for site in second.sites]

@@ -1,0 +1,61 @@
+"""Noise of each sensor as it shows when an unknown force is allowed for."""
+
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from chladni.gap.comparison.autoregressive import noise_floor_of
+from chladni.gap.location.profile import Elimination, Profile
+from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.record_lines import all_lines
+from chladni.gap.records.noise_floor import NoiseFloor
+
+Matrix = NDArray[np.float64]
+#: Bands over which the noise of a sensor is taken for flat.
+_BANDS = 24
+#: A floor is lowered at most to this share of what it was estimated as.
+_LEAST = 0.05
+
+
+def noise_behind(problem: LinearProblem, found: Profile) -> NoiseFloor:
+    """Estimate the noise again, under the hypothesis that forces of any shape act at the sites of a profile.
+
+    What is left off the patterns has, in sensor j, the variance ``sum_k |P_jk|^2 s_k^2`` with P the projector off the
+    patterns and s_k^2 the noise of sensor k (whitened by the former estimate): a small non-negative least-squares
+    problem in each band (minimum norm quadratic unbiased estimation, Rao 1971). A floor is lowered, never raised:
+    the estimates before hold distortion that the force explains.
+    """
+    measurement = problem.measurement
+    whole = problem.on(all_lines(measurement.samples, measurement.sample_rate_hz))
+    view = whole.view(found.z)
+    patterns = [whole.pattern(view, site) for site in found.sites]
+    out = Elimination(patterns, whole.transients(view))
+    residual = (whole.measured - view.response(found.transient, ())) * whole.weight
+    left = np.abs(out.away(residual)[:, 0]) ** 2
+    size = len(left)
+    spread = np.abs(out.away(np.broadcast_to(np.eye(size)[:, :, None, None], (size, size, 1, left.shape[1])))) ** 2
+    edges = np.linspace(0, left.shape[1], _BANDS + 1).astype(np.int64)
+    factor = np.ones((size, left.shape[1]))
+    for low, high in itertools.pairwise(edges):
+        matrix = spread[:, :, 0, low:high].mean(axis=2).T
+        # A sensor that the patterns take whole says nothing of its noise: a faint wish keeps it as it was.
+        wish = 0.02 * np.eye(size)
+        found_power = nnls(
+            np.vstack([matrix, wish]), np.concatenate([left[:, low:high].mean(axis=1), np.diag(wish)])
+        )[0]
+        factor[:, low:high] = np.clip(found_power, _LEAST**2, 1.0)[:, None]
+    density = factor / whole.weight[:, 0] ** 2
+    former = problem.noise
+    return noise_floor_of(
+        np.pad(density, ((0, 0), (1, 1 - measurement.samples % 2)), mode="edge"),
+        samples=measurement.samples,
+        freedom=np.full(size, 2.0 * left.shape[1]),
+        method=tuple(
+            "explained residual" if np.mean(one) < 0.8 else old
+            for one, old in zip(factor, former.method, strict=True)
+        ),
+        upper_bound=former.upper_bound,
+        scale=np.std(measurement.outputs, axis=1),
+    )

@@ -1,0 +1,127 @@
+"""The force that a model lacks at a site, and the motion there, recovered from all sensors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.location.profile import Profile
+from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.places import Site
+from chladni.gap.plant.record_lines import RecordLines, all_lines
+from chladni.signals.value import Value
+
+Matrix = NDArray[np.float64]
+Spectrum = NDArray[np.complex128]
+#: Lines over which the power of an unknown force is taken for the same.
+_SMOOTH = 31
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Recovered(Value):
+    """Unknown force and motion at one site over a whole record.
+
+    Attributes
+    ----------
+    site
+        Where.
+    lines
+        On which trials are weighed.
+    force
+        ``[sample]`` as in `Port`: a joint's resists, an input's adds to the command, an output's to what is measured.
+    displacement, velocity
+        ``[sample]`` at the port; of an input the command, of an output the signal without its error.
+    z, transient
+        Parameters and transients with which it was recovered.
+    reliable
+        ``[line]`` share of the force's power that is no noise, on `all_lines`.
+    """
+
+    site: Site
+    lines: RecordLines
+    force: Matrix
+    displacement: Matrix
+    velocity: Matrix
+    reliable: Matrix
+    z: Matrix
+    transient: Matrix
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+    @property
+    def time_s(self) -> Matrix:
+        """``[sample]`` from the start of the record."""
+        return np.asarray(np.arange(self.force.size) / self.lines.sample_rate_hz, dtype=np.float64)
+
+    @property
+    def s(self) -> Spectrum:
+        """``[line]`` j omega."""
+        return np.asarray(2j * np.pi * self.lines.frequency_hz, dtype=np.complex128)
+
+    def position_at(self, problem: LinearProblem, port: int) -> Matrix:
+        """``[sample]`` displacement at another port, under the same force."""
+        lines = all_lines(problem.measurement.samples, problem.measurement.sample_rate_hz)
+        whole = problem.on(lines)
+        view = whole.view(self.z)
+        motion = view.motion(port, self.transient, [(whole.way(view, self.site), lines.spectrum(self.force))])
+        return np.asarray(lines.signal(motion[0])[0], dtype=np.float64)
+
+    def spectrum(self, signal: Matrix) -> Spectrum:
+        """``[line]`` of a signal ``[sample]``."""
+        return np.asarray(self.lines.spectrum(signal)[0], dtype=np.complex128)
+
+
+def recovered(problem: LinearProblem, found: Profile, site: Site) -> Recovered:
+    """Recover force and motion at a site, with the parameters of a profile of that place.
+
+    On each line the force is the one that explains most, held back where noise would make most of it (Wiener's
+    filter, with the force's power taken from its neighbours).
+
+    Parameters
+    ----------
+    problem
+        Of the whole record; its lines are those that trials will be weighed on.
+    """
+    measurement = problem.measurement
+    lines = all_lines(measurement.samples, measurement.sample_rate_hz)
+    whole = problem.on(lines)
+    view = whole.view(found.z)
+    pattern = whole.pattern(view, site)[:, 0]
+    residual = (whole.measured - view.response(found.transient, ())) * whole.weight
+    strength = np.sum(np.abs(pattern) ** 2, axis=0)
+    plain = np.sum(pattern.conj() * residual[:, 0], axis=0) / np.where(strength > 0, strength, np.inf)
+    noise = 1.0 / np.where(strength > 0, strength, 1e-300)
+    # Neighbours count by how well they tell the force: where a pattern fades, as that of a force on accelerometers
+    # does toward 0 Hz, those that still see it speak for those that don't.
+    say = 1.0 / noise**2
+    power = np.maximum(_smooth(say * (np.abs(plain) ** 2 - noise)) / np.maximum(_smooth(say), 1e-300), 0.0)
+    reliable = power / (power + noise)
+    force = (reliable * plain)[None]
+    way = whole.way(view, site)
+    if site.kind == "output" and way.port is None:
+        row = measurement.output_names.index(site.name)
+        displacement, velocity = measurement.outputs[row] - lines.signal(force)[0], np.zeros(lines.samples)
+    elif site.kind == "input" and way.port is None:
+        row = measurement.input_names.index(site.name)
+        displacement, velocity = measurement.inputs[row], np.zeros(lines.samples)
+    else:
+        motion = view.motion(view.compiled.port_index(site.name, site.kind), found.transient, [(way, force)])
+        displacement, velocity = (lines.signal(one)[0] for one in motion)
+    return Recovered(
+        site=site,
+        lines=problem.lines,
+        force=lines.signal(force)[0],
+        displacement=displacement,
+        velocity=velocity,
+        reliable=reliable,
+        z=found.z,
+        transient=found.transient,
+    )
+
+
+def _smooth(power: Matrix) -> Matrix:
+    if power.size < _SMOOTH:
+        return np.full_like(power, power.mean())
+    padded = np.pad(power, _SMOOTH // 2, mode="reflect")
+    return np.asarray(np.convolve(padded, np.full(_SMOOTH, 1.0 / _SMOOTH), mode="valid"), dtype=np.float64)
