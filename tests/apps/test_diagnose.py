@@ -122,3 +122,22 @@ def test_the_withheld_check_gets_the_document(engine: StandIn, files: tuple[Path
     assert document["verdict"] == "effect"
     assert engine.options["leave_out"] == frozenset({"delay"})
     assert engine.options["seed"] == 3
+
+
+@pytest.mark.parametrize(
+    ("model", "log", "shape", "rate_hz"),
+    [("emps", "emps", (1, 24841), 1000.0), ("emps_closed_loop", "emps_pulses", (2, 24841), 1000.0)],
+)
+def test_measured_logs_find_their_models_signals(
+    engine: StandIn, shared_data: Path, model: str, log: str, shape: tuple[int, int], rate_hz: float
+) -> None:
+    chladni.diagnose_gap(shared_data / "models" / f"{model}.toml", shared_data / f"{log}.mcap")
+    (measurement,) = engine.measurements
+    assert measurement.outputs.shape == shape
+    assert measurement.sample_rate_hz == pytest.approx(rate_hz, rel=1e-6)
+    assert np.ptp(measurement.inputs) > 0
+
+
+def test_a_model_of_another_machine_is_refused(engine: StandIn, shared_data: Path) -> None:
+    with pytest.raises(LogError, match=r"emps\.mcap: holds no channel that model 'silverbox' listens to"):
+        chladni.diagnose_gap(shared_data / "models" / "silverbox.toml", shared_data / "emps.mcap")
