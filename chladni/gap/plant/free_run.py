@@ -25,7 +25,7 @@ Windows = Sequence[tuple[int, int]]
 #: Integrators kept; a fit asks for the same model again when it draws, never for more than a few.
 _KEPT = 8
 #: Steps between samples where windows of a model with laws are marched through.
-PARTS = 4
+PARTS = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

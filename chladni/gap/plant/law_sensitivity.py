@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from chladni.gap.plant.law_kernel import March
 from chladni.gap.plant.law_run import Equations, Windows, kernel_laws, kernel_room, new_record
 from chladni.gap.plant.law_slopes import Change, Unknowns, law_slopes
+from chladni.models.core.balance import balance
 from chladni.models.integrator.integrator import Integration
 from chladni.signals.errors import ModelError
 
@@ -24,9 +25,10 @@ def recorded(equation: Equations, windows: Windows, runs: Sequence[Integration])
         motion = np.vstack([run.displacement, run.velocity])
         records.append(
             record._replace(
-                x=np.ascontiguousarray(run.states.T),
-                motion=np.ascontiguousarray(motion.T),
-                force=np.ascontiguousarray(run.force.T),
+                # Copies: a kernel would be compiled again for arrays that can't be written to.
+                x=np.array(run.states.T, order="C"),
+                motion=np.array(motion.T, order="C"),
+                force=np.array(run.force.T, order="C"),
             )
         )
     return tuple(records)
@@ -85,20 +87,21 @@ def sensitivities(
 
 def modal_coordinates(matrix: Matrix) -> tuple[Matrix, Matrix]:
     """``(T^-1, T)`` with ``T^-1 matrix T`` in real blocks of one or two; the identity where there are none."""
-    values, vectors = np.linalg.eig(matrix)
+    if not matrix.size:
+        return matrix, matrix
+    # States are in m and in m/s: unless they are balanced, their sizes say more than the angles between modes.
+    balanced, scale = balance(matrix)
+    values, vectors = np.linalg.eig(balanced)
     columns = []
     for value, vector in zip(values, vectors.T, strict=True):
-        if abs(value.imag) <= 0:
+        if value.imag == 0:
             columns.append(vector.real)
         elif value.imag > 0:
             columns += [vector.real, vector.imag]
-    basis = np.array(columns, dtype=np.float64).T.reshape(matrix.shape)
-    size = np.linalg.norm(basis, axis=1, keepdims=True)
-    size[size == 0] = 1.0
-    # States are in m and in m/s: their sizes say nothing of whether the modes are independent.
-    if not matrix.size or np.linalg.cond(basis / size) > _CONDITION:
+    basis = np.array(columns, dtype=np.float64).T
+    if np.linalg.cond(basis) > _CONDITION:
         return np.eye(len(matrix)), np.eye(len(matrix))
-    return np.asarray(np.linalg.inv(basis), dtype=np.float64), basis
+    return np.asarray(np.linalg.inv(basis) / scale, dtype=np.float64), basis * scale[:, None]
 
 
 def _fixed(
@@ -140,9 +143,15 @@ def _leads(
     )
     here = np.hstack([record.x, record.rows, record.force])
     ends = np.hstack([here[:-1], record.force[1:]])
-    lead = (ends @ tables.transpose(2, 1, 0).reshape(ends.shape[1], -1)).reshape(steps - 1, -1, q)
-    seen = (here @ outputs.transpose(2, 1, 0).reshape(here.shape[1], -1)).reshape(steps, -1, q)
-    first = np.array([(one.start - equation.start) @ here[0] / by for one, by in changed]).reshape(q, -1).T
+    lead = (ends @ tables.transpose(2, 1, 0).reshape(ends.shape[1], tables.shape[1] * q)).reshape(
+        steps - 1, tables.shape[1], q
+    )
+    seen = (here @ outputs.transpose(2, 1, 0).reshape(here.shape[1], outputs.shape[1] * q)).reshape(
+        steps, outputs.shape[1], q
+    )
+    first = np.zeros((len(equation.start), q))
+    for place, (one, by) in enumerate(changed):
+        first[:, place] = (one.start - equation.start) @ here[0] / by
     for place, (one, by) in enumerate(changed):
         if not np.array_equal(one.rows, equation.rows):
             rows = (one.rows[start : start + steps] - record.rows) / by
@@ -151,7 +160,7 @@ def _leads(
             lead[..., place] += rows[:-1] @ moved.T
             seen[..., place] += rows @ equation.output[:, n : n + width].T
             first[:, place] += equation.start[:, n : n + width] @ rows[0]
-    return lead, np.ascontiguousarray(first), seen
+    return lead, first, seen
 
 
 def _require_same_form(equation: Equations, other: Equations) -> None:

@@ -1,0 +1,38 @@
+import numpy as np
+import pytest
+
+from chladni.gap.plant.tunable import Tunables
+from chladni.signals.errors import EstimateError, ModelError
+from tests.gap.made_log import chain, three_bodies
+
+
+def test_a_sigma_is_the_tolerance_of_the_value():
+    tunables = Tunables.of(three_bodies())
+    z = np.zeros(9)
+    z[tunables.names.index("j1.stiffness")] = 2.0
+    values = tunables.values(z)
+    assert values["j1.stiffness"] == pytest.approx(6e5 * np.exp(0.1), rel=1e-15)
+    assert values["b0.mass"] == 2.0
+
+
+def test_values_and_z_are_inverse():
+    tunables = Tunables.of(three_bodies())
+    z = np.random.default_rng(0).standard_normal(9)
+    np.testing.assert_allclose(tunables.z(tunables.values(z)), z, rtol=1e-12, atol=1e-12)
+
+
+def test_what_is_zero_or_certain_does_not_move():
+    from dataclasses import replace
+
+    model = replace(chain([1.0, 1.0], [1e5, 0.0], [10.0, 10.0]), tolerances={"b1.mass": 0.0})
+    assert Tunables.of(model).names == ("b0.mass", "j0.stiffness", "j0.damping", "j1.damping")
+
+
+def test_mistakes_are_named():
+    tunables = Tunables.of(three_bodies())
+    with pytest.raises(ModelError, match=r"'j9\.stiffness' can't be tuned"):
+        tunables.z({"j9.stiffness": 1.0})
+    with pytest.raises(ModelError, match="another sign"):
+        tunables.z({"b0.mass": -1.0})
+    with pytest.raises(EstimateError, match="shape"):
+        tunables.values(np.zeros(3))

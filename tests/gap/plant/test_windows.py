@@ -1,0 +1,61 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from chladni.gap.plant.windows import _horizon_s, _lasting, horizon_s, windows_for
+from chladni.gap.records.measurement import Measurement
+from chladni.models.files.model_file import load_model
+from tests.gap.made_log import chain, three_bodies
+
+
+def log_of(model, samples=10_000, rate_hz=1000.0):
+    compiled = model.compile()
+    return Measurement(
+        log="log", sample_rate_hz=rate_hz,
+        inputs=np.zeros((len(compiled.inputs), samples)), outputs=np.zeros((len(compiled.outputs), samples)),
+        input_names=tuple(one.name for one in compiled.inputs),
+        output_names=tuple(one.name for one in compiled.outputs),
+        output_units=tuple(one.unit for one in compiled.outputs),
+    )  # fmt: skip
+
+
+def test_a_damped_structure_needs_none():
+    assert windows_for(three_bodies(), log_of(three_bodies())) is None
+
+
+def test_a_lightly_damped_mode_is_still_a_mode():
+    model = chain([1.0], [1e4], [1e-3])
+    assert windows_for(model, log_of(model)) is None
+
+
+def test_a_free_structure_lasts_some_cycles_of_its_slowest_mode():
+    # Free as a whole; the two bodies move against each other at sqrt(2 k/m) = 15.9 Hz.
+    model = chain([1.0, 1.0], [0.0, 5e3], [0.0, 1.0])
+    windows = windows_for(model, log_of(model))
+    assert horizon_s(windows, 1000.0) == pytest.approx(3 / 15.9, rel=0.02)
+    assert windows[0][0] == 0
+    assert windows[-1][1] == 10_000
+    assert all(before[1] == after[0] for before, after in pairwise(windows))
+
+
+def test_what_grows_is_left_before_it_has_grown_far():
+    # A falling mass: poles at +-5 rad/s. By e^3, though another time of the model is 10 s.
+    poles = np.array([5.0, -5.0, -0.1], dtype=complex)
+    lasting = _lasting(poles, 100.0)
+    np.testing.assert_array_equal(lasting, [True, False, False])
+    assert _horizon_s(poles, lasting) == pytest.approx(0.6)
+
+
+def test_a_model_without_a_time_of_its_own_is_given_a_second():
+    poles = np.zeros(2, dtype=complex)
+    assert _horizon_s(poles, _lasting(poles, 10.0)) == 1.0
+
+
+def test_the_axis_of_a_robot(shared_data):
+    model = load_model(shared_data / "models" / "emps.toml")
+    windows = windows_for(model, log_of(model, samples=24_841))
+    # Three times 95 kg/(300 N s/m).
+    assert horizon_s(windows, 1000.0) == pytest.approx(0.95, rel=0.02)
+    closed = load_model(shared_data / "models" / "emps_closed_loop.toml")
+    assert windows_for(closed, log_of(closed)) is None
