@@ -122,12 +122,14 @@ def _split(u: Complex, periods: Matrix, excited: Mask, *, odd_only: bool) -> _Sp
     # The mean of the periods carries its share of the noise too.
     repeated = np.abs(y) ** 2 - scatter / count
     line = np.arange(u.size)
+    # Sums first, clipped later: noise makes single lines negative, and clipping those would add up.
     even = float(repeated[~excited & (line % 2 == 0)].sum())
     beside = float(repeated[~excited & (line % 2 == 1)].sum())
     told = _detected(repeated, excited, step=2 if odd_only else 1)
     if told is None:
         told = _roughness(u[excited], y[excited], scatter[excited] / count, line[excited])
     answered = max(float(repeated[excited].sum()), 0.0)
+    # Distortion can't be more than what is there.
     on_excited = min(max(told or 0.0, 0.0), answered)
     return _Split(
         linear=answered - on_excited,
@@ -141,6 +143,7 @@ def _split(u: Complex, periods: Matrix, excited: Mask, *, odd_only: bool) -> _Sp
 def _detected(repeated: Matrix, excited: Mask, *, step: int) -> float | None:
     """Power on the excited lines as their nearest detection lines have it; None with few of those."""
     lines = np.flatnonzero(excited)
+    # Outside of the band the machine answers differently; those lines say nothing of the excited ones.
     inside = np.arange(lines[0], lines[-1] + 1, step)
     detection = inside[~excited[inside]]
     if detection.size < FEWEST_DETECTION:
@@ -161,6 +164,7 @@ def _roughness(u: Complex, y: Complex, noise: Matrix, line: NDArray[np.intp]) ->
     first = np.minimum(np.arange(blocks + (u.size % size > 0)) * size, u.size - size)
     index = first[:, None] + np.arange(size)
     places = line[index].astype(np.float64)
+    # Odd lines and combs aren't neighbours; the polynomials go over their true places.
     centre, half = (places[:, -1:] + places[:, :1]) / 2, (places[:, -1:] - places[:, :1]) / 2
     left = output_error(u[index][:, :, None], y[index], (places - centre) / half)
     power = np.mean(np.abs(left) ** 2) * size / (size - TERMS - POLES) - noise.mean()

@@ -95,6 +95,7 @@ def compare_levels(measurements: Sequence[Measurement]) -> tuple[str, ...]:
     if levels[-1].level < LEAST_RATIO * levels[0].level:
         return (f"the levels differ by less than {LEAST_RATIO - 1:.0%}: they tell nothing about nonlinearity",)
     outputs = [channel.name for channel in levels[0].response.responses]
+    # A sensor that one log lacks can't be compared.
     told = [_of_output(output, levels) for output in outputs if _everywhere(output, levels)]
     return (*(sentence for sentences in told for sentence in sentences), *_parity(levels))
 
@@ -114,6 +115,7 @@ def _everywhere(output: str, levels: Sequence[LevelResponse]) -> bool:
 
 def _of_output(output: str, levels: Sequence[LevelResponse]) -> list[str]:
     reference = levels[0].response.references[0].name
+    # Levels alone say nothing without the input that they are levels of.
     span = f"while {reference} rises from {levels[0].level:.3g} to {levels[-1].level:.3g} RMS"
     sentences = []
     peaks = followed_peak(output, levels)
@@ -133,6 +135,7 @@ def followed_peak(output: str, levels: Sequence[LevelResponse]) -> tuple[Peak, .
     Between one level and the next it moves by at most 8 %.
     """
     followed: list[Peak] = []
+    # Level by level: over the whole range a resonance may move past where its neighbour was.
     for level in levels:
         rows = level.response.select([output])
         peaks = [peak for peak in find_response_peaks(rows) if peak.channels[1] == rows.references[0].name]
@@ -154,6 +157,7 @@ def _resonance(first: Peak, last: Peak) -> str:
     if not moves and not swells:
         return f"its resonance at {first.frequency_hz:.4g} Hz stays as it is"
     parts = []
+    # What a change speaks for, in the words of the effects that cause it.
     if moves:
         word, why = ("falls", "a stiffness gives way") if shift < 0 else ("rises", "a stiffness hardens")
         parts.append(f"{word} from {first.frequency_hz:.4g} to {last.frequency_hz:.4g} Hz ({why})")
@@ -170,6 +174,7 @@ def _level(measurement: Measurement, name: str) -> float:
 
 def _nonlinear(measurement: Measurement) -> tuple[float, ...]:
     """RMS share by output; without a period noise is in it."""
+    # Periods tell noise apart; without them the residual of a linear fit is all there is.
     distortion = distortion_of(measurement)
     if distortion is not None:
         return tuple(float(share) for share in np.sqrt(distortion.nonlinear))

@@ -13,6 +13,7 @@ from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.frequency_response import frequency_response
 from chladni.spectral.periodic import Period, periodic_cross_spectra
 
+# One period has no scatter.
 FEWEST_PERIODS = 2
 
 
@@ -44,6 +45,7 @@ def period_spectra(measurement: Measurement) -> CrossSpectra | None:
     count = measurement.samples // samples - measurement.transient_periods
     if count < FEWEST_PERIODS:
         return None
+    # The measurement knows its period already; it needn't be searched for in one channel again.
     found = Period(
         channel=names[0],
         samples=samples,
@@ -61,6 +63,7 @@ def period_spectra(measurement: Measurement) -> CrossSpectra | None:
 def moving_inputs(measurement: Measurement) -> list[str]:
     """Names of the inputs that change, where there are steady periods within those."""
     signals = measurement.inputs
+    # A step before the first steady period moves, but excites nothing in those.
     if measurement.period_samples is not None:
         signals = periods_of(signals, measurement.period_samples)[:, -1]
     moves = np.ptp(signals, axis=1) > 0
@@ -69,6 +72,7 @@ def moving_inputs(measurement: Measurement) -> list[str]:
 
 def _series(measurement: Measurement) -> TimeSeries:
     """Inputs that move, then outputs, under their names in the model."""
+    # One that stands still would make the references' matrix singular.
     inputs = [measurement.input_names.index(name) for name in moving_inputs(measurement)]
     return TimeSeries(
         values=np.concatenate([measurement.inputs[inputs], measurement.outputs]),

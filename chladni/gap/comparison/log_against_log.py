@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.comparison.noise_estimate import estimate_noise
+from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, pooled_gap, regime_shares
 from chladni.gap.records.diagnosis import Where
 from chladni.gap.records.measurement import Measurement
@@ -123,8 +124,10 @@ def compare_logs(
             f"{', '.join(simulated.output_names)}; give them the same names"
         )
     samples = min(measured.samples, simulated.samples)
-    ours, theirs = _cut(measured, names, samples), _cut(simulated, names, samples)
+    # Cutting may leave fewer periods than were found before.
+    ours, theirs = with_period(_cut(measured, names, samples)), _cut(simulated, names, samples)
     _require_same_units(ours, theirs)
+    # Variables belong to the measurement's clock and are cut with it.
     kept = {name: values[:samples] for name, values in (variables or {}).items()}
     return replace(view_gap(ours, theirs.outputs, variables=kept), remarks=_remarks(measured, simulated, samples))
 
@@ -151,6 +154,7 @@ def _require_same_rate(measured: Measurement, simulated: Measurement) -> None:
 
 def _require_same_units(measured: Measurement, simulated: Measurement) -> None:
     for name, ours, theirs in zip(measured.output_names, measured.output_units, simulated.output_units, strict=True):
+        # A log without units is believed, as everywhere.
         if ours != theirs and "1" not in (ours, theirs):
             raise LogError(
                 f"output {name!r} is in {ours} in {measured.log}, in {theirs} in {simulated.log}; state the true unit"
@@ -171,6 +175,7 @@ def _remarks(measured: Measurement, simulated: Measurement, samples: int) -> tup
 def _input_remarks(measured: Measurement, simulated: Measurement, samples: int) -> list[str]:
     remarks = []
     for place, name in enumerate(measured.input_names):
+        # An input that the simulator didn't write down can't be checked.
         if name in simulated.input_names:
             ours = measured.inputs[place, :samples]
             theirs = simulated.inputs[simulated.input_names.index(name), :samples]

@@ -101,12 +101,14 @@ def measurement_of(model: Model, recording: TimeSeries, *, log: str) -> tuple[Me
 
 def _matched(terminal: Terminal, recording: TimeSeries) -> _Match:
     rows = {channel.name: row for row, channel in enumerate(recording.channels)}
+    # The channel that the model names goes first: a log may hold another one by the terminal's name.
     found = [rows[name] for name in (terminal.channel, terminal.name) if name in rows]
     return _Match(terminal=terminal, row=found[0] if found else None)
 
 
 def _require_inputs(inputs: Sequence[_Match], recording: TimeSeries, model: str, log: str) -> None:
     for match in inputs:
+        # An input that names no channel isn't expected in a log; one that does is needed.
         if match.row is None and match.terminal.channel is not None:
             raise LogError(
                 f"{log}: input {match.terminal.name!r} of the model listens to channel {match.wanted!r}, which the "
@@ -144,6 +146,7 @@ def _usable_outputs(
 def _why_unusable(match: _Match, recording: TimeSeries, log: str) -> str | None:
     if match.row is None:
         return f"{log} holds no channel {match.wanted!r}"
+    # Judged alone: one dead sensor shouldn't cost the samples of all others.
     good = _good(recording, [match.row])
     if np.mean(good) < MOSTLY_MISSING:
         return f"channel {match.wanted!r} misses {np.mean(~good):.0%} of its samples"
@@ -165,6 +168,7 @@ def _good(recording: TimeSeries, rows: Sequence[int]) -> Mask:
 def _whole_stretch(recording: TimeSeries, rows: Sequence[int], log: str) -> tuple[slice, tuple[str, ...]]:
     """Give the longest stretch without a missing sample, and a sentence when it isn't all of the log."""
     good = _good(recording, rows)
+    # Stretches begin where good samples do, and end where they end.
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
     firsts, lasts = edges[::2], edges[1::2]
     longest = int(np.argmax(lasts - firsts)) if firsts.size else 0

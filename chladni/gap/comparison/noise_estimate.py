@@ -31,6 +31,10 @@ LEAST_QUIET = 0.05
 MOVED = 0.85
 # Residuals in loud bands that exceed the quiet ones by this power ratio may hold distortion.
 LOUDER = 1.5
+# Steps whose rounding is this share of a floor's power, or this share of samples that repeat the one before: what a
+# sensor does to its signal is then in its floor.
+ROUNDING = 0.3
+REPEATING = 0.2
 # Top of the band that a log too short for anything else is judged by.
 TOP_QUARTER = 0.75
 RESIDUAL_SEGMENT = 512
@@ -49,13 +53,18 @@ def estimate_noise(measurement: Measurement) -> NoiseFloor:
 
     Of either, only that is kept which the other outputs don't share, since a force that nobody modelled (distortion,
     a floor that shakes) reaches all sensors, while each has its own noise; the method then is ``incoherent
-    residual``.
+    residual``. A floor that a sensor's coarse steps or held samples make is an upper bound too.
 
     Returns
     -------
     NoiseFloor
         `std` is the relative standard deviation of `rms` by its degrees of freedom; bias by distortion isn't in it.
     """
+    floor = _of_periods_or_fit(measurement)
+    return replace(floor, upper_bound=floor.upper_bound | _stepped(measurement.outputs, floor))
+
+
+def _of_periods_or_fit(measurement: Measurement) -> NoiseFloor:
     fitted = _of_fit(measurement)
     steady = _steady_periods(measurement)
     spectra = None if steady is None else _between_periods(steady)
@@ -65,6 +74,18 @@ def estimate_noise(measurement: Measurement) -> NoiseFloor:
     floor = _floor(spectra, outputs, "periods", np.zeros(len(outputs), dtype=np.bool_))
     # A machine that changes, or is disturbed, between periods makes their scatter a poor bound.
     return _chosen(fitted.rms < MOVED * floor.rms, floor, fitted)
+
+
+def _stepped(outputs: Matrix, floor: NoiseFloor) -> Mask:
+    """Whether coarse steps or held samples make up much of each floor; they look like noise, but a law gives them."""
+    answers = []
+    for row, rms in zip(outputs, floor.rms, strict=True):
+        levels = np.unique(row)
+        # Of samples that are all different, the distances say how many there are, not how coarse they are.
+        few = 1 < levels.size < row.size / 2
+        rounded = few and float(np.median(np.diff(levels))) ** 2 / 12 > ROUNDING * rms**2
+        answers.append(rounded or float(np.mean(np.diff(row) == 0)) > REPEATING)
+    return np.array(answers)
 
 
 def _of_fit(measurement: Measurement) -> NoiseFloor:

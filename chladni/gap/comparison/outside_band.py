@@ -116,8 +116,10 @@ def _motions(
     measurement: Measurement, mean: Complex, excited: Mask, period: int
 ) -> Iterator[tuple[tuple[str, ...], tuple[Matrix, Matrix]]]:
     """Displacement and velocity ``[sample]`` of outputs and of differences of two, of unit RMS."""
+    # In radians a period; scaled to unit RMS later, so that the rate doesn't matter.
     omega = 2 * np.pi * np.arange(excited.size)
     names, units = measurement.output_names, measurement.output_units
+    # Distortion within the band is in it too, but small there against the response.
     inside = np.where(excited, mean, 0.0)
     candidates: list[tuple[tuple[str, ...], Complex, str]]
     candidates = [((name,), row, unit) for name, row, unit in zip(names, inside, units, strict=True)]
@@ -150,6 +152,7 @@ def _share(basis: Complex, targets: Complex) -> float:
     powers = np.linspace(-1, 1, LINES)[:, None] ** np.arange(TERMS)
     terms = basis.transpose(1, 2, 0)[:, :, :, None] * powers[:, None, :]
     regressors = terms.reshape(*terms.shape[:2], -1)
+    # Output by output, so that a loud one doesn't speak for all; random functions explain their number over LINES.
     left = np.sum(np.abs(unreached(regressors, targets)) ** 2, axis=(0, 1))
     whole = np.sum(np.abs(targets) ** 2, axis=(0, 1))
     return float(1 - np.mean(left / whole) * LINES / (LINES - regressors.shape[2]))

@@ -49,6 +49,7 @@ class ResidualSpectra:
         left = self.freedom - (outputs - 1)
         if outputs == 1 or not np.all(power > 0) or np.any(left < LEAST_FREEDOM):
             return self.densities()
+        # Outputs differ in size by orders of magnitude; with unit power each, inversion loses nothing.
         scale = np.sqrt(power)
         # Loaded, since residuals without noise can be one signal to the last digit.
         scaled = products / (scale[:, :, None] * scale[:, None, :]) + 1e-12 * np.eye(outputs)

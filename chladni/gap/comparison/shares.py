@@ -66,6 +66,7 @@ def channel_gaps(
 ) -> tuple[ChannelGap, ...]:
     """Give gap and noise of each output, over the RMS of what was measured; arrays are ``[output, sample]``."""
     gaps = np.sqrt(np.mean(relative_residual(residual, measured) ** 2, axis=1))
+    # The same scale for both, so that gap and noise can be held against each other.
     floors = relative_residual(np.broadcast_to(noise.rms[:, None], measured.shape), measured)[:, 0]
     return tuple(
         ChannelGap(name=name, gap=float(gap), noise=float(floor))
@@ -95,6 +96,7 @@ def band_shares(
     """
     samples = residual.shape[1]
     frequency_hz = fft.rfftfreq(samples, 1 / sample_rate_hz)
+    # One transform of the whole record: no window shifts power between bands, and shares add up.
     gap, whole = (_line_power(relative_residual(one, measured)) for one in (residual, measured))
     edges_hz = _mode_edges_hz(modes_hz, frequency_hz) if len(modes_hz) else _log_edges_hz(gap, whole, frequency_hz)
     band = np.clip(np.searchsorted(edges_hz, frequency_hz, side="right") - 1, 0, edges_hz.size - 2)
@@ -134,6 +136,7 @@ def regime_shares(residual: Matrix, measured: Matrix, variables: Mapping[str, Ma
         if values.shape != power.shape:
             raise EstimateError(f"variable {name!r} has {values.size} samples, the residual {power.size}")
         found += _apart([_regime(name, values, power, edges) for edges in _regimes(values)])
+    # Each variable has its say first; the strongest of all are told.
     found.sort(key=lambda regime: -regime.excess)
     return tuple(regime.told for regime in found[:MOST_REGIMES])
 
@@ -197,6 +200,7 @@ def _log_edges_hz(gap: Matrix, whole: Matrix, frequency_hz: Matrix) -> Matrix:
 def _spaced(inner_hz: Sequence[float] | Matrix, top_hz: float, apart_hz: float) -> Matrix:
     """Put edges between 0 and the top, without those that would leave a band of less than some lines."""
     edges = [0.0]
+    # Modes closer than some lines share a band.
     for edge in inner_hz:
         if edges[-1] + apart_hz <= edge <= top_hz - apart_hz:
             edges.append(float(edge))

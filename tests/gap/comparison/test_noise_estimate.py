@@ -3,7 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter, welch
+from scipy.signal import butter, lfilter, welch
 
 from chladni.gap.comparison.noise_estimate import estimate_noise, noise_of_residual, smaller_floor
 from chladni.gap.comparison.periodicity import with_period
@@ -172,6 +172,24 @@ def test_two_steady_periods_are_enough_and_one_falls_back() -> None:
     assert set(estimate_noise(two).method) == {"periods"}
     one = replace(run, transient_periods=6)
     assert "periods" not in estimate_noise(one).method
+
+
+def test_a_floor_made_of_coarse_steps_or_held_samples_is_a_bound() -> None:
+    # Excited up to an eighth of the rate, so that there is a quiet band.
+    force = lfilter(*butter(6, 0.25), np.random.default_rng(23).standard_normal(SAMPLES))
+    y, rms = noisy(made.machine(force, made.weights(4, 23)), "white", 23)
+    run = made.measurement(force, y)
+    assert not estimate_noise(run).upper_bound.any()
+    outputs = run.outputs.copy()
+    step = 10 * rms[1]
+    outputs[1] = step * np.round(outputs[1] / step)
+    outputs[2] = np.repeat(outputs[2, ::2], 2)
+    # A converter with steps below the noise is an ordinary sensor.
+    outputs[3] = rms[3] / 2 * np.round(outputs[3] / (rms[3] / 2))
+    floor = estimate_noise(replace(run, outputs=outputs))
+    np.testing.assert_array_equal(floor.upper_bound, [False, True, True, False])
+    # Rounding errors are uniform over a step.
+    assert floor.rms[1] == pytest.approx(np.hypot(step / np.sqrt(12), rms[1]), rel=0.1)
 
 
 def test_a_noise_free_measurement_has_a_tiny_floor() -> None:
