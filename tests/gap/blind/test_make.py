@@ -23,12 +23,14 @@ from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.effects.catalogue import FAMILIES as CATALOGUE_FAMILIES
 from chladni.signals.errors import SetupError
 
+ONE_OF_EACH = {"effect": 1, "none": 1, "parameters": 1}
+
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
     directory = tmp_path_factory.mktemp("campaign")
-    made = make_cases(directory, count=4, seed=5, composition={"effect": 2, "none": 1, "parameters": 1})
-    assert made == 4
+    made = make_cases(directory, count=3, seed=7, composition=ONE_OF_EACH)
+    assert made == 3
     return directory
 
 
@@ -66,7 +68,10 @@ def test_true_numbers_are_as_near_as_the_tolerances_say(campaign):
         truth, model = truth_of_case(campaign, case), chladni.load_model(case.model)
         for name, value in truth["parameters"].items():
             nominal = model.parameters[name]
-            sigmas = (value / nominal.value - 1) / nominal.tolerance if nominal.tolerance else 0.0
+            if nominal.value * nominal.tolerance == 0:
+                assert value == nominal.value
+                continue
+            sigmas = (value / nominal.value - 1) / nominal.tolerance
             if name in truth["off"]:
                 assert sigmas == pytest.approx(truth["off"][name])
                 assert 4 <= abs(sigmas) <= 8
@@ -75,13 +80,12 @@ def test_true_numbers_are_as_near_as_the_tolerances_say(campaign):
 
 
 def test_a_campaign_is_resumed_and_made_again_the_same(campaign, tmp_path):
-    assert make_cases(campaign, count=4, seed=5, composition={"effect": 2, "none": 1, "parameters": 1}) == 0
+    assert make_cases(campaign, count=3, seed=7, composition=ONE_OF_EACH) == 0
     again = tmp_path / "again"
-    (again / "cases" / "case-0001").mkdir(parents=True)
-    for name in ("case-0001", "case-0002", "case-0004"):
-        (again / "cases" / name).mkdir(parents=True, exist_ok=True)
+    for name in ("case-0001", "case-0002"):
+        (again / "cases" / name).mkdir(parents=True)
         (again / "cases" / name / "case.json").write_text("{}")
-    assert make_cases(again, count=4, seed=5, composition={"effect": 2, "none": 1, "parameters": 1}) == 1
+    assert make_cases(again, count=3, seed=7, composition=ONE_OF_EACH) == 1
     for file in ("model.toml", "log.mcap"):
         path = f"cases/case-0003/{file}"
         assert (again / path).read_bytes() == (campaign / path).read_bytes()
@@ -175,7 +179,7 @@ def test_an_effect_has_the_severity_that_was_asked_for(kind):
 
 
 def test_a_case_with_two_effects_has_both_at_different_sites():
-    case = draw_case(Order(kind="two", words=("quadratic_damping", "gain_error")), np.random.default_rng(4))
+    case = draw_case(Order(kind="two", words=("quadratic_damping", "gain_error")), np.random.default_rng(7))
     assert [one.effect for one in case.effects] == ["quadratic_damping", "gain_error"]
     assert len({one.site for one in case.effects}) == 2
     assert min(case.ratios) >= 2.8
