@@ -92,7 +92,7 @@ def machine(commands: Matrix) -> tuple[Matrix, Matrix]:
 
 
 def lugre(bend: float, speed: float, step_s: float) -> tuple[float, float]:
-    """Give the bend of the bristles after a step, and the friction (Canudas de Wit et al. 1995)."""
+    """Give the bend of the bristles after a step, and the friction (IEEE Trans. Automatic Control 40, 1995, 419)."""
     sliding = COULOMB + (STATIC - COULOMB) * exp(-((speed / STRIBECK_SPEED) ** 2))
     after = (bend + step_s * speed) / (1 + step_s * BRISTLE_STIFFNESS * abs(speed) / sliding)
     return after, BRISTLE_STIFFNESS * after + BRISTLE_DAMPING * (after - bend) / step_s

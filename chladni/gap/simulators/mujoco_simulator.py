@@ -6,17 +6,17 @@ The only module that imports MuJoCo, which comes with the extra ``[mujoco]``.
 import ctypes
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
-from math import inf
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.simulators.joint_law import JointLaw
+from chladni.gap.simulators.mujoco_numbers import index, names, parameter, set_number, turns
 from chladni.gap.simulators.simulator import SimulatorResponse
-from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Port, Terminal
 from chladni.models.core.simulation import PortMotion
 from chladni.models.effects.wording import nearest
@@ -41,27 +41,6 @@ _MOTION_UNITS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Number:
-    """Where MuJoCo keeps a number that may be tuned."""
-
-    array: str
-    kind: str
-    # Units where the joint turns, and where it slides.
-    units: tuple[str, str]
-    of_dof: bool = False
-
-
-_NUMBERS = {
-    "damping": _Number(array="dof_damping", kind="joint", units=("N m s/rad", "N s/m"), of_dof=True),
-    "armature": _Number(array="dof_armature", kind="joint", units=("kg m^2", "kg"), of_dof=True),
-    "frictionloss": _Number(array="dof_frictionloss", kind="joint", units=("N m", "N"), of_dof=True),
-    "stiffness": _Number(array="jnt_stiffness", kind="joint", units=("N m/rad", "N/m")),
-    "mass": _Number(array="body_mass", kind="body", units=("kg", "kg")),
-    "gear": _Number(array="actuator_gear", kind="actuator", units=("1", "1")),
-}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class MujocoSimulator:
     """Implements `Simulator`; made by `mujoco_simulator`.
 
@@ -82,6 +61,12 @@ class MujocoSimulator:
     joints: tuple[Port, ...]
     model: Any
     keyframe: str | None = None
+
+    def refined(self) -> Self:
+        """Give the same with steps half as long."""
+        model = copy(self.model)
+        model.opt.timestep /= 2
+        return replace(self, model=model)
 
     def respond(
         self,
@@ -105,7 +90,7 @@ class MujocoSimulator:
         model = copy(self.model)
         data = mujoco.MjData(model)
         for name, value in values.items():
-            _set_number(model, name, self.parameters.require(name).with_value(value).value)
+            set_number(model, name, self.parameters.require(name).with_value(value).value)
         if values:
             # Masses enter constants that MuJoCo computes once.
             mujoco.mj_setConst(model, data)
@@ -160,8 +145,8 @@ def mujoco_simulator(
             f"<option integrator> to {', '.join(_INTEGRATORS.values())}"
         )
     if keyframe is not None:
-        _index(loaded, "key", keyframe)
-    numbers = tuple(_parameter(loaded, each, spread) for each, spread in (parameters or {}).items())
+        index(loaded, "key", keyframe)
+    numbers = tuple(parameter(loaded, each, spread) for each, spread in (parameters or {}).items())
     return MujocoSimulator(
         # Names follow one another in one text; the model's own is the first.
         name=name or bytes(loaded.names).split(b"\0", 1)[0].decode(),
@@ -193,48 +178,26 @@ def _load(mujoco: Any, model: Path | str) -> Any:
         raise ModelError(f"{where}: {' '.join(str(error).split())[:300]}") from error
 
 
-def _names(model: Any, kind: str) -> list[str]:
-    """Names of all bodies, joints, actuators, sensors or keyframes, in MuJoCo's order."""
-    places = getattr(model, {"joint": "name_jntadr", "keyframe": "name_keyadr"}.get(kind, f"name_{kind}adr"))
-    return [bytes(model.names)[place:].split(b"\0", 1)[0].decode() for place in places]
-
-
-def _index(model: Any, kind: str, name: str) -> int:
-    names = _names(model, kind)
-    if name not in names:
-        raise ModelError(f"MuJoCo model: no {kind} {name!r}; {nearest(name, [each for each in names if each], kind)}")
-    return names.index(name)
-
-
-def _turns(model: Any, joint: int) -> bool:
-    """Whether a joint is a hinge; `ModelError` when it's neither that nor a slide."""
-    kind = int(model.jnt_type[joint])
-    if kind not in (2, 3):
-        name = _names(model, "joint")[joint]
-        raise ModelError(f"MuJoCo model: joint {name!r} has several axes; name a hinge or a slide")
-    return kind == 3
-
-
 def _joint(model: Any, name: str) -> Port:
-    place = _index(model, "joint", name)
-    turns = _turns(model, place)
+    place = index(model, "joint", name)
+    rotates = turns(model, place)
     return Port(
         name=name,
         kind="joint",
-        unit="N m" if turns else "N",
-        displacement_unit="rad" if turns else "m",
+        unit="N m" if rotates else "N",
+        displacement_unit="rad" if rotates else "m",
         stiffness=float(np.ravel(model.jnt_stiffness[place])[0]),
         damping=float(np.ravel(model.dof_damping[model.jnt_dofadr[place]])[0]),
     )
 
 
 def _input(model: Any, name: str, channel: str | None) -> Terminal:
-    place = _index(model, "actuator", name)
+    place = index(model, "actuator", name)
     # Motors give a force; a servo's command is a position or a velocity, which only its author knows.
     unit = "1"
     drives_joint = int(model.actuator_trntype[place]) == 0
     if drives_joint and int(model.actuator_biastype[place]) == 0:
-        unit = "N m" if _turns(model, int(model.actuator_trnid[place, 0])) else "N"
+        unit = "N m" if turns(model, int(model.actuator_trnid[place, 0])) else "N"
     return Terminal(name=name, unit=unit, channel=channel)
 
 
@@ -243,7 +206,7 @@ def _sensor(model: Any, name: str) -> tuple[int, str]:
     import mujoco
 
     base, offset = _split(name)
-    sensor = _index(model, "sensor", base if base in _names(model, "sensor") else name)
+    sensor = index(model, "sensor", base if base in names(model, "sensor") else name)
     size = int(model.sensor_dim[sensor])
     # A name without a place stands for a sensor with one number only.
     if (offset is None and size != 1) or (offset is not None and not 0 <= offset < size):
@@ -256,7 +219,7 @@ def _sensor(model: Any, name: str) -> tuple[int, str]:
     if kind in _MOTION_UNITS:
         moved = int(model.sensor_objid[sensor])
         joint = moved if kind.startswith("JOINT") else int(model.actuator_trnid[moved, 0])
-        unit = _MOTION_UNITS[kind][0 if _turns(model, joint) else 1]
+        unit = _MOTION_UNITS[kind][0 if turns(model, joint) else 1]
     return int(model.sensor_adr[sensor]) + (offset or 0), unit
 
 
@@ -270,57 +233,9 @@ def _split(name: str) -> tuple[str, int | None]:
     return name, None
 
 
-def _parameter(model: Any, name: str, tolerance: float) -> Parameter:
-    number, _ = _place(model, name)
-    value = _number(model, name)
-    if not (np.isfinite(tolerance) and tolerance > 0 and value):
-        raise ModelError(
-            f"MuJoCo model: {name} = {value:g} with a relative tolerance of {tolerance:g} can't be tuned; give both "
-            "a value other than zero, or leave it out"
-        )
-    turns = number.kind == "joint" and _turns(model, _index(model, "joint", name.rpartition(".")[0]))
-    far = sorted((0.2 * value, 5.0 * value))
-    least = 0.0 if number.array != "actuator_gear" else -inf
-    return Parameter(
-        name=name,
-        value=value,
-        unit=number.units[0 if turns else 1],
-        low=far[0],
-        high=far[1],
-        minimum=least,
-        tolerance=tolerance,
-    )
-
-
-def _place(model: Any, name: str) -> tuple[_Number, int]:
-    """Which array holds the number, and at which row."""
-    owner, _, word = name.rpartition(".")
-    if word not in _NUMBERS:
-        raise ModelError(f"MuJoCo model: {name!r}: {nearest(word, list(_NUMBERS), 'numbers that may be tuned')}")
-    number = _NUMBERS[word]
-    place = _index(model, number.kind, owner)
-    if number.kind == "joint":
-        _turns(model, place)
-    return number, int(model.jnt_dofadr[place]) if number.of_dof else place
-
-
-def _number(model: Any, name: str) -> float:
-    number, place = _place(model, name)
-    # A gear has six numbers, of which a joint feels the first; newer versions may give others more than one too.
-    return float(np.ravel(getattr(model, number.array)[place])[0])
-
-
-def _set_number(model: Any, name: str, value: float) -> None:
-    number, place = _place(model, name)
-    if number.array == "body_mass":
-        model.body_inertia[place] *= value / float(model.body_mass[place])
-    rows = getattr(model, number.array)
-    rows.reshape(rows.shape[0], -1)[place, 0] = value
-
-
 def _start(mujoco: Any, model: Any, data: Any, keyframe: str | None) -> None:
     if keyframe is not None:
-        mujoco.mj_resetDataKeyframe(model, data, _index(model, "key", keyframe))
+        mujoco.mj_resetDataKeyframe(model, data, index(model, "key", keyframe))
 
 
 def _steps(step_s: float, sample_rate_hz: float) -> int:
@@ -355,7 +270,7 @@ def _run(
     from chladni.gap.simulators.mujoco_kernel import Laws, Record, Simulated, run
 
     step_s = float(model.opt.timestep)
-    rows = np.array([_index(model, "actuator", each.name) for each in simulator.inputs], dtype=np.int64)
+    rows = np.array([index(model, "actuator", each.name) for each in simulator.inputs], dtype=np.int64)
     sensors = np.array([_sensor(model, each.name)[0] for each in simulator.outputs], dtype=np.int64)
     tables = _laws(Laws, model, [port.name for port in simulator.joints], joint_laws)
     samples, joints = inputs.shape[1], len(simulator.joints)
@@ -442,7 +357,7 @@ def _laws(kind: Any, model: Any, joints: Sequence[str], joint_laws: Mapping[str,
     table = np.zeros((max(len(found), 1), 4), dtype=np.int64)
     for row, (law, _) in enumerate(found):
         table[row] = law_address(law.function), own[row], starts[row], counts[row]
-    indices = [_index(model, "joint", name) for name in joints]
+    indices = [index(model, "joint", name) for name in joints]
     return kind(
         table=table,
         first=np.searchsorted([place for _, place in found], np.arange(len(joints) + 1)).astype(np.int64),

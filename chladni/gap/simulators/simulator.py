@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,3 +87,11 @@ class Simulator(Protocol):
         ModelError
             When the simulation diverges.
         """
+
+
+@runtime_checkable
+class RefinableSimulator(Simulator, Protocol):
+    """A simulator that can tell the error of its own step."""
+
+    def refined(self) -> Self:
+        """Give the same with steps half as long."""

@@ -71,4 +71,4 @@ def test_an_effect_elsewhere_is_told():
     with pytest.raises(ModelError, match="has no 'wrist'"):
         WrappedSimulator(simulator=in_python(), effects=(chladni.attached("delay", "wrist", {"delay": 0.1}),))
     with pytest.raises(ModelError, match="stiffness"):
-        WrappedSimulator(simulator=in_python(), values={"stifness": 1.0})
+        WrappedSimulator(simulator=in_python(), values={"stiff": 1.0})
