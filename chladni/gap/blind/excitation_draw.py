@@ -14,6 +14,7 @@ from chladni.models.excitations.swept_sine import SweptSine
 Matrix = NDArray[np.float64]
 #: Samples simulated beyond the log, so that a clock that is early has something to show.
 BEYOND = 64
+_LEAST_LINES = 8
 #: RMS of what drives a drive, at most, in its unit.
 _DRIVE_LEVELS = {"flow": 2.5e-5, "load": 150.0, "voltage": 8.0, "load_torque": 0.1, "position_reference": 0.5}
 _WORDS, _SHARES = ("random", "multisine", "sweep", "steps", "impacts"), (0.42, 0.28, 0.15, 0.08, 0.07)
@@ -81,8 +82,9 @@ def _unit(rng: np.random.Generator, word: str, bench: Bench, count: int, band_hz
     if word == "random":
         return RandomNoise(band_hz=band_hz).samples(count, bench.rate_hz, rng)
     if word == "multisine":
-        # Several periods in the log, a whole number of samples each.
-        period = bench.samples // int(rng.integers(3, 9))
+        # Several periods in the log, a whole number of samples each; each so long that its lines fill the band.
+        longest = int(bench.samples / bench.rate_hz * (band_hz[1] - band_hz[0]) / _LEAST_LINES)
+        period = bench.samples // max(min(int(rng.integers(3, 9)), longest), 1)
         lines = ("full", "odd", "odd-detection")[int(rng.integers(3))]
         sines = Multisine(period_s=period / bench.rate_hz, band_hz=band_hz, lines=lines)  # type: ignore[arg-type]
         return sines.samples(count, bench.rate_hz, rng)

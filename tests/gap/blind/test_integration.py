@@ -253,3 +253,77 @@ def test_an_effect_acts_from_the_logs_start_when_the_machine_was_moving_before()
     from_before, from_rest = perform(short, numbers, early, [late]), perform(bench, numbers, drive, [plain])
     for name in measured(bench):
         assert_allclose(from_before[name], from_rest[name][500:], rtol=1e-6, atol=1e-9 * rms(from_rest[name]))
+
+
+IN_LOOP = [
+    ("factor", "pos1", {"gain": 1.2}, "gain_error", {"gain": 1.2}, {}),
+    ("factor", "motor", {"gain": 0.7}, "gain_error", {"gain": 0.7}, {}),
+    ("second_order", "motor", {"time_constant": 1e-3, "damping_ratio": 0.9}, "lag",
+     {"time_constant": 1e-3, "damping_ratio": 0.9}, {"variant": "second_order"}),
+    ("dead_time", "motor", {"delay": 1.7e-3}, "delay", {"delay": 1.7e-3}, {}),
+    ("hard_limit", "motor", {"limit": 1.0}, "saturation", {"limit": 1.0}, {}),
+    ("hyperbolic_limit", "motor", {"limit": 1.0}, "saturation", {"limit": 1.0}, {"variant": "smooth"}),
+    ("overlap", "motor", {"width": 0.3, "rounding": 1e-6}, "dead_zone", {"width": 0.3}, {}),
+    ("ripple", "motor", {"amplitude": 0.3, "period": 0.01, "phase": 0.4, "second": 0.0, "second_phase": 0.0},
+     "ripple", {"amplitude": 0.3, "period": 0.01, "phase": 0.4}, {}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("law", "site", "hidden", "effect", "values", "more"), IN_LOOP, ids=[f"{o[0]}-{o[1]}" for o in IN_LOOP]
+)
+def test_effects_act_inside_a_loop_where_their_words_say(law, site, hidden, effect, values, more, tmp_path):
+    rng = np.random.default_rng(1)
+    bench = replace(draw_structure(rng, "loop"), samples=2000)
+    while bench.plan.rotary:
+        bench = replace(draw_structure(rng, "loop"), samples=2000)
+    drive, numbers = at_rest(bench, rng), dict(bench.plan.numbers)
+    pushed = rms(perform(bench, numbers, drive, watched=True)["motor.u"])
+    sized = {"limit", "width", "rounding", "amplitude"}
+    hidden = {name: value * (pushed if name in sized else 1.0) for name, value in hidden.items()}
+    values = {name: value * (pushed if name in sized else 1.0) for name, value in values.items()}
+    moved = perform(bench, numbers, drive, [Hidden(effect=effect, site=site, law=law, numbers=hidden)], steps=64)
+    log = as_log(bench, numbers, drive, moved)
+    model = loaded(bench, tmp_path)
+    assert disagreement(simulate(model, log), log) > 0.01
+    done = simulate(model.with_effects([attached(effect, site, values, **more)]), log)
+    # The motor's force in the log is what the controller asked for, before the motor made something else of it.
+    assert disagreement(done, log) < 1e-3
+
+
+IN_DRIVE = [
+    ("dahl", "joint", {"force": 1.0, "stiffness": 1.0, "exponent": 1.0}, "coulomb_friction",
+     {"force": 1.0, "presliding": 1.0}, {"variant": "bristle"}),
+    ("quadratic", "joint", {"coefficient": 1.0, "laminar_speed": 1e-12}, "quadratic_damping", {"coefficient": 1.0},
+     {}),
+    ("rigid", "body", {"mass": 1.0}, "added_mass", {"mass": 1.0}, {}),
+    ("factor", "input", {"gain": 0.8}, "gain_error", {"gain": 0.8}, {}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("drive_word", ["pneumatic-motor", "hydraulic-motor", "dc-servo"])
+@pytest.mark.parametrize(
+    ("law", "part", "hidden", "effect", "values", "more"), IN_DRIVE, ids=[o[0] for o in IN_DRIVE]
+)
+def test_effects_act_in_drives_where_their_words_say(drive_word, law, part, hidden, effect, values, more, tmp_path):
+    rng = np.random.default_rng(12)
+    bench = draw_drive_bench(rng)
+    while bench.plan.drive != drive_word or len(bench.plan.inputs) < 2:
+        bench = draw_drive_bench(rng)
+    bench = replace(bench, samples=2000)
+    drive, numbers = at_rest(bench, rng), dict(bench.plan.numbers)
+    plan = bench.plan
+    site = {"joint": plan.joints[0].name, "body": plan.bodies[0], "input": plan.inputs[1].name}[part]
+    moving = {name: rms(row) for name, row in perform(bench, numbers, drive, watched=True).items()}
+    d, s, force = moving[f"{plan.joints[0].name}.d"], moving[f"{plan.joints[0].name}.s"], moving["drive.force"]
+    bend = 0.05 * d
+    sizes = {"force": 0.2 * force, "stiffness": 0.2 * force / bend, "presliding": bend,
+             "coefficient": 0.3 * force / s**2, "mass": 0.3 * numbers[plan.inertia_of(plan.bodies[0])]}  # fmt: skip
+    hidden = {name: value * sizes.get(name, 1.0) for name, value in hidden.items()}
+    values = {name: value * sizes.get(name, 1.0) for name, value in values.items()}
+    moved = perform(bench, numbers, drive, [Hidden(effect=effect, site=site, law=law, numbers=hidden)], steps=128)
+    log = as_log(bench, numbers, drive, moved)
+    model = loaded(bench, tmp_path)
+    assert disagreement(simulate(model, log), log) > 0.003
+    done = simulate(model.with_effects([attached(effect, site, values, **more)]), log)
+    assert disagreement(done, log) < 1e-3

@@ -11,7 +11,9 @@ from chladni.gap.blind.case_draw import Order, draw_case
 from chladni.gap.blind.case_folder import case_folders, truth_of_case
 from chladni.gap.blind.composition import DEFAULT, counts, orders
 from chladni.gap.blind.draft import Scene
+from chladni.gap.blind.drive_draw import draw_drive_bench
 from chladni.gap.blind.excitation_draw import BEYOND, draw_drive
+from chladni.gap.blind.joint_drafts import NEED_A_SPRING
 from chladni.gap.blind.make import make_cases
 from chladni.gap.blind.noise import SensorNoise, draw_noise
 from chladni.gap.blind.performance import measured, perform, pooled_change, rms
@@ -131,31 +133,43 @@ def test_all_cases_are_shared_out(count):
     assert sum(counts(count).values()) == count
 
 
-@pytest.mark.parametrize("word", [*WORDS, *OUTSIDE])
-def test_every_draft_moves_the_outputs_the_more_the_larger(word):
+def scene_for(word, footing):
+    """A bench on which the word has a site, what drives it, and its draft."""
     rng = np.random.default_rng([3, len(word)])
     for _ in range(40):
-        bench = draw_structure(rng, "grounded")
-
-        bench = replace(bench, samples=500)
+        bench = draw_drive_bench(rng) if footing == "drive" else draw_structure(rng, footing)
+        bench = replace(bench, samples=2000 if footing == "drive" else 500)
         drive = draw_drive(rng, bench)
         numbers = draw_numbers(rng, bench.plan)
         clean = perform(bench, numbers, drive, watched=True)
         scene = Scene(bench=bench, numbers=numbers, rng=rng, moving={name: rms(row) for name, row in clean.items()})
         draft = draw_draft(scene, word)
         if draft is not None:
-            break
-    assert draft is not None
+            return scene, drive, clean, draft
+    return None
+
+
+@pytest.mark.parametrize("footing", ["grounded", "loop", "drive"])
+@pytest.mark.parametrize("word", [*WORDS, *OUTSIDE])
+def test_every_draft_moves_the_outputs_the_more_the_larger(word, footing):
+    found = scene_for(word, footing)
+    if found is None:
+        # Only what needs springs, a ground or two equal sensors has no place in a drive.
+        assert footing == "drive"
+        assert word in NEED_A_SPRING | {"base_vibration", "cross_axis"} | set(OUTSIDE)
+        return
+    scene, drive, clean, draft = found
+    bench, names = scene.bench, measured(scene.bench)
     assert drive.signals.shape[1] == drive.before + bench.samples + BEYOND
-    names = measured(bench)
 
     def change(size):
         hidden = draft.hidden(size)
         assert hidden.effect == word
-        moved = perform(bench, numbers, drive, [hidden], steps=64)
+        moved = perform(bench, scene.numbers, drive, [hidden], steps=64)
         return pooled_change(bench, {name: clean[name] for name in names}, converted(moved, (hidden,), names))
 
-    middle = min(max(1.0, draft.least), draft.most)
+    # Limits of size one are at four times the RMS, which a sweep never reaches.
+    middle = min(max(3.5 if word in ("clipping", "saturation") else 1.0, draft.least), draft.most)
     assert change(middle) > 1e-6
     small = max(0.3 * middle, draft.least)
     if small < 0.9 * middle and word != "held_samples":
