@@ -183,6 +183,23 @@ def implicit_force(
 
 
 @part_code
+def answer_to_unit(mujoco: Simulated, dof: int) -> None:
+    """Fill `column` with the accelerations that a unit force at one joint makes."""
+    mujoco.unit[dof] = 1.0
+    _SOLVE(
+        mujoco.address[5],
+        (
+            mujoco.address[0],
+            mujoco.address[1],
+            mujoco.address[7],
+            mujoco.address[8],
+            np.int32(1),
+        ),
+    )
+    mujoco.unit[dof] = 0.0
+
+
+@part_code
 def resist(mujoco: Simulated, laws: Laws, t: float, step_s: float) -> bool:
     """Set the generalised forces of the laws for the step that begins, joint after joint; False when they explode."""
     _STEP(mujoco.address[3], (mujoco.address[0], mujoco.address[1]))
@@ -191,18 +208,7 @@ def resist(mujoco: Simulated, laws: Laws, t: float, step_s: float) -> bool:
         if laws.first[joint] == laws.first[joint + 1]:
             continue
         dof = laws.dof[joint]
-        mujoco.unit[dof] = 1.0
-        _SOLVE(
-            mujoco.address[5],
-            (
-                mujoco.address[0],
-                mujoco.address[1],
-                mujoco.address[7],
-                mujoco.address[8],
-                np.int32(1),
-            ),
-        )
-        mujoco.unit[dof] = 0.0
+        answer_to_unit(mujoco, dof)
         # MuJoCo adds the joint's damping to the inertia, by the step's length.
         heavier = 1.0 + step_s * mujoco.damping[dof] * mujoco.column[dof]
         d = mujoco.position[laws.place[joint]] - laws.rest[joint]
