@@ -27,7 +27,6 @@ def bounded_step(curvature: Matrix, gradient: Matrix, low: Matrix, high: Matrix,
     EstimateError
         When a number isn't finite.
     """
-    from scipy.linalg import cholesky, solve_triangular
     from scipy.optimize import lsq_linear
 
     if not (np.all(np.isfinite(curvature)) and np.all(np.isfinite(gradient))):
@@ -40,9 +39,12 @@ def bounded_step(curvature: Matrix, gradient: Matrix, low: Matrix, high: Matrix,
         return step
     scale = size[moving]
     scaled = curvature[np.ix_(moving, moving)] / np.multiply.outer(scale, scale)
-    root = cholesky(scaled + (damping + scale.size * _RIDGE) * np.eye(scale.size), lower=False)
-    target = -solve_triangular(root, gradient[moving] / scale, trans="T")
-    free = solve_triangular(root, target)
+    # Where initial states were eliminated rounding may leave a curvature just below zero.
+    values, vectors = np.linalg.eigh(scaled)
+    sizes = np.sqrt(np.maximum(values, 0.0) + damping + scale.size * _RIDGE)
+    root = sizes[:, None] * vectors.T
+    target = -(vectors.T @ (gradient[moving] / scale)) / sizes
+    free = vectors @ (target / sizes)
     below, above = low[moving] * scale, high[moving] * scale
     if np.any(free < below) or np.any(free > above):
         # The solver wants room between the bounds, also where an unknown stands on both.

@@ -14,6 +14,7 @@ from chladni.gap.tuning.effect_scale import EffectNumber, with_numbers
 from chladni.gap.tuning.residual import Residual, Whitening, likelihood_cost, weights
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.integrator import Integrator
+from chladni.signals.errors import EstimateError
 
 Matrix = NDArray[np.float64]
 #: How far apart the two runs of a difference are, in ln(value) of a parameter.
@@ -22,6 +23,8 @@ _APART = 1e-5
 _APART_WITH_LAWS = 1e-3
 #: Precision of an effect's parameter before a log is seen: none, but for what keeps the equations regular.
 _UNKNOWN = 1e-6
+#: Curvatures beyond this say that neighbouring motions part, not what a parameter does.
+_PARTED = 1e100
 #: One sigma of an initial state is what alone would make the outputs this many times what was measured.
 _WIDE = 10.0
 
@@ -165,8 +168,21 @@ class FitProblem:
         return float(0.5 * np.sum(self._prior * point.x**2) + 0.5 * at_start)
 
     def slopes(self, here: Evaluation) -> Slopes:
-        """Gauss and Newton's equations around a point, each output weighed by what it misses."""
-        return self._equations(here, *self._columns(here))
+        """Gauss and Newton's equations around a point, each output weighed by what it misses.
+
+        Raises
+        ------
+        EstimateError
+            When neighbouring motions part so fast that slopes leave the numbers.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = self._equations(here, *self._columns(here))
+        # NaN is beyond too.
+        if not (np.all(np.abs(found.curvature) < _PARTED) and np.all(np.isfinite(found.gradient))):
+            raise EstimateError(
+                "the run is too sensitive for a fit: its slopes leave the numbers; use shorter windows"
+            )
+        return found
 
     def _equations(self, here: Evaluation, own: Matrix, starts: Callable[[int, int], Matrix]) -> Slopes:
         root = np.sqrt(weights(here.residual.power))[:, None]
@@ -260,6 +276,8 @@ def _eliminated(own: Matrix, cross: Matrix, slope: Matrix) -> tuple[Matrix, Matr
     """Best step of some unknowns, ``constant - per step``, from ``own p + cross step + slope = 0``."""
     if not len(own):
         return np.zeros(cross.shape), np.zeros(0)
+    if not np.all(np.isfinite(own)):
+        return np.full(cross.shape, np.nan), np.full(len(own), np.nan)
     solved = np.asarray(np.linalg.solve(own, np.column_stack([cross, slope])), dtype=np.float64)
     return solved[:, :-1], -solved[:, -1]
 

@@ -13,7 +13,7 @@ from chladni.gap.tuning.effect_scale import effect_numbers
 from chladni.gap.tuning.fit_problem import Z_LIMIT, Evaluation, FitProblem, Point, Slopes
 from chladni.gap.tuning.residual import Whitening
 from chladni.models.effects.attached_effect import AttachedEffect
-from chladni.signals.errors import ModelError
+from chladni.signals.errors import EstimateError, ModelError
 from chladni.signals.value import Value, require_shape
 
 Matrix = NDArray[np.float64]
@@ -27,6 +27,8 @@ _COARSE = 0.01
 _LONGEST = 2.0
 #: An unknown that a log leaves as uncertain as it was.
 _UNDETERMINED = 0.9
+#: Least curvature of scaled unknowns.
+_FLAT = 1e-15
 #: Iterations that are left for fine runs at least.
 _FINE = 4
 _DAMPINGS = (0.0, 1e-2, 1e-1, 1.0, 10.0, 100.0)
@@ -153,7 +155,7 @@ def fit_output_error(
     ModelError
         When the model diverges at the start already.
     EstimateError
-        When nothing is left to fit on.
+        When nothing is left to fit on, or motions at the start part so fast that they have no slopes.
     """
     count, samples = len(run.tunables.names), run.measurement.samples
     training = np.ones(samples, dtype=bool) if training is None else np.asarray(training, dtype=bool)
@@ -180,7 +182,7 @@ def _fit(problem: FitProblem, start: Point, most: int, precision: float) -> tupl
         try:
             found, _, _, spent = _descend(problem, problem.evaluate(start), most, enough)
             start = found.point
-        except ModelError:
+        except (ModelError, EstimateError):
             spent = 0
         problem.coarse = False
     here, slopes, converged, more = _descend(problem, problem.evaluate(start), max(most - spent, _FINE), precision)
@@ -198,7 +200,10 @@ def _descend(problem: FitProblem, here: Evaluation, most: int, enough: float) ->
         gained, here = here.cost - found.cost, found
         if max(promised, gained) < enough:
             return here, slopes, True, iterations
-        slopes = problem.slopes(here)
+        try:
+            slopes = problem.slopes(here)
+        except EstimateError:
+            return here, slopes, False, iterations
     return here, slopes, False, iterations
 
 
@@ -275,9 +280,10 @@ def _report(
 def _inverse(curvature: Matrix) -> Matrix:
     """Inverse of a matrix whose rows have very different units."""
     size = np.sqrt(np.maximum(np.diag(curvature), np.finfo(np.float64).tiny))
-    scaled = curvature / np.multiply.outer(size, size)
-    found = np.linalg.pinv(scaled, rcond=1e-15, hermitian=True) / np.multiply.outer(size, size)
-    return np.asarray(found, dtype=np.float64)
+    values, vectors = np.linalg.eigh(curvature / size[:, None] / size)
+    # Directions that rounding leaves without curvature are as good as unknown.
+    spread = vectors / size[:, None]
+    return np.asarray((spread / np.maximum(values, _FLAT)) @ spread.T, dtype=np.float64)
 
 
 def _effect_std(problem: FitProblem, x: Matrix, std: Matrix) -> tuple[Mapping[str, float], ...]:
