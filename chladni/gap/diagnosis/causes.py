@@ -11,19 +11,28 @@ from chladni.gap.explanation.candidates import screened
 from chladni.gap.explanation.degenerate import is_degenerate
 from chladni.gap.explanation.hypotheses import effect_hypotheses, hypothesis_of, wrong_parameters
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
-from chladni.gap.location.locate import Located, Location, locate, located_pairs
-from chladni.gap.records.diagnosis import Verdict
+from chladni.gap.explanation.lattice import Lattice, lattice_of
+from chladni.gap.explanation.shaken_ground import follows_inputs
+from chladni.gap.location.locate import Located, locate
+from chladni.gap.location.recovered import recovered
+from chladni.gap.records.diagnosis import Candidate, Verdict
+from chladni.signals.errors import EstimateError
 
 Matrix = NDArray[np.float64]
 Step = Callable[[float], None]
 #: Fits of a first effect, of a second beside it.
 _FITTED, _SECOND = 7, 4
 #: Nats that an effect must bring to be named at all, and those that a second must bring beside the first.
-NAMED, ADDED = 6.0, 8.0
+NAMED, ADDED = 6.0, 10.0
 #: Below this share of the gap's power, the best effect leaves too much to be the cause.
 EXPLAINS = 0.8
 #: A fit that leaves less than this, over the noise's power, leaves nothing to be explained.
 _CLEAN = 1.6
+#: A first effect that leaves less than this, over the noise's power, is alone.
+_ALONE = 1.3
+#: A floor that shakes: how well the place must explain, by what factor better than any other, and how little of the
+#: recovered motion may follow the inputs.
+_SHAKEN_CHI, _SHAKEN_MARGIN, _SHAKEN_COHERENCE = 1.5, 1.1, 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,11 +46,15 @@ class Causes:
     tuned
         The contestant without any cause.
     best
-        The one that is believed: `tuned` for the verdicts ``none`` and ``unknown`` without a candidate.
+        The one that is believed; `tuned` when none pays.
     ranked
         All single ones by falling evidence.
     probabilities
         Of each of `ranked`, in order; they sum to one with that of no cause.
+    shaken
+        The ground's profile when the floor shakes, else None.
+    lattices
+        Outputs whose samples stand on a lattice that is coarse beside the noise.
     """
 
     verdict: Verdict
@@ -49,39 +62,39 @@ class Causes:
     best: Contestant
     ranked: tuple[Contestant, ...]
     probabilities: tuple[float, ...]
+    shaken: Located | None
+    lattices: dict[str, Lattice]
 
 
 def causes_of(study: Study, progress: Step) -> Causes:
     """Enter hypotheses and judge."""
-    location, contest = study.location, study.contest
-    nothing = contest.enter(Hypothesis(start_z=location.tuned.z), max_iterations=20)
-    if nothing is None:
-        raise AssertionError("the nominal model was simulated before")
+    nothing = _nothing(study)
     progress(0.1)
-    candidates = screened(location, location.ranked, study.leave_out)
-    progress(0.3)
-    hypotheses = effect_hypotheses(candidates, study.own, count=_FITTED)
-    wrong = wrong_parameters(location)
-    entered = contest.enter_all([*hypotheses, *([wrong] if wrong else [])], lambda done: progress(0.3 + 0.5 * done))
-    sound = [one for one in entered if not is_degenerate(contest.run, one)]
-    ranked = sorted(sound, key=lambda one: -one.log_evidence)
+    ranked = _ranked(study, progress)
     best = ranked[0] if ranked and ranked[0].log_evidence > nothing.log_evidence + NAMED else nothing
-    if best.hypothesis.effects and best.chi > _CLEAN:
+    if best.hypothesis.effects and best.chi > _ALONE:
         best = _with_second(study, best)
     progress(1.0)
+    lattices = _lattices(study)
+    verdict = _verdict(study, nothing, best)
+    shaken = _shaken(study) if verdict == "unknown" else None
+    if shaken is not None or (verdict == "none" and lattices):
+        verdict = "effect"
     probabilities = _probabilities([*ranked, nothing])
     return Causes(
-        verdict=_verdict(study, nothing, best),
+        verdict=verdict,
         tuned=nothing,
         best=best,
         ranked=tuple(ranked),
         probabilities=tuple(probabilities[:-1]),
+        shaken=shaken,
+        lattices=lattices,
     )
 
 
-def explained_power(tuned: Contestant, found: Contestant, noise_gap: float) -> float:
+def explained_power(tuned: Contestant, found: Contestant, noise: float) -> float:
     """Share of the gap's power beyond noise that a hypothesis explains, on held-out samples."""
-    room = tuned.gap**2 - noise_gap**2
+    room = tuned.gap**2 - noise**2
     return float(np.clip((tuned.gap**2 - found.gap**2) / room, 0.0, 1.0)) if room > 0 else 0.0
 
 
@@ -92,29 +105,74 @@ def noise_gap(study: Study) -> float:
     return float(np.sqrt(np.mean(study.location.problem.noise.rms**2 / np.maximum(size, 1e-300))))
 
 
+def _nothing(study: Study) -> Contestant:
+    found = study.contest.enter(Hypothesis(start_z=study.location.tuned.z), max_iterations=20)
+    if found is None:
+        raise EstimateError(
+            f"model {study.model.name!r} diverges on log {study.measurement.log!r} within its tolerances; "
+            "check the model's stability and the units of its inputs"
+        )
+    return found
+
+
+def _ranked(study: Study, progress: Step) -> list[Contestant]:
+    location, contest = study.location, study.contest
+    candidates = screened(location, location.ranked, study.leave_out, study.own)
+    progress(0.3)
+    hypotheses = effect_hypotheses(candidates, study.own, count=_FITTED)
+    wrong = wrong_parameters(location)
+    entered = contest.enter_all([*hypotheses, *([wrong] if wrong else [])], lambda done: progress(0.3 + 0.5 * done))
+    sound = [one for one in entered if not is_degenerate(contest.run, one)]
+    return sorted(sound, key=lambda one: -one.log_evidence)
+
+
 def _with_second(study: Study, first: Contestant) -> Contestant:
     """Look for a second effect in what the first leaves; keep it when it pays."""
     contest = study.contest
     # What the first effect did beyond the linear model is taken from the log: the rest is a gap of its own.
-    plain = contest.run.outputs(first.fit.z, (), first.fit.initial[:, : _states(study)])
+    states = len(contest.run.compiled().states)
+    plain = contest.run.outputs(first.fit.z, (), first.fit.initial[:, :states])
     bent = first.fit.outputs - first.fit.offsets[:, None] - plain
     measurement = replace(study.measurement, outputs=study.measurement.outputs - bent)
     location = locate(study.model, measurement, contest.noise, contest.run.tunables)
-    found = screened(location, location.ranked[:4], study.leave_out)
-    singles = effect_hypotheses(found, study.own, count=_SECOND)
-    taken = {(one.effect, one.site) for one in first.fit.effects}
-    both = [
-        hypothesis_of((*first.fit.effects, *one.effects), first.fit.z, screened=one.screened)
-        for one in singles
-        if (one.effects[0].effect, one.effects[0].site) not in taken
-    ]
+    found = screened(location, location.ranked[:4], study.leave_out, study.own)
+    taken = {one.site for one in first.fit.effects}
+    # At the same site a second word would mend the details of the first one's law.
+    singles = effect_hypotheses([one for one in found if one.trial.site.name not in taken], study.own, count=_SECOND)
+    both = [hypothesis_of((*first.fit.effects, *one.effects), first.fit.z, screened=one.screened) for one in singles]
     entered = [one for one in contest.enter_all(both) if not is_degenerate(contest.run, one)]
     best = max(entered, key=lambda one: one.log_evidence, default=first)
     return best if best.log_evidence > first.log_evidence + ADDED else first
 
 
-def _states(study: Study) -> int:
-    return len(study.contest.run.compiled().states)
+def _shaken(study: Study) -> Located | None:
+    """Give the ground's profile when only a floor that shakes explains the gap."""
+    if "base_vibration" in study.leave_out or len(study.measurement.output_names) < 2:
+        return None
+    ranked = study.location.ranked
+    first = ranked[0]
+    ground = [site for site in first.places[0].sites if site.kind == "ground"]
+    if not ground or first.profile.chi > _SHAKEN_CHI:
+        return None
+    if len(ranked) > 1 and ranked[1].profile.chi < _SHAKEN_MARGIN * first.profile.chi:
+        return None
+    motion = recovered(study.location.problem, first.profile, ground[0])
+    return first if follows_inputs(study.location.problem, motion.force) < _SHAKEN_COHERENCE else None
+
+
+def _lattices(study: Study) -> dict[str, Lattice]:
+    if "quantization" in study.leave_out:
+        return {}
+    found = {}
+    rows = zip(
+        study.measurement.output_names, study.measurement.outputs, study.location.problem.noise.rms, strict=True
+    )
+    for name, signal, noise in rows:
+        lattice = lattice_of(signal)
+        # Steps far below the noise are those of any converter.
+        if lattice is not None and lattice.step / np.sqrt(12.0) > 0.5 * noise:
+            found[name] = lattice
+    return found
 
 
 def _verdict(study: Study, tuned: Contestant, best: Contestant) -> Verdict:
@@ -132,4 +190,11 @@ def _probabilities(contestants: Sequence[Contestant]) -> list[float]:
     return [float(one) for one in weight / weight.sum()]
 
 
-__all__ = ["Causes", "Located", "Location", "causes_of", "explained_power", "located_pairs", "noise_gap"]
+def named(causes: Causes) -> tuple[Candidate, ...]:
+    """Give what is named as causes, in order."""
+    if causes.shaken is not None:
+        return (Candidate(effect="base_vibration", site="ground"),)
+    found = list(causes.best.hypothesis.named) if causes.verdict in ("effect", "parameters") else []
+    if causes.verdict == "effect":
+        found += [Candidate(effect="quantization", site=name) for name in causes.lattices]
+    return tuple(dict.fromkeys(found))

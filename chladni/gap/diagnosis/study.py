@@ -11,12 +11,15 @@ from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.explanation.contest import Contest, training_mask
 from chladni.gap.location.locate import Location, locate
 from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.tunable import Tunables
 from chladni.gap.plant.windows import windows_for
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.model import Model
 from chladni.models.effects.effect_kind import EffectKind
 
 Matrix = NDArray[np.float64]
+#: Misfit over noise with which a record is followed from its start to its end.
+_FOLLOWS = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,10 +66,10 @@ def study_of(
 ) -> Study:
     """Prepare the study of one log."""
     measurement = with_period(measurement)
-    windows = windows_for(model, measurement)
-    run = FreeRun(model, measurement, windows=windows)
     noise = estimate_noise(measurement)
-    location = locate(model, measurement, noise, run.tunables)
+    location = locate(model, measurement, noise, Tunables.of(model))
+    windows = None if _runs_free(model, location) else windows_for(model, measurement)
+    run = FreeRun(model, measurement, windows=windows)
     training = training_mask(measurement.samples, measurement.sample_rate_hz, measurement.period_samples)
     return Study(
         model=model,
@@ -77,3 +80,15 @@ def study_of(
         leave_out=leave_out,
         own=own,
     )
+
+
+def _runs_free(model: Model, location: Location) -> bool:
+    """Whether the linear part follows the whole record from one state, but for a force at the best place.
+
+    A free body does, when its forces are told well enough; one that doesn't is compared over windows.
+    """
+    growing = np.linalg.eigvals(model.compile().a).real.max(initial=-1.0) * location.problem.measurement.duration_s
+    best = location.best
+    if growing > 1.0 or best is None or len(location.problem.measured) < 2:
+        return False
+    return min(best.profile.chi, location.tuned.chi) < _FOLLOWS

@@ -46,7 +46,9 @@ def _limits(motion: Recovered) -> Iterator[Trial]:
     u, rate = motion.displacement, motion.lines.sample_rate_hz
     size, rms = float(np.max(np.abs(u))), float(np.sqrt(np.mean(u**2)))
     shares = (0.3, 0.5, 0.65, 0.75, 0.83, 0.89, 0.93, 0.96, 0.98, 0.99, 0.997)
-    limits = [limit for limit in np.quantile(np.abs(u), shares).tolist() if 0 < limit < size]
+    # By how often it's reached, and by size: steps stand at few levels.
+    limits = [*np.quantile(np.abs(u), shares).tolist(), *(size * np.array([0.1, 0.3, 0.6, 0.9])).tolist()]
+    limits = sorted({limit for limit in limits if 0 < limit < size})
     if limits:
         yield _known(
             motion,
@@ -66,15 +68,11 @@ def _limits(motion: Recovered) -> Iterator[Trial]:
         )
     widths = (rms * np.geomspace(0.01, 1.5, 18)).tolist()
     yield _known(motion, "dead_zone", lambda value: motion.spectrum(-np.clip(u, -value, value)), widths, "width")
-    rates = [one for one in np.quantile(np.abs(np.diff(u)) * rate, shares[:10]).tolist() if one > 0]
-    if rates:
-        yield _known(
-            motion,
-            "rate_limit",
-            lambda value: motion.spectrum(limited_samples(u, rate, value, 0.0) - u),
-            rates,
-            "rate",
-        )
+    fastest = float(np.max(np.abs(np.diff(u)))) * rate
+    rates = (fastest * np.geomspace(0.002, 0.95, 24)).tolist()
+    yield _known(
+        motion, "rate_limit", lambda value: motion.spectrum(limited_samples(u, rate, value, 0.0) - u), rates, "rate"
+    )
 
 
 def _known(

@@ -22,7 +22,7 @@ _SEGMENTS = (8.0, 24.0)
 _SEGMENT_LINES = 1500
 _RECORD_LINES = 1500
 #: Places that are followed to the end.
-_FOLLOWED = 6
+_FOLLOWED, _FOLLOWED_AGAIN = 6, 4
 #: Patterns tell places apart only when there are more sensors than forces.
 _PAIR_SENSORS = 3
 
@@ -88,7 +88,7 @@ def locate(model: Model, measurement: Measurement, noise: NoiseFloor, tunables: 
     ranked = _followed(record, rough)
     if ranked and ranked[0].profile.expected > 1 and _pays(plain, ranked[0].profile):
         record = record.with_noise(noise_behind(record, ranked[0].profile))
-        ranked = _followed(record, [(one.profile, one.places[0]) for one in ranked])
+        ranked = _followed(record, [(one.profile, one.places[0]) for one in ranked[:_FOLLOWED_AGAIN]])
         plain = profiled(record, (), plain.z, iterations=4)
     return Location(problem=record, tuned=plain, ranked=tuple(ranked), shares=_shares(tuned, rough))
 
@@ -135,14 +135,14 @@ def _lowest_hz(model: Model, measurement: Measurement) -> float:
 def _on_segments(segments: LinearProblem, tuned: Profile, places: Sequence[Place]) -> list[tuple[Profile, Place]]:
     if len(segments.measured) < 2:
         return [(replace(tuned, sites=(place.sites[0],)), place) for place in places]
-    found = [(profiled(segments, (place.sites[0],), tuned.z, iterations=4), place) for place in places]
+    found = [(profiled(segments, (place.sites[0],), tuned.z, iterations=3), place) for place in places]
     return sorted(found, key=lambda one: one[0].chi)
 
 
 def _followed(record: LinearProblem, rough: Sequence[tuple[Profile, Place]]) -> list[Located]:
     # With one sensor all patterns are one place: nothing is known of it but that it explains all.
     found = [
-        Located(places=(place,), profile=profiled(record, (place.sites[0],), profile.z, iterations=5))
+        Located(places=(place,), profile=profiled(record, (place.sites[0],), profile.z, iterations=4))
         for profile, place in rough[:_FOLLOWED]
     ]
     return sorted(found, key=lambda one: one.profile.chi)

@@ -1,0 +1,252 @@
+"""The whole diagnosis of a model and its logs."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.comparison.distortion import distortion_of
+from chladni.gap.comparison.levels import compare_levels
+from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, regime_shares
+from chladni.gap.diagnosis.causes import Causes, causes_of
+from chladni.gap.diagnosis.closing import closing_of
+from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
+from chladni.gap.diagnosis.study import Study, study_of
+from chladni.gap.explanation.shaken_ground import predicted_by_others
+from chladni.gap.location.recovered import Recovered, recovered
+from chladni.gap.plant.places import Site
+from chladni.gap.records.diagnosis import (
+    Cause,
+    Diagnosis,
+    DistortionShare,
+    GapSignals,
+    RestoringForce,
+    SiteShare,
+    Where,
+)
+from chladni.gap.records.measurement import Measurement
+from chladni.models.core.model import Model
+from chladni.models.effects.effect_kind import EffectKind
+from chladni.signals.errors import EstimateError, ModelError
+
+Matrix = NDArray[np.float64]
+StepProgress = Callable[[str, float], None]
+
+
+def diagnose(
+    model: Model,
+    measurements: Sequence[Measurement],
+    *,
+    leave_out: frozenset[str] = frozenset(),
+    own_effects: Sequence[EffectKind] = (),
+    seed: int = 0,
+    progress: StepProgress | None = None,
+) -> Diagnosis:
+    """Say where a model and logs disagree, what causes it, and how far that closes the gap.
+
+    The first log is diagnosed; with more of them, what changes with level is told too.
+
+    Parameters
+    ----------
+    measurements
+        One at least.
+    leave_out
+        Words of effects that don't take part.
+    own_effects
+        Records of the user's that do.
+    seed
+        Of the bootstrap.
+    progress
+        Called with the name of the step and the share done.
+
+    Raises
+    ------
+    EstimateError
+        When there's no measurement, or the model diverges on it.
+    """
+    if not measurements:
+        raise EstimateError("no measurement to hold against the model")
+    tell = progress or _silent
+    tell("locating", 0.0)
+    study = study_of(model, measurements[0], leave_out=leave_out, own={one.name: one for one in own_effects})
+    tell("explaining", 0.3)
+    causes = causes_of(study, lambda done: tell("explaining", 0.3 + 0.6 * done))
+    tell("measuring the closing", 0.9)
+    found = _assembled(study, causes, [one.log for one in measurements], seed)
+    tell("measuring the closing", 1.0)
+    levels = tuple(compare_levels(measurements)) if len(measurements) > 1 else ()
+    return found if not levels else _with_levels(found, levels)
+
+
+def _silent(_step: str, _share: float) -> None:
+    pass
+
+
+def _with_levels(found: Diagnosis, levels: tuple[str, ...]) -> Diagnosis:
+    from dataclasses import replace
+
+    return replace(found, levels=levels)
+
+
+def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> Diagnosis:
+    said = causes_named(study, causes)
+    before = _nominal(study)
+    shown = causes.best if causes.verdict in ("effect", "parameters") else causes.tuned
+    after = shown.fit.outputs
+    if causes.shaken is not None:
+        after = predicted_by_others(study.location.problem, causes.shaken.profile)
+    motion = _evidence(study, said)
+    distortion = _distortion(study.measurement)
+    return Diagnosis(
+        model=study.model.name,
+        logs=tuple(logs),
+        verdict=causes.verdict,
+        causes=said,
+        ranking=ranking_of(causes, said),
+        where=_where(study, before, motion),
+        gap=closing_of(
+            study, before, causes.tuned.fit.outputs, after, cross_sensor=causes.shaken is not None, seed=seed
+        ),
+        tuned_parameters=tuned_numbers(study, shown.fit),
+        naive=naive_of(causes),
+        remarks=tuple(_remarks(study, causes)),
+        advice=_advice(causes),
+        restoring_force=_restoring(study, causes, motion),
+        signals=_signals(study, before, after),
+        distortion=distortion,
+    )
+
+
+def _nominal(study: Study) -> Matrix:
+    """Free run of the nominal model from the initial state that suits it best."""
+    run, contest = study.contest.run, study.contest
+    from chladni.gap.tuning.output_error import fit_output_error
+
+    try:
+        return fit_output_error(run, contest.noise, training=contest.training, tune=False).outputs
+    except ModelError:
+        return run.outputs()
+
+
+def _where(study: Study, before: Matrix, motion: Recovered | None) -> Where:
+    measurement = study.measurement
+    residual = measurement.outputs - before
+    shares = sorted(study.location.shares.items(), key=lambda one: -one[1])
+    variables = {}
+    if motion is not None and motion.site.kind == "joint":
+        variables = {
+            f"{motion.site.name}.displacement": motion.displacement,
+            f"{motion.site.name}.velocity": motion.velocity,
+        }
+    return Where(
+        channels=channel_gaps(
+            residual, measurement.outputs, study.contest.noise, output_names=measurement.output_names
+        ),
+        bands=band_shares(residual, measurement.outputs, sample_rate_hz=measurement.sample_rate_hz),
+        sites=tuple(SiteShare(name=name, share=share) for name, share in shares),
+        regimes=tuple(regime_shares(residual, measurement.outputs, variables)) if variables else (),
+    )
+
+
+def _evidence(study: Study, said: Sequence[Cause]) -> Recovered | None:
+    """Force and motion at the named site, else at the best place."""
+    problem = study.location.problem
+    if not study.location.ranked:
+        return None
+    for located in study.location.ranked:
+        for site in located.places[0].sites:
+            if not said or site.name == said[0].site:
+                return recovered(problem, located.profile, site)
+    return None
+
+
+def _restoring(study: Study, causes: Causes, motion: Recovered | None) -> RestoringForce | None:
+    if motion is None:
+        return None
+    port = _port(study, motion.site)
+    law = None
+    if causes.best.fit.effects and causes.verdict == "effect" and motion.site.kind == "joint":
+        law = _law_force(study, causes, motion)
+    return RestoringForce(
+        site=motion.site.name,
+        time_s=motion.time_s,
+        displacement=motion.displacement,
+        velocity=motion.velocity,
+        force=motion.force,
+        law_force=law,
+        force_unit=port[0],
+        displacement_unit=port[1],
+    )
+
+
+def _law_force(study: Study, causes: Causes, motion: Recovered) -> Matrix | None:
+    fit = causes.best.fit
+    try:
+        return study.contest.run.motion(fit.z, fit.effects, fit.initial, site=motion.site.name).force
+    except ModelError:
+        return None
+
+
+def _port(study: Study, site: Site) -> tuple[str, str]:
+    compiled = study.contest.run.compiled()
+    for port in compiled.ports:
+        if (port.name, port.kind) == (site.name, site.kind):
+            return port.unit, port.displacement_unit
+    for terminal in (*compiled.inputs, *compiled.outputs):
+        if terminal.name == site.name:
+            return terminal.unit, terminal.unit
+    return "1", "1"
+
+
+def _signals(study: Study, before: Matrix, after: Matrix) -> GapSignals:
+    measurement = study.measurement
+    time_s, frequency_hz, density = gap_map(
+        measurement.outputs - before, measurement.outputs, measurement.sample_rate_hz
+    )
+    return GapSignals(
+        log=measurement.log,
+        sample_rate_hz=measurement.sample_rate_hz,
+        output_names=measurement.output_names,
+        output_units=measurement.output_units,
+        measured=measurement.outputs,
+        before=before,
+        after=after,
+        noise_rms=study.contest.noise.rms,
+        map_time_s=time_s,
+        map_frequency_hz=frequency_hz,
+        gap_map=density,
+        gap_map_after=gap_map(measurement.outputs - after, measurement.outputs, measurement.sample_rate_hz)[2],
+    )
+
+
+def _distortion(measurement: Measurement) -> tuple[DistortionShare, ...]:
+    try:
+        found = distortion_of(measurement)
+    except EstimateError:
+        return ()
+    return () if found is None else tuple(found.shares)
+
+
+def _remarks(study: Study, causes: Causes) -> list[str]:
+    found = []
+    if len(study.measurement.output_names) < 2:
+        found.append(
+            "one output only: which site the missing force acts at can't be told from patterns, only from its law; "
+            "a second sensor would tell"
+        )
+    if causes.tuned.fit.undetermined:
+        names = ", ".join(causes.tuned.fit.undetermined[:6])
+        found.append(f"this log doesn't determine {names}: held near nominal")
+    if study.horizon_s is not None:
+        found.append(f"compared over windows of {study.horizon_s:.3g} s, each from its own estimated state")
+    if np.any(study.contest.noise.upper_bound):
+        found.append("the noise floor of some outputs is an upper bound: distortion may be in it")
+    return found
+
+
+def _advice(causes: Causes) -> str | None:
+    if causes.verdict == "unknown":
+        return "no effect of the catalogue explains the gap; the site and the recovered force say where to look"
+    if causes.verdict == "none" and causes.tuned.chi > 1.2:
+        return "what is left beside the noise is too little to be named"
+    return None

@@ -1,0 +1,154 @@
+"""From contestants to named causes: groups, alternatives, probabilities, fitted numbers."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from chladni.gap.diagnosis.causes import Causes
+from chladni.gap.diagnosis.study import Study
+from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.records.diagnosis import Candidate, Cause, FittedNumber, Ranked
+from chladni.gap.tuning.output_error import OutputErrorFit
+
+#: Nats within which this log can't tell two candidates apart.
+_CLOSE = 2.0
+#: Of a floor that shakes and of a lattice: neither is a contest of likelihoods.
+_SHAKEN, _LATTICE = 0.9, 0.97
+
+
+def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
+    """Give the causes that a verdict names, the surest first."""
+    if causes.verdict not in ("effect", "parameters"):
+        return ()
+    if causes.shaken is not None:
+        return (_plain("base_vibration", "ground", _SHAKEN, group=causes.shaken.places[0].names),)
+    found: list[Cause] = []
+    if causes.best is not causes.tuned:
+        found += [_cause(causes, place) for place in range(len(causes.best.hypothesis.named))]
+    if causes.verdict == "effect":
+        taken = {(one.effect, one.site) for one in found}
+        found += [
+            _plain("quantization", name, _LATTICE, step=lattice.step, unit=_unit(study, name))
+            for name, lattice in causes.lattices.items()
+            if ("quantization", name) not in taken
+        ]
+    return tuple(found)
+
+
+def ranking_of(causes: Causes, causes_said: Sequence[Cause]) -> tuple[Ranked, ...]:
+    """Give every candidate once, by falling probability; what is said as a cause comes first."""
+    rows: dict[tuple[str, str], Ranked] = {}
+    for said in causes_said:
+        rows[said.effect, said.site] = Ranked(
+            effect=said.effect, site=said.site, probability=said.probability, gap=None, log_evidence=None
+        )
+    for one, probability in zip(causes.ranked, causes.probabilities, strict=True):
+        for candidate in one.hypothesis.named:
+            key = (candidate.effect, candidate.site)
+            known = rows.get(key)
+            if known is None or known.gap is None:
+                said_probability = known.probability if known is not None else probability
+                rows[key] = Ranked(
+                    effect=key[0],
+                    site=key[1],
+                    probability=said_probability,
+                    gap=one.gap,
+                    log_evidence=one.log_evidence,
+                )
+    return tuple(sorted(rows.values(), key=lambda row: -row.probability))
+
+
+def naive_of(causes: Causes) -> Candidate | None:
+    """Give what the largest drop in RMS alone would name."""
+    if not causes.ranked:
+        return None
+    return min(causes.ranked, key=lambda one: one.gap).hypothesis.named[0]
+
+
+def tuned_numbers(study: Study, fit: OutputErrorFit) -> dict[str, FittedNumber]:
+    """Give every tuned parameter with its standard deviation; None for those that the log doesn't determine."""
+    tunables = study.contest.run.tunables
+    rows = zip(tunables.names, tunables.nominal, fit.parameter_std, tunables.units, strict=True)
+    return {
+        name: FittedNumber(
+            value=float(fit.values[name]),
+            std=None if name in fit.undetermined or not np.isfinite(std) else float(std),
+            unit=unit,
+            nominal=float(nominal),
+        )
+        for name, nominal, std, unit in rows
+    }
+
+
+def _cause(causes: Causes, place: int) -> Cause:
+    best = causes.best
+    candidate = best.hypothesis.named[place]
+    alone = len(best.hypothesis.named) == 1
+    same = [(one, p) for one, p in zip(causes.ranked, causes.probabilities, strict=True)]
+    close = [one for one, _ in same if alone and one.log_evidence > best.log_evidence - _CLOSE]
+    group = [one.hypothesis.named[0].site for one in close if one.hypothesis.named[0].effect == candidate.effect]
+    others = [
+        one.hypothesis.named[0]
+        for one in close
+        if len(one.hypothesis.named) == 1 and one.hypothesis.named[0].effect != candidate.effect
+    ]
+    effect = best.fit.effects[place] if place < len(best.fit.effects) else None
+    return Cause(
+        effect=candidate.effect,
+        site=candidate.site,
+        probability=_probability(causes, best, candidate) if alone else 0.9,
+        group=tuple(dict.fromkeys([candidate.site, *group])),
+        alternatives=tuple(dict.fromkeys(others)),
+        parameters=_numbers(best, place),
+        variant=effect.variant if effect is not None else None,
+        source=effect.source if effect is not None else None,
+    )
+
+
+def _probability(causes: Causes, best: Contestant, candidate: Candidate) -> float:
+    """Probability of a word at a site, all forms of its law together."""
+    return float(
+        sum(
+            p
+            for one, p in zip(causes.ranked, causes.probabilities, strict=True)
+            if one is best or one.hypothesis.named == (candidate,)
+        )
+    )
+
+
+def _numbers(found: Contestant, place: int) -> dict[str, FittedNumber]:
+    if not found.fit.effects:
+        return {}
+    effect, std = found.fit.effects[place], found.fit.effect_std[place]
+    return {
+        name: FittedNumber(value=float(one.value), std=_finite(std.get(name)), unit=one.unit)
+        for name, one in effect.parameters.items()
+    }
+
+
+def _finite(std: float | None) -> float | None:
+    return float(std) if std is not None and np.isfinite(std) else None
+
+
+def _plain(
+    effect: str,
+    site: str,
+    probability: float,
+    *,
+    group: tuple[str, ...] = (),
+    step: float | None = None,
+    unit: str = "1",
+) -> Cause:
+    numbers = {} if step is None else {"step": FittedNumber(value=step, std=None, unit=unit)}
+    return Cause(
+        effect=effect,
+        site=site,
+        probability=probability,
+        group=tuple(dict.fromkeys([site, *group])),
+        alternatives=(),
+        parameters=numbers,
+    )
+
+
+def _unit(study: Study, name: str) -> str:
+    return study.measurement.output_units[study.measurement.output_names.index(name)]
