@@ -7,7 +7,7 @@ from chladni.signals.errors import EstimateError
 
 Matrix = NDArray[np.float64]
 #: Added to the curvature of each unknown, relative: what a log doesn't show at all must not make it singular.
-_RIDGE = 1e-12
+_RIDGE = 1e-15
 
 
 def bounded_step(curvature: Matrix, gradient: Matrix, low: Matrix, high: Matrix, *, damping: float) -> Matrix:

@@ -113,7 +113,7 @@ class FitProblem:
         self.low = np.concatenate([-limit, [number.low for number in numbers]])
         self.high = np.concatenate([limit, [number.high for number in numbers]])
         self._prior = np.concatenate([np.ones(self.tuned), np.full(len(numbers), _UNKNOWN)])
-        self._decay = self._wide = np.zeros(0)
+        self._wide = np.zeros(0)
         compiled = run.compiled(start_z, self.effects)
         self.has_laws = bool(compiled.laws)
         self.has_slopes = can_run(compiled)
@@ -139,7 +139,7 @@ class FitProblem:
         outputs = np.hstack([part.outputs[self.run.rows] for part in parts])
         residual = self.whitening.residual(self.run.measurement.outputs - outputs)
         here = Evaluation(start, outputs, residual, 0.0)
-        step = self._equations(here, np.zeros((0, *outputs.shape)), self._local).initial_step(np.zeros(0))
+        step = self._equations(here, np.zeros((0, *outputs.shape)), self._local(start)).initial_step(np.zeros(0))
         return Point(start.x, step)
 
     def z(self, x: Matrix) -> Matrix:
@@ -220,7 +220,7 @@ class FitProblem:
     def _columns(self, here: Evaluation) -> tuple[Matrix, Callable[[int, int], Matrix]]:
         """Slopes ``[unknown, output, sample]``, and whitened ``[state, output, training sample]`` of each window."""
         if here.made is None:
-            return self._differences(here), self._local
+            return self._differences(here), self._local(here.point)
         steps = self._steps(here.point.x, _APART)
         changed = [(self._setting(here.point.x + row), by) for row, by in zip(np.diag(steps), steps, strict=True)]
         own, starts = slopes_of(self.run, here.made, changed)
@@ -248,18 +248,27 @@ class FitProblem:
     def _spread(self, point: Point) -> Matrix:
         """``[state]`` one sigma of an initial state, so wide that it only keeps the equations regular."""
         if not self._wide.size:
-            compiled = self.run.compiled(self.z(point.x), self.effects_at(point.x))
-            longest = max(stop - start for start, stop in self.run.windows)
-            found = decay(compiled, self.run.rows, self.run.measurement.sample_rate_hz, longest)
-            self._decay = self.whitening.whitened(found)
+            alone = np.sqrt(np.mean(self._decays(point) ** 2, axis=(1, 2)))
             measured = np.mean(self.whitening.whitened(self.run.measurement.outputs) ** 2)
-            alone = np.sqrt(np.mean(self._decay**2, axis=(1, 2)))
+            # What grows beyond all numbers is seen all the more.
+            alone = np.where(np.isfinite(alone), alone, 1e100)
             seen = alone > 1e-12 * max(alone.max(initial=0.0), 1e-300)
             self._wide = np.where(seen, _WIDE * np.sqrt(measured) / np.where(seen, alone, 1.0), 0.0)
         return self._wide
 
-    def _local(self, start: int, stop: int) -> Matrix:
-        return self._decay[..., : stop - start][..., self.training[start:stop]]
+    def _decays(self, point: Point) -> Matrix:
+        """``[state, output, sample]`` whitened outputs from a unit of each state, as long as the longest window."""
+        compiled = self.run.compiled(self.z(point.x), self.effects_at(point.x))
+        longest = max(stop - start for start, stop in self.run.windows)
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = decay(compiled, self.run.rows, self.run.measurement.sample_rate_hz, longest)
+            return self.whitening.whitened(found)
+
+    def _local(self, point: Point) -> Callable[[int, int], Matrix]:
+        """Slopes of a window's outputs over its start, of the linear part."""
+        # At this point: after many cycles a decay of slightly other parameters is out of phase.
+        decays = self._decays(point)
+        return lambda start, stop: decays[..., : stop - start][..., self.training[start:stop]]
 
     def _seen(self, start: int, stop: int) -> slice:
         """Place of a window's samples among the training samples."""
