@@ -43,6 +43,8 @@ class Mark:
         Parameter beyond its tolerance, or empty.
     causes
         As named, most probable first.
+    alternatives
+        Words that the answer says can't be told from the first cause.
     naive
         Effect and site that leave the smallest RMS.
     ratio, ratio_tuned
@@ -62,6 +64,7 @@ class Mark:
     ratio: float | None
     ratio_tuned: float | None
     closed: float | None
+    alternatives: tuple[str, ...] = ()
 
     @property
     def first(self) -> Cause | None:
@@ -88,6 +91,12 @@ class Mark:
     def is_right(self) -> bool:
         """Whether the first cause is something that was hidden, where it was hidden."""
         return self.first is not None and any(self.first.fits(*one) for one in self.hidden)
+
+    @property
+    def is_among_the_alike(self) -> bool:
+        """Whether the right word is the first cause's, or one that the answer says the log can't tell from it."""
+        words = [effect for effect, _ in self.hidden]
+        return self.first is not None and (self.word_is_right or any(one in words for one in self.alternatives))
 
     def found(self) -> int:
         """How many of the hidden effects were named, at their sites."""
@@ -121,7 +130,7 @@ def mark(name: str, truth: Mapping[str, Any], result: Mapping[str, Any]) -> Mark
     closed, ideal = gap.get("closed"), truth.get("ideal") or 1.0
     try:
         causes = tuple(_cause(one) for one in result.get("causes") or () if one.get("effect") != "parameter")
-        naive = _naive(result)
+        naive, alternatives = _naive(result), _alternatives(result)
     except (KeyError, TypeError, AttributeError) as error:
         raise SetupError(f"{name}: causes or ranking of its result break the format: {error}") from error
     return Mark(
@@ -136,6 +145,7 @@ def mark(name: str, truth: Mapping[str, Any], result: Mapping[str, Any]) -> Mark
         ratio=truth.get("ratio"),
         ratio_tuned=truth.get("ratio_tuned"),
         closed=None if closed is None else float(closed) / float(ideal),
+        alternatives=alternatives,
     )
 
 
@@ -143,6 +153,11 @@ def _cause(one: Mapping[str, Any]) -> Cause:
     group: Sequence[str] = one.get("group") or ()
     return Cause(effect=str(one["effect"]), site=str(one["site"]), group=tuple(str(site) for site in group),
                  probability=float(one.get("probability") or 0.0))  # fmt: skip
+
+
+def _alternatives(result: Mapping[str, Any]) -> tuple[str, ...]:
+    named = list(result.get("causes") or ())
+    return tuple(str(one["effect"]) for one in (named[0].get("alternatives") or () if named else ()))
 
 
 def _naive(result: Mapping[str, Any]) -> tuple[str, str] | None:

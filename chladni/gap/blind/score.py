@@ -70,6 +70,7 @@ def scored(marks: Sequence[Mark]) -> dict[str, Any]:
         "failed": [one.name for one in marks if one.verdict == FAILED],
         "effect": _told(clear, lambda one: one.word_is_right),
         "family": _told(clear, lambda one: one.family_is_right),
+        "effect_or_alternative": _told(clear, lambda one: one.is_among_the_alike),
         "effect_naive": _told(clear, lambda one: one.naive_is_right),
         "site": _told(clear, lambda one: one.site_is_right),
         "group_sizes": _group_sizes(clear),

@@ -12,6 +12,7 @@ def score_rows(score: Mapping[str, Any]) -> list[Row]:
     faint, two, closed = score["faint"], score["two"], score["closed"]
     return [
         _share("right effect, first place", score["effect"], at_least=0.92),
+        _share("right effect, or told to be like the named one", score["effect_or_alternative"]),
         _share("right family", score["family"], at_least=0.96),
         _share("right effect by the lowest RMS alone (naive)", score["effect_naive"]),
         _share("right site, or a group that holds it", score["site"], at_least=0.95),

@@ -54,6 +54,15 @@ def test_first_place_counts():
     assert score["confusion_family"] == {"actuator": {"actuator": 3, "sensor": 1, "unknown": 1}}
 
 
+def test_an_alternative_that_the_answer_tells_is_counted_apart():
+    truth = {"kind": "effect", "ratio": 9.0, "effects": [{"effect": "delay", "site": "m"}]}
+    cause = {"effect": "lag", "site": "m", "probability": 0.6, "alternatives": [{"effect": "delay", "site": "m"}]}
+    one = mark("x", truth, {"format": "chladni.gap/1", "verdict": "effect", "causes": [cause]})
+    score = scored([one, answered("effect", "delay@m", "lag@m")])
+    assert score["effect"]["right"] == 0
+    assert (score["effect_or_alternative"]["right"], score["effect_or_alternative"]["count"]) == (1, 2)
+
+
 def test_the_naive_pick_may_be_told():
     marks = [answered("effect", "delay@m", "delay@m", naive="lag@m")]
     assert scored(marks)["effect_naive"]["right"] == 0
