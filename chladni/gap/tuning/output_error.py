@@ -31,7 +31,7 @@ _UNDETERMINED = 0.9
 _FLAT = 1e-15
 #: Iterations that are left for fine runs at least.
 _FINE = 4
-_DAMPINGS = (0.0, 1e-2, 1e-1, 1.0, 10.0, 100.0)
+_DAMPINGS = (0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
