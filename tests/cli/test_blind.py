@@ -63,7 +63,8 @@ def test_make_writes_cases_and_truths(run: Run, tmp_path: Path) -> None:
     assert done.code == 0
     assert done.document["made"] == 1
     assert sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()) == [
-        "cases/case-0001/case.json", "cases/case-0001/log.mcap", "cases/case-0001/model.toml", "truth/case-0001.json",
+        "cases/case-0001/case.json", "cases/case-0001/log.mcap", "cases/case-0001/model.toml", "truth/campaign.json",
+        "truth/case-0001.json",
     ]  # fmt: skip
     assert run("blind", "make", tmp_path, "--count", 1, "--seed", 2, "--jobs", 1).code == 0
 

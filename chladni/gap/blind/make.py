@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from chladni.gap.blind.case_draw import Case, Kind, Order, draw_case
+from chladni.gap.blind.case_folder import read_json
 from chladni.gap.blind.composition import DEFAULT, orders
 from chladni.gap.blind.model_text import model_text
 from chladni.gap.blind.performance import measured
-from chladni.gap.blind.seal import seal_case
+from chladni.gap.blind.seal import seal_case, write_json
 from chladni.io.atomic import atomic_write
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
@@ -20,6 +21,7 @@ from chladni.signals.errors import SetupError
 from chladni.signals.time_series import TimeSeries
 
 Progress = Callable[[float], None]
+CAMPAIGN_FORMAT = "chladni.blind-campaign/1"
 #: The same for all cases: a log's date tells nothing.
 START_TIME_NS = 1_760_000_000_000_000_000
 
@@ -58,7 +60,7 @@ def make_cases(directory: Path, *, count: int, seed: int, composition: Mapping[K
     Raises
     ------
     SetupError
-        When `count` or `seed` is impossible.
+        When `count` or `seed` is impossible, or the campaign in the folder is another one.
     LogError
         When the folder can't be written.
     """
@@ -72,10 +74,27 @@ def make_cases(directory: Path, *, count: int, seed: int, composition: Mapping[K
         if not (directory / "cases" / name / "case.json").is_file()
     ]
     (directory / "truth").mkdir(parents=True, exist_ok=True)
+    _keep_to_one(
+        directory / "truth" / "campaign.json", {"count": count, "seed": seed, "composition": {**composition}}
+    )
     made = map(make_case, tasks) if executor is None else executor.map(make_case, tasks)
     for done, _ in enumerate(made, start=1):
         progress(done / len(tasks))
     return len(tasks)
+
+
+def _keep_to_one(path: Path, told: dict[str, Any]) -> None:
+    """Refuse to go on with a campaign of another count, seed or composition: its cases would be a mixture.
+
+    With the truths, since whoever knows the seed can make them again.
+    """
+    if path.is_file():
+        found = read_json(path, CAMPAIGN_FORMAT)
+        if any(found.get(key) != value for key, value in told.items()):
+            raise SetupError(f"{path.parents[1]}: was begun with count {found.get('count')} and seed "
+                             f"{found.get('seed')}; go on with those, or take another folder")  # fmt: skip
+    else:
+        write_json(path, {"format": CAMPAIGN_FORMAT, **told})
 
 
 def make_case(task: CaseTask) -> str:

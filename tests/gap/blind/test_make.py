@@ -97,6 +97,11 @@ def test_a_campaign_is_resumed_and_made_again_the_same(campaign, tmp_path):
     assert salts[0] != salts[1]
 
 
+def test_a_campaign_is_not_mixed_with_another(campaign):
+    with pytest.raises(SetupError, match="begun with count 3 and seed 7"):
+        make_cases(campaign, count=4, seed=7, composition=ONE_OF_EACH)
+
+
 @pytest.mark.parametrize(("count", "seed", "told"), [(0, 1, "count 0"), (3, -1, "seed -1")])
 def test_impossible_campaigns_are_refused(tmp_path, count, seed, told):
     with pytest.raises(SetupError, match=told):
