@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from chladni.gap.plant.linear_view import LinearView, Way
 from chladni.gap.plant.places import Site, way_to
 from chladni.gap.plant.record_lines import RecordLines
+from chladni.gap.plant.view_slopes import same_frame, view_slopes
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.compiled_model import CompiledModel
@@ -16,8 +17,8 @@ from chladni.models.core.model import Model
 
 Matrix = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
-#: Of a tunable's sigma: small against curvature, large against rounding.
-_STEP = 1e-4
+#: Of a tunable's sigma: small against curvature, large against rounding. Equations round less than responses.
+_STEP, _RESPONSE_STEP = 1e-5, 1e-4
 
 
 class Scaled(Protocol):
@@ -55,6 +56,7 @@ class LinearProblem:
         self.model, self.measurement, self.tunables, self.lines = model, measurement, tunables, lines
         self.noise = noise
         self._inputs: dict[tuple[float, ...], Spectrum] = {}
+        self._view: tuple[bytes, LinearView] | None = None
         self._compile = changed or _compiled
         compiled = self._compile(model)
         names = [terminal.name for terminal in compiled.outputs]
@@ -77,8 +79,11 @@ class LinearProblem:
 
     def view(self, z: Matrix) -> LinearView:
         """Give the linear part at parameters z."""
-        model = self.model.with_values(self.tunables.values(z)) if z.size else self.model
-        return LinearView(self._compile(model), self.lines, self.measurement.inputs, self.rows, known=self._inputs)
+        # What is profiled at some parameters is linearised there next.
+        if self._view is None or self._view[0] != z.tobytes():
+            view = LinearView(self._at(z), self.lines, self.measurement.inputs, self.rows, known=self._inputs)
+            self._view = z.tobytes(), view
+        return self._view[1]
 
     def way(self, view: LinearView, site: Site) -> Way:
         """How a force at a site enters the equations of a view."""
@@ -100,13 +105,32 @@ class LinearProblem:
 
     def slopes(self, z: Matrix, transient: Matrix, forces: Sequence[tuple[Site, Spectrum]]) -> Spectrum:
         """``[tunable, output, segment, line]``: derivatives of `response` with all else held."""
-        here = self.response(z, transient, forces)
-        found = np.empty((z.size, *here.shape), dtype=np.complex128)
-        for place in range(z.size):
-            moved = z.copy()
-            moved[place] += _STEP
-            found[place] = (self.response(moved, transient, forces) - here) / _STEP
+        if not z.size:
+            return np.zeros((0, *self.measured.shape), dtype=np.complex128)
+        view = self.view(z)
+        changed = [self._at(moved) for moved in z + _STEP * np.eye(z.size)]
+        ways = [(self.way(view, site), force) for site, force in forces]
+        plain = [place for place, one in enumerate(changed) if same_frame(view.compiled, one)]
+        found = np.empty((z.size, *self.measured.shape), dtype=np.complex128)
+        slopes = view_slopes(view, [changed[place] for place in plain], _STEP, transient, ways)
+        found[plain] = slopes * self.weight
+        for place in set(range(z.size)) - set(plain):
+            found[place] = self._difference(z, place, transient, forces)
         return found
+
+    def _difference(
+        self, z: Matrix, place: int, transient: Matrix, forces: Sequence[tuple[Site, Spectrum]]
+    ) -> Spectrum:
+        """Slope along a parameter that moves a dead time, which isn't in the equations."""
+        here = self.response(z, transient, forces)
+        moved = z + _RESPONSE_STEP * np.eye(z.size)[place]
+        there = LinearView(self._at(moved), self.lines, self.measurement.inputs, self.rows, known=self._inputs)
+        ways = [(self.way(there, site), force) for site, force in forces]
+        slope = (there.response(transient, ways) * self.weight - here) / _RESPONSE_STEP
+        return np.asarray(slope, dtype=np.complex128)
+
+    def _at(self, z: Matrix) -> CompiledModel:
+        return self._compile(self.model.with_values(self.tunables.values(z)) if z.size else self.model)
 
 
 def _compiled(model: Model) -> CompiledModel:

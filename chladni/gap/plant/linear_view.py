@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +30,14 @@ class Way:
         ``[output, line]`` what passes at once.
     port
         Index of the port, None for an input's or output's own samples.
+    column
+        Column of u of an input's own samples, None for all else.
     """
 
     states: Spectrum
     outputs: Spectrum
     port: int | None = None
+    column: int | None = None
 
 
 class LinearView:
@@ -67,27 +71,21 @@ class LinearView:
         *,
         known: dict[tuple[float, ...], Spectrum] | None = None,
     ) -> None:
-        self.compiled, self.lines, self._rows = compiled, lines, list(rows)
-        self._hold = hold_of(compiled, lines.sample_rate_hz)
-        step = responses(
-            compiled.a,
-            self._hold.spread(compiled.b),
-            compiled.g,
-            self._hold,
-            step_s=1.0 / lines.sample_rate_hz,
-            kink_at=self._hold.kink_at,
-            fractions=np.array([1.0]),
-        )[0]
+        self.compiled, self.lines, self.rows = compiled, lines, list(rows)
+        self.hold = hold_of(compiled, lines.sample_rate_hz)
         n = len(compiled.states)
-        self._gamma, self._force = step.state[:, n:], step.force
+        step, _ = self._step(np.zeros((n, 0)))
+        self._gamma = step[:, n:]
         # Triangular form once: then each line costs a substitution, defective matrices (a free body) included.
-        self._triangle, self._unitary = schur(step.state[:, :n], output="complex")
-        self._shift = np.exp(
-            -2j * np.pi * lines.frequency_hz * np.asarray(compiled.output_offsets_s)[self._rows][:, None]
+        self._triangle, self._unitary = schur(step[:, :n], output="complex")
+        self._z = lines.z
+        self.shift = np.exp(
+            -2j * np.pi * lines.frequency_hz * np.asarray(compiled.output_offsets_s)[self.rows][:, None]
         )
-        self._kick = lines.z / np.sqrt(lines.samples)
+        self._kick = self._z / np.sqrt(lines.samples)
         self._signals = signals
         self._known: dict[tuple[float, ...], Spectrum] = {} if known is None else known
+        self._forces: dict[int, Matrix] = {}
 
     def forced(self) -> Spectrum:
         """``[output, segment, line]`` response to the log's inputs, but for the transients of the segments."""
@@ -104,98 +102,137 @@ class LinearView:
         forces
             Where each acts, and its spectrum ``[segment, line]``.
         """
-        compiled, spectrum = self.compiled, self._inputs()
-        shape = (len(self.lines.starts), self.lines.index.size)
-        drive = _along(self._gamma, spectrum).reshape(-1, *shape)
-        outputs = _along(self._hold.spread(compiled.d[self._rows]), spectrum[: self._hold.columns]).reshape(
-            -1, *shape
-        )
-        if transient is not None:
-            drive = drive + transient[:, :, None] * self._kick
+        spectrum = self.inputs()
+        through = self.hold.spread(self.compiled.d[self.rows])
+        outputs = along(through, spectrum[: self.hold.columns])
         for way, force in forces:
-            drive = drive + way.states[:, None] * force
-            outputs = outputs + way.outputs[:, None] * force
-        found = outputs + _along(compiled.c[self._rows], self._solved(drive))
-        return np.asarray(found * self._shift[:, None], dtype=np.complex128)
+            outputs += way.outputs[:, None] * force
+        outputs += np.einsum("nol,nsl->osl", self.printed, self._drive(transient, forces))
+        return np.asarray(outputs * self.shift[:, None], dtype=np.complex128)
+
+    def states(self, transient: Matrix | None, forces: Sequence[tuple[Way, Spectrum]]) -> Spectrum:
+        """``[state, segment, line]`` under the same as `response`."""
+        return self._solved(self._drive(transient, forces))
 
     def transients(self) -> Spectrum:
         """``[state, output, line]``: what one of each state more at the start (or less at the end) prints."""
-        n = len(self._triangle)
-        found = np.empty((n, len(self._rows), self.lines.index.size), dtype=np.complex128)
-        for place in range(n):
-            drive = np.zeros((n, self.lines.index.size), dtype=np.complex128)
-            drive[place] = self._kick
-            found[place] = self.compiled.c[self._rows] @ self._solved(drive) * self._shift
-        return found
+        return np.asarray(self.printed * (self._kick * self.shift), dtype=np.complex128)
 
     def way_of_port(self, port: int) -> Way:
         """Way of a force at a port that runs along straight lines between samples."""
-        drive = self._force[0][:, port, None] + (self.lines.z - 1.0) * self._force[1][:, port, None]
-        through = np.broadcast_to(self.compiled.h[self._rows, port][:, None], (len(self._rows), drive.shape[1]))
-        return Way(states=drive, outputs=np.asarray(through, dtype=np.complex128), port=port)
+        start, rise = self.force(port)
+        drive = start[:, None] + (self._z - 1.0) * rise[:, None]
+        return Way(states=drive, outputs=self._constant(self.compiled.h[self.rows, port]), port=port)
 
     def way_of_input(self, name: str) -> Way:
         """Way of a change of an input, straight between samples."""
         column = self.compiled.column_of(name)
-        inner = int(np.flatnonzero(self._hold.source == column)[0])
-        straight = self._hold.columns + int(np.flatnonzero(self._hold.straight == inner)[0])
-        drive = self._gamma[:, inner, None] + (self.lines.z - 1.0) * self._gamma[:, straight, None]
-        through = np.broadcast_to(self.compiled.d[self._rows, column][:, None], (len(self._rows), drive.shape[1]))
-        return Way(states=drive, outputs=np.asarray(through, dtype=np.complex128))
+        inner, straight = self.places(column)
+        drive = self._gamma[:, inner, None] + (self._z - 1.0) * self._gamma[:, straight, None]
+        return Way(states=drive, outputs=self._constant(self.compiled.d[self.rows, column]), column=column)
 
     def way_of_output(self, place: int) -> Way:
         """Way of an error of the sensor in row `place` of the outputs that are wanted."""
         count = self.lines.index.size
-        through = np.zeros((len(self._rows), count), dtype=np.complex128)
+        through = np.zeros((len(self.rows), count), dtype=np.complex128)
         # An error of what is recorded comes behind a clock that is late.
-        through[place] = 1.0 / self._shift[place]
+        through[place] = 1.0 / self.shift[place]
         return Way(states=np.zeros((len(self._triangle), count), dtype=np.complex128), outputs=through)
 
     def pattern(self, way: Way) -> Spectrum:
         """``[output, line]`` that a force of one prints."""
-        found = self.compiled.c[self._rows] @ self._solved(way.states) + way.outputs
-        return np.asarray(found * self._shift, dtype=np.complex128)
+        found = np.einsum("nol,nl->ol", self.printed, way.states) + way.outputs
+        return np.asarray(found * self.shift, dtype=np.complex128)
 
     def motion(
         self, port: int, transient: Matrix | None, forces: Sequence[tuple[Way, Spectrum]]
     ) -> tuple[Spectrum, Spectrum]:
         """Displacement and velocity ``[segment, line]`` at a port, under the same as `response`."""
-        compiled, spectrum = self.compiled, self._inputs()
-        shape = (len(self.lines.starts), self.lines.index.size)
-        drive = _along(self._gamma, spectrum).reshape(-1, *shape)
+        compiled, spectrum = self.compiled, self.inputs()
         state = np.stack([compiled.displacement_state[port], compiled.velocity_state[port]])
-        column = self._hold.spread(np.stack([compiled.displacement_column[port], compiled.velocity_column[port]]))
+        column = self.hold.spread(np.stack([compiled.displacement_column[port], compiled.velocity_column[port]]))
         through = np.stack([compiled.displacement_port[port], compiled.velocity_port[port]])
-        found = _along(column, spectrum[: self._hold.columns]).reshape(-1, *shape)
-        if transient is not None:
-            drive = drive + transient[:, :, None] * self._kick
+        found = along(column, spectrum[: self.hold.columns])
         for way, force in forces:
-            drive = drive + way.states[:, None] * force
             if way.port is not None:
                 found = found + through[:, way.port][:, None, None] * force
-        found = found + _along(state, self._solved(drive))
+        found = found + along(state, self.states(transient, forces))
         return found[0], found[1]
 
-    def _inputs(self) -> Spectrum:
+    def inputs(self) -> Spectrum:
         """``[internal column, segment, line]`` of the rows that drive each step."""
         key = self.compiled.input_delays_s
         if key not in self._known:
-            rows = input_rows(self.compiled, self._hold, self._signals, self.lines.sample_rate_hz, 1)
+            rows = input_rows(self.compiled, self.hold, self._signals, self.lines.sample_rate_hz, 1)
             self._known[key] = self.lines.spectrum(np.ascontiguousarray(rows[:-1].T))
         return self._known[key]
 
+    def force(self, port: int) -> Matrix:
+        """``[start or rise, state]``: what a force at a port does to the states within a step."""
+        # Asked for port by port: few are ever looked at, and each makes the exponential larger.
+        if port not in self._forces:
+            self._forces[port] = self._step(self.compiled.g[:, [port]])[1][:2, :, 0]
+        return self._forces[port]
+
+    def places(self, column: int) -> tuple[int, int]:
+        """Places of a column of u and of its rise in the rows that drive each step."""
+        inner = int(np.flatnonzero(self.hold.source == column)[0])
+        return inner, self.hold.columns + int(np.flatnonzero(self.hold.straight == inner)[0])
+
+    @cached_property
+    def printed(self) -> Spectrum:
+        """``[state, output, line]``: ``C (z I - Phi)^-1``, what a kick of each state prints, by substitution."""
+        upper, outputs = self._triangle, len(self.rows)
+        wanted = self.compiled.c[self.rows] @ self._unitary
+        shape = (len(upper), outputs, self._z.size)
+        found = np.empty(shape, dtype=np.complex128)
+        for place in range(len(upper)):
+            ahead = along(upper[None, :place, place], found[:place])[0]
+            found[place] = (wanted[:, place, None] + ahead) / (self._z - upper[place, place])
+        return along(self._unitary.conj(), found)
+
+    def _step(self, g: Matrix) -> tuple[Matrix, Matrix]:
+        """One step of the states, and of what ports do to them."""
+        found = responses(
+            self.compiled.a,
+            self.hold.spread(self.compiled.b),
+            g,
+            self.hold,
+            step_s=1.0 / self.lines.sample_rate_hz,
+            kink_at=self.hold.kink_at,
+            fractions=np.ones(1),
+        )[0]
+        return found.state, found.force
+
+    def _drive(self, transient: Matrix | None, forces: Sequence[tuple[Way, Spectrum]]) -> Spectrum:
+        """``[state, segment, line]`` of all that drives the states."""
+        drive = along(self._gamma, self.inputs())
+        if transient is not None:
+            drive += transient[:, :, None] * self._kick
+        for way, force in forces:
+            drive += way.states[:, None] * force
+        return drive
+
+    def _constant(self, through: Matrix) -> Spectrum:
+        return np.asarray(np.repeat(through[:, None], self._z.size, axis=1), dtype=np.complex128)
+
     def _solved(self, drive: Spectrum) -> Spectrum:
         """``(z I - Phi)^-1 drive`` for ``[state, ..., line]``, by substitution in the triangular form."""
-        z, upper = self.lines.z, self._triangle
-        wanted = _along(self._unitary.conj().T, drive)
+        upper = self._triangle
+        wanted = along(self._unitary.conj().T, drive)
         found = np.empty_like(wanted)
         for row in range(len(upper) - 1, -1, -1):
-            behind = _along(upper[row : row + 1, row + 1 :], found[row + 1 :])[0]
-            found[row] = (wanted[row] + behind) / (z - upper[row, row])
-        return _along(self._unitary, found)
+            behind = along(upper[row : row + 1, row + 1 :], found[row + 1 :])[0]
+            found[row] = (wanted[row] + behind) / (self._z - upper[row, row])
+        return along(self._unitary, found)
 
 
-def _along(matrix: Matrix | Spectrum, spectra: Spectrum) -> Spectrum:
+def along(matrix: Matrix | Spectrum, spectra: Spectrum) -> Spectrum:
     """``matrix @ spectra`` over the first axis of ``[row, ...]``; much faster on a flat array."""
-    flat = matrix @ spectra.reshape(len(spectra), int(np.prod(spectra.shape[1:])))
+    rows = np.ascontiguousarray(spectra).reshape(len(spectra), int(np.prod(spectra.shape[1:])))
+    if np.isrealobj(matrix):
+        # Half the work: real and imaginary parts are columns of their own.
+        flat = (matrix @ rows.view(np.float64)).view(np.complex128)
+    else:
+        flat = matrix @ rows
     return np.asarray(flat.reshape(len(matrix), *spectra.shape[1:]), dtype=np.complex128)

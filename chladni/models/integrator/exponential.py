@@ -1,6 +1,8 @@
 """Exact response of the linear part inside a step: matrix exponentials of the equations with their inputs."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil, log2
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,8 @@ from chladni.models.integrator.hold import Hold
 Matrix = NDArray[np.float64]
 #: Port forces run inside a step as polynomials of degree 2.
 POWERS = 3
+#: Terms of the exponential's series where the matrix has a norm of at most 1/2: the last one is below 1e-17.
+_TERMS = 14
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +61,64 @@ def responses(
     # Before its kink a delayed input has none.
     found[1:][since[1:] < 0] = 0.0
     return [_response(found[:, place], a.shape[0], g.shape[1], hold) for place in range(fractions.size)]
+
+
+def response_slopes(
+    a: Matrix,
+    b: Matrix,
+    g: Matrix,
+    hold: Hold,
+    changes: Sequence[tuple[Matrix, Matrix, Matrix]],
+    *,
+    step_s: float,
+    kink_at: Matrix,
+) -> list[Response]:
+    """Derivatives of the response at the end of a step, while a, b and g move along some directions.
+
+    Parameters
+    ----------
+    a, b, g, kink_at
+        As in `responses`.
+    changes
+        Directions: what becomes of a, b and g with each unit of a parameter.
+    """
+    n, m = a.shape[0], hold.columns
+    matrix = _augmented(a, b, g, hold, step_s)
+    first = n + m + hold.straight.size
+    ways = np.zeros((n, len(changes), matrix.shape[0]))
+    for place, (by_a, by_b, by_g) in enumerate(changes):
+        ways[:, place, :n], ways[:, place, n : n + m] = by_a, by_b
+        ways[:, place, first : first + g.shape[1]] = by_g
+    since = np.concatenate([[1.0], 1.0 - kink_at]) * step_s
+    found = np.zeros((since.size, len(changes), *matrix.shape))
+    for place, time_s in enumerate(since):
+        found[place, :, :n] = _exponential_slopes(matrix * time_s, ways * time_s)
+    return [_response(found[:, place], n, g.shape[1], hold) for place in range(len(changes))]
+
+
+def _exponential_slopes(matrix: Matrix, ways: Matrix) -> Matrix:
+    """``[way, row, column]``: derivatives of the exponential along ``ways [row, way, column]``.
+
+    The series of the exponential and its derivative, scaled and squared (Al-Mohy and Higham 2009, section 4). Only
+    the first rows may change: with the equations of the inputs below them held, so does the exponential.
+    """
+    rows, count, size = ways.shape
+    balanced, scale = balance(matrix)
+    squarings = max(0, ceil(log2(float(np.linalg.norm(balanced, 1)) + 1e-300)) + 1)
+    matrix = balanced / 2.0**squarings
+    ways = ways * (scale / scale[:rows, None, None]) / 2.0**squarings
+    term, slope = np.eye(size), np.zeros((rows, count * size))
+    total, found = term, slope
+    for power in range(1, _TERMS + 1):
+        slope = ((ways.reshape(-1, size) @ term).reshape(rows, -1) + matrix[:rows, :rows] @ slope) / power
+        term = matrix @ term / power
+        total, found = total + term, found + slope
+    for _ in range(squarings):
+        # E E, of which each factor moves.
+        found = (found.reshape(-1, size) @ total).reshape(rows, -1) + total[:rows, :rows] @ found
+        total = total @ total
+    slopes = found.reshape(ways.shape) * (scale[:rows, None, None] / scale)
+    return np.asarray(slopes.transpose(1, 0, 2), dtype=np.float64)
 
 
 def _augmented(a: Matrix, b: Matrix, g: Matrix, hold: Hold, step_s: float) -> Matrix:
