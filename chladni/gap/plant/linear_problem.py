@@ -108,7 +108,10 @@ class LinearProblem:
         if not z.size:
             return np.zeros((0, *self.measured.shape), dtype=np.complex128)
         view = self.view(z)
-        changed = [self._at(moved) for moved in z + _STEP * np.eye(z.size)]
+        # From the model at z each takes one new number.
+        base = self.model.with_values(self.tunables.values(z))
+        steps = z + _STEP * np.eye(z.size)
+        changed = [self._compile(base.with_values(self.tunables.values(moved))) for moved in steps]
         ways = [(self.way(view, site), force) for site, force in forces]
         plain = [place for place, one in enumerate(changed) if same_frame(view.compiled, one)]
         found = np.empty((z.size, *self.measured.shape), dtype=np.complex128)

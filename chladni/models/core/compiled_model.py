@@ -238,7 +238,7 @@ class CompiledModel(Value):
             matrix = getattr(self, name)
             if matrix.shape != shape:
                 raise ModelError(f"compiled model: {name} has shape {matrix.shape}, {shape} was expected")
-            if not np.all(np.isfinite(matrix)):
+            if not np.isfinite(matrix).all():
                 raise ModelError(f"compiled model: {name} holds a number that is not finite")
         for name, values, count in (
             ("input_delays_s", self.input_delays_s, len(self.inputs)),

@@ -71,6 +71,8 @@ class Parameter:
 
     def with_value(self, value: float) -> Self:
         """Give the same parameter with another value."""
+        if value == self.value:
+            return self
         return replace(self, value=float(value))
 
     @property
@@ -124,7 +126,7 @@ class Parameters(Mapping[str, Parameter]):
         ModelError
             When a name is unknown (the nearest one is named) or a value is not possible.
         """
-        for name in values:
+        for name in values.keys() - set(self):
             self.require(name)
         return type(self)(
             tuple(

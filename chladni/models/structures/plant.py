@@ -9,6 +9,7 @@ prescribed has no state either: its displacement, velocity and acceleration are 
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Port, PortKind, Terminal
-from chladni.models.structures.structure import GROUND, Motion, Structure
+from chladni.models.structures.structure import GROUND, Body, Joint, Motion, Structure
 from chladni.models.structures.structure_input import StructureInput
 from chladni.models.structures.structure_output import StructureOutput, measure_unit
 
@@ -46,7 +47,9 @@ def compile_plant(
     States are displacement and velocity of each body that is free to move; ports are of kind ``joint``, ``body``,
     ``ground``, ``actuation`` for each force, and ``output`` for each of `fed_back`.
     """
-    return _Plant(structure, inputs, outputs, fed_back).compiled()
+    bodies = tuple((body.name, body.motion) for body in structure.bodies)
+    joints = tuple((joint.name, joint.between) for joint in structure.joints)
+    return _plant(bodies, joints, inputs, outputs, fed_back).compiled(structure)
 
 
 def force_pattern(structure: Structure, at: str) -> Matrix:
@@ -84,8 +87,32 @@ def output_terminal(structure: Structure, one: StructureOutput) -> Terminal:
     return Terminal(name=one.name, unit=unit, channel=one.channel)
 
 
+# Fits and charts ask for one plant with thousands of numbers.
+@lru_cache(maxsize=8)
+def _plant(
+    bodies: tuple[tuple[str, Motion], ...],
+    joints: tuple[tuple[str, tuple[str, str]], ...],
+    inputs: tuple[StructureInput, ...],
+    outputs: tuple[StructureOutput, ...],
+    fed_back: tuple[str, ...],
+) -> "_Plant":
+    structure = Structure(
+        bodies=tuple(Body(name=name, motion=motion, mass=1.0) for name, motion in bodies),
+        joints=tuple(Joint(name=name, between=between, stiffness=0.0, damping=0.0) for name, between in joints),
+    )
+    return _Plant(structure, inputs, outputs, fed_back)
+
+
 class _Plant:
-    """Writes every signal as a row over (states, columns of u, what laws add at ports)."""
+    """Writes every signal as a row over (states, columns of u, what laws add at ports).
+
+    All that holds for any masses, stiffnesses and dampings is laid out once.
+
+    Parameters
+    ----------
+    structure
+        Of any numbers.
+    """
 
     def __init__(
         self,
@@ -105,18 +132,31 @@ class _Plant:
         self._n = 2 * len(self._free)
         self._m = sum(1 + terminal.derivatives for terminal in self._terminals)
         self._size = self._n + self._m + len(self._ports)
+        self._prescribed = [
+            (structure.body_index(one.at), self._column(one.name)) for one in inputs if one.kind == "displacement"
+        ]
         self._ground = self._ground_row()
-        self._displacement, self._velocity, self._acceleration = self._motion()
+        self._shaken = self._shaken_bodies()
+        self._displacement, self._velocity = self._motion()
+        self._joints = np.array([structure.pattern(joint.between) for joint in structure.joints])
+        self._joints = self._joints.reshape(len(structure.joints), len(structure.bodies))
+        self._applied = self._all_applied()
+        self._port_displacement, self._port_velocity = self._port_rows()
+        self._patterns = [_Pattern(force_pattern(structure, one.at)) for one in outputs]
+        self._names = [structure.bodies[row].name for row in self._free]
 
-    def compiled(self) -> CompiledModel:
-        """Give the model."""
+    def compiled(self, structure: Structure) -> CompiledModel:
+        """Give the model with the numbers of a structure that is wired like this one."""
+        acceleration = self._acceleration(structure)
         # Ports of outputs see what the output is before anything is added to it.
-        outputs = self._stack([self._output_row(one) for one in self._outputs])
-        displacement, velocity = self._port_rows(outputs)
+        rows = [self._output_row(structure, place, acceleration) for place in range(len(self._outputs))]
+        outputs = np.array(rows, dtype=np.float64).reshape(len(rows), self._size)
+        displacement = self._port_displacement.copy()
         for name in self._fed_back:
-            outputs[self._output_place(name), self._port(name, "output")] += 1.0
-        rates = np.vstack([self._velocity[self._free], self._acceleration[self._free]])
-        names = [self._structure.bodies[row].name for row in self._free]
+            row, port = self._output_place(name), self._port_places[name, "output"]
+            displacement[port] = outputs[row]
+            outputs[row, self._port(name, "output")] += 1.0
+        rates = np.vstack([self._velocity[self._free], acceleration[self._free]])
         n, u, f = slice(0, self._n), slice(self._n, self._n + self._m), slice(self._n + self._m, None)
         return CompiledModel(
             a=rates[:, n],
@@ -128,30 +168,32 @@ class _Plant:
             displacement_state=displacement[:, n],
             displacement_column=displacement[:, u],
             displacement_port=displacement[:, f],
-            velocity_state=velocity[:, n],
-            velocity_column=velocity[:, u],
-            velocity_port=velocity[:, f],
+            velocity_state=self._port_velocity[:, n],
+            velocity_column=self._port_velocity[:, u],
+            velocity_port=self._port_velocity[:, f],
             inputs=self._terminals,
             outputs=self._output_terminals,
-            states=(*(f"{name}.displacement" for name in names), *(f"{name}.velocity" for name in names)),
-            ports=self._ports,
+            states=(
+                *(f"{name}.displacement" for name in self._names),
+                *(f"{name}.velocity" for name in self._names),
+            ),
+            ports=self._ports_of(structure),
         )
+
+    def _ports_of(self, structure: Structure) -> tuple[Port, ...]:
+        """Ports with the springs and dampers of a structure; those of joints are in front."""
+        joints = [
+            replace(port, stiffness=joint.stiffness, damping=joint.damping)
+            for port, joint in zip(self._ports, structure.joints, strict=False)
+        ]
+        return (*joints, *self._ports[len(joints) :])
 
     def _all_ports(self) -> tuple[Port, ...]:
         structure = self._structure
         ports = []
         for joint in structure.joints:
             force, motion = _units(structure.motion_of(joint))
-            ports.append(
-                Port(
-                    name=joint.name,
-                    kind="joint",
-                    unit=force,
-                    displacement_unit=motion,
-                    stiffness=joint.stiffness,
-                    damping=joint.damping,
-                )
-            )
+            ports.append(Port(name=joint.name, kind="joint", unit=force, displacement_unit=motion))
         for body in structure.bodies:
             force, motion = _units(body.motion)
             ports.append(Port(name=body.name, kind="body", unit=force, displacement_unit=motion))
@@ -166,25 +208,33 @@ class _Plant:
             ports.append(Port(name=name, kind="output", unit=unit, displacement_unit=unit))
         return tuple(ports)
 
-    def _motion(self) -> tuple[Matrix, Matrix, Matrix]:
-        """Displacement, velocity and acceleration of each body, relative to the ground, ``[body, signal]``."""
-        structure, count = self._structure, len(self._structure.bodies)
-        displacement, velocity = np.zeros((2, count, self._size))
+    def _motion(self) -> tuple[Matrix, Matrix]:
+        """Displacement and velocity of each body, relative to the ground, ``[body, signal]``."""
+        displacement, velocity = np.zeros((2, len(self._structure.bodies), self._size))
         for place, row in enumerate(self._free):
             displacement[row, place] = velocity[row, len(self._free) + place] = 1.0
-        prescribed = [(one, self._column(one.name)) for one in self._inputs if one.kind == "displacement"]
-        for one, column in prescribed:
-            row = structure.body_index(one.at)
+        for row, column in self._prescribed:
             displacement[row, column] = velocity[row, column + 1] = 1.0
-        force = self._applied() - structure.stiffness_matrix() @ displacement - structure.damping_matrix() @ velocity
-        # Relative to a ground that accelerates, every body is pulled back by its inertia.
-        acceleration = force / np.diag(structure.mass_matrix())[:, None] - np.outer(self._shaken(), self._ground)
-        # Whatever acts on a prescribed body is borne by what prescribes its motion.
-        for one, column in prescribed:
-            acceleration[structure.body_index(one.at)] = self._unit(column + 2)
-        return displacement, velocity, acceleration
+        return displacement, velocity
 
-    def _applied(self) -> Matrix:
+    def _acceleration(self, structure: Structure) -> Matrix:
+        """Acceleration of each body, relative to the ground, ``[body, signal]``."""
+        stiffness = self._assembled([joint.stiffness for joint in structure.joints])
+        damping = self._assembled([joint.damping for joint in structure.joints])
+        force = self._applied - stiffness @ self._displacement - damping @ self._velocity
+        # Relative to a ground that accelerates, every body is pulled back by its inertia.
+        mass = np.array([body.mass for body in structure.bodies])
+        acceleration = force / mass[:, None] - np.outer(self._shaken, self._ground)
+        # Whatever acts on a prescribed body is borne by what prescribes its motion.
+        for row, column in self._prescribed:
+            acceleration[row] = self._unit(column + 2)
+        return np.asarray(acceleration, dtype=np.float64)
+
+    def _assembled(self, coefficients: Sequence[float]) -> Matrix:
+        """``[body, body]`` as `Structure.stiffness_matrix`, from patterns that are kept."""
+        return np.asarray(self._joints.T @ (np.array(coefficients)[:, None] * self._joints))
+
+    def _all_applied(self) -> Matrix:
         """Force on each body from inputs and laws, ``[body, signal]``."""
         structure = self._structure
         applied = np.zeros((len(structure.bodies), self._size))
@@ -207,39 +257,36 @@ class _Plant:
                 row[self._column(one.name)] = 1.0
         return row
 
-    def _shaken(self) -> Matrix:
+    def _shaken_bodies(self) -> Matrix:
         """``[body]``: 1 for a body that feels the ground's acceleration."""
         motion = shaken_motion(self._structure)
         return np.array([float(body.motion == motion) for body in self._structure.bodies])
 
-    def _output_row(self, one: StructureOutput) -> Matrix:
-        pattern = force_pattern(self._structure, one.at)
+    def _output_row(self, structure: Structure, place: int, acceleration: Matrix) -> Matrix:
+        one, pattern = self._outputs[place], self._patterns[place]
         if one.measures == "force":
-            joint = self._structure.joint_named(one.at)
+            joint = structure.joint_named(one.at)
             linear = joint.stiffness * self._displacement + joint.damping * self._velocity
-            return np.asarray(_summed(pattern, linear) + self._unit(self._port(joint.name, "joint")))
-        of_bodies = {
-            "displacement": self._displacement,
-            "velocity": self._velocity,
-            # An accelerometer feels the ground's acceleration too; between the ends of a joint it cancels.
-            "acceleration": self._acceleration + np.outer(self._shaken(), self._ground),
-        }[one.measures]
-        if one.measures == "acceleration" and one.at in [joint.name for joint in self._structure.joints]:
-            of_bodies = self._acceleration
-        return _summed(pattern, of_bodies)
+            return np.asarray(pattern.of(linear) + self._unit(self._port(joint.name, "joint")))
+        if one.measures == "displacement":
+            return pattern.of(self._displacement)
+        if one.measures == "velocity":
+            return pattern.of(self._velocity)
+        # An accelerometer feels the ground's acceleration too; between the ends of a joint it cancels.
+        if any(joint.name == one.at for joint in structure.joints):
+            return pattern.of(acceleration)
+        return pattern.of(acceleration + np.outer(self._shaken, self._ground))
 
-    def _port_rows(self, outputs: Matrix) -> tuple[Matrix, Matrix]:
-        """Displacement and velocity at each port, ``[port, signal]``."""
+    def _port_rows(self) -> tuple[Matrix, Matrix]:
+        """Displacement and velocity at each port but those of outputs, ``[port, signal]``."""
         structure = self._structure
         displacement, velocity = np.zeros((2, len(self._ports), self._size))
         at = {one.name: one.at for one in self._inputs}
         for place, port in enumerate(self._ports):
-            if port.kind == "output":
-                displacement[place] = outputs[self._output_place(port.name)]
-            elif port.kind != "ground":
-                pattern = force_pattern(structure, at[port.name] if port.kind == "actuation" else port.name)
-                displacement[place] = _summed(pattern, self._displacement)
-                velocity[place] = _summed(pattern, self._velocity)
+            if port.kind not in ("output", "ground"):
+                pattern = _Pattern(force_pattern(structure, at[port.name] if port.kind == "actuation" else port.name))
+                displacement[place] = pattern.of(self._displacement)
+                velocity[place] = pattern.of(self._velocity)
         return displacement, velocity
 
     def _column(self, name: str) -> int:
@@ -263,14 +310,16 @@ class _Plant:
         row[place] = 1.0
         return row
 
-    def _stack(self, rows: Sequence[Matrix]) -> Matrix:
-        return np.array(rows, dtype=np.float64).reshape(len(rows), self._size)
 
+class _Pattern:
+    """Product with a pattern that is mostly zero: one or two bodies of a thousand."""
 
-def _summed(pattern: Matrix, rows: Matrix) -> Matrix:
-    """``pattern @ rows`` where most of the pattern is zero: one or two bodies of a thousand."""
-    places = np.flatnonzero(pattern)
-    return np.asarray(pattern[places] @ rows[places])
+    def __init__(self, pattern: Matrix) -> None:
+        self._places = np.flatnonzero(pattern)
+        self._signs = pattern[self._places]
+
+    def of(self, rows: Matrix) -> Matrix:
+        return np.asarray(self._signs @ rows[self._places])
 
 
 def _units(motion: Motion) -> tuple[str, str]:

@@ -1,8 +1,9 @@
 """Lumped structures: bodies that move along one axis, joined by springs and dampers."""
 
+from copy import copy
 from dataclasses import dataclass
 from math import pi
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,6 +120,14 @@ class Structure:
             taken.add(name)
         for joint in self.joints:
             self._require_ends(joint)
+
+    def with_parts(self, bodies: tuple[Body, ...], joints: tuple[Joint, ...]) -> Self:
+        """Give the structure with other numbers: parts of the same names, ends and motions, in the same order."""
+        # What was checked when it was wired holds for any numbers.
+        other = copy(self)
+        object.__setattr__(other, "bodies", bodies)
+        object.__setattr__(other, "joints", joints)
+        return other
 
     def mass_matrix(self) -> NDArray[np.float64]:
         """``[body, body]`` in kg."""

@@ -1,6 +1,7 @@
 """A structure with what drives it, what is measured on it and what controls it: a `Model`."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Literal, Self
 
@@ -124,13 +125,16 @@ class StructureModel:
             When a name is unknown or a value not possible.
         """
         # Ranges stay those of the nominal values: a knob that is turned must not move its own ends.
-        declared = self.parameters.with_values(values)
-        return replace(
-            self,
-            structure=with_numbers(self.structure, values),
-            controllers=tuple(controller_with_numbers(controller, values) for controller in self.controllers),
-            declared=declared,
-        )
+        changes: dict[str, object] = {
+            "declared": self.parameters.with_values(values),
+            "structure": with_numbers(self.structure, values),
+            "controllers": tuple(controller_with_numbers(controller, values) for controller in self.controllers),
+        }
+        # Other numbers are wired as these are, which was checked: fits ask for thousands of settings.
+        other = copy(self)
+        for name, content in changes.items():
+            object.__setattr__(other, name, content)
+        return other
 
     def with_effects(self, effects: Sequence[Effect]) -> Self:
         """Give the model with these effects in place of those it has."""

@@ -6,7 +6,7 @@ from math import inf
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.structures.controller import FILTER, Controller
-from chladni.models.structures.structure import Body, Structure
+from chladni.models.structures.structure import Body, Joint, Structure
 
 #: A knob goes from the value divided by this to the value times this.
 SPAN = 4.0
@@ -44,18 +44,9 @@ def structure_parameters(
 
 def with_numbers(structure: Structure, values: Mapping[str, float]) -> Structure:
     """Give the structure with the numbers of `values`, by the name of the parameter."""
-    bodies = tuple(
-        replace(body, mass=values.get(f"{body.name}.{inertia_key(body)}", body.mass)) for body in structure.bodies
-    )
-    joints = tuple(
-        replace(
-            joint,
-            stiffness=values.get(f"{joint.name}.stiffness", joint.stiffness),
-            damping=values.get(f"{joint.name}.damping", joint.damping),
-        )
-        for joint in structure.joints
-    )
-    return Structure(bodies=bodies, joints=joints)
+    bodies = tuple(_body_with(body, values) for body in structure.bodies)
+    joints = tuple(_joint_with(joint, values) for joint in structure.joints)
+    return structure.with_parts(bodies, joints)
 
 
 def controller_with_numbers(controller: Controller, values: Mapping[str, float]) -> Controller:
@@ -69,6 +60,20 @@ def controller_with_numbers(controller: Controller, values: Mapping[str, float])
         gain=values.get(f"{name}.gain", controller.gain),
         limit=None if controller.limit is None else values.get(f"{name}.limit", controller.limit),
     )
+
+
+def _body_with(body: Body, values: Mapping[str, float]) -> Body:
+    mass = values.get(f"{body.name}.{inertia_key(body)}", body.mass)
+    return body if mass == body.mass else replace(body, mass=mass)
+
+
+def _joint_with(joint: Joint, values: Mapping[str, float]) -> Joint:
+    stiffness = values.get(f"{joint.name}.stiffness", joint.stiffness)
+    damping = values.get(f"{joint.name}.damping", joint.damping)
+    # A fit changes one number at a time: the rest stays as it is.
+    if (stiffness, damping) == (joint.stiffness, joint.damping):
+        return joint
+    return replace(joint, stiffness=stiffness, damping=damping)
 
 
 def usual_range(value: float, others: Iterable[float] = ()) -> tuple[float, float]:

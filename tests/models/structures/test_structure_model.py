@@ -1,6 +1,7 @@
 """Structures with inputs and outputs against closed forms, and what a model tells about itself."""
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import fields, replace
 from math import pi, sqrt
 
 import numpy as np
@@ -250,3 +251,37 @@ def test_a_tolerance_of_nothing_is_refused() -> None:
 def test_declared_parameters_must_be_those_of_the_parts() -> None:
     with pytest.raises(ModelError, match="other values than its parts"):
         replace(tree(), declared=tree().parameters.with_values({"base.mass": 1.0}))
+
+
+@pytest.mark.parametrize("make", [tree, lambda: axis(limit=10.0)])
+def test_other_numbers_give_the_equations_of_a_model_made_with_them(make: Callable[[], StructureModel]) -> None:
+    """A changed model skips the checks of its wiring and takes what is laid out for it: nothing else may differ."""
+    model = make()
+    model.compile()
+    rng = np.random.default_rng(0)
+    values = {name: number * rng.uniform(0.5, 2.0) for name, number in model.parameters.numbers().items()}
+    changed = model.with_values(values)
+    anew = StructureModel(
+        name=model.name,
+        structure=Structure(
+            bodies=tuple(replace(body) for body in changed.structure.bodies),
+            joints=tuple(replace(joint) for joint in changed.structure.joints),
+        ),
+        inputs=model.inputs,
+        outputs=model.outputs,
+        controllers=changed.controllers,
+    )
+    assert anew.parameters.numbers() == pytest.approx(values)
+    assert changed.parameters.numbers() == values
+    found, wanted = changed.compile(), anew.compile()
+    for field in fields(found):
+        np.testing.assert_equal(getattr(found, field.name), getattr(wanted, field.name))
+    # And the equations are those of the matrices, with new numbers in them.
+    count = len(changed.structure.bodies)
+    if not changed.controllers:
+        force = np.diag([body.mass for body in changed.structure.bodies]) @ found.a[count:]
+        matrices = [-changed.structure.stiffness_matrix(), -changed.structure.damping_matrix()]
+        np.testing.assert_allclose(force, np.hstack(matrices), rtol=1e-12, atol=1e-6)
+    assert [port.stiffness for port in found.ports if port.kind == "joint"] == [
+        joint.stiffness for joint in changed.structure.joints
+    ]
