@@ -1,0 +1,99 @@
+"""One experiment in simulation: what every candidate predicts, and how far apart they are."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.design.experiment import Experiment
+from chladni.gap.design.imitation import Part, sums_of
+from chladni.gap.design.rival import Rival
+from chladni.gap.explanation.contest import SLACK
+from chladni.gap.plant.free_run import FreeRun, Windows
+from chladni.gap.records.measurement import Measurement
+from chladni.gap.records.noise_floor import NoiseFloor
+
+Matrix = NDArray[np.float64]
+
+
+class Course:
+    """Candidates in one experiment.
+
+    Parameters
+    ----------
+    experiment
+        What is done; its model has all sensors that may be used.
+    rivals
+        The candidates.
+    measurement
+        What the experiment's record would be like: names, rate, length.
+    windows
+        None in free run.
+
+    Raises
+    ------
+    ModelError
+        When a candidate diverges in this experiment: then nobody should try it.
+    """
+
+    def __init__(
+        self, experiment: Experiment, rivals: Sequence[Rival], measurement: Measurement, windows: Windows | None
+    ) -> None:
+        self.experiment, self._rivals = experiment, rivals
+        self._run = FreeRun(experiment.model, replace(measurement, inputs=experiment.inputs), windows=windows)
+        self._predictions = [rival.predicted(self._run, self._initial(rival)) for rival in rivals]
+        self._kept: dict[tuple[int, int], Matrix] = {}
+
+    @property
+    def outputs(self) -> Matrix:
+        """``[output, sample]`` as the first candidate predicts them."""
+        return self._predictions[0].outputs
+
+    def part(
+        self,
+        noise: NoiseFloor,
+        detail: Matrix,
+        chosen: Sequence[int],
+        pair: tuple[int, int],
+        at: Matrix | None = None,
+    ) -> Part:
+        """Give the record of this experiment that one candidate makes and the other imitates.
+
+        Parameters
+        ----------
+        noise
+            Of all outputs.
+        detail
+            ``[output]`` share of an output's power that even the right law would leave.
+        chosen
+            Rows of the outputs that are measured.
+        pair
+            Places of the candidate that is true and of the one that imitates it.
+        at
+            ``[unknown]`` of the one that imitates; as fitted by default.
+
+        Raises
+        ------
+        ModelError
+            When it diverges there.
+        """
+        rows, gain = list(chosen), float(self.experiment.repeats)
+        wanted = self._predictions[pair[0]].outputs
+        power = np.mean(noise.whitened(wanted)[rows] ** 2, axis=-1)
+        sums = self._sums(noise, pair) if at is None else self._sums_at(noise, pair, at)
+        return Part(gain * sums[:, rows], 1.0 + SLACK + gain * detail[rows] * power, wanted.shape[-1])
+
+    def _sums(self, noise: NoiseFloor, pair: tuple[int, int]) -> Matrix:
+        if pair not in self._kept:
+            wanted, prediction = (self._predictions[one] for one in pair)
+            self._kept[pair] = sums_of(wanted.outputs, prediction, noise, self._run.windows)
+        return self._kept[pair]
+
+    def _sums_at(self, noise: NoiseFloor, pair: tuple[int, int], at: Matrix) -> Matrix:
+        rival = self._rivals[pair[1]]
+        prediction = rival.predicted(self._run, self._initial(rival), at)
+        return sums_of(self._predictions[pair[0]].outputs, prediction, noise, self._run.windows)
+
+    def _initial(self, rival: Rival) -> Matrix:
+        return np.asarray(self.experiment.start * rival.contestant.fit.initial, dtype=np.float64)

@@ -1,0 +1,63 @@
+"""An experiment that could be done next: what it changes, and what drives the machine in it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.core.model import Model
+from chladni.signals.value import Value
+
+Matrix = NDArray[np.float64]
+Change = Literal["nothing", "level", "repeats", "band", "sweep", "slow", "sensor", "position"]
+#: What changes ask of people, from a knob that is turned to a machine that is rebuilt.
+EFFORT: dict[Change, float] = {
+    "nothing": 0.0,
+    "level": 1.0,
+    "repeats": 1.2,
+    "band": 2.0,
+    "sweep": 2.0,
+    "slow": 2.0,
+    "sensor": 3.0,
+    "position": 4.0,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Experiment(Value):
+    """One way to measure again.
+
+    Attributes
+    ----------
+    change
+        What kind of change it is.
+    words
+        What to do, as the beginning of a sentence.
+    model
+        With the inputs where they act in this experiment.
+    inputs
+        ``[input, sample]``, SI.
+    start
+        Times the initial states of the log; 0 from rest.
+    repeats
+        Records of the same input that are averaged.
+    further
+        Added to the effort of its kind: a level that is changed more, more records.
+    """
+
+    change: Change
+    words: str
+    model: Model
+    inputs: Matrix
+    start: float = 0.0
+    repeats: int = 1
+    further: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+    @property
+    def effort(self) -> float:
+        """Rank among changes, the least first."""
+        return EFFORT[self.change] + self.further

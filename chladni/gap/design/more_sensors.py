@@ -1,0 +1,109 @@
+"""Sensors that a structure could have besides those in a log."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.records.measurement import Measurement
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.models.core.model import Model
+from chladni.models.structures.structure_model import StructureModel
+from chladni.models.structures.structure_output import Measure, StructureOutput
+
+Matrix = NDArray[np.float64]
+_WORDS: dict[Measure, str] = {
+    "acceleration": "an accelerometer at",
+    "displacement": "an encoder across",
+    "force": "a force sensor in",
+    "velocity": "a velocity sensor at",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoreSensor:
+    """A sensor that isn't there yet; `words` say which, as in "add an accelerometer at wrist"."""
+
+    output: StructureOutput
+    words: str
+
+
+def more_sensors(model: Model, measurement: Measurement, suspects: Collection[str] = ()) -> tuple[MoreSensor, ...]:
+    """Give accelerometers at bodies without one, encoders and force sensors at suspected joints.
+
+    Parameters
+    ----------
+    measurement
+        Outputs that it doesn't hold are sensors that aren't there.
+    suspects
+        Names of sites. A sensor that is suspected itself doesn't count: a second one beside it may tell.
+    """
+    if not isinstance(model, StructureModel):
+        return ()
+    have = {
+        (one.at, one.measures)
+        for one in model.outputs
+        if one.name in measurement.output_names and one.name not in suspects
+    }
+    joints = [joint.name for joint in model.structure.joints if joint.name in suspects]
+    wanted: list[tuple[str, Measure]] = [(body.name, "acceleration") for body in model.structure.bodies]
+    wanted += [(joint, "displacement") for joint in joints] + [(joint, "force") for joint in joints]
+    taken = _names(model)
+    found = []
+    for at, measures in wanted:
+        if (at, measures) not in have:
+            output = StructureOutput(name=_free(f"{measures}_of_{at}"[:90], taken), measures=measures, at=at)
+            found.append(MoreSensor(output=output, words=f"{_WORDS[measures]} {at}"))
+    return tuple(found)
+
+
+def with_sensors(model: Model, sensors: Sequence[MoreSensor]) -> Model:
+    """Give the model with the sensors behind its own."""
+    if not sensors or not isinstance(model, StructureModel):
+        return model
+    return replace(model, outputs=(*model.outputs, *(one.output for one in sensors)))
+
+
+def with_noise_of(noise: NoiseFloor, units: Sequence[str], more_units: Sequence[str], signals: Matrix) -> NoiseFloor:
+    """Give the noise of the log's outputs and of sensors that would be as good.
+
+    A sensor of a unit that the log holds is as noisy as those in the middle; another one as noisy for its signal.
+
+    Parameters
+    ----------
+    units, more_units
+        Of the log's outputs, and of the new sensors.
+    signals
+        ``[output, sample]`` of all, the new ones last.
+    """
+    size = np.maximum(np.std(signals, axis=1), np.finfo(np.float64).tiny)
+    count = len(units)
+    relative = float(np.median(noise.rms / size[:count]))
+    new = np.empty(len(more_units))
+    for place, unit in enumerate(more_units):
+        same = noise.rms[[one == unit for one in units]]
+        new[place] = np.median(same) if same.size else relative * size[count + place]
+    white = np.zeros((new.size, noise.whitening.shape[1]))
+    white[:, 0] = 1.0
+    return NoiseFloor(
+        rms=np.concatenate([noise.rms, new]),
+        whitening=np.concatenate([noise.whitening, white]),
+        innovation_rms=np.concatenate([noise.innovation_rms, new]),
+        method=(*noise.method, *("as the others",) * new.size),
+        std=np.concatenate([noise.std, np.ones(new.size)]),
+        upper_bound=np.concatenate([noise.upper_bound, np.ones(new.size, dtype=np.bool_)]),
+    )
+
+
+def _names(model: StructureModel) -> set[str]:
+    bodies = {body.name for body in model.structure.bodies} | {joint.name for joint in model.structure.joints}
+    signals = {one.name for one in model.inputs} | {one.name for one in model.outputs}
+    return bodies | signals | {one.name for one in model.controllers}
+
+
+def _free(name: str, taken: set[str]) -> str:
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name

@@ -1,0 +1,106 @@
+"""The next measurement, as a sentence."""
+
+from collections.abc import Sequence
+
+from chladni.gap.design.design import Design
+from chladni.gap.design.search import Search
+from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.plant.tunable import Tunables
+from chladni.gap.records.diagnosis import Candidate
+from chladni.gap.records.measurement import Measurement
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.models.core.model import Model
+from chladni.signals.errors import EstimateError, ModelError
+
+
+def next_measurement(
+    study_model: Model,
+    measurement: Measurement,
+    tunables: Tunables,
+    candidates: Sequence[Contestant],
+    noise: NoiseFloor,
+    *,
+    seed: int,
+) -> str | None:
+    """Say which measurement would tell candidates apart that are still close.
+
+    Every design is simulated with every candidate as fitted; each candidate is refitted to what the other predicts,
+    and what is left is weighed as the contest weighs (after Hunter & Reiner 1965, Box & Hill 1967, Atkinson &
+    Fedorov 1975). The smallest change that tells them apart is named.
+
+    Parameters
+    ----------
+    study_model
+        Nominal model.
+    measurement, noise
+        The log, and the noise of its outputs.
+    tunables
+        Of the model.
+    candidates
+        Two or more, fitted to this log, best first; the first three are compared.
+    seed
+        Of random excitations.
+
+    Returns
+    -------
+    str or None
+        None when there's nothing to tell apart.
+    """
+    if len(candidates) < 2:
+        return None
+    try:
+        search = Search(study_model, measurement, tunables, candidates, noise, seed=seed)
+    except (ModelError, EstimateError):
+        # Candidates that can't be simulated even with the log's own inputs have no next measurement.
+        return None
+    return sentence(search.best(), candidates)
+
+
+def sentence(designs: Sequence[Design], candidates: Sequence[Contestant]) -> str | None:
+    """Write designs, the one to do first in front, as one sentence."""
+    if not designs:
+        return None
+    first, both = designs[0], _apart(candidates)
+    now = f"{first.now_sigmas:.2g}"
+    if not first.tells:
+        return (
+            f"No level up to 4 times, band, place of the input or one more sensor tells {both} apart: the best, "
+            f"'{first.words}', would bring them to {first.sigmas:.2g} sigma (now {now}); take them as one answer."
+        )
+    more = [f"; or {_lowered(one.words)}: {one.sigmas:.2g} sigma" for one in designs[1:]]
+    least = "at least " if len(candidates) > 2 else ""
+    return f"{first.words}: {both} then differ by {least}{first.sigmas:.2g} sigma (now {now}){''.join(more)}."
+
+
+def _apart(candidates: Sequence[Contestant]) -> str:
+    """Names of the candidates that are to be told apart."""
+    named = [_spoken(one) for one in candidates[:3]]
+    sites = {site for _, site in named}
+    if len(sites) == 1 and "" not in sites:
+        return f"{_listed([what for what, _ in named])} at {sites.pop()}"
+    return _listed([f"{what} at {site}" if site else what for what, site in named])
+
+
+def _spoken(candidate: Contestant) -> tuple[str, str]:
+    """What a candidate names, and where, when that is one place."""
+    named = candidate.hypothesis.named
+    if not named:
+        return "the model as it is", ""
+    if len(named) == 1 and named[0].effect != "parameter":
+        return named[0].effect.replace("_", " "), named[0].site
+    words = [_whole(one) for one in named]
+    return " with ".join(words), ""
+
+
+def _whole(one: Candidate) -> str:
+    if one.effect == "parameter":
+        return f"another value of {one.site}"
+    return f"{one.effect.replace('_', ' ')} at {one.site}"
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def _lowered(words: str) -> str:
+    return words[0].lower() + words[1:]

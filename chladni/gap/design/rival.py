@@ -1,0 +1,133 @@
+"""A candidate in an experiment: what it predicts, and how that moves with its parameters."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.law_plant import Setting, fine_run, slopes_of
+from chladni.gap.plant.law_run import can_run
+from chladni.gap.plant.tunable import Tunables
+from chladni.gap.tuning.decay import decay
+from chladni.gap.tuning.effect_scale import EffectNumber, effect_numbers, with_numbers
+
+Matrix = NDArray[np.float64]
+#: Hard bound on parameters that stay within their tolerance, in sigmas.
+_LIMIT = 3.0
+#: How far an effect's parameter may go in one linear step, in factors of e.
+_TRUST = 1.0
+#: Step of differences, in ln(value): large against the errors of a run's steps where there are laws.
+_APART, _APART_WITH_LAWS = 1e-5, 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """What a candidate predicts, and its slopes.
+
+    Attributes
+    ----------
+    outputs
+        ``[output, sample]``.
+    own
+        ``[unknown, output, sample]`` by its parameters and those of its effects.
+    starts
+        ``[state, output, sample]`` by the initial state of each window.
+    at
+        ``[unknown]`` where.
+    """
+
+    outputs: Matrix
+    own: Matrix
+    starts: Matrix
+    at: Matrix
+
+
+class Rival:
+    """One fitted candidate.
+
+    Parameters
+    ----------
+    contestant
+        With its fit.
+    tunables
+        Of the model.
+    """
+
+    def __init__(self, contestant: Contestant, tunables: Tunables) -> None:
+        fit, hypothesis = contestant.fit, contestant.hypothesis
+        self.contestant = contestant
+        self._z, self._tolerance = fit.z, tunables.tolerance
+        self._effects = fit.effects
+        fitted = hypothesis.fitted if len(hypothesis.fitted) == len(fit.effects) else None
+        self._numbers: tuple[EffectNumber, ...] = effect_numbers(fit.effects, fitted)
+        limit = np.array([hypothesis.wide.get(name, _LIMIT) for name in tunables.names])
+        low = [max(one.low, -_TRUST) for one in self._numbers]
+        high = [min(one.high, _TRUST) for one in self._numbers]
+        #: Bounds on the unknowns, which are 0 at the fit.
+        self.low = np.concatenate([np.minimum(-limit - fit.z, 0.0), low])
+        self.high = np.concatenate([np.maximum(limit - fit.z, 0.0), high])
+        #: ``[unknown]`` where the unknowns are believed beforehand, and how much.
+        self.believed = np.concatenate([-fit.z, np.zeros(len(low))])
+        # A parameter that may leave its tolerance pays for its freedom instead of its distance.
+        own = [0.0 if name in hypothesis.wide else 1.0 for name in tunables.names]
+        self.sure = np.concatenate([own, np.zeros(len(low))])
+
+    def paid(self, at: Matrix) -> float:
+        """Nats that the parameters pay to go from the fit to ``at [unknown]``."""
+        there, here = at - self.believed, -self.believed
+        return float(0.5 * np.sum(self.sure * (there**2 - here**2)))
+
+    @property
+    def unknowns(self) -> int:
+        """How many numbers a refit would move."""
+        return int(self.low.size)
+
+    def outputs(self, run: FreeRun, initial: Matrix) -> Matrix:
+        """Give ``[output, sample]`` of an experiment; `ModelError` when it diverges there."""
+        return run.outputs(self._z, self._effects, initial)
+
+    def predicted(self, run: FreeRun, initial: Matrix, at: Matrix | None = None) -> Prediction:
+        """Predict an experiment.
+
+        Parameters
+        ----------
+        initial
+            ``[window, state]``.
+        at
+            ``[unknown]``; as fitted by default.
+
+        Raises
+        ------
+        ModelError
+            When it diverges there.
+        """
+        x = np.zeros(self.unknowns) if at is None else at
+        here = self._setting(x)
+        compiled = run.compiled(here.z, here.effects)
+        if can_run(compiled):
+            made = fine_run(run, here, initial)
+            steps = self._steps(x, _APART)
+            changed = [(self._setting(x + row), by) for row, by in zip(np.diag(steps), steps, strict=True)]
+            own, starts = slopes_of(run, made, changed)
+            return Prediction(made.outputs, own, starts, x)
+        outputs = run.outputs(here.z, here.effects, initial)
+        own = np.empty((x.size, *outputs.shape))
+        for place, by in enumerate(self._steps(x, _APART_WITH_LAWS if compiled.laws else _APART)):
+            moved = x.copy()
+            moved[place] += by
+            there = self._setting(moved)
+            own[place] = (run.outputs(there.z, there.effects, initial) - outputs) / by
+        rate = run.measurement.sample_rate_hz
+        longest = decay(compiled, run.rows, rate, max(stop - start for start, stop in run.windows))
+        starts = np.concatenate([longest[..., : stop - start] for start, stop in run.windows], axis=-1)
+        return Prediction(outputs, own, starts, x)
+
+    def _setting(self, x: Matrix) -> Setting:
+        count = self._z.size
+        return Setting(self._z + x[:count], with_numbers(self._effects, self._numbers, x[count:]))
+
+    def _steps(self, x: Matrix, apart: float) -> Matrix:
+        steps = np.concatenate([apart / self._tolerance, np.full(len(self._numbers), apart)])
+        return np.asarray(np.where(x + steps > self.high, -steps, steps))

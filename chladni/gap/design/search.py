@@ -1,0 +1,203 @@
+"""Search among further measurements for those that tell candidates apart."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.design.course import Course
+from chladni.gap.design.design import Design
+from chladni.gap.design.experiment import Experiment
+from chladni.gap.design.experiments import Reach
+from chladni.gap.design.more_sensors import MoreSensor, more_sensors, with_noise_of, with_sensors
+from chladni.gap.design.rival import Rival
+from chladni.gap.design.separation import Record, Separation
+from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.plant.free_run import Windows
+from chladni.gap.plant.tunable import Tunables
+from chladni.gap.plant.windows import windows_for
+from chladni.gap.records.measurement import Measurement
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.models.core.model import Model
+from chladni.signals.errors import EstimateError, ModelError
+
+Matrix = NDArray[np.float64]
+#: Samples that are simulated of each experiment.
+_SAMPLES = 6000
+#: Candidates that are compared.
+_RIVALS = 3
+#: Linear steps of the refits behind the numbers that are told.
+_PASSES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """A design with what it takes to compute it more precisely."""
+
+    design: Design
+    course: Course
+    chosen: tuple[int, ...]
+
+
+class Search:
+    """Further measurements that would tell the candidates of one log apart.
+
+    Parameters
+    ----------
+    model, measurement, tunables, noise
+        Nominal model, log, and the noise of its outputs.
+    candidates
+        Fitted, best first.
+    seed
+        Of random excitations.
+
+    Raises
+    ------
+    ModelError
+        When a candidate can't be simulated with the log's own inputs.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        measurement: Measurement,
+        tunables: Tunables,
+        candidates: Sequence[Contestant],
+        noise: NoiseFloor,
+        *,
+        seed: int,
+    ) -> None:
+        candidates = candidates[:_RIVALS]
+        self._rivals = [Rival(one, tunables) for one in candidates]
+        suspects = {named.site.split(".")[0] for one in candidates for named in one.hypothesis.named}
+        self._sensors = more_sensors(model, measurement, suspects)
+        self._own = tuple(range(len(measurement.output_names)))
+        stretch, begin, self._windows = _stretch(model, measurement, candidates)
+        self._duration_s = stretch.duration_s
+        self._reach = Reach(
+            model=with_sensors(model, self._sensors), measurement=stretch, begins_with_log=begin == 0, seed=seed
+        )
+        self._record = _with_rows(stretch, self._reach.model, self._sensors)
+        self._logged = self._course(self._reach.as_logged())
+        all_noise = with_noise_of(
+            noise, measurement.output_units, self._record.output_units[len(self._own) :], self._logged.outputs
+        )
+        detail = _details(candidates[0], all_noise, self._logged.outputs)
+        self._separation = Separation(self._rivals, all_noise, detail)
+        self.now_nats = self._nats([(self._logged, self._own)], _PASSES)
+
+    def best(self) -> tuple[Design, ...]:
+        """Designs that tell the candidates apart, the least effort first; else the one that comes nearest.
+
+        At most two: one changes how the machine is driven, the other the sensors or the input's place.
+        """
+        tried = [*self._with_sensors(), *self._each(self._reach.levels())]
+        for more in (self._reach.courses, self._reach.positions):
+            if not self._enough(tried):
+                tried += self._each(more())
+        sure = self._confirmed(self._enough(tried))
+        if sure:
+            return tuple(sure)
+        tried.sort(key=lambda one: (-one.design.nats, one.design.effort))
+        return tuple(self._precise(one).design for one in tried[:1])
+
+    def _confirmed(self, found: Sequence[_Found]) -> list[Design]:
+        """Of each kind the first that still tells them apart when refits are followed further."""
+        kept: dict[bool, Design] = {}
+        for one in found:
+            built = one.design.change in ("sensor", "position")
+            if built not in kept:
+                precise = self._precise(one)
+                if precise.design.tells:
+                    kept[built] = precise.design
+        return sorted(kept.values(), key=lambda one: one.effort)
+
+    def _with_sensors(self) -> list[_Found]:
+        return [
+            self._found(
+                replace(self._logged.experiment, change="sensor", words=f"Add {sensor.words}"),
+                self._logged,
+                (*self._own, len(self._own) + place),
+            )
+            for place, sensor in enumerate(self._sensors)
+        ]
+
+    def _each(self, experiments: Iterable[Experiment]) -> list[_Found]:
+        found = []
+        for experiment in experiments:
+            try:
+                found.append(self._found(experiment, self._course(experiment), self._own))
+            except (ModelError, EstimateError):
+                # A candidate that diverges there says that nobody should try it.
+                continue
+        return found
+
+    def _course(self, experiment: Experiment) -> Course:
+        return Course(experiment, self._rivals, self._record, self._windows)
+
+    def _found(self, experiment: Experiment, course: Course, chosen: tuple[int, ...]) -> _Found:
+        design = Design(
+            change=experiment.change,
+            words=experiment.words,
+            effort=experiment.effort,
+            nats=self._nats([(self._logged, self._own), (course, chosen)], 1),
+            now_nats=self.now_nats,
+            duration_s=self._duration_s,
+        )
+        return _Found(design, course, chosen)
+
+    def _precise(self, found: _Found) -> _Found:
+        nats = self._nats([(self._logged, self._own), (found.course, found.chosen)], _PASSES)
+        return replace(found, design=replace(found.design, nats=nats))
+
+    def _nats(self, records: list[Record], passes: int) -> float:
+        return float(self._separation.nats(records, passes=passes).min())
+
+    def _enough(self, tried: Sequence[_Found]) -> list[_Found]:
+        return sorted(
+            (one for one in tried if one.design.tells), key=lambda one: (one.design.effort, -one.design.nats)
+        )
+
+
+def _details(best: Contestant, noise: NoiseFloor, outputs: Matrix) -> Matrix:
+    """``[output]`` share of its power that the best candidate leaves beyond noise."""
+    power = np.maximum(np.mean(noise.whitened(outputs) ** 2, axis=-1), np.finfo(np.float64).tiny)
+    count = best.held.size
+    own = np.maximum(best.held - 1.0, 0.0) / power[:count]
+    return np.concatenate([own, np.full(power.size - count, np.median(own))])
+
+
+def _stretch(
+    model: Model, measurement: Measurement, candidates: Sequence[Contestant]
+) -> tuple[Measurement, int, Windows | None]:
+    """Part of a log that stands for all of it: its first sample, and its windows."""
+    windows = windows_for(model, measurement)
+    if windows is not None:
+        kept = [one for one in windows if one[1] <= max(_SAMPLES, windows[0][1])]
+        return _part(measurement, 0, kept[-1][1]), 0, tuple(kept)
+    # What changes at a time of its own is seen in the whole log only.
+    timed = any(named.effect == "varying_stiffness" for one in candidates for named in one.hypothesis.named)
+    count = measurement.samples if timed else min(_SAMPLES, measurement.samples)
+    power = np.sum(measurement.outputs**2 / np.maximum(np.var(measurement.outputs, axis=1), 1e-300)[:, None], axis=0)
+    begins = np.arange(0, measurement.samples - count + 1, count)
+    loud = np.array([float(np.mean(power[begin : begin + count])) for begin in begins])
+    begin = int(begins[np.argmin(np.abs(np.log(np.maximum(loud, 1e-300) / np.mean(power))))])
+    return _part(measurement, begin, begin + count), begin, None
+
+
+def _part(measurement: Measurement, start: int, stop: int) -> Measurement:
+    inputs, outputs = measurement.inputs[:, start:stop], measurement.outputs[:, start:stop]
+    return replace(measurement, inputs=inputs, outputs=outputs, period_samples=None, transient_periods=0)
+
+
+def _with_rows(measurement: Measurement, model: Model, sensors: Sequence[MoreSensor]) -> Measurement:
+    """Give the record that would be made with the sensors too; what they would show is not known."""
+    units = {one.name: one.unit for one in model.compile().outputs}
+    names = tuple(one.output.name for one in sensors)
+    return replace(
+        measurement,
+        outputs=np.concatenate([measurement.outputs, np.zeros((len(names), measurement.samples))]),
+        output_names=(*measurement.output_names, *names),
+        output_units=(*measurement.output_units, *(units[name] for name in names)),
+    )

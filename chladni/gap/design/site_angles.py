@@ -1,0 +1,48 @@
+"""How differently forces at two sites look to a set of sensors."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.plant.linear_view import LinearView
+from chladni.gap.plant.places import Site, way_to
+from chladni.gap.records.noise_floor import NoiseFloor
+
+Matrix = NDArray[np.float64]
+Spectrum = NDArray[np.complex128]
+
+
+def printed_patterns(view: LinearView, sites: Sequence[Site], outputs: Sequence[str], noise: NoiseFloor) -> Spectrum:
+    """``[site, output, line]`` that a force of one (a change of an input, an error) at each site prints, over noise.
+
+    Parameters
+    ----------
+    outputs
+        Names of the view's outputs, which `noise` is of.
+    """
+    weight = 1.0 / np.sqrt(noise.density(view.lines.cycles))
+    return np.stack([view.pattern(way_to(view, site, outputs)) * weight for site in sites])
+
+
+def angles_deg(patterns: Spectrum, chosen: Sequence[int]) -> Matrix:
+    """Angle between the patterns of each two sites on some outputs, ``[site, site]``, 0 to 90 degrees.
+
+    A force of any shape is free on every line, so only the direction over the outputs tells: with one output all
+    angles are 0. The mean over the lines of the squared sine is taken.
+
+    Examples
+    --------
+    Two sites that two sensors see apart, and one sensor alone doesn't:
+
+    >>> patterns = np.array([[[1.0], [0.0]], [[1.0], [1.0]]], dtype=np.complex128)
+    >>> angles_deg(patterns, [0, 1]).round(6).tolist(), angles_deg(patterns, [0]).tolist()
+    ([[0.0, 45.0], [45.0, 0.0]], [[0.0, 0.0], [0.0, 0.0]])
+    """
+    seen = patterns[:, list(chosen)]
+    size = np.sqrt(np.sum(np.abs(seen) ** 2, axis=1, keepdims=True))
+    unit = seen / np.where(size > 0, size, 1.0)
+    along = np.abs(np.einsum("iol,kol->ikl", unit.conj(), unit)) ** 2
+    # A line on which a site prints nothing tells nothing.
+    sine = np.where(size[:, 0][:, None] * size[:, 0][None] > 0, np.maximum(1.0 - along, 0.0), 0.0)
+    return np.asarray(np.degrees(np.arcsin(np.sqrt(np.clip(sine.mean(axis=-1), 0.0, 1.0)))), dtype=np.float64)

@@ -1,0 +1,164 @@
+"""What a log lacks for any answer: length, level, or the sensor that would tell where a force acts."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.design.experiments import excited_band_hz
+from chladni.gap.design.more_sensors import MoreSensor, more_sensors, with_noise_of, with_sensors
+from chladni.gap.design.site_angles import angles_deg, printed_patterns
+from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.linear_view import LinearView
+from chladni.gap.plant.places import Site, placed, sites_of
+from chladni.gap.plant.record_lines import RecordLines
+from chladni.gap.records.measurement import Measurement
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.models.core.model import Model
+
+Matrix = NDArray[np.float64]
+#: Cycles of the lowest mode that tell its frequency within a percent or so.
+CYCLES = 20.0
+#: Noise over signal above which little can be said of anything.
+LOUD = 0.3
+#: Patterns nearer to each other than this are hard to tell apart in noise.
+NEAR_DEG = 10.0
+_LINES = 200
+_SITES = 5
+
+
+def what_is_missing(
+    model: Model, measurement: Measurement, noise: NoiseFloor, *, sites: Sequence[str] = ()
+) -> str | None:
+    """Say what to measure where a log is too short, too quiet, or has too few sensors to say where a force acts.
+
+    Parameters
+    ----------
+    model
+        Nominal.
+    measurement, noise
+        The log, and the noise of its outputs.
+    sites
+        Names of the most likely sites, best first; every joint and body without any.
+
+    Returns
+    -------
+    str or None
+        Sentences, or None when nothing of this is missing.
+
+    Raises
+    ------
+    ModelError
+        When the log isn't one of this model.
+    """
+    found = [_length(model, measurement), _level(measurement, noise), _sensor(model, measurement, noise, sites)]
+    return " ".join(one for one in found if one) or None
+
+
+def _length(model: Model, measurement: Measurement) -> str | None:
+    """Ask for a longer record when the lowest mode turns only a few times."""
+    poles = np.linalg.eigvals(model.compile().a)
+    turning = np.abs(poles[poles.imag > 1e-3 * np.abs(poles)]) / (2 * np.pi)
+    if not turning.size or turning.min() * measurement.duration_s >= CYCLES:
+        return None
+    lowest = float(turning.min())
+    return (
+        f"The log holds {lowest * measurement.duration_s:.2g} cycles of the lowest mode ({lowest:.3g} Hz): record at "
+        f"least {CYCLES / lowest:.2g} s ({CYCLES:g} cycles)."
+    )
+
+
+def _level(measurement: Measurement, noise: NoiseFloor) -> str | None:
+    """Ask for a higher level when noise drowns the outputs."""
+    share = noise.rms / np.maximum(np.std(measurement.outputs, axis=1), np.finfo(np.float64).tiny)
+    middle = float(np.median(share))
+    if middle <= LOUD:
+        return None
+    # What is measured holds the noise too.
+    signal = max(1.0 - middle**2, 0.01)
+    factor = min(max(2.0, float(np.ceil(middle / (LOUD * signal**0.5)))), 4.0)
+    return (
+        f"Noise is {middle:.0%} of what the sensors show: raise the level {factor:.0f} times, or average "
+        f"{factor**2:.0f} records of the same input."
+    )
+
+
+def _sensor(model: Model, measurement: Measurement, noise: NoiseFloor, names: Sequence[str]) -> str | None:
+    """Ask for the sensor that splits the likeliest sites best, when those there are don't."""
+    sensors = more_sensors(model, measurement, names)
+    if not sensors or not measurement.output_names:
+        return None
+    patterns, sites = _patterns(model, measurement, noise, sensors, names)
+    if len(sites) < 2:
+        return None
+    own = list(range(len(measurement.output_names)))
+    now, _ = _least(angles_deg(patterns, own))
+    if now >= NEAR_DEG:
+        return None
+    gained = [_least(angles_deg(patterns, [*own, len(own) + place])) for place in range(len(sensors))]
+    best = max(range(len(sensors)), key=lambda place: gained[place])
+    then = gained[best][0]
+    if then < 2.0 * now or then < 1.0:
+        return None
+    places = _listed([site.name for site in sites])
+    reason = (
+        "One sensor can't tell where a force acts" if len(own) == 1 else f"The sensors hardly tell {places} apart"
+    )
+    by = "" if len(sites) == 2 else "at least "
+    return (
+        f"{reason}: add {sensors[best].words}, and what forces at {places} print is {by}{then:.2g} degrees apart "
+        f"(now {round(now, 1):g})."
+    )
+
+
+def _patterns(
+    model: Model, measurement: Measurement, noise: NoiseFloor, sensors: Sequence[MoreSensor], names: Sequence[str]
+) -> tuple[NDArray[np.complex128], list[Site]]:
+    """Patterns of the likeliest sites over the log's sensors and those that may be added."""
+    more = with_sensors(model, sensors)
+    compiled = more.compile()
+    outputs = (*measurement.output_names, *(one.output.name for one in sensors))
+    rows = tuple([terminal.name for terminal in compiled.outputs].index(name) for name in outputs)
+    view = LinearView(compiled, _lines(measurement), measurement.inputs, rows)
+    floor = _floor(more, measurement, noise, rows)
+    every = sites_of(compiled, measurement.output_names)
+    wanted = [site for name in names for site in every if site.name == name]
+    wanted = wanted or [site for site in every if site.kind in ("joint", "body")]
+    # Sites that even all these sensors see as one are one place.
+    sites = [place.sites[0] for place in placed(view, wanted, outputs)][:_SITES]
+    if not sites:
+        return np.zeros((0, len(rows), 1), dtype=np.complex128), []
+    return printed_patterns(view, sites, outputs, floor), sites
+
+
+def _floor(model: Model, measurement: Measurement, noise: NoiseFloor, rows: Sequence[int]) -> NoiseFloor:
+    """Noise of the log's outputs and the new ones, by what the nominal model would show."""
+    terminals = [model.compile().outputs[row] for row in rows]
+    count = len(measurement.output_names)
+    record = replace(
+        measurement,
+        outputs=np.zeros((len(rows), measurement.samples)),
+        output_names=tuple(one.name for one in terminals),
+        output_units=tuple(one.unit for one in terminals),
+    )
+    signals = np.concatenate([measurement.outputs, FreeRun(model, record).outputs()[count:]])
+    return with_noise_of(noise, measurement.output_units, record.output_units[count:], signals)
+
+
+def _lines(measurement: Measurement) -> RecordLines:
+    low, high = excited_band_hz(measurement)
+    step = measurement.sample_rate_hz / measurement.samples
+    first, last = max(round(low / step), 1), min(round(high / step), (measurement.samples - 1) // 2)
+    index = np.unique(np.linspace(first, max(first, last), _LINES).round().astype(np.int64))
+    return RecordLines(index=index, samples=measurement.samples, sample_rate_hz=measurement.sample_rate_hz)
+
+
+def _least(angles: Matrix) -> tuple[float, float]:
+    """Smallest and mean angle between different sites."""
+    apart = angles[np.triu_indices(len(angles), 1)]
+    return float(apart.min()), float(apart.mean())
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]])

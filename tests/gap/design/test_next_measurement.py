@@ -1,0 +1,147 @@
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chladni.gap.design.experiments import Reach
+from chladni.gap.design.next_measurement import next_measurement
+from chladni.gap.design.search import Search
+from chladni.gap.explanation.contest import Contest, training_mask
+from chladni.gap.explanation.hypotheses import hypothesis_of
+from chladni.gap.explanation.hypothesis import Hypothesis
+from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.windows import windows_for
+from chladni.models.effects.attached_effect import attached
+from chladni.models.structures.controller import Controller
+from tests.gap.design.close_candidates import acting, axis, contested, fitted, wrong
+from tests.gap.made_log import measured
+
+HARDENING = attached("hardening_stiffness", "j1", {"cubic": 1.2e9})
+COULOMB = attached("coulomb_friction", "j1", {"force": 0.3})
+
+
+@pytest.fixture(scope="module")
+def hardening_or_stiffer():
+    return contested(HARDENING, acting("hardening_stiffness", "j1", cubic=1e9), wrong("j1.stiffness"))
+
+
+@pytest.fixture(scope="module")
+def hammer_or_sensor():
+    gain = attached("gain_error", "hammer", {"gain": 1.3})
+    hypotheses = [acting("gain_error", site, gain=1.1) for site in ("hammer", "a2")]
+    return contested(gain, *hypotheses, outputs=[2])
+
+
+def test_hardening_against_a_stiffer_spring_asks_for_a_higher_level(hardening_or_stiffer):
+    first = Search(*hardening_or_stiffer, seed=1).best()[0]
+    assert first.change == "level"
+    assert "hammer at 2 times the level" in first.words
+    # A cubic grows with the square of the level, so that twice is plenty.
+    assert first.nats > 10 * first.now_nats
+
+
+def test_measuring_as_advised_tells_hardening_from_a_stiffer_spring(hardening_or_stiffer):
+    model, log, _, candidates, floor = hardening_or_stiffer
+    apart = candidates[0].log_evidence - candidates[1].log_evidence
+    clean = measured(model.with_effects((HARDENING,)), 2 * log.inputs, noise=0.0)[0]
+    noise = np.random.default_rng(6).standard_normal(clean.outputs.shape) * floor.rms[:, None]
+    louder = replace(clean, outputs=clean.outputs + noise)
+    again = fitted(model, louder, floor, *(one.hypothesis for one in candidates))
+    assert again[0].hypothesis.named == candidates[0].hypothesis.named
+    assert again[0].log_evidence - again[1].log_evidence > apart + 20
+
+
+def test_what_is_expected_of_the_log_is_what_the_contest_found():
+    arguments = contested(COULOMB, acting("coulomb_friction", "j1", force=0.3), wrong("j1.damping"))
+    candidates = arguments[3]
+    found = candidates[0].log_evidence - candidates[1].log_evidence
+    expected = Search(*arguments, seed=1).now_nats
+    # One log's evidence scatters by sqrt(2 nats), and an expectation over which is true takes their mean.
+    assert 0.3 * found < expected < found + np.sqrt(2 * found) + 3
+
+
+def test_coulomb_against_viscous_friction_asks_for_another_level_or_less_noise():
+    arguments = contested(COULOMB, acting("coulomb_friction", "j1", force=0.3), wrong("j1.damping"))
+    search = Search(*arguments, seed=1)
+    levels = [one.design for one in search._each(search._reach.levels()) if one.design.change == "level"]
+    repeated = 2 * search.now_nats
+    # Whatever the level, viscous damping can match the loss at one of them only.
+    assert all(one.nats > repeated + 1 for one in levels)
+    assert search.best()[0].change in ("level", "repeats")
+
+
+def test_an_input_against_the_only_sensor_asks_for_a_sensor(hammer_or_sensor):
+    search = Search(*hammer_or_sensor, seed=1)
+    designs = search.best()
+    assert [one.change for one in designs] == ["sensor"]
+    assert "accelerometer" in designs[0].words
+    # No drive tells them apart: both scale the same channel.
+    assert search.now_nats == pytest.approx(0.0, abs=1e-6)
+    assert all(one.design.nats < 1e-3 for one in search._each(search._reach.levels()))
+    assert all(one.design.nats < 1e-3 for one in search._each(search._reach.courses()))
+
+
+def test_the_sentence_names_what_to_do_and_numbers(hardening_or_stiffer):
+    said = next_measurement(*hardening_or_stiffer, seed=1)
+    pattern = (
+        r"Repeat with hammer at 2 times the level \(RMS [\d.]+ N\): hardening stiffness at j1 and another value of "
+        r"j1\.stiffness then differ by ([\d.]+) sigma \(now ([\d.]+)\)"
+    )
+    then, now = (float(one) for one in re.match(pattern, said).groups())
+    assert then > 3 * now
+    log = hardening_or_stiffer[1]
+    level = float(re.search(r"RMS ([\d.]+) N", said).group(1))
+    assert level == pytest.approx(2 * np.sqrt(np.mean(log.inputs**2)), rel=0.01)
+
+
+def test_the_same_seed_says_the_same(hammer_or_sensor):
+    assert next_measurement(*hammer_or_sensor, seed=3) == next_measurement(*hammer_or_sensor, seed=3)
+
+
+def test_one_candidate_has_nothing_to_be_told_from(hammer_or_sensor):
+    model, log, tunables, candidates, floor = hammer_or_sensor
+    assert next_measurement(model, log, tunables, candidates[:1], floor, seed=1) is None
+
+
+def test_candidates_that_nothing_tells_apart_are_said_to_be_one(hammer_or_sensor):
+    model, log, tunables, candidates, floor = hammer_or_sensor
+    said = next_measurement(model, log, tunables, [candidates[0], candidates[0]], floor, seed=1)
+    assert "take them as one answer" in said
+    assert "0 sigma" in said
+
+
+def test_an_experiment_in_which_a_candidate_diverges_is_never_asked_for(hardening_or_stiffer):
+    search = Search(*hardening_or_stiffer, seed=1)
+    logged = search._reach.as_logged()
+    assert len(search._each([logged])) == 1
+    assert not search._each([replace(logged, inputs=1e200 * logged.inputs)])
+
+
+def test_a_free_axis_is_compared_in_windows():
+    model = axis()
+    true = model.with_effects((attached("coulomb_friction", "guide", {"force": 3.0}),))
+    force = 20 * np.sin(2 * np.pi * 0.7 * np.arange(3000) / 500.0)[None]
+    log, floor = measured(true, force, noise=0.002, rate_hz=500.0)
+    run = FreeRun(model, log, windows=windows_for(model, log))
+    assert len(run.windows) > 1
+    contest = Contest(run, floor, training_mask(log.samples, log.sample_rate_hz))
+    z = np.zeros(len(run.tunables.names))
+    friction = hypothesis_of((attached("coulomb_friction", "guide", {"force": 2.0}),), z)
+    candidates = [contest.enter(friction), contest.enter(Hypothesis(wide={"guide.damping": 15.0}, start_z=z))]
+    search = Search(model, log, run.tunables, candidates, floor, seed=1)
+    # Coulomb friction of 3 N at 20 N of force, in noise of 0.2 %: the log tells them apart already.
+    assert search.now_nats > 20
+    assert {one.design.change for one in search._each(search._reach.levels())} == {"level", "repeats"}
+
+
+def test_what_a_loop_should_follow_is_not_replaced_by_noise():
+    loop = Controller(
+        name="loop", feedback="position", drives="motor", law="p-p", gains={"kp": 20.0, "kv": 300.0}, gain=1.0
+    )
+    model = replace(axis(), controllers=(loop,))
+    log, _ = measured(model, 0.01 * np.sin(np.arange(2000) / 50)[None], rate_hz=500.0)
+    reach = Reach(model=model, measurement=log, begins_with_log=True, seed=0)
+    assert not list(reach.courses())
+    assert not list(reach.positions())
+    assert "loop at 2 times the level" in next(reach.levels()).words
