@@ -9,7 +9,7 @@ from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.output_error import OutputErrorFit, fit_output_error
-from chladni.signals.errors import ModelError
+from chladni.signals.errors import EstimateError, ModelError
 
 Matrix = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -62,7 +62,7 @@ class Contest:
                 z_limit={name: hypothesis.wide.get(name, 3.0) for name in self.run.tunables.names},
                 max_iterations=max_iterations,
             )  # fmt: skip
-        except ModelError:
+        except (ModelError, EstimateError):
             return None
         return self.judged(hypothesis, fit)
 

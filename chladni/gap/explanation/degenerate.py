@@ -50,7 +50,8 @@ def _never_seen(word: str, values: Mapping[str, float], d: Matrix) -> bool:
     if word == "one_sided_stop":
         touching = float(np.mean(values["side"] * d > values["clearance"]))
         return not 1e-4 < touching < 0.7
-    return values["period"] > float(np.ptp(d)) if word == "ripple" else False
+    # Fewer than two periods of a ripple are a spring that bends.
+    return 2.0 * values["period"] > float(np.ptp(d)) if word == "ripple" else False
 
 
 def _displacement(run: FreeRun, found: Contestant, effect: AttachedEffect) -> Matrix | None:

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from chladni.gap.explanation.hypothesis import Hypothesis
 from chladni.gap.explanation.screen import Screened
-from chladni.gap.location.locate import Location
-from chladni.gap.location.profile import profiled
+from chladni.gap.location.locate import Location, tuned_stepwise
 from chladni.gap.tuning.effect_scale import usually_fitted
 from chladni.models.core.parameter import Parameter
 from chladni.models.effects.attached_effect import AttachedEffect, attached
@@ -80,7 +79,8 @@ def wrong_parameters(location: Location, *, most: int = 2) -> Hypothesis | None:
     All may go far at first; those that do stay free, the others are held within their tolerance again.
     """
     problem, names = location.problem, location.problem.tunables.names
-    far = profiled(problem, (), location.tuned.z, iterations=10, limit=_FAR)
+    steps = (*location.segments, problem)
+    far = tuned_stepwise(steps, np.zeros(len(names)), _FAR)
     order = np.argsort(-np.abs(far.z))
     outside = [int(place) for place in order if abs(far.z[place]) > OUTSIDE]
     if not outside:
@@ -90,7 +90,7 @@ def wrong_parameters(location: Location, *, most: int = 2) -> Hypothesis | None:
         limit = np.full(len(names), OUTSIDE)
         limit[outside[:count]] = _FAR
         start = np.clip(far.z, -limit, limit)
-        found = profiled(problem, (), start, iterations=10, limit=limit)
+        found = tuned_stepwise(steps, start, limit)
         if best is None or found.cost < 0.8 * best[1].cost:
             best = ([names[place] for place in outside[:count]], found)
     if best is None or best[1].chi > 0.5 * location.tuned.chi:

@@ -9,6 +9,8 @@ Matrix = NDArray[np.float64]
 #: ``abs(mean exp(2 pi i y/step))`` of a signal without steps stays far below; of a quantised one it's near 1.
 _CLEAR = 0.9
 _BINS = 1 << 16
+#: Samples away from the level where most stand that are needed to see a lattice.
+_MOVING = 200
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +44,18 @@ def lattice_of(signal: Matrix) -> Lattice | None:
         return None
     place = first + int(high_enough[0])
     step, sharp = _sharpened(signal, span / place, span)
-    return Lattice(step=step, strength=sharp) if sharp > _CLEAR else None
+    if sharp < _CLEAR or _mostly_still(signal, step):
+        return None
+    return Lattice(step=step, strength=sharp)
+
+
+def _mostly_still(signal: Matrix, step: float) -> bool:
+    """Whether the samples seem to stand on a lattice because most of them stand at one level."""
+    middle = float(np.median(signal))
+    moving = signal[np.abs(signal - middle) > 1.5 * step]
+    if moving.size < _MOVING:
+        return True
+    return float(np.abs(np.mean(np.exp(2j * np.pi * moving / step)))) < _CLEAR
 
 
 def _sharpened(signal: Matrix, step: float, span: float) -> tuple[float, float]:

@@ -16,13 +16,14 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
 
 Matrix = NDArray[np.float64]
+_Rough = tuple[Profile, Place]
 #: Lengths of the segments on which parameters are found, in periods of the lowest mode, one after another: short
 #: ones forgive a resonance that lies elsewhere, long ones tell it exactly.
 _SEGMENTS = (8.0, 24.0)
 _SEGMENT_LINES = 1500
 _RECORD_LINES = 1500
-#: Places that are followed to the end.
-_FOLLOWED, _FOLLOWED_AGAIN = 6, 4
+#: Places that are followed to the end: so many, and more where the segments don't tell them apart.
+_FOLLOWED, _FOLLOWED_AGAIN, _TIED, _MOST = 5, 4, 1.5, 10
 #: Patterns tell places apart only when there are more sensors than forces.
 _PAIR_SENSORS = 3
 
@@ -55,6 +56,8 @@ class Location:
         Profile without any force: the parameters alone.
     ranked
         The places that were followed, by rising misfit.
+    segments
+        The problems on segments, short ones first.
     shares
         Share of the misfit beyond noise that an unknown force at each site explains, by name.
     """
@@ -62,6 +65,7 @@ class Location:
     problem: LinearProblem
     tuned: Profile
     ranked: tuple[Located, ...]
+    segments: tuple[LinearProblem, ...]
     shares: dict[str, float]
 
     @property
@@ -80,17 +84,20 @@ def locate(model: Model, measurement: Measurement, noise: NoiseFloor, tunables: 
         model, measurement, noise, tunables, all_lines(measurement.samples, measurement.sample_rate_hz)
     )
     segments, tuned = _tuned_on_segments(model, whole)
-    view = segments.view(tuned.z)
+    view = segments[-1].view(tuned.z)
     places = placed(view, sites_of(view.compiled, measurement.output_names), measurement.output_names)
-    rough = _on_segments(segments, tuned, places)
+    rough = _on_segments(segments[-1], tuned, places)
     record = whole.on(_telling(whole))
     plain = profiled(record, (), tuned.z, iterations=6)
-    ranked = _followed(record, rough)
+    ranked = _followed(record, _tied([one.chi for one, _ in rough], rough, _FOLLOWED))
     if ranked and ranked[0].profile.expected > 1 and _pays(plain, ranked[0].profile):
         record = record.with_noise(noise_behind(record, ranked[0].profile))
-        ranked = _followed(record, [(one.profile, one.places[0]) for one in ranked[:_FOLLOWED_AGAIN]])
+        again = [(one.profile, one.places[0]) for one in ranked]
+        ranked = _followed(record, _tied([one.profile.chi for one in ranked], again, _FOLLOWED_AGAIN))
         plain = profiled(record, (), plain.z, iterations=4)
-    return Location(problem=record, tuned=plain, ranked=tuple(ranked), shares=_shares(tuned, rough))
+    return Location(
+        problem=record, tuned=plain, ranked=tuple(ranked), segments=segments, shares=_shares(tuned, rough)
+    )
 
 
 def located_pairs(location: Location, rough: int = 5) -> list[Located]:
@@ -108,20 +115,25 @@ def located_pairs(location: Location, rough: int = 5) -> list[Located]:
     return sorted(found, key=lambda one: one.profile.chi)
 
 
-def _tuned_on_segments(model: Model, whole: LinearProblem) -> tuple[LinearProblem, Profile]:
+def _tuned_on_segments(model: Model, whole: LinearProblem) -> tuple[tuple[LinearProblem, ...], Profile]:
     measurement = whole.measurement
     period = measurement.sample_rate_hz / _lowest_hz(model, measurement)
-    z = np.zeros(len(whole.tunables.names))
-    problem, found = whole, None
+    problems = []
     for periods in _SEGMENTS:
         length = int(np.clip(periods * period, 64, measurement.samples // 2))
         lines = segment_lines(
             length, samples=measurement.samples, sample_rate_hz=measurement.sample_rate_hz, count=_SEGMENT_LINES
         )
-        problem = whole.on(lines)
-        found = profiled(problem, (), z, iterations=8)
-        z = found.z
-    return problem, found or profiled(problem, (), z)
+        problems.append(whole.on(lines))
+    return tuple(problems), tuned_stepwise(problems, np.zeros(len(whole.tunables.names)))
+
+
+def tuned_stepwise(problems: Sequence[LinearProblem], z: Matrix, limit: float | Matrix = 3.0) -> Profile:
+    """Fit the parameters alone on one problem after another, each starting where the one before ended."""
+    found = profiled(problems[0], (), z, iterations=8, limit=limit)
+    for problem in problems[1:]:
+        found = profiled(problem, (), found.z, iterations=8, limit=limit)
+    return found
 
 
 def _lowest_hz(model: Model, measurement: Measurement) -> float:
@@ -132,20 +144,26 @@ def _lowest_hz(model: Model, measurement: Measurement) -> float:
     return float(heard.min()) if heard.size else 20.0 / measurement.duration_s
 
 
-def _on_segments(segments: LinearProblem, tuned: Profile, places: Sequence[Place]) -> list[tuple[Profile, Place]]:
+def _on_segments(segments: LinearProblem, tuned: Profile, places: Sequence[Place]) -> list[_Rough]:
     if len(segments.measured) < 2:
         return [(replace(tuned, sites=(place.sites[0],)), place) for place in places]
     found = [(profiled(segments, (place.sites[0],), tuned.z, iterations=3), place) for place in places]
     return sorted(found, key=lambda one: one[0].chi)
 
 
-def _followed(record: LinearProblem, rough: Sequence[tuple[Profile, Place]]) -> list[Located]:
+def _followed(record: LinearProblem, rough: Sequence[_Rough]) -> list[Located]:
     # With one sensor all patterns are one place: nothing is known of it but that it explains all.
     found = [
         Located(places=(place,), profile=profiled(record, (place.sites[0],), profile.z, iterations=4))
-        for profile, place in rough[:_FOLLOWED]
+        for profile, place in rough
     ]
     return sorted(found, key=lambda one: one.profile.chi)
+
+
+def _tied(chi: Sequence[float], rough: list[_Rough], least: int) -> list[_Rough]:
+    """Keep the first few, and those behind them that are as good."""
+    tied = sum(one < _TIED * chi[0] for one in chi)
+    return rough[: min(max(least, tied), _MOST)]
 
 
 def _telling(whole: LinearProblem) -> RecordLines:
@@ -160,7 +178,7 @@ def _pays(plain: Profile, found: Profile) -> bool:
     return found.chi < 0.7 * plain.chi
 
 
-def _shares(tuned: Profile, rough: Sequence[tuple[Profile, Place]]) -> dict[str, float]:
+def _shares(tuned: Profile, rough: Sequence[_Rough]) -> dict[str, float]:
     gap = max(tuned.chi - 1.0, 1e-12)
     return {
         site.name: float(np.clip((tuned.chi - max(profile.chi, 1.0)) / gap, 0.0, 1.0))

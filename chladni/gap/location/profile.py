@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg import qr, solve_triangular
 from scipy.optimize import lsq_linear
 
 from chladni.gap.plant.linear_problem import LinearProblem
@@ -14,6 +14,8 @@ from chladni.gap.plant.places import Site
 Matrix = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
 _TOLD = 1e-3
+#: Of the largest singular value: below it columns are the same but for rounding.
+_RANK = 1e-10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,34 +74,53 @@ class Elimination:
         self._patterns = np.asarray(patterns, dtype=np.complex128)
         self._unit = _orthonormal(patterns)
         self._transients = transients
-        self._stacked = _real(np.moveaxis(self.away(transients), -2, -3)[:, 0])
-        self._basis = _range(self._stacked.T)
+        stacked = _real(self.away(transients))[:, 0]
+        size = np.sqrt(np.einsum("sn,sn->s", stacked, stacked))
+        self._scale = np.where(size > 0, 1.0 / np.where(size > 0, size, 1.0), 0.0)
+        self._basis, self._upper = qr(
+            (stacked * self._scale[:, None]).T, mode="economic", overwrite_a=True, check_finite=False
+        )
+        # Columns that print nothing, or the same as others, add nothing to what is taken away.
+        left, values, _ = np.linalg.svd(self._upper)
+        kept = left[:, : values.size][:, values > _RANK * max(values.max(initial=0.0), 1e-300)]
+        self._kept = kept @ kept.T
 
     def away(self, spectra: Spectrum) -> Spectrum:
         """Take the forces from ``[..., output, segment, line]``."""
         for known in self._unit:
-            spectra = spectra - known * np.sum(known.conj() * spectra, axis=-3, keepdims=True)
+            share = np.einsum("ol,...osl->...sl", known[:, 0].conj(), spectra)
+            spectra = spectra - known * share[..., None, :, :]
         return spectra
 
     def rest(self, spectra: Spectrum) -> Matrix:
         """Take forces and transients; give real numbers ``[..., number]``."""
-        real = _real(np.moveaxis(self.away(spectra), -2, -3))
-        left = real - (real @ self._basis) @ self._basis.T
+        real = _real(self.away(spectra))
+        left = real - (real @ self._basis @ self._kept) @ self._basis.T
         return np.asarray(left.reshape(*spectra.shape[:-3], -1), dtype=np.float64)
 
     def unknowns(self, residual: Spectrum) -> tuple[Matrix, list[Spectrum]]:
         """Best transients ``[state, segment]`` and forces ``[segment, line]`` for a residual."""
-        real = _real(np.moveaxis(self.away(residual), -2, -3))
         # What a force could print as well (a blow at the very start) is left to the force: of a transient that is
         # told by a thousandth of itself, noise would make almost anything.
         size = np.sqrt(np.sum(np.abs(self._transients) ** 2, axis=(1, 2, 3)))
         scale = np.where(size > 0, 1.0 / np.where(size > 0, size, 1.0), 0.0)
-        scaled = np.linalg.lstsq((self._stacked * scale[:, None]).T, real.T, rcond=_TOLD)[0]
+        ratio = np.where(self._scale > 0, scale / np.where(self._scale > 0, self._scale, 1.0), 0.0)
+        printed = self._basis.T @ _real(self.away(residual)).T
+        scaled = np.linalg.lstsq(self._upper * ratio, printed, rcond=_TOLD)[0]
         transient = np.asarray(scaled * scale[:, None], dtype=np.float64)
         if not len(self._patterns):
             return transient, []
-        left = residual - np.einsum("sok,sm->omk", self._transients[:, :, 0], transient)
+        left = residual - np.einsum("sol,sm->oml", self._transients[:, :, 0], transient, optimize=True)
         return transient, list(_forces(self._patterns, left))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Fit:
+    """A profile with what it was found by."""
+
+    profile: Profile
+    out: Elimination
+    residual: Spectrum
 
 
 def _forces(patterns: Spectrum, left: Spectrum) -> Spectrum:
@@ -127,16 +148,6 @@ def _orthonormal(patterns: Sequence[Spectrum]) -> list[Spectrum]:
     return basis
 
 
-def _range(matrix: Matrix) -> Matrix:
-    """Orthonormal basis of the columns' span; columns that print nothing or the same as others add nothing."""
-    size = np.linalg.norm(matrix, axis=0)
-    scaled = matrix[:, size > 0] / size[size > 0]
-    if not scaled.size:
-        return np.zeros((len(matrix), 0))
-    vectors, values, _ = np.linalg.svd(scaled, full_matrices=False)
-    return np.asarray(vectors[:, values > 1e-10 * values[0]], dtype=np.float64)
-
-
 def profiled(
     problem: LinearProblem,
     sites: Sequence[Site],
@@ -150,33 +161,32 @@ def profiled(
     Gauss and Newton steps within ``|z| <= limit`` on what is left (variable projection: Golub and Pereyra 1973),
     shortened while they don't improve.
     """
-    best = profile_at(problem, sites, start)
+    best = _fitted(problem, sites, start)
     for _ in range(iterations):
+        here = best.profile
         step, promised = _step(problem, best, limit)
         if (
-            best.misfit + best.prior / 2 - promised - (best.z + step) @ (best.z + step) / 2
-            < 1e-3 * best.expected**0.5
+            here.misfit + here.prior / 2 - promised - (here.z + step) @ (here.z + step) / 2
+            < 1e-3 * here.expected**0.5
         ):
             break
-        improved = _searched(problem, best, step)
+        improved = _searched(problem, here, step)
         if improved is None:
             break
         best = improved
-    return best
+    return best.profile
 
 
-def _step(problem: LinearProblem, here: Profile, limit: float | Matrix) -> tuple[Matrix, float]:
+def _step(problem: LinearProblem, fit: _Fit, limit: float | Matrix) -> tuple[Matrix, float]:
     """Solve the linearised problem within the bounds; give the step in z and the misfit that it promises."""
+    here = fit.profile
     z = here.z
-    view = problem.view(z)
-    out = Elimination([problem.pattern(view, site) for site in here.sites], problem.transients(view))
-    residual = problem.measured * problem.weight - problem.response(z, np.zeros_like(here.transient), ())
     # Where forces and transients are large, so is what the parameters do to them (Kaufman 1975).
     slopes = problem.slopes(z, here.transient, list(zip(here.sites, here.forces, strict=True)))
-    matrix, right = out.rest(slopes).T, out.rest(residual)
-    normal = matrix.T @ matrix + np.eye(z.size) / 2.0
-    moved = bounded_minimum(normal, matrix.T @ right - z / 2.0, -limit - z, limit - z)
-    return moved, float(np.sum((right - matrix @ moved) ** 2))
+    matrix, right = fit.out.rest(slopes), fit.out.rest(fit.residual)
+    normal = matrix @ matrix.T + np.eye(z.size) / 2.0
+    moved = bounded_minimum(normal, matrix @ right - z / 2.0, -limit - z, limit - z)
+    return moved, float(np.sum((right - moved @ matrix) ** 2))
 
 
 def bounded_minimum(normal: Matrix, toward: Matrix, low: Matrix, high: Matrix) -> Matrix:
@@ -193,11 +203,11 @@ def bounded_minimum(normal: Matrix, toward: Matrix, low: Matrix, high: Matrix) -
     return np.asarray(lsq_linear(root.T, right, bounds=bounds, method="bvls").x, dtype=np.float64)
 
 
-def _searched(problem: LinearProblem, best: Profile, step: Matrix) -> Profile | None:
+def _searched(problem: LinearProblem, best: Profile, step: Matrix) -> _Fit | None:
     share = 1.0
     for _ in range(4):
-        found = profile_at(problem, best.sites, best.z + share * step)
-        if found.cost < best.cost:
+        found = _fitted(problem, best.sites, best.z + share * step)
+        if found.profile.cost < best.cost:
             return found
         share *= 0.3
     return None
@@ -205,12 +215,16 @@ def _searched(problem: LinearProblem, best: Profile, step: Matrix) -> Profile | 
 
 def profile_at(problem: LinearProblem, sites: Sequence[Site], z: Matrix) -> Profile:
     """Profile at given parameters: only the forces and the transients are free."""
+    return _fitted(problem, sites, z).profile
+
+
+def _fitted(problem: LinearProblem, sites: Sequence[Site], z: Matrix) -> _Fit:
     view = problem.view(z)
     out = Elimination([problem.pattern(view, site) for site in sites], problem.transients(view))
     residual = np.asarray((problem.measured - view.forced()) * problem.weight, dtype=np.complex128)
     transient, forces = out.unknowns(residual)
     outputs, *others = problem.measured.shape
-    return Profile(
+    profile = Profile(
         sites=tuple(sites),
         z=z,
         transient=transient,
@@ -219,9 +233,10 @@ def profile_at(problem: LinearProblem, sites: Sequence[Site], z: Matrix) -> Prof
         expected=float(max(outputs - len(sites), 0) * np.prod(others)) or 1.0,
         prior=float(z @ z),
     )
+    return _Fit(profile=profile, out=out, residual=residual)
 
 
 def _real(spectra: Spectrum) -> Matrix:
-    """``[..., number]`` real and imaginary parts of ``[..., output, line]``."""
-    flat = spectra.reshape(*spectra.shape[:-2], -1)
-    return np.asarray(np.concatenate([flat.real, flat.imag], axis=-1), dtype=np.float64)
+    """``[..., segment, number]`` real and imaginary parts of ``[..., output, segment, line]``."""
+    flat = np.ascontiguousarray(np.swapaxes(spectra, -2, -3), dtype=np.complex128)
+    return flat.reshape(*flat.shape[:-2], -1).view(np.float64)

@@ -287,7 +287,9 @@ def _eliminated(own: Matrix, cross: Matrix, slope: Matrix) -> tuple[Matrix, Matr
         return np.zeros(cross.shape), np.zeros(0)
     if not np.all(np.isfinite(own)):
         return np.full(cross.shape, np.nan), np.full(len(own), np.nan)
-    solved = np.asarray(np.linalg.solve(own, np.column_stack([cross, slope])), dtype=np.float64)
+    # A start that prints nothing (a state that no sensor sees) stays where it is.
+    held = own + np.diag(1e-13 * np.diag(own) + 1e-300) + np.diag(np.where(np.diag(own) > 0, 0.0, 1.0))
+    solved = np.asarray(np.linalg.solve(held, np.column_stack([cross, slope])), dtype=np.float64)
     return solved[:, :-1], -solved[:, -1]
 
 
