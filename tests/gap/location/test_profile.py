@@ -1,0 +1,137 @@
+"""Forces of any shape recovered from simulated logs, at the right place and with the right parameters."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chladni.gap.location.profile import Elimination, bounded_minimum, profile_at, profiled
+from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.places import Site
+from chladni.gap.plant.record_lines import all_lines, segment_lines
+from chladni.gap.plant.tunable import Tunables
+from chladni.models.effects.attached_effect import attached
+from chladni.models.structures.structure_input import StructureInput
+from tests.gap.made_log import RATE_HZ, band_noise, chain, measured
+
+SAMPLES = 3000
+JOINTS = [Site(name=f"j{i}", kind="joint") for i in range(4)]
+
+
+def four_bodies():
+    return chain([2.0, 2.5, 3.0, 1.5], [5e5, 6e5, 4e5, 7e5], [40.0, 60.0, 50.0, 30.0], at=3)
+
+
+def lines_of(segments):
+    if segments:
+        return segment_lines(500, samples=SAMPLES, sample_rate_hz=RATE_HZ)
+    return all_lines(SAMPLES, RATE_HZ)
+
+
+def problem_of(true, *, segments=False, noise=0.01, signals=None, model=None):
+    """The log of `true` beside the plain chain, on its way when the record starts."""
+    signals = band_noise(SAMPLES) if signals is None else signals
+    initial = np.repeat([1e-4, 2e-2], 4) * np.random.default_rng(7).standard_normal(8)
+    log, floor = measured(true, signals, noise=noise, initial=initial)
+    model = four_bodies() if model is None else model
+    return LinearProblem(model, log, floor, Tunables.of(model), lines_of(segments))
+
+
+@pytest.mark.parametrize("segments", [False, True])
+def test_a_force_at_a_joint_is_found_there_and_nowhere_else(segments):
+    """A hardening spring in one joint: the profile of that joint leaves noise, all others leave much more."""
+    effect = attached("hardening_stiffness", "j2", {"cubic": 1e11})
+    problem = problem_of(four_bodies().with_effects([effect]), segments=segments)
+    chi = [profiled(problem, (site,), np.zeros(12), iterations=4).chi for site in JOINTS]
+    # Expected 1 with a spread of 1/sqrt(3 x 1499).
+    assert chi[2] == pytest.approx(1.0, abs=0.06)
+    assert min(chi[:2] + chi[3:]) > 10
+
+
+def test_a_known_force_is_recovered_line_by_line():
+    """A second input at a joint's body that the model hasn't: its spectrum, to what noise allows."""
+    # Long periodic, so that the record ends as it starts: a transient could be the work of a force as well.
+    period = np.vstack([band_noise(1000), band_noise(1000, seed=5, rms=60.0)]) * np.hanning(1000)
+    true = four_bodies()
+    true = replace(true, inputs=(*true.inputs, StructureInput(name="unknown", at="b1")))
+    log, floor = measured(true, np.tile(period, 15), noise=1e-6)
+    unknown = np.tile(period[1], 3)
+    log = replace(
+        log, inputs=log.inputs[:1, -unknown.size :], outputs=log.outputs[:, -unknown.size :], input_names=("hammer",)
+    )
+    model = four_bodies()
+    problem = LinearProblem(model, log, floor, Tunables.of(model), all_lines(unknown.size, RATE_HZ))
+    (found,) = profile_at(problem, (Site(name="b1", kind="body"),), np.zeros(12)).forces
+    force = problem.lines.spectrum(unknown[None])[0]
+    # Toward 0 Hz accelerometers tell neither a force nor a start: what counts is what they see of it.
+    seen = problem.pattern(problem.view(np.zeros(12)), Site(name="b1", kind="body"))
+    assert np.linalg.norm(seen * (found - force)) < 1e-4 * np.linalg.norm(seen * force)
+
+
+@pytest.mark.parametrize("sites", [(), (JOINTS[1],)])
+def test_parameters_off_by_one_and_a_half_sigma_are_found(sites):
+    """As far as the log tells them: their errors over the spread that Bayes allows are of size one."""
+    model = four_bodies()
+    tunables = Tunables.of(model)
+    z = 1.5 * np.where(np.random.default_rng(3).uniform(size=12) > 0.5, 1.0, -1.0)
+    problem = problem_of(model.with_values(tunables.values(z)), segments=True)
+    start = profiled(problem, sites, np.zeros(12), iterations=8)
+    record = problem.on(lines_of(False))
+    found = profiled(record, sites, start.z, iterations=6)
+    assert found.chi == pytest.approx(1.0, abs=0.06)
+    assert profile_at(record, sites, np.zeros(12)).chi > 10
+    slopes = record.slopes(found.z, found.transient, list(zip(found.sites, found.forces, strict=True)))
+    view = record.view(found.z)
+    rest = Elimination([record.pattern(view, site) for site in sites], record.transients(view)).rest(slopes)
+    covariance = np.linalg.inv(2 * rest @ rest.T + np.eye(12))
+    # Noise makes 12 squares of mean 1, the prior, 1.5 sigma off in each, at most 27 more: 39, with a spread of 11.5.
+    off = found.z - z
+    assert off @ np.linalg.solve(covariance, off) < 39 + 4 * 11.5
+    assert np.sum(np.sqrt(np.diag(covariance)) < 0.2) >= (6 if sites else 8)
+
+
+def test_what_is_eliminated_is_orthogonal_to_forces_and_transients():
+    problem = problem_of(four_bodies())
+    view = problem.view(np.zeros(12))
+    patterns = [problem.pattern(view, site) for site in (JOINTS[0], JOINTS[3])]
+    transients = problem.transients(view)
+    # A state that prints as another does, and one that prints nothing.
+    doubled = np.concatenate([transients, 3.0 * transients[:1], 0.0 * transients[:1]])
+    rng = np.random.default_rng(0)
+    shape = (4, 1, problem.lines.index.size)
+    spectra = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+    out = Elimination(patterns, doubled)
+    force = rng.standard_normal(shape[1:]) + 1j * rng.standard_normal(shape[1:])
+    printed = patterns[0] * force + 5 * patterns[1] * force.conj() + 2 * transients[3]
+    np.testing.assert_allclose(out.rest(spectra + printed), out.rest(spectra), atol=1e-8 * np.abs(printed).max())
+    assert np.abs(out.rest(printed)).max() < 1e-9 * np.abs(printed).max()
+    # Two complex numbers of four are left on each line, less the eight states.
+    assert np.sum(out.rest(spectra) ** 2) == pytest.approx(2 * (2 * shape[2]) - 8, rel=4 / np.sqrt(4 * shape[2]))
+    plain = Elimination(patterns, transients)
+    # What transients hardly print is told from the rest to the rounding over its share, 1e-10 at least.
+    np.testing.assert_allclose(plain.rest(spectra), out.rest(spectra), atol=1e-5)
+
+
+def test_transients_and_forces_are_taken_apart():
+    problem = problem_of(four_bodies(), segments=True)
+    view = problem.view(np.zeros(12))
+    pattern, transients = problem.pattern(view, JOINTS[1]), problem.transients(view)
+    out = Elimination([pattern], transients)
+    rng = np.random.default_rng(1)
+    size = 1.0 / np.linalg.norm(transients.reshape(8, -1), axis=1)
+    transient = size[:, None] * rng.standard_normal((8, len(problem.lines.starts)))
+    force = rng.standard_normal((len(problem.lines.starts), problem.lines.index.size)) + 0j
+    residual = np.einsum("sol,sm->oml", transients[:, :, 0], transient) + pattern * force
+    found, (recovered,) = out.unknowns(residual)
+    left = residual - np.einsum("sol,sm->oml", transients[:, :, 0], found) - pattern * recovered
+    assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(residual)
+
+
+def test_bounds_hold_and_bind_where_the_minimum_lies_outside():
+    normal = np.array([[2.0, 1.0], [1.0, 2.0]])
+    free = bounded_minimum(normal, np.array([3.0, 3.0]), np.full(2, -9.0), np.full(2, 9.0))
+    np.testing.assert_allclose(free, [1.0, 1.0], rtol=1e-12)
+    # With the first at its bound of 1/2 the other solves 2 x + 1/2 = 3.
+    bound = bounded_minimum(normal, np.array([3.0, 3.0]), np.full(2, -9.0), np.array([0.5, 9.0]))
+    np.testing.assert_allclose(bound, [0.5, 1.25], rtol=1e-12)
+    assert bounded_minimum(np.zeros((0, 0)), np.zeros(0), np.zeros(0), np.zeros(0)).size == 0
