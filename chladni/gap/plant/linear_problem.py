@@ -19,6 +19,8 @@ Matrix = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
 #: Of a tunable's sigma: small against curvature, large against rounding. Equations round less than responses.
 _STEP, _RESPONSE_STEP = 1e-5, 1e-4
+#: Complex numbers that slopes of some parameters at once may need beside their result: 64 MB.
+_AT_ONCE = 4_000_000
 
 
 class Scaled(Protocol):
@@ -108,17 +110,20 @@ class LinearProblem:
         if not z.size:
             return np.zeros((0, *self.measured.shape), dtype=np.complex128)
         view = self.view(z)
+        ways = [(self.way(view, site), force) for site, force in forces]
         # From the model at z each takes one new number.
         base = self.model.with_values(self.tunables.values(z))
         steps = z + _STEP * np.eye(z.size)
-        changed = [self._compile(base.with_values(self.tunables.values(moved))) for moved in steps]
-        ways = [(self.way(view, site), force) for site, force in forces]
-        plain = [place for place, one in enumerate(changed) if same_frame(view.compiled, one)]
         found = np.empty((z.size, *self.measured.shape), dtype=np.complex128)
-        slopes = view_slopes(view, [changed[place] for place in plain], _STEP, transient, ways)
-        found[plain] = slopes * self.weight
-        for place in set(range(z.size)) - set(plain):
-            found[place] = self._difference(z, place, transient, forces)
+        count = max(1, _AT_ONCE // (len(view.compiled.states) * self.measured[0].size))
+        for first in range(0, z.size, count):
+            places = range(first, min(first + count, z.size))
+            changed = {place: self._compile(base.with_values(self.tunables.values(steps[place]))) for place in places}
+            plain = [place for place in places if same_frame(view.compiled, changed[place])]
+            slopes = view_slopes(view, [changed[place] for place in plain], _STEP, transient, ways)
+            found[plain] = slopes * self.weight
+            for place in set(places) - set(plain):
+                found[place] = self._difference(z, place, transient, forces)
         return found
 
     def _difference(

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chladni.gap.plant import linear_problem
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import all_lines, segment_lines
@@ -145,3 +146,23 @@ def test_a_view_is_kept_for_its_parameters_and_no_others():
     np.testing.assert_array_equal(problem.view(z).compiled.a, first.compiled.a)
     # The same problem elsewhere starts anew.
     assert problem.on(segment_lines(150, samples=SAMPLES, sample_rate_hz=RATE_HZ)).view(z).lines.samples == 150
+
+
+def test_many_parameters_are_taken_some_at_a_time(monkeypatch):
+    """A model too large for all at once has the same slopes."""
+    problem = problem_of(three_bodies())
+    z, transient, forces = drawn(problem, [Site(name="j1", kind="joint")])
+    wanted = problem.slopes(z, transient, forces)
+    asked = []
+    plain = linear_problem.view_slopes
+
+    def counted(view, changed, *others):
+        asked.append(len(changed))
+        return plain(view, changed, *others)
+
+    monkeypatch.setattr(linear_problem, "view_slopes", counted)
+    monkeypatch.setattr(linear_problem, "_AT_ONCE", 4 * 6 * problem.lines.index.size)
+    np.testing.assert_allclose(
+        problem.slopes(z, transient, forces), wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max()
+    )
+    assert asked == [4, 4, 1]
