@@ -52,7 +52,7 @@ def rate_limit(scene: Scene, site: str) -> Draft:
     """A valve that moves no faster, and softly at its goal."""
     swift = scene.moving[f"{site}.u"] * 2 * pi * scene.bench.modes_hz[-1]
     return _draft("rate_limit", site, "slew", lambda size: {
-        "rate": 4.0 * swift / size, "tracking_time": 0.2 * scene.interval}, least=0.1, most=60.0)  # fmt: skip
+        "rate": 4.0 * swift / size, "tracking_time": 0.05 * scene.interval}, least=0.1, most=60.0)  # fmt: skip
 
 
 def input_ripple(scene: Scene, site: str) -> Draft:

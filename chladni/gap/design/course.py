@@ -1,6 +1,7 @@
 """One experiment in simulation: what every candidate predicts, and how far apart they are."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from chladni.gap.design.experiment import Experiment
 from chladni.gap.design.imitation import Part, sums_of
-from chladni.gap.design.rival import Rival
+from chladni.gap.design.rival import Prediction, Rival
 from chladni.gap.explanation.contest import SLACK
 from chladni.gap.plant.free_run import FreeRun, Windows
 from chladni.gap.records.measurement import Measurement
@@ -30,6 +31,8 @@ class Course:
         What the experiment's record would be like: names, rate, length.
     windows
         None in free run.
+    logged
+        The log's own course, whose slopes serve another level of it when slopes are slow; None for itself.
 
     Raises
     ------
@@ -38,17 +41,29 @@ class Course:
     """
 
     def __init__(
-        self, experiment: Experiment, rivals: Sequence[Rival], measurement: Measurement, windows: Windows | None
+        self,
+        experiment: Experiment,
+        rivals: Sequence[Rival],
+        measurement: Measurement,
+        windows: Windows | None,
+        logged: "Course | None" = None,
     ) -> None:
         self.experiment, self._rivals = experiment, rivals
         self._run = FreeRun(experiment.model, replace(measurement, inputs=experiment.inputs), windows=windows)
-        self._predictions = [rival.predicted(self._run, self._initial(rival)) for rival in rivals]
         self._kept: dict[tuple[int, int], Matrix] = {}
+        #: Of each candidate.
+        self.predictions: list[Prediction] = [self._predicted(place, logged) for place in range(len(rivals))]
+
+    def again(self, experiment: Experiment) -> "Course":
+        """Give an experiment with the same course, that is averaged or has more sensors."""
+        same = copy(self)
+        same.experiment = experiment
+        return same
 
     @property
     def outputs(self) -> Matrix:
         """``[output, sample]`` as the first candidate predicts them."""
-        return self._predictions[0].outputs
+        return self.predictions[0].outputs
 
     def part(
         self,
@@ -79,21 +94,30 @@ class Course:
             When it diverges there.
         """
         rows, gain = list(chosen), float(self.experiment.repeats)
-        wanted = self._predictions[pair[0]].outputs
+        wanted = self.predictions[pair[0]].outputs
         power = np.mean(noise.whitened(wanted)[rows] ** 2, axis=-1)
         sums = self._sums(noise, pair) if at is None else self._sums_at(noise, pair, at)
         return Part(gain * sums[:, rows], 1.0 + SLACK + gain * detail[rows] * power, wanted.shape[-1])
 
+    def _predicted(self, place: int, logged: "Course | None") -> Prediction:
+        rival, level = self._rivals[place], self.experiment.level
+        initial = self._initial(rival)
+        if logged is not None and level is not None and rival.is_slow(self._run):
+            return rival.scaled(self._run, initial, logged.predictions[place], level)
+        return rival.predicted(self._run, initial)
+
     def _sums(self, noise: NoiseFloor, pair: tuple[int, int]) -> Matrix:
         if pair not in self._kept:
-            wanted, prediction = (self._predictions[one] for one in pair)
+            wanted, prediction = (self.predictions[one] for one in pair)
             self._kept[pair] = sums_of(wanted.outputs, prediction, noise, self._run.windows)
         return self._kept[pair]
 
     def _sums_at(self, noise: NoiseFloor, pair: tuple[int, int], at: Matrix) -> Matrix:
         rival = self._rivals[pair[1]]
         prediction = rival.predicted(self._run, self._initial(rival), at)
-        return sums_of(self._predictions[pair[0]].outputs, prediction, noise, self._run.windows)
+        return sums_of(self.predictions[pair[0]].outputs, prediction, noise, self._run.windows)
 
     def _initial(self, rival: Rival) -> Matrix:
-        return np.asarray(self.experiment.start * rival.contestant.fit.initial, dtype=np.float64)
+        # Of a long log only the first windows are simulated.
+        initial = rival.contestant.fit.initial[: len(self._run.windows)]
+        return np.asarray(self.experiment.start * initial, dtype=np.float64)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.design.experiment import Change, Experiment
+from chladni.gap.plant.windows import windows_for
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.model import Model
 from chladni.models.excitations.random_noise import RandomNoise
@@ -56,21 +57,21 @@ class Reach:
         """``[input]`` RMS."""
         return np.asarray(np.sqrt(np.mean(self.measurement.inputs**2, axis=1)), dtype=np.float64)
 
-    def experiment(self, change: Change, words: str, inputs: Matrix, *, start: float = 0.0) -> Experiment:
+    def experiment(self, change: Change, words: str, inputs: Matrix, *, level: float | None = None) -> Experiment:
         """Give an experiment on the model as it is."""
-        start = start if self.begins_with_log else 0.0
-        return Experiment(change=change, words=words, model=self.model, inputs=inputs, start=start)
+        start = level if level is not None and self.begins_with_log else 0.0
+        return Experiment(change=change, words=words, model=self.model, inputs=inputs, level=level, start=start)
 
     def as_logged(self) -> Experiment:
         """Give the experiment that the log is."""
-        return self.experiment("nothing", "Repeat the same", self.measurement.inputs, start=1.0)
+        return self.experiment("nothing", "Repeat the same", self.measurement.inputs, level=1.0)
 
     def levels(self) -> Iterator[Experiment]:
         """Give the log's own excitation, louder and quieter, and averaged."""
         logged = self.as_logged()
         for factor in LEVELS:
             words = f"Repeat with {self._driven()} at {factor:g} times the level{self._told(factor * self.rms)}"
-            louder = self.experiment("level", words, factor * self.measurement.inputs, start=factor)
+            louder = self.experiment("level", words, factor * self.measurement.inputs, level=factor)
             # Twice is less to ask for than four times.
             yield replace(louder, further=0.5 * (abs(float(np.log2(factor))) - 1.0))
         for place, count in enumerate(_REPEATS):
@@ -110,7 +111,12 @@ class Reach:
                 yield replace(moved, model=replace(model, inputs=inputs))
 
     def _is_free(self) -> bool:
-        """Whether the inputs may take any course: forces and floors, not motions or what a loop should follow."""
+        """Whether the inputs may take any course: forces and floors, not motions or what a loop should follow.
+
+        Nor may those of an axis that is free: nothing would hold it where it can travel.
+        """
+        if windows_for(self.model, self.measurement) is not None:
+            return False
         derivatives = [one.derivatives for one in self.model.compile().inputs]
         closed = isinstance(self.model, StructureModel) and bool(self.model.controllers)
         return not closed and self.model.kind == "structure" and not any(derivatives) and bool(np.any(self.rms > 0))

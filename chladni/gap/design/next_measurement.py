@@ -1,8 +1,9 @@
 """The next measurement, as a sentence."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from chladni.gap.design.design import Design
+from chladni.gap.design.experiment import Change
 from chladni.gap.design.search import Search
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.tunable import Tunables
@@ -46,30 +47,68 @@ def next_measurement(
     str or None
         None when there's nothing to tell apart.
     """
-    if len(candidates) < 2:
+    distinct = different(candidates)
+    if len(distinct) < 2:
         return None
     try:
-        search = Search(study_model, measurement, tunables, candidates, noise, seed=seed)
+        search = Search(study_model, measurement, tunables, distinct, noise, seed=seed)
+        designs = search.best()
     except (ModelError, EstimateError):
         # Candidates that can't be simulated even with the log's own inputs have no next measurement.
         return None
-    return sentence(search.best(), candidates)
+    return sentence(designs, distinct, search.tried)
 
 
-def sentence(designs: Sequence[Design], candidates: Sequence[Contestant]) -> str | None:
-    """Write designs, the one to do first in front, as one sentence."""
+def different(candidates: Sequence[Contestant]) -> list[Contestant]:
+    """Give the best of those that name the same: variants of a law are one answer."""
+    found: dict[tuple[Candidate, ...], Contestant] = {}
+    for one in candidates:
+        found.setdefault(one.hypothesis.named, one)
+    return list(found.values())
+
+
+def sentence(designs: Sequence[Design], candidates: Sequence[Contestant], tried: Collection[Change]) -> str | None:
+    """Write designs, the one to do first in front, as one sentence.
+
+    Parameters
+    ----------
+    candidates
+        That are to be told apart.
+    tried
+        Kinds of changes that were looked at.
+
+    Returns
+    -------
+    str or None
+        None without a design, or when the model is right and nothing would tell of an effect that acts all the same.
+    """
     if not designs:
         return None
     first, both = designs[0], _apart(candidates)
     now = f"{first.now_sigmas:.2g}"
+    if not first.tells and not candidates[0].hypothesis.named:
+        return None
     if not first.tells:
         return (
-            f"No level up to 4 times, band, place of the input or one more sensor tells {both} apart: the best, "
-            f"'{first.words}', would bring them to {first.sigmas:.2g} sigma (now {now}); take them as one answer."
+            f"{_alternatives(tried)} tells {both} apart: the best, '{first.words}', would bring them to "
+            f"{first.sigmas:.2g} sigma (now {now}); take them as one answer."
         )
     more = [f"; or {_lowered(one.words)}: {one.sigmas:.2g} sigma" for one in designs[1:]]
     least = "at least " if len(candidates) > 2 else ""
     return f"{first.words}: {both} then differ by {least}{first.sigmas:.2g} sigma (now {now}){''.join(more)}."
+
+
+def _alternatives(tried: Collection[Change]) -> str:
+    """Say what was looked at."""
+    words: dict[Change, str] = {
+        "level": "level up to 4 times",
+        "repeats": "average of 16 records",
+        "band": "other band",
+        "sweep": "sweep",
+        "sensor": "further sensor",
+        "position": "other place of the input",
+    }
+    return "No " + " or ".join(word for change, word in words.items() if change in tried)
 
 
 def _apart(candidates: Sequence[Contestant]) -> str:

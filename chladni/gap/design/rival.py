@@ -9,6 +9,7 @@ from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.law_plant import Setting, fine_run, slopes_of
 from chladni.gap.plant.law_run import can_run
+from chladni.gap.plant.linear_run import is_plain
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.tuning.decay import decay
 from chladni.gap.tuning.effect_scale import EffectNumber, effect_numbers, with_numbers
@@ -79,14 +80,26 @@ class Rival:
         there, here = at - self.believed, -self.believed
         return float(0.5 * np.sum(self.sure * (there**2 - here**2)))
 
+    def is_slow(self, run: FreeRun) -> bool:
+        """Whether slopes take a run of the integrator each: dead time in a loop, laws before a late clock."""
+        compiled = run.compiled(self._z, self._effects)
+        return not (can_run(compiled) or is_plain(compiled))
+
     @property
     def unknowns(self) -> int:
         """How many numbers a refit would move."""
         return int(self.low.size)
 
-    def outputs(self, run: FreeRun, initial: Matrix) -> Matrix:
-        """Give ``[output, sample]`` of an experiment; `ModelError` when it diverges there."""
-        return run.outputs(self._z, self._effects, initial)
+    def scaled(self, run: FreeRun, initial: Matrix, logged: Prediction, level: float) -> Prediction:
+        """Predict the log's own course at another level, with slopes that grow as the level does.
+
+        Raises
+        ------
+        ModelError
+            When it diverges there.
+        """
+        outputs = run.outputs(self._z, self._effects, initial)
+        return Prediction(outputs, level * logged.own, logged.starts, logged.at)
 
     def predicted(self, run: FreeRun, initial: Matrix, at: Matrix | None = None) -> Prediction:
         """Predict an experiment.

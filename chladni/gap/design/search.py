@@ -2,29 +2,29 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.design.course import Course
 from chladni.gap.design.design import Design
-from chladni.gap.design.experiment import Experiment
+from chladni.gap.design.experiment import Change, Experiment
 from chladni.gap.design.experiments import Reach
 from chladni.gap.design.more_sensors import MoreSensor, more_sensors, with_noise_of, with_sensors
 from chladni.gap.design.rival import Rival
 from chladni.gap.design.separation import Record, Separation
 from chladni.gap.explanation.hypothesis import Contestant
-from chladni.gap.plant.free_run import Windows
+from chladni.gap.plant.free_run import FreeRun, Windows
 from chladni.gap.plant.tunable import Tunables
-from chladni.gap.plant.windows import windows_for
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
 from chladni.signals.errors import EstimateError, ModelError
 
 Matrix = NDArray[np.float64]
-#: Samples that are simulated of each experiment.
-_SAMPLES = 6000
+#: Samples that are simulated of each experiment; of candidates whose slopes are slow.
+_SAMPLES, _SLOW_SAMPLES = 6000, 2000
 #: Candidates that are compared.
 _RIVALS = 3
 #: Linear steps of the refits behind the numbers that are told.
@@ -69,23 +69,28 @@ class Search:
         seed: int,
     ) -> None:
         candidates = candidates[:_RIVALS]
+        #: Kinds of changes that `best` looked at.
+        self.tried: frozenset[Change] = frozenset()
         self._rivals = [Rival(one, tunables) for one in candidates]
         suspects = {named.site.split(".")[0] for one in candidates for named in one.hypothesis.named}
         self._sensors = more_sensors(model, measurement, suspects)
         self._own = tuple(range(len(measurement.output_names)))
-        stretch, begin, self._windows = _stretch(model, measurement, candidates)
-        self._duration_s = stretch.duration_s
+        # Their slopes are taken once, on the log's own course.
+        self._slow = any(one.is_slow(FreeRun(model, measurement)) for one in self._rivals)
+        self._passes = 1 if self._slow else _PASSES
+        stretch, begin, self._windows = _stretch(measurement, candidates, _SLOW_SAMPLES if self._slow else _SAMPLES)
+        self._duration_s = measurement.duration_s
         self._reach = Reach(
             model=with_sensors(model, self._sensors), measurement=stretch, begins_with_log=begin == 0, seed=seed
         )
         self._record = _with_rows(stretch, self._reach.model, self._sensors)
-        self._logged = self._course(self._reach.as_logged())
+        self._logged = Course(self._reach.as_logged(), self._rivals, self._record, self._windows)
         all_noise = with_noise_of(
             noise, measurement.output_units, self._record.output_units[len(self._own) :], self._logged.outputs
         )
         detail = _details(candidates[0], all_noise, self._logged.outputs)
         self._separation = Separation(self._rivals, all_noise, detail)
-        self.now_nats = self._nats([(self._logged, self._own)], _PASSES)
+        self.now_nats = self._nats([(self._logged, self._own)], self._passes)
 
     def best(self) -> tuple[Design, ...]:
         """Designs that tell the candidates apart, the least effort first; else the one that comes nearest.
@@ -93,9 +98,10 @@ class Search:
         At most two: one changes how the machine is driven, the other the sensors or the input's place.
         """
         tried = [*self._with_sensors(), *self._each(self._reach.levels())]
-        for more in (self._reach.courses, self._reach.positions):
+        for more in () if self._slow else (self._reach.courses, self._reach.positions):
             if not self._enough(tried):
                 tried += self._each(more())
+        self.tried = frozenset(one.design.change for one in tried)
         sure = self._confirmed(self._enough(tried))
         if sure:
             return tuple(sure)
@@ -134,7 +140,9 @@ class Search:
         return found
 
     def _course(self, experiment: Experiment) -> Course:
-        return Course(experiment, self._rivals, self._record, self._windows)
+        if experiment.change == "repeats":
+            return self._logged.again(experiment)
+        return Course(experiment, self._rivals, self._record, self._windows, self._logged)
 
     def _found(self, experiment: Experiment, course: Course, chosen: tuple[int, ...]) -> _Found:
         design = Design(
@@ -148,7 +156,7 @@ class Search:
         return _Found(design, course, chosen)
 
     def _precise(self, found: _Found) -> _Found:
-        nats = self._nats([(self._logged, self._own), (found.course, found.chosen)], _PASSES)
+        nats = self._nats([(self._logged, self._own), (found.course, found.chosen)], self._passes)
         return replace(found, design=replace(found.design, nats=nats))
 
     def _nats(self, records: list[Record], passes: int) -> float:
@@ -169,21 +177,27 @@ def _details(best: Contestant, noise: NoiseFloor, outputs: Matrix) -> Matrix:
 
 
 def _stretch(
-    model: Model, measurement: Measurement, candidates: Sequence[Contestant]
+    measurement: Measurement, candidates: Sequence[Contestant], most: int
 ) -> tuple[Measurement, int, Windows | None]:
     """Part of a log that stands for all of it: its first sample, and its windows."""
-    windows = windows_for(model, measurement)
-    if windows is not None:
-        kept = [one for one in windows if one[1] <= max(_SAMPLES, windows[0][1])]
+    windows = _windows(candidates[0], measurement.samples)
+    if len(windows) > 1:
+        kept = [one for one in windows if one[1] <= max(most, windows[0][1])]
         return _part(measurement, 0, kept[-1][1]), 0, tuple(kept)
     # What changes at a time of its own is seen in the whole log only.
     timed = any(named.effect == "varying_stiffness" for one in candidates for named in one.hypothesis.named)
-    count = measurement.samples if timed else min(_SAMPLES, measurement.samples)
+    count = measurement.samples if timed else min(most, measurement.samples)
     power = np.sum(measurement.outputs**2 / np.maximum(np.var(measurement.outputs, axis=1), 1e-300)[:, None], axis=0)
     begins = np.arange(0, measurement.samples - count + 1, count)
     loud = np.array([float(np.mean(power[begin : begin + count])) for begin in begins])
     begin = int(begins[np.argmin(np.abs(np.log(np.maximum(loud, 1e-300) / np.mean(power))))])
     return _part(measurement, begin, begin + count), begin, None
+
+
+def _windows(fitted: Contestant, samples: int) -> list[tuple[int, int]]:
+    """Windows of a fit, which are as long as each other: each has an initial state."""
+    edges = np.round(np.linspace(0, samples, len(fitted.fit.initial) + 1)).astype(int).tolist()
+    return list(pairwise(edges))
 
 
 def _part(measurement: Measurement, start: int, stop: int) -> Measurement:

@@ -36,7 +36,7 @@ def angles_deg(patterns: Spectrum, chosen: Sequence[int]) -> Matrix:
     Two sites that two sensors see apart, and one sensor alone doesn't:
 
     >>> patterns = np.array([[[1.0], [0.0]], [[1.0], [1.0]]], dtype=np.complex128)
-    >>> angles_deg(patterns, [0, 1]).round(6).tolist(), angles_deg(patterns, [0]).tolist()
+    >>> angles_deg(patterns, [0, 1]).round(3).tolist(), angles_deg(patterns, [0]).tolist()
     ([[0.0, 45.0], [45.0, 0.0]], [[0.0, 0.0], [0.0, 0.0]])
     """
     seen = patterns[:, list(chosen)]

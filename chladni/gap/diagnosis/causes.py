@@ -9,11 +9,17 @@ from numpy.typing import NDArray
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.candidates import screened
 from chladni.gap.explanation.degenerate import is_degenerate
-from chladni.gap.explanation.hypotheses import effect_hypotheses, hypothesis_of, wrong_parameters
+from chladni.gap.explanation.hypotheses import (
+    effect_hypotheses,
+    hypothesis_of,
+    polished,
+    with_siblings,
+    wrong_parameters,
+)
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.lattice import Lattice, lattice_of
 from chladni.gap.explanation.shaken_ground import follows_inputs
-from chladni.gap.location.locate import Located, locate
+from chladni.gap.location.locate import Located, locate, located_pairs
 from chladni.gap.location.recovered import recovered
 from chladni.gap.records.diagnosis import Candidate, Verdict
 from chladni.signals.errors import EstimateError
@@ -30,6 +36,8 @@ EXPLAINS = 0.8
 _CLEAN = 1.6
 #: A first effect that leaves less than this, over the noise's power, is alone.
 _ALONE = 1.3
+#: Two forces must leave less than this of what one leaves.
+_PAIR_GAIN = 0.6
 #: A floor that shakes: how well the place must explain, by what factor better than any other, and how little of the
 #: recovered motion may follow the inputs.
 _SHAKEN_CHI, _SHAKEN_MARGIN, _SHAKEN_COHERENCE = 1.5, 1.1, 0.5
@@ -73,7 +81,11 @@ def causes_of(study: Study, progress: Step) -> Causes:
     ranked = _ranked(study, progress)
     best = ranked[0] if ranked and ranked[0].log_evidence > nothing.log_evidence + NAMED else nothing
     if best.hypothesis.effects and best.chi > _ALONE:
-        best = _with_second(study, best)
+        best = _polished(study, best)
+        if best.chi > _ALONE:
+            best = _with_second(study, best)
+    if max(best.chi, nothing.chi if best is nothing else 0.0) > _ALONE:
+        best = _better_pair(study, best)
     progress(1.0)
     lattices = _lattices(study)
     verdict = _verdict(study, nothing, best)
@@ -106,7 +118,11 @@ def noise_gap(study: Study) -> float:
 
 
 def _nothing(study: Study) -> Contestant:
-    found = study.contest.enter(Hypothesis(start_z=study.location.tuned.z), max_iterations=20)
+    contest = study.contest
+    found = contest.enter(Hypothesis(start_z=study.location.tuned.z), max_iterations=20)
+    if found is None:
+        # Too sensitive to be fitted in free run: what the linear part said of the parameters has to do.
+        found = contest.enter(Hypothesis(start_z=study.location.tuned.z), tune=False)
     if found is None:
         raise EstimateError(
             f"model {study.model.name!r} diverges on log {study.measurement.log!r} within its tolerances; "
@@ -119,8 +135,8 @@ def _ranked(study: Study, progress: Step) -> list[Contestant]:
     location, contest = study.location, study.contest
     candidates = screened(location, location.ranked, study.leave_out, study.own)
     progress(0.3)
-    hypotheses = effect_hypotheses(candidates, study.own, count=_FITTED)
-    wrong = wrong_parameters(location)
+    hypotheses = with_siblings(effect_hypotheses(candidates, study.own, count=_FITTED), study.leave_out)
+    wrong = wrong_parameters(location, heavier_is_added="added_mass" not in study.leave_out)
     entered = contest.enter_all([*hypotheses, *([wrong] if wrong else [])], lambda done: progress(0.3 + 0.5 * done))
     sound = [one for one in entered if not is_degenerate(contest.run, one)]
     return sorted(sound, key=lambda one: -one.log_evidence)
@@ -143,6 +159,36 @@ def _with_second(study: Study, first: Contestant) -> Contestant:
     entered = [one for one in contest.enter_all(both) if not is_degenerate(contest.run, one)]
     best = max(entered, key=lambda one: one.log_evidence, default=first)
     return best if best.log_evidence > first.log_evidence + ADDED else first
+
+
+def _polished(study: Study, found: Contestant) -> Contestant:
+    """Let the details of the laws move too: creep, presliding, shape; kept when that pays."""
+    finer = polished(found.hypothesis, found.fit.effects, found.fit.z)
+    entered = study.contest.enter(finer) if finer is not None else None
+    if entered is None or is_degenerate(study.contest.run, entered):
+        return found
+    return entered if entered.log_evidence > found.log_evidence else found
+
+
+def _better_pair(study: Study, best: Contestant) -> Contestant:
+    """Look for two effects at two places at once, which one after the other may miss."""
+    pairs = located_pairs(study.location)
+    single = study.location.ranked[0].profile.chi if study.location.ranked else 0.0
+    if not pairs or pairs[0].profile.chi > _PAIR_GAIN * single:
+        return best
+    forms = []
+    for place in pairs[0].places:
+        sites = {site.name for site in place.sites}
+        found = screened(study.location, pairs[:1], study.leave_out, study.own)
+        forms.append(effect_hypotheses([one for one in found if one.trial.site.name in sites], study.own, count=2))
+    both = [
+        hypothesis_of((*first.effects, *second.effects), pairs[0].profile.z)
+        for first in forms[0]
+        for second in forms[1]
+    ]
+    entered = [one for one in study.contest.enter_all(both) if not is_degenerate(study.contest.run, one)]
+    found_best = max(entered, key=lambda one: one.log_evidence, default=best)
+    return found_best if found_best.log_evidence > best.log_evidence + ADDED else best
 
 
 def _shaken(study: Study) -> Located | None:

@@ -1,6 +1,7 @@
 """The whole diagnosis of a model and its logs."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from chladni.gap.diagnosis.closing import closing_of
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
 from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.explanation.shaken_ground import predicted_by_others
+from chladni.gap.location.profile import profile_at
 from chladni.gap.location.recovered import Recovered, recovered
 from chladni.gap.plant.places import Site
 from chladni.gap.records.diagnosis import (
@@ -25,6 +27,7 @@ from chladni.gap.records.diagnosis import (
     Where,
 )
 from chladni.gap.records.measurement import Measurement
+from chladni.gap.tuning.output_error import fit_output_error
 from chladni.models.core.model import Model
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.signals.errors import EstimateError, ModelError
@@ -83,8 +86,6 @@ def _silent(_step: str, _share: float) -> None:
 
 
 def _with_levels(found: Diagnosis, levels: tuple[str, ...]) -> Diagnosis:
-    from dataclasses import replace
-
     return replace(found, levels=levels)
 
 
@@ -95,7 +96,7 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
     after = shown.fit.outputs
     if causes.shaken is not None:
         after = predicted_by_others(study.location.problem, causes.shaken.profile)
-    motion = _evidence(study, said)
+    motion = _evidence(study, causes, said)
     distortion = _distortion(study.measurement)
     return Diagnosis(
         model=study.model.name,
@@ -120,8 +121,6 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
 def _nominal(study: Study) -> Matrix:
     """Free run of the nominal model from the initial state that suits it best."""
     run, contest = study.contest.run, study.contest
-    from chladni.gap.tuning.output_error import fit_output_error
-
     try:
         return fit_output_error(run, contest.noise, training=contest.training, tune=False).outputs
     except ModelError:
@@ -148,15 +147,15 @@ def _where(study: Study, before: Matrix, motion: Recovered | None) -> Where:
     )
 
 
-def _evidence(study: Study, said: Sequence[Cause]) -> Recovered | None:
-    """Force and motion at the named site, else at the best place."""
+def _evidence(study: Study, causes: Causes, said: Sequence[Cause]) -> Recovered | None:
+    """Force and motion at the named site, else at the best place, with the parameters that are believed."""
     problem = study.location.problem
-    if not study.location.ranked:
-        return None
     for located in study.location.ranked:
         for site in located.places[0].sites:
-            if not said or site.name == said[0].site:
-                return recovered(problem, located.profile, site)
+            if said and site.name != said[0].site:
+                continue
+            z = located.profile.z if causes.best is causes.tuned else causes.best.fit.z
+            return recovered(problem, profile_at(problem, (site,), z), site)
     return None
 
 

@@ -52,7 +52,7 @@ class Contest:
     def __init__(self, run: FreeRun, noise: NoiseFloor, training: Mask) -> None:
         self.run, self.noise, self.training = run, noise, training
 
-    def enter(self, hypothesis: Hypothesis, *, max_iterations: int = 12) -> Contestant | None:
+    def enter(self, hypothesis: Hypothesis, *, max_iterations: int = 12, tune: bool = True) -> Contestant | None:
         """Fit a hypothesis; None when its start already diverges."""
         try:
             fit = fit_output_error(
@@ -60,9 +60,9 @@ class Contest:
                 effects=hypothesis.effects, fitted=hypothesis.fitted or None, training=self.training,
                 start_z=np.clip(hypothesis.start_z, -3.0, 3.0) if not hypothesis.wide else hypothesis.start_z,
                 z_limit={name: hypothesis.wide.get(name, 3.0) for name in self.run.tunables.names},
-                max_iterations=max_iterations,
+                max_iterations=max_iterations, tune=tune,
             )  # fmt: skip
-        except (ModelError, EstimateError):
+        except (ModelError, EstimateError, np.linalg.LinAlgError):
             return None
         return self.judged(hypothesis, fit)
 

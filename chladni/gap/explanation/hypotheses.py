@@ -18,6 +18,17 @@ from chladni.signals.errors import ModelError
 Matrix = NDArray[np.float64]
 #: A parameter outside of this many sigmas is wrong, not uncertain.
 OUTSIDE = 3.0
+#: Numbers that shape a law without naming it: fitted only when that pays.
+_DETAILS: Mapping[str, tuple[str, ...]] = {
+    "coulomb_friction": ("offset", "creep_speed", "presliding"),
+    "stribeck_friction": ("creep_speed", "presliding", "bristle_damping"),
+    "hysteresis": ("shape",),
+    "one_sided_stop": ("dissipation",),
+    "varying_stiffness": ("rise",),
+    "rate_limit": ("tracking_time",),
+    "ripple": ("phase",),
+    "tonal_disturbance": ("phase",),
+}
 #: How far one may be searched for outside its tolerance, in sigmas.
 _FAR = 15.0
 
@@ -73,16 +84,61 @@ def effect_of(one: Screened, own: Mapping[str, EffectKind]) -> AttachedEffect | 
     return replace(plain, values=values)
 
 
-def wrong_parameters(location: Location, *, most: int = 2) -> Hypothesis | None:
+def with_siblings(found: Sequence[Hypothesis], leave_out: frozenset[str]) -> list[Hypothesis]:
+    """Add to the best Coulomb friction the Stribeck friction that begins where it stands: nested laws compete."""
+    if "stribeck_friction" in leave_out:
+        return list(found)
+    first = next((one for one in found if one.effects[0].effect == "coulomb_friction"), None)
+    if first is None:
+        return list(found)
+    (plain,) = first.effects
+    force = plain.values["force"]
+    added = []
+    for variant, detail in (("bristle", "presliding"), ("regularised", "creep_speed")):
+        if detail not in plain.values:
+            continue
+        for speed in (0.2, 1.0):
+            values = {"coulomb": 0.9 * force, "static": 1.3 * force, detail: plain.values[detail]}
+            reach = plain.values[detail] * (300.0 if detail == "creep_speed" else 3e4)
+            added.append(
+                attached("stribeck_friction", plain.site, {**values, "speed": speed * reach}, variant=variant)
+            )
+    return [*found, *(hypothesis_of((one,), first.start_z, screened=first.screened) for one in added)]
+
+
+def polished(coarse: Hypothesis, effects: tuple[AttachedEffect, ...], z: Matrix) -> Hypothesis | None:
+    """Give the hypothesis with the details of the laws free too, starting from a fit; None when there are none."""
+    fitted = tuple(
+        (*usually_fitted(effect), *(name for name in _DETAILS.get(effect.effect, ()) if name in effect.values))
+        for effect in effects
+    )
+    if fitted == coarse.fitted or not effects:
+        return None
+    return replace(coarse, effects=effects, fitted=fitted, start_z=np.clip(z, -OUTSIDE, OUTSIDE))
+
+
+def wrong_parameters(location: Location, *, most: int = 2, heavier_is_added: bool = True) -> Hypothesis | None:
     """Give the hypothesis that a few parameters are outside of their tolerance, None when none goes there.
 
     All may go far at first; those that do stay free, the others are held within their tolerance again.
+
+    Parameters
+    ----------
+    most
+        Parameters at once.
+    heavier_is_added
+        Whether a body that is heavier than its tolerance allows is left to the effect ``added_mass``.
     """
     problem, names = location.problem, location.problem.tunables.names
     steps = (*location.segments, problem)
     far = tuned_stepwise(steps, np.zeros(len(names)), _FAR)
     order = np.argsort(-np.abs(far.z))
     outside = [int(place) for place in order if abs(far.z[place]) > OUTSIDE]
+    if heavier_is_added:
+        # A body heavier than its tolerance carries something: that is an effect, not a wrong value.
+        outside = [
+            place for place in outside if not (names[place].endswith((".mass", ".inertia")) and far.z[place] > 0)
+        ]
     if not outside:
         return None
     best = None

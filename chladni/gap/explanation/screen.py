@@ -15,6 +15,8 @@ from chladni.gap.plant.places import Site
 
 Matrix = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
+#: Beyond this, whitened, a force is no force but a law that left the numbers; its square still is one.
+_RUNAWAY = 1e100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +125,7 @@ class Screen:
         basis = self._printed(force.basis)
         rest = self._rest if force.fixed is None else self._rest - self._printed(force.fixed[None])[0]
         # A law that ran away along the recovered motion prints nothing that could be weighed.
-        if not (np.all(np.isfinite(basis)) and np.all(np.isfinite(rest))):
+        if not (np.all(np.abs(basis) < _RUNAWAY) and np.all(np.abs(rest) < _RUNAWAY)):
             return None
         amplitudes, misfit, z = self._solved(basis, rest)
         values = trial.values(shape, amplitudes)

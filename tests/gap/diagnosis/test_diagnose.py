@@ -1,0 +1,110 @@
+"""A hidden cause in a small machine is named, at its site, with its size; where there's none, none is named."""
+
+import json
+
+import numpy as np
+import pytest
+
+import chladni
+from chladni.apps.gap_document import gap_document
+from chladni.gap.diagnosis.diagnose import diagnose
+from chladni.gap.records.diagnosis import Diagnosis
+from chladni.signals.errors import EstimateError
+from tests.gap.arm import arm, measured, with_outputs
+
+FRICTION = chladni.attached("coulomb_friction", "elbow", {"force": 20.0})
+
+
+@pytest.fixture(scope="module")
+def friction() -> Diagnosis:
+    return diagnose(arm(), [measured((FRICTION,))])
+
+
+def test_friction_is_named_with_its_force(friction: Diagnosis) -> None:
+    assert friction.verdict == "effect"
+    (cause,) = friction.causes
+    assert (cause.effect, cause.site) == ("coulomb_friction", "elbow")
+    assert cause.probability > 0.9
+    assert cause.parameters["force"].value == pytest.approx(20.0, rel=0.05)
+
+
+def test_the_gap_closes_to_the_noise(friction: Diagnosis) -> None:
+    assert friction.gap.before > 0.1
+    # Held-out samples of one noise: its level is known to about one in the root of their number.
+    assert friction.gap.after == pytest.approx(friction.gap.noise, rel=0.1)
+    assert friction.gap.closed is not None
+    assert friction.gap.closed > 0.98
+    low, high = friction.gap.interval or (0.0, 0.0)
+    assert low <= friction.gap.closed <= high
+
+
+def test_the_recovered_force_follows_the_law(friction: Diagnosis) -> None:
+    found = friction.restoring_force
+    assert found is not None
+    assert found.site == "elbow"
+    assert found.law_force is not None
+    inside = slice(500, -500)
+    assert np.corrcoef(found.force[inside], found.law_force[inside])[0, 1] > 0.8
+
+
+def test_the_same_input_gives_the_same_document(friction: Diagnosis) -> None:
+    again = diagnose(arm(), [measured((FRICTION,))])
+    assert json.dumps(gap_document(again)) == json.dumps(gap_document(friction))
+
+
+@pytest.mark.parametrize(
+    ("effect", "site", "values"),
+    [
+        ("hardening_stiffness", "hand", {"cubic": 3e10}),
+        ("saturation", "shaker", {"limit": 120.0}),
+        ("delay", "shaker", {"delay": 2.3e-3}),
+        ("gain_error", "acc_arm", {"gain": 1.2}),
+        ("time_offset", "acc_column", {"offset": 1.4e-3}),
+    ],
+)
+def test_each_kind_of_site(effect: str, site: str, values: dict[str, float]) -> None:
+    found = diagnose(arm(), [measured((chladni.attached(effect, site, values),), seed=3)])
+    assert [(one.effect, one.site) for one in found.causes] == [(effect, site)]
+    for name, value in values.items():
+        assert found.causes[0].parameters[name].value == pytest.approx(value, rel=0.1)
+
+
+def test_a_body_that_is_too_heavy_carries_something() -> None:
+    found = diagnose(arm(), [measured((chladni.attached("added_mass", "arm", {"mass": 2.0}),), seed=3, off={})])
+    assert [(one.effect, one.site) for one in found.causes] == [("added_mass", "arm")]
+    # What is carried and what the body may weigh within its tolerance are one number to any sensor.
+    assert found.causes[0].parameters["mass"].value + found.tuned_parameters["arm.mass"].value == pytest.approx(
+        6.0, rel=0.02
+    )
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.9])
+def test_noise_alone_names_nothing(colour: float) -> None:
+    found = diagnose(arm(), [measured(seed=5, colour=colour)])
+    assert found.verdict == "none"
+    assert not found.causes
+    assert found.gap.tuned == pytest.approx(found.gap.noise, rel=0.1)
+
+
+def test_a_stiffness_far_outside_its_tolerance_is_a_parameter() -> None:
+    found = diagnose(arm(), [measured(off={"elbow.stiffness": 1.5}, seed=6)])
+    assert found.verdict == "parameters"
+    assert [(one.effect, one.site) for one in found.causes] == [("parameter", "elbow.stiffness")]
+    assert found.tuned_parameters["elbow.stiffness"].value == pytest.approx(3e5, rel=0.02)
+
+
+def test_without_its_word_the_cause_is_unknown_or_of_its_family() -> None:
+    stop = chladni.attached("one_sided_stop", "hand", {"stiffness": 5e5, "clearance": 1e-4})
+    found = diagnose(arm(), [measured((stop,), seed=7)], leave_out=frozenset({"one_sided_stop"}))
+    siblings = {"hardening_stiffness", "softening_stiffness", "backlash", "varying_stiffness"}
+    assert found.verdict == "unknown" or {one.effect for one in found.causes} <= siblings
+
+
+def test_one_sensor_is_said_to_limit_the_answer() -> None:
+    found = diagnose(arm(), [with_outputs(measured((FRICTION,)), ["acc_wrist"])])
+    assert any("one output only" in remark for remark in found.remarks)
+
+
+def test_no_measurement_is_refused() -> None:
+    with pytest.raises(EstimateError, match="no measurement"):
+        diagnose(arm(), [])
