@@ -36,6 +36,8 @@ EXPLAINS = 0.8
 _CLEAN = 1.6
 #: A first effect that leaves less than this, over the noise's power, is alone.
 _ALONE = 1.3
+#: A best fit that leaves more than this has details of laws worth a fit, those of the first few.
+_DETAILED, _POLISHED = 1.1, 4
 #: Two forces must leave less than this of what one leaves.
 _PAIR_GAIN = 0.6
 #: A floor that shakes: how well the place must explain, by what factor better than any other, and how little of the
@@ -81,9 +83,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
     ranked = _ranked(study, progress)
     best = ranked[0] if ranked and ranked[0].log_evidence > nothing.log_evidence + NAMED else nothing
     if best.hypothesis.effects and best.chi > _ALONE:
-        best = _polished(study, best)
-        if best.chi > _ALONE:
-            best = _with_second(study, best)
+        best = _with_second(study, best)
     if max(best.chi, nothing.chi if best is nothing else 0.0) > _ALONE:
         best = _better_pair(study, best)
     progress(1.0)
@@ -139,7 +139,11 @@ def _ranked(study: Study, progress: Step) -> list[Contestant]:
     wrong = wrong_parameters(location, heavier_is_added="added_mass" not in study.leave_out)
     entered = contest.enter_all([*hypotheses, *([wrong] if wrong else [])], lambda done: progress(0.3 + 0.5 * done))
     sound = [one for one in entered if not is_degenerate(contest.run, one)]
-    return sorted(sound, key=lambda one: -one.log_evidence)
+    ranked = sorted(sound, key=lambda one: -one.log_evidence)
+    if ranked and ranked[0].chi > _DETAILED:
+        # A detail of its law that was set by the screen's grid must not cost a word its place.
+        ranked = [_polished(study, one) for one in ranked[:_POLISHED]] + ranked[_POLISHED:]
+    return sorted(ranked, key=lambda one: -one.log_evidence)
 
 
 def _with_second(study: Study, first: Contestant) -> Contestant:

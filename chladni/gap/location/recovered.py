@@ -88,15 +88,21 @@ def recovered(problem: LinearProblem, found: Profile, site: Site) -> Recovered:
     whole = problem.on(lines)
     view = whole.view(found.z)
     pattern = whole.pattern(view, site)[:, 0]
-    residual = (whole.measured - view.response(found.transient, ())) * whole.weight
+    residual = ((whole.measured - view.forced()) * whole.weight)[:, 0]
+    transients = whole.transients(view)[:, :, 0]
     strength = np.sum(np.abs(pattern) ** 2, axis=0)
-    plain = np.sum(pattern.conj() * residual[:, 0], axis=0) / np.where(strength > 0, strength, np.inf)
     noise = 1.0 / np.where(strength > 0, strength, 1e-300)
-    # Neighbours count by how well they tell the force: where a pattern fades, as that of a force on accelerometers
-    # does toward 0 Hz, those that still see it speak for those that don't.
-    say = 1.0 / noise**2
-    power = np.maximum(_smooth(say * (np.abs(plain) ** 2 - noise)) / np.maximum(_smooth(say), 1e-300), 0.0)
-    reliable = power / (power + noise)
+    transient = found.transient
+    for _ in range(2):
+        left = residual - np.tensordot(transient[:, 0], transients, axes=1)
+        plain = np.sum(pattern.conj() * left, axis=0) * noise
+        # Neighbours count by how well they tell the force: where a pattern fades, as that of a force on
+        # accelerometers does toward 0 Hz, those that still see it speak for those that don't.
+        say = 1.0 / noise**2
+        power = np.maximum(_smooth(say * (np.abs(plain) ** 2 - noise)) / np.maximum(_smooth(say), 1e-300), 0.0)
+        reliable = power / (power + noise)
+        # What force and transient could both print goes to whichever needs less of itself for it.
+        transient = _transient(transients, pattern, residual, reliable * noise)
     force = (reliable * plain)[None]
     way = whole.way(view, site)
     if site.kind == "output" and way.port is None:
@@ -106,7 +112,7 @@ def recovered(problem: LinearProblem, found: Profile, site: Site) -> Recovered:
         row = measurement.input_names.index(site.name)
         displacement, velocity = measurement.inputs[row], np.zeros(lines.samples)
     else:
-        motion = view.motion(view.compiled.port_index(site.name, site.kind), found.transient, [(way, force)])
+        motion = view.motion(view.compiled.port_index(site.name, site.kind), transient, [(way, force)])
         displacement, velocity = (lines.signal(one)[0] for one in motion)
     return Recovered(
         site=site,
@@ -116,8 +122,25 @@ def recovered(problem: LinearProblem, found: Profile, site: Site) -> Recovered:
         velocity=velocity,
         reliable=reliable,
         z=found.z,
-        transient=found.transient,
+        transient=transient,
     )
+
+
+def _transient(transients: Spectrum, pattern: Spectrum, residual: Spectrum, held: Matrix) -> Matrix:
+    """Best transients ``[state, 1]`` when the force is random with a known power, by weighted least squares.
+
+    Parameters
+    ----------
+    held
+        ``[line]`` share of what lies along the pattern that the force takes, over the pattern's square.
+    """
+    along = np.sum(pattern.conj() * transients, axis=1)
+    weighted = transients - pattern * (held * along)[:, None]
+    normal = np.einsum("aol,bol->ab", weighted.conj(), transients).real
+    toward = np.einsum("aol,ol->a", weighted.conj(), residual).real
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    scaled = np.linalg.lstsq(normal / size[:, None] / size, toward / size, rcond=1e-9)[0]
+    return np.asarray(scaled / size, dtype=np.float64)[:, None]
 
 
 def _smooth(power: Matrix) -> Matrix:
