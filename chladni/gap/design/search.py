@@ -24,7 +24,9 @@ from chladni.signals.errors import EstimateError, ModelError
 
 Matrix = NDArray[np.float64]
 #: Samples that are simulated of each experiment; of candidates whose slopes are slow.
-_SAMPLES, _SLOW_SAMPLES = 6000, 2000
+_SAMPLES, _SLOW_SAMPLES = 6000, 4000
+#: Share of a stretch from the middle of a log over which its inputs are faded in.
+_FADE = 0.1
 #: Candidates that are compared.
 _RIVALS = 3
 #: Linear steps of the refits behind the numbers that are told.
@@ -191,7 +193,12 @@ def _stretch(
     begins = np.arange(0, measurement.samples - count + 1, count)
     loud = np.array([float(np.mean(power[begin : begin + count])) for begin in begins])
     begin = int(begins[np.argmin(np.abs(np.log(np.maximum(loud, 1e-300) / np.mean(power))))])
-    return _part(measurement, begin, begin + count), begin, None
+    part = _part(measurement, begin, begin + count)
+    if begin:
+        # From rest in the middle of a course: a jump would shake all modes as the log never did.
+        fade = np.minimum(np.arange(count) / (_FADE * count), 1.0)
+        part = replace(part, inputs=part.inputs * np.sin(0.5 * np.pi * fade) ** 2)
+    return part, begin, None
 
 
 def _windows(fitted: Contestant, samples: int) -> list[tuple[int, int]]:

@@ -139,6 +139,17 @@ def test_an_experiment_in_which_a_candidate_diverges_is_never_asked_for(hardenin
     assert not search._each([replace(logged, inputs=1e200 * logged.inputs)])
 
 
+def test_a_stretch_from_the_middle_of_a_long_log_is_faded_in():
+    # Nothing in the first 6000 samples: they don't stand for the log.
+    signals = np.concatenate([np.zeros((1, 6000)), band_noise(7000) + 500.0], axis=1)
+    arguments = contested(
+        attached("gain_error", "a0", {"gain": 1.2}), wrong(""), wrong("j1.stiffness"), signals=signals
+    )
+    inputs = Search(*arguments, seed=1)._reach.measurement.inputs[0]
+    assert inputs[0] == 0.0
+    np.testing.assert_array_equal(inputs[600:], signals[0, 6600:12000])
+
+
 def test_a_free_axis_is_compared_in_windows():
     model = axis()
     true = model.with_effects((attached("coulomb_friction", "guide", {"force": 3.0}),))
