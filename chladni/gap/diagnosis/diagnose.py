@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from chladni.gap.comparison.distortion import distortion_of
 from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, regime_shares
+from chladni.gap.design.next_measurement import next_measurement
+from chladni.gap.design.what_is_missing import what_is_missing
 from chladni.gap.diagnosis.causes import Causes, causes_of
 from chladni.gap.diagnosis.closing import closing_of
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
@@ -34,6 +36,8 @@ from chladni.signals.errors import EstimateError, ModelError
 
 Matrix = NDArray[np.float64]
 StepProgress = Callable[[str, float], None]
+#: Nats within which a further measurement is worth a thought.
+_STILL_CLOSE = 8.0
 
 
 def diagnose(
@@ -109,6 +113,7 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
             study, before, causes.tuned.fit.outputs, after, cross_sensor=causes.shaken is not None, seed=seed
         ),
         tuned_parameters=tuned_numbers(study, shown.fit),
+        next_measurement=_next(study, causes, seed),
         naive=naive_of(causes),
         remarks=tuple(_remarks(study, causes)),
         advice=_advice(causes),
@@ -241,6 +246,24 @@ def _remarks(study: Study, causes: Causes) -> list[str]:
     if np.any(study.contest.noise.upper_bound):
         found.append("the noise floor of some outputs is an upper bound: distortion may be in it")
     return found
+
+
+def _next(study: Study, causes: Causes, seed: int) -> str | None:
+    """What to measure so that the answer gets clearer, None when it's clear or nothing would help."""
+    run = study.contest.run
+    if causes.shaken is not None:
+        return None
+    close = [one for one in (*causes.ranked, causes.tuned) if len(one.hypothesis.named) <= 1]
+    close = sorted(close, key=lambda one: -one.log_evidence)
+    near = [one for one in close if one.log_evidence > close[0].log_evidence - _STILL_CLOSE]
+    if causes.verdict != "unknown" and len(near) > 1 and close[0] is not causes.tuned:
+        return next_measurement(
+            study.model, study.measurement, run.tunables, near[:4], study.contest.noise, seed=seed
+        )
+    if causes.verdict == "unknown":
+        sites = [located.places[0].sites[0].name for located in study.location.ranked[:3]]
+        return what_is_missing(study.model, study.measurement, study.contest.noise, sites=sites)
+    return None
 
 
 def _advice(causes: Causes) -> str | None:

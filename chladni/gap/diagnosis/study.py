@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
+from chladni.gap.comparison.quiet_floor import quiet_floor
 from chladni.gap.explanation.contest import Contest, training_mask
 from chladni.gap.location.locate import Location, locate
 from chladni.gap.plant.free_run import FreeRun
@@ -67,6 +68,8 @@ def study_of(
     """Prepare the study of one log."""
     measurement = with_period(measurement)
     noise = estimate_noise(measurement)
+    if len(measurement.output_names) < 2 and noise.upper_bound.any():
+        noise = quiet_floor(measurement)
     location = locate(model, measurement, noise, Tunables.of(model))
     windows = None if _runs_free(model, location) else windows_for(model, measurement)
     run = FreeRun(model, measurement, windows=windows)

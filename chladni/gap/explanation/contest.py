@@ -61,6 +61,8 @@ class Contest:
                 start_z=np.clip(hypothesis.start_z, -3.0, 3.0) if not hypothesis.wide else hypothesis.start_z,
                 z_limit={name: hypothesis.wide.get(name, 3.0) for name in self.run.tunables.names},
                 max_iterations=max_iterations, tune=tune,
+                # Over windows each start is free: of a free axis a constant is the same thing again.
+                offsets=len(self.run.windows) == 1,
             )  # fmt: skip
         except (ModelError, EstimateError, np.linalg.LinAlgError):
             return None

@@ -24,8 +24,6 @@ def _degenerate(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool
         share = values["time"] / run.measurement.duration_s
         # A change that is over at once, or never comes, is a stiffness.
         return not (0.02 < share < 0.98 if effect.variant == "step" else share > 0.1)
-    if effect.site in [terminal.name for terminal in run.compiled().inputs]:
-        return False
     if effect.effect in (
         "hysteresis",
         "coulomb_friction",
@@ -55,7 +53,14 @@ def _never_seen(word: str, values: Mapping[str, float], d: Matrix) -> bool:
 
 
 def _displacement(run: FreeRun, found: Contestant, effect: AttachedEffect) -> Matrix | None:
+    """Displacement that the effect's law saw, over the whole log; None when the run diverges."""
+    compiled = run.compiled(found.fit.z, found.fit.effects)
     try:
-        return run.motion(found.fit.z, found.fit.effects, found.fit.initial, site=effect.site).displacement
+        runs = run.integrations(found.fit.z, found.fit.effects, found.fit.initial)
     except ModelError:
         return None
+    for port in runs[0][1].ports:
+        if compiled.ports[port].name == effect.site:
+            row = runs[0][1].ports.index(port)
+            return np.concatenate([integration.displacement[row] for _, integration in runs])
+    return None

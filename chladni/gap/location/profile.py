@@ -239,4 +239,4 @@ def _fitted(problem: LinearProblem, sites: Sequence[Site], z: Matrix) -> _Fit:
 def _real(spectra: Spectrum) -> Matrix:
     """``[..., segment, number]`` real and imaginary parts of ``[..., output, segment, line]``."""
     flat = np.ascontiguousarray(np.swapaxes(spectra, -2, -3), dtype=np.complex128)
-    return flat.reshape(*flat.shape[:-2], -1).view(np.float64)
+    return flat.reshape(*flat.shape[:-2], flat.shape[-2] * flat.shape[-1]).view(np.float64)

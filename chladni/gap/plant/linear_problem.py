@@ -115,7 +115,7 @@ class LinearProblem:
         base = self.model.with_values(self.tunables.values(z))
         steps = z + _STEP * np.eye(z.size)
         found = np.empty((z.size, *self.measured.shape), dtype=np.complex128)
-        count = max(1, _AT_ONCE // (len(view.compiled.states) * self.measured[0].size))
+        count = max(1, _AT_ONCE // (max(1, len(view.compiled.states)) * self.measured[0].size))
         for first in range(0, z.size, count):
             places = range(first, min(first + count, z.size))
             changed = {place: self._compile(base.with_values(self.tunables.values(steps[place]))) for place in places}

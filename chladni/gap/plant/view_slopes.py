@@ -53,12 +53,12 @@ def view_slopes(
             signals.append(np.stack([force, (view.lines.z - 1.0) * force]))
     rows = np.concatenate(signals)
     by_step, through = _coefficients(view, changed, step, forces)
-    drive = along(by_step.reshape(count * n, -1), rows).reshape(count, n, *rows.shape[1:])
+    drive = along(by_step.reshape(count * n, rows.shape[0]), rows).reshape(count, n, *rows.shape[1:])
     found = np.einsum("nol,pnsl->posl", view.printed, drive, optimize=False)
     moved = np.flatnonzero(np.any(through != 0, axis=(1, 2)))
     if moved.size:
         direct = along(through[moved].reshape(-1, rows.shape[0]), rows)
-        found[moved] += direct.reshape(moved.size, -1, *rows.shape[1:])
+        found[moved] += direct.reshape(moved.size, len(view.rows), *rows.shape[1:])
     return np.asarray(found * view.shift[:, None], dtype=np.complex128)
 
 

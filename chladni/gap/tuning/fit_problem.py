@@ -278,7 +278,9 @@ class FitProblem:
 
 def _products(left: Matrix, right: Matrix) -> Matrix:
     """``[left, right]`` sums over outputs and samples."""
-    return left.reshape(len(left), -1) @ right.reshape(len(right), -1).T
+    # Lengths are written out: of nothing, none can be told from the size.
+    size = int(np.prod(left.shape[1:]))
+    return np.asarray(left.reshape(len(left), size) @ right.reshape(len(right), size).T, dtype=np.float64)
 
 
 def _eliminated(own: Matrix, cross: Matrix, slope: Matrix) -> tuple[Matrix, Matrix]:

@@ -110,12 +110,14 @@ def _exponential_slopes(matrix: Matrix, ways: Matrix) -> Matrix:
     term, slope = np.eye(size), np.zeros((rows, count * size))
     total, found = term, slope
     for power in range(1, _TERMS + 1):
-        slope = ((ways.reshape(-1, size) @ term).reshape(rows, -1) + matrix[:rows, :rows] @ slope) / power
+        slope = (
+            (ways.reshape(rows * count, size) @ term).reshape(rows, count * size) + matrix[:rows, :rows] @ slope
+        ) / power
         term = matrix @ term / power
         total, found = total + term, found + slope
     for _ in range(squarings):
         # E E, of which each factor moves.
-        found = (found.reshape(-1, size) @ total).reshape(rows, -1) + total[:rows, :rows] @ found
+        found = (found.reshape(rows * count, size) @ total).reshape(rows, count * size) + total[:rows, :rows] @ found
         total = total @ total
     slopes = found.reshape(ways.shape) * (scale[:rows, None, None] / scale)
     return np.asarray(slopes.transpose(1, 0, 2), dtype=np.float64)

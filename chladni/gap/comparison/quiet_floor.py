@@ -1,0 +1,37 @@
+"""The level that an output's spectrum doesn't fall below: what is left of noise when distortion hides it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.comparison.autoregressive import noise_floor_of
+from chladni.gap.records.measurement import Measurement
+from chladni.gap.records.noise_floor import NoiseFloor
+
+Matrix = NDArray[np.float64]
+#: Quantile of the lines that counts as quiet, and the share of the signal's power that is always granted to noise.
+_QUIET, _LEAST = 0.2, 1e-8
+_SEGMENT = 1024
+
+
+def quiet_floor(measurement: Measurement) -> NoiseFloor:
+    """Take the quiet lines of each output for its noise, as if that were white.
+
+    A bound from below where noise has more power where the machine responds. It's for a single sensor beside strong
+    distortion, where every other estimate holds the distortion, and hypotheses are compared with each other more
+    than with the noise.
+    """
+    outputs = measurement.outputs - measurement.outputs.mean(axis=1, keepdims=True)
+    length = min(_SEGMENT, max(16, measurement.samples // 8))
+    window = np.hanning(length)
+    count = measurement.samples // length
+    segments = outputs[:, : count * length].reshape(len(outputs), count, length) * window
+    density = np.mean(np.abs(np.fft.rfft(segments, axis=2)) ** 2, axis=1) / np.sum(window**2)
+    level = np.quantile(density, _QUIET, axis=1) + _LEAST * np.mean(outputs**2, axis=1)
+    return noise_floor_of(
+        np.broadcast_to(level[:, None], density.shape),
+        samples=measurement.samples,
+        freedom=np.full(len(outputs), 2.0 * count),
+        method=("quiet band",) * len(outputs),
+        upper_bound=np.zeros(len(outputs), dtype=np.bool_),
+        scale=np.std(outputs, axis=1),
+    )
