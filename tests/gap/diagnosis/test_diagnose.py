@@ -30,8 +30,9 @@ def test_friction_is_named_with_its_force(friction: Diagnosis) -> None:
 
 def test_the_gap_closes_to_the_noise(friction: Diagnosis) -> None:
     assert friction.gap.before > 0.1
-    # Held-out samples of one noise: its level is known to about one in the root of their number.
-    assert friction.gap.after == pytest.approx(friction.gap.noise, rel=0.1)
+    # One per cent of noise was added; its estimate before may hold what friction did beyond a linear response.
+    assert friction.gap.after == pytest.approx(0.01, rel=0.1)
+    assert friction.gap.after < friction.gap.noise < 0.015
     assert friction.gap.closed is not None
     assert friction.gap.closed > 0.98
     low, high = friction.gap.interval or (0.0, 0.0)
@@ -47,15 +48,17 @@ def test_the_recovered_force_follows_the_law(friction: Diagnosis) -> None:
     assert np.corrcoef(found.force[inside], found.law_force[inside])[0, 1] > 0.8
 
 
-def test_the_same_input_gives_the_same_document(friction: Diagnosis) -> None:
-    again = diagnose(arm(), [measured((FRICTION,))])
-    assert json.dumps(gap_document(again)) == json.dumps(gap_document(friction))
+@pytest.mark.slow
+def test_the_same_input_gives_the_same_document() -> None:
+    log = measured((chladni.attached("saturation", "shaker", {"limit": 120.0}),), seconds=5.0)
+    first, again = (json.dumps(gap_document(diagnose(arm(), [log]))) for _ in range(2))
+    assert first == again
 
 
 @pytest.mark.parametrize(
     ("effect", "site", "values"),
     [
-        ("hardening_stiffness", "hand", {"cubic": 3e10}),
+        pytest.param("hardening_stiffness", "hand", {"cubic": 3e10}, marks=pytest.mark.slow),
         ("saturation", "shaker", {"limit": 120.0}),
         ("delay", "shaker", {"delay": 2.3e-3}),
         ("gain_error", "acc_arm", {"gain": 1.2}),
@@ -93,15 +96,17 @@ def test_a_stiffness_far_outside_its_tolerance_is_a_parameter() -> None:
     assert found.tuned_parameters["elbow.stiffness"].value == pytest.approx(3e5, rel=0.02)
 
 
+@pytest.mark.slow
 def test_without_its_word_the_cause_is_unknown_or_of_its_family() -> None:
     stop = chladni.attached("one_sided_stop", "hand", {"stiffness": 5e5, "clearance": 1e-4})
-    found = diagnose(arm(), [measured((stop,), seed=7)], leave_out=frozenset({"one_sided_stop"}))
+    found = diagnose(arm(), [measured((stop,), seed=7, seconds=5.0)], leave_out=frozenset({"one_sided_stop"}))
     siblings = {"hardening_stiffness", "softening_stiffness", "backlash", "varying_stiffness"}
     assert found.verdict == "unknown" or {one.effect for one in found.causes} <= siblings
 
 
+@pytest.mark.slow
 def test_one_sensor_is_said_to_limit_the_answer() -> None:
-    found = diagnose(arm(), [with_outputs(measured((FRICTION,)), ["acc_wrist"])])
+    found = diagnose(arm(), [with_outputs(measured((FRICTION,), seconds=4.0), ["acc_wrist"])])
     assert any("one output only" in remark for remark in found.remarks)
 
 

@@ -52,12 +52,12 @@ def test_one_free_run_at_once_would_be_caught_elsewhere():
 
 
 @pytest.mark.slow
-def test_ninety_eight_of_a_hundred():
+def test_all_but_one_of_forty():
     tuned = 0
-    for seed in range(100, 200):
+    for seed in range(100, 140):
         model, log, floor = random_case(seed)
         tuned += tune_linear(FreeRun(model, log), floor, training=TRAINING).misfit < 1.1
-    assert tuned >= 98
+    assert tuned >= 39
 
 
 def test_linear_effects_of_the_model_take_part():

@@ -1,0 +1,31 @@
+"""Steps of a sensor are seen in its samples."""
+
+import numpy as np
+import pytest
+
+from chladni.gap.explanation.lattice import lattice_of
+
+RNG = np.random.default_rng(1)
+SMOOTH = RNG.standard_normal(8000)
+
+
+@pytest.mark.parametrize("step", [0.05, 0.1, 0.23])
+def test_the_step_is_found(step: float) -> None:
+    found = lattice_of(step * np.round(SMOOTH / step))
+    assert found is not None
+    assert found.step == pytest.approx(step, rel=1e-3)
+    assert found.strength > 0.99
+
+
+def test_a_smooth_signal_has_none() -> None:
+    assert lattice_of(SMOOTH) is None
+
+
+def test_a_signal_that_stands_still_most_of_the_time_has_none() -> None:
+    signal = 1e-4 * SMOOTH
+    signal[:150] += 3.0
+    assert lattice_of(signal) is None
+
+
+def test_a_constant_has_none() -> None:
+    assert lattice_of(np.ones(100)) is None

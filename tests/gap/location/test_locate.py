@@ -1,0 +1,55 @@
+"""A missing force is located, its shape recovered, and the noise behind it estimated again."""
+
+import numpy as np
+import pytest
+
+import chladni
+from chladni.gap.comparison.noise_estimate import estimate_noise
+from chladni.gap.location.locate import Location, locate
+from chladni.gap.location.recovered import recovered
+from chladni.gap.plant.tunable import Tunables
+from tests.gap.arm import arm, measured, with_outputs
+
+
+@pytest.fixture(scope="module")
+def hardened() -> Location:
+    spring = chladni.attached("hardening_stiffness", "hand", {"cubic": 3e10})
+    log = measured((spring,), seconds=6.0, seed=4)
+    return locate(arm(), log, estimate_noise(log), Tunables.of(arm()))
+
+
+def test_the_right_place_explains_all_and_others_do_not(hardened: Location) -> None:
+    assert hardened.best is not None
+    assert "hand" in hardened.best.places[0].names
+    assert hardened.best.profile.chi < 2.0
+    assert hardened.ranked[1].profile.chi > 5.0 * hardened.best.profile.chi
+    assert hardened.shares["hand"] > 0.9
+
+
+def test_the_recovered_force_is_the_cube_of_the_displacement(hardened: Location) -> None:
+    assert hardened.best is not None
+    site = next(one for one in hardened.best.places[0].sites if one.name == "hand")
+    found = recovered(hardened.problem, hardened.best.profile, site)
+    inside = slice(300, -300)
+    d = found.displacement[inside]
+    # Stiffness and damping of the joint itself are as free as the force: what is left is the law.
+    basis = np.stack([d, found.velocity[inside], d**3])
+    share = np.linalg.lstsq(basis.T, found.force[inside], rcond=None)[0]
+    # A regression on a displacement that has noise itself comes out low, by a quarter here.
+    assert share[2] == pytest.approx(3e10, rel=0.35)
+    cubic = basis[2] - basis[:2].T @ np.linalg.lstsq(basis[:2].T, basis[2], rcond=None)[0]
+    rest = found.force[inside] - basis[:2].T @ np.linalg.lstsq(basis[:2].T, found.force[inside], rcond=None)[0]
+    assert np.corrcoef(cubic, rest)[0, 1] > 0.7
+
+
+def test_noise_that_held_distortion_is_lowered(hardened: Location) -> None:
+    # One per cent of each output's RMS was added.
+    rms = np.std(hardened.problem.measurement.outputs, axis=1)
+    assert np.all(hardened.problem.noise.rms < 0.05 * rms)
+
+
+def test_with_one_sensor_every_place_stays_open() -> None:
+    log = with_outputs(measured(seconds=4.0), ["acc_wrist"])
+    found = locate(arm(), log, estimate_noise(log), Tunables.of(arm()))
+    names = {site.name for located in found.ranked for site in located.places[0].sites}
+    assert {"shoulder", "elbow", "hand", "shaker", "acc_wrist"} <= names
