@@ -32,13 +32,15 @@ def _degenerate(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool
         "one_sided_stop",
         "ripple",
     ):
-        motion = _displacement(run, found, effect)
-        return motion is None or _never_seen(effect.effect, values, motion)
+        motion = _motion(run, found, effect)
+        return motion is None or _never_seen(effect.effect, values, *motion)
     return False
 
 
-def _never_seen(word: str, values: Mapping[str, float], d: Matrix) -> bool:
+def _never_seen(word: str, values: Mapping[str, float], d: Matrix, s: Matrix) -> bool:
     reach = float(np.max(np.abs(d)))
+    if word == "stribeck_friction" and _is_coulomb(values, s):
+        return True
     if word == "hysteresis":
         return values["yield"] > 2.0 * reach
     if word in ("coulomb_friction", "stribeck_friction"):
@@ -52,15 +54,22 @@ def _never_seen(word: str, values: Mapping[str, float], d: Matrix) -> bool:
     return 2.0 * values["period"] > float(np.ptp(d)) if word == "ripple" else False
 
 
-def _displacement(run: FreeRun, found: Contestant, effect: AttachedEffect) -> Matrix | None:
-    """Displacement that the effect's law saw, over the whole log; None when the run diverges."""
+def _is_coulomb(values: Mapping[str, float], s: Matrix) -> bool:
+    """Whether the drop from static to sliding friction is hardly there, or over before anything slides."""
+    speed = float(np.sqrt(np.mean(s**2)))
+    return values["static"] < 1.05 * values["coulomb"] or not 0.01 * speed < values["speed"] < 5.0 * speed
+
+
+def _motion(run: FreeRun, found: Contestant, effect: AttachedEffect) -> tuple[Matrix, Matrix] | None:
+    """Displacement and velocity that the effect's law saw, over the whole log; None when the run diverges."""
     compiled = run.compiled(found.fit.z, found.fit.effects)
     try:
         runs = run.integrations(found.fit.z, found.fit.effects, found.fit.initial)
     except ModelError:
         return None
-    for port in runs[0][1].ports:
+    for row, port in enumerate(runs[0][1].ports):
         if compiled.ports[port].name == effect.site:
-            row = runs[0][1].ports.index(port)
-            return np.concatenate([integration.displacement[row] for _, integration in runs])
+            displacement = np.concatenate([integration.displacement[row] for _, integration in runs])
+            velocity = np.concatenate([integration.velocity[row] for _, integration in runs])
+            return displacement, velocity
     return None
