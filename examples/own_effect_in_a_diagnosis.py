@@ -17,7 +17,7 @@ from chladni.models.excitations.multisine import Multisine
 from chladni.models.instruments.robot_arm import arm_model
 from chladni.viewers.gap_summary import summary
 
-SECONDS, RATE_HZ, NOISE = 12.0, 1000.0, 0.01
+SECONDS, RATE_HZ, NOISE = 6.0, 1000.0, 0.01
 COEFFICIENT = 200.0
 
 

@@ -20,6 +20,7 @@ def friction() -> Diagnosis:
     return diagnose(arm(), [measured((FRICTION,))])
 
 
+@pytest.mark.slow
 def test_friction_is_named_with_its_force(friction: Diagnosis) -> None:
     assert friction.verdict == "effect"
     (cause,) = friction.causes
@@ -28,6 +29,7 @@ def test_friction_is_named_with_its_force(friction: Diagnosis) -> None:
     assert cause.parameters["force"].value == pytest.approx(20.0, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_gap_closes_to_the_noise(friction: Diagnosis) -> None:
     assert friction.gap.before > 0.1
     # One per cent of noise was added; its estimate before may hold what friction did beyond a linear response.
@@ -39,6 +41,7 @@ def test_the_gap_closes_to_the_noise(friction: Diagnosis) -> None:
     assert low <= friction.gap.closed <= high
 
 
+@pytest.mark.slow
 def test_the_recovered_force_follows_the_law(friction: Diagnosis) -> None:
     found = friction.restoring_force
     assert found is not None
@@ -60,9 +63,9 @@ def test_the_same_input_gives_the_same_document() -> None:
     [
         pytest.param("hardening_stiffness", "hand", {"cubic": 3e10}, marks=pytest.mark.slow),
         ("saturation", "shaker", {"limit": 120.0}),
-        ("delay", "shaker", {"delay": 2.3e-3}),
+        pytest.param("delay", "shaker", {"delay": 2.3e-3}, marks=pytest.mark.slow),
         ("gain_error", "acc_arm", {"gain": 1.2}),
-        ("time_offset", "acc_column", {"offset": 1.4e-3}),
+        pytest.param("time_offset", "acc_column", {"offset": 1.4e-3}, marks=pytest.mark.slow),
     ],
 )
 def test_each_kind_of_site(effect: str, site: str, values: dict[str, float]) -> None:
@@ -72,6 +75,7 @@ def test_each_kind_of_site(effect: str, site: str, values: dict[str, float]) -> 
         assert found.causes[0].parameters[name].value == pytest.approx(value, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_body_that_is_too_heavy_carries_something() -> None:
     found = diagnose(arm(), [measured((chladni.attached("added_mass", "arm", {"mass": 2.0}),), seed=3, off={})])
     assert [(one.effect, one.site) for one in found.causes] == [("added_mass", "arm")]
@@ -81,7 +85,7 @@ def test_a_body_that_is_too_heavy_carries_something() -> None:
     )
 
 
-@pytest.mark.parametrize("colour", [0.0, 0.9])
+@pytest.mark.parametrize("colour", [0.0, pytest.param(0.9, marks=pytest.mark.slow)])
 def test_noise_alone_names_nothing(colour: float) -> None:
     found = diagnose(arm(), [measured(seed=5, colour=colour)])
     assert found.verdict == "none"
@@ -89,6 +93,7 @@ def test_noise_alone_names_nothing(colour: float) -> None:
     assert found.gap.tuned == pytest.approx(found.gap.noise, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_stiffness_far_outside_its_tolerance_is_a_parameter() -> None:
     found = diagnose(arm(), [measured(off={"elbow.stiffness": 1.5}, seed=6)])
     assert found.verdict == "parameters"

@@ -133,6 +133,7 @@ def test_same_log_same_answer():
     assert (first.causes, first.ranking, first.gap) == (second.causes, second.ranking, second.gap)
 
 
+@pytest.mark.slow
 def test_late_commands_are_named():
     found = diagnose_simulator(slide(), log_of([chladni.attached("delay", "push", {"delay": 0.007})], MOVED))
     (cause,) = found.causes
@@ -167,6 +168,7 @@ def test_no_effect_where_only_parameters_are_off(seed):
     assert found.gap.tuned < 1.1 * found.gap.noise < found.gap.before
 
 
+@pytest.mark.slow
 def test_a_parameter_far_beyond_its_tolerance_is_named():
     found = diagnose_simulator(slide(), log_of([], {"guide.stiffness": 1200.0}))
     assert found.verdict == "parameters"
@@ -174,6 +176,7 @@ def test_a_parameter_far_beyond_its_tolerance_is_named():
     assert found.tuned_parameters["guide.stiffness"].value == pytest.approx(1200.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_an_effect_of_ones_own_takes_part():
     log = log_of([chladni.attached(CUBIC_DAMPING, "guide", {"strength": 900.0})], MOVED)
     found = diagnose_simulator(slide(), log, own_effects=(CUBIC_DAMPING,))
