@@ -72,6 +72,15 @@ def curves(page: Any) -> list[float]:
     )
 
 
+def until_drawn(page: Any, count: int) -> int:
+    """Wait until there are so many curves, for as long as a busy machine may take; give how many there are."""
+    for _ in range(200):
+        if len(curves(page)) == count:
+            break
+        page.wait_for_timeout(25)
+    return len(curves(page))
+
+
 def until_changed(page: Any, before: list[float]) -> list[float]:
     """Wait until some curve differs, for as long as a busy machine may take."""
     for _ in range(200):

@@ -12,7 +12,15 @@ import pytest
 
 from chladni.viewers.bench import serve
 from chladni.viewers.bench.instrument_page import VIEWS
-from tests.viewers.bench.serving import browsing, curves, needs_chromium, open_page, running, until_changed
+from tests.viewers.bench.serving import (
+    browsing,
+    curves,
+    needs_chromium,
+    open_page,
+    running,
+    until_changed,
+    until_drawn,
+)
 from tests.viewers.bench.stand_in import OSCILLATOR, read, tools
 
 pytestmark = [
@@ -203,13 +211,14 @@ def test_kept_variants_stay_as_faded_curves_with_a_chip(page: Any) -> None:
     page.get_by_role("button", name="Keep this variant").click()
     chip = page.get_by_role("button", name="as declared")
     chip.wait_for()
-    assert len(curves(page)) == 2 * drawn
+    # The chip and the curves come in messages of their own.
+    assert until_drawn(page, 2 * drawn) == 2 * drawn
     page.get_by_role("button", name=VIEWS[2], exact=True).click()
     page.get_by_role("columnheader", name="now: as declared").wait_for()
     page.get_by_role("button", name=VIEWS[0], exact=True).click()
     chip.click()
     chip.wait_for(state="detached")
-    assert len(curves(page)) == drawn
+    assert until_drawn(page, drawn) == drawn
 
 
 @needs_chromium
