@@ -9,6 +9,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.gap_rows import print_comparison, print_diagnosis
+from chladni.cli.linear_algebra import take_one_thread
 from chladni.cli.output import Output
 
 if TYPE_CHECKING:
@@ -22,57 +23,71 @@ if TYPE_CHECKING:
 FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
 
 
+Files = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="MODEL LOG...",
+        help="A model file, then logs of the machine; several levels tell more.",
+        show_default=False,
+    ),
+]
+Simulated = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="LOG",
+        help="What a simulator of your own wrote, in place of MODEL: only tells where.",
+        show_default=False,
+    ),
+]
+Without = Annotated[
+    list[str] | None,
+    typer.Option(metavar="EFFECT", help="Leave this effect out; may be repeated.", show_default=False),
+]
+Seed = Annotated[int, typer.Option(metavar="N", min=0, help="Of everything random.")]
+Report = Annotated[
+    Path | None,
+    typer.Option(
+        "--html", "--report", metavar="FILE.html", help="Write a self-contained HTML report.", show_default=False
+    ),
+]
+Sheet = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="OUT.png", help="Write one sheet with the evidence, as PNG, SVG or PDF.", show_default=False
+    ),
+]
+Recording = Annotated[
+    Path | None, typer.Option(metavar="OUT.rrd", help="Write a rerun recording.", show_default=False)
+]
+ExplainedModel = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.toml",
+        help="Write the model, tuned and with the effects that were found.",
+        show_default=False,
+    ),
+]
+
+
 def gap(
-    files: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="MODEL LOG...",
-            help="A model file, then logs of the machine; several levels tell more.",
-            show_default=False,
-        ),
-    ],
+    files: Files,
     *,
-    simulated: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="LOG", help="What a simulator of your own wrote, in place of MODEL: only tells where.",
-            show_default=False,
-        ),
-    ] = None,
-    without: Annotated[
-        list[str] | None,
-        typer.Option(metavar="EFFECT", help="Leave this effect out; may be repeated.", show_default=False),
-    ] = None,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of everything random.")] = 0,
+    simulated: Simulated = None,
+    without: Without = None,
+    seed: Seed = 0,
     start: options.Start = None,
     end: options.End = None,
     setup: options.Setup = None,
     stamp: options.Stamp = "auto",
     json: options.Json = None,
-    report: Annotated[
-        Path | None,
-        typer.Option(
-            "--html", "--report", metavar="FILE.html", help="Write a self-contained HTML report.", show_default=False
-        ),
-    ] = None,
-    figure: Annotated[
-        Path | None,
-        typer.Option(metavar="OUT.png", help="Write one sheet with the evidence, as PNG, SVG or PDF.",
-                     show_default=False),
-    ] = None,
+    report: Report = None,
+    figure: Sheet = None,
     figures: options.Figures = None,
-    save: Annotated[
-        Path | None, typer.Option(metavar="OUT.rrd", help="Write a rerun recording.", show_default=False)
-    ] = None,
-    write_model: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.toml", help="Write the model, tuned and with the effects that were found.",
-            show_default=False,
-        ),
-    ] = None,
-) -> None:  # fmt: skip
+    save: Recording = None,
+    write_model: ExplainedModel = None,
+) -> None:
     """Where a model and a log disagree, which effect was left out, and how far the gap closes with it."""
+    take_one_thread()
     from chladni.io.log import open_log
 
     out = Output(json)
@@ -206,7 +221,9 @@ def _draw(out: Output, found: "Diagnosis", model: "Model", wanted: _Wanted) -> N
         from chladni.apps.gap_structure import structure_sketch
         from chladni.viewers.rerun.gap import write_gap_rrd
 
-        write_gap_rrd(evidence, wanted.save, sketch=structure_sketch(model, found.where))
+        # A structure coloured by nothing would look like one that can't explain the gap anywhere.
+        sketch = structure_sketch(model, found.where) if found.where.sites else None
+        write_gap_rrd(evidence, wanted.save, sketch=sketch)
         out.line(f"recording: {wanted.save}")
 
 

@@ -11,60 +11,74 @@ from chladni.cli.settings import effect_of, with_settings
 from chladni.cli.words import count, number
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
+    from chladni.apps.simulated_log import SimulatedLog
+    from chladni.io.mcap.writer import WrittenLog
     from chladni.models.core.instrument import Instrument
+    from chladni.models.core.model import Model
     from chladni.signals.time_series import TimeSeries
 
 
+ModelOrInstrument = Annotated[
+    str, typer.Argument(metavar="MODEL", help="A model file, or the name of an instrument.", show_default=False)
+]
+Target = Annotated[Path, typer.Option("--out", metavar="LOG.mcap", help="The log to write.", show_default=False)]
+Seconds = Annotated[
+    float | None, typer.Option(metavar="S", help="Length; by the slowest decay if not given.", show_default=False)
+]
+Rate = Annotated[
+    float | None,
+    typer.Option(metavar="HZ", help="Sample rate; twenty times the highest natural frequency if not given."),
+]
+Kind = Annotated[
+    Literal["random", "sweep", "multisine", "step", "impact"],
+    typer.Option("--input", help="What drives the model."),
+]
+At = Annotated[str | None, typer.Option(metavar="NAME", help="Input that is driven; the first if not given.")]
+Level = Annotated[
+    float | None,
+    typer.Option(metavar="X", help="RMS, amplitude, step or peak, in the input's unit; 1, or the instrument's."),
+]
+Band = Annotated[
+    tuple[float, float] | None,
+    typer.Option(metavar="LO HI", help="Excited frequencies in Hz, of random, sweep and multisine."),
+]
+Driving = Annotated[
+    Path | None,
+    typer.Option(metavar="LOG", help="Drive the model with this log's channels instead.", show_default=False),
+]
+Noise = Annotated[float, typer.Option(metavar="SHARE", help="Noise of each sensor, as a share of its signal's RMS.")]
+Seed = Annotated[int, typer.Option(metavar="N", help="Of everything random.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Change a parameter; may be repeated.", show_default=False),
+]
+Effects = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="EFFECT@SITE:NAME=VALUE,...",
+        help="Add an effect, such as coulomb_friction@elbow:force=8; may be repeated.",
+        show_default=False,
+    ),
+]
+
+
 def simulate(
-    model: Annotated[
-        str, typer.Argument(metavar="MODEL", help="A model file, or the name of an instrument.", show_default=False)
-    ],
+    model: ModelOrInstrument,
     *,
-    out: Annotated[Path, typer.Option("--out", metavar="LOG.mcap", help="The log to write.", show_default=False)],
-    seconds: Annotated[
-        float | None, typer.Option(metavar="S", help="Length; by the slowest decay if not given.", show_default=False)
-    ] = None,
-    rate: Annotated[
-        float | None,
-        typer.Option(metavar="HZ", help="Sample rate; twenty times the highest natural frequency if not given."),
-    ] = None,
-    kind: Annotated[
-        Literal["random", "sweep", "multisine", "step", "impact"],
-        typer.Option("--input", help="What drives the model."),
-    ] = "random",
-    at: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Input that is driven; the first if not given.")
-    ] = None,
-    level: Annotated[
-        float | None,
-        typer.Option(metavar="X", help="RMS, amplitude, step or peak, in the input's unit; 1, or the instrument's."),
-    ] = None,
-    band: Annotated[
-        tuple[float, float] | None,
-        typer.Option(metavar="LO HI", help="Excited frequencies in Hz, of random, sweep and multisine."),
-    ] = None,
-    log: Annotated[
-        Path | None,
-        typer.Option(metavar="LOG", help="Drive the model with this log's channels instead.", show_default=False),
-    ] = None,
-    noise: Annotated[
-        float, typer.Option(metavar="SHARE", help="Noise of each sensor, as a share of its signal's RMS.")
-    ] = 0.0,
-    seed: Annotated[int, typer.Option(metavar="N", help="Of everything random.")] = 0,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Change a parameter; may be repeated.", show_default=False),
-    ] = None,
-    effect: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="EFFECT@SITE:NAME=VALUE,...",
-            help="Add an effect, such as coulomb_friction@elbow:force=8; may be repeated.",
-            show_default=False,
-        ),
-    ] = None,
+    out: Target,
+    seconds: Seconds = None,
+    rate: Rate = None,
+    kind: Kind = "random",
+    at: At = None,
+    level: Level = None,
+    band: Band = None,
+    log: Driving = None,
+    noise: Noise = 0.0,
+    seed: Seed = 0,
+    settings: Settings = None,
+    effect: Effects = None,
     json: options.Json = None,
 ) -> None:
     """Simulate a model and write a log, with its truth beside it and in its metadata."""
@@ -75,9 +89,7 @@ def simulate(
     # A simulation may take minutes: it shouldn't be lost to a misspelt folder.
     require_place(out)
     instrument = named_instrument(model)
-    chosen = with_settings(instrument.model(), settings or ())
-    if effect:
-        chosen = chosen.with_effects((*chosen.effects, *(effect_of(one, chosen) for one in effect)))
+    chosen = _changed(instrument.model(), settings or (), effect or ())
     recording = None
     damage: tuple[str, ...] = ()
     if log is not None:
@@ -94,21 +106,34 @@ def simulate(
     )
     made = simulate_log(chosen, drive, seconds=seconds, rate_hz=rate, recording=recording)
     written, truth = write_simulated_log(made, out)
-    series = made.recorded
-    to.line(
-        f"{chosen.name}: {number(series.duration_s, digits=6)} s at {number(series.sample_rate_hz, digits=6)} Hz, "
-        f"{count(series.samples)} samples of {len(series.channels)} channels"
-    )
-    to.table("What the log holds", ["channel", "role", "RMS", "unit"], _rows(series, written.names))
-    for score in made.agreement:
-        told = "not known" if score.value is None else f"{score.value:.3g} {score.unit}"
-        to.line(f"{score.name}: {told} ({score.definition})")
+    _print(to, chosen.name, made, written)
     to.lines((*damage, *made.simulation.flags))
     to.line(f"wrote {written.path}")
     to.line(f"wrote {truth}")
     nrmse = {score.name.removeprefix("NRMSE "): score.value for score in made.agreement}
     to.json({**made.truth, "format": "chladni.simulate/1", "log": str(written.path), "truth_file": str(truth),
              "nrmse_percent": nrmse})  # fmt: skip
+
+
+def _changed(model: "Model", settings: "Sequence[str]", effects: "Sequence[str]") -> "Model":
+    """Give the model with the parameters and the further effects that were asked for."""
+    chosen = with_settings(model, settings)
+    if not effects:
+        return chosen
+    return chosen.with_effects((*chosen.effects, *(effect_of(one, chosen) for one in effects)))
+
+
+def _print(to: Output, name: str, made: "SimulatedLog", written: "WrittenLog") -> None:
+    """Print what was recorded, and how well it agrees with the log that drove it."""
+    series = made.recorded
+    to.line(
+        f"{name}: {number(series.duration_s, digits=6)} s at {number(series.sample_rate_hz, digits=6)} Hz, "
+        f"{count(series.samples)} samples of {len(series.channels)} channels"
+    )
+    to.table("What the log holds", ["channel", "role", "RMS", "unit"], _rows(series, written.names))
+    for score in made.agreement:
+        told = "not known" if score.value is None else f"{score.value:.3g} {score.unit}"
+        to.line(f"{score.name}: {told} ({score.definition})")
 
 
 def _usual_level(instrument: "Instrument", at: str | None) -> float:
