@@ -133,7 +133,7 @@ def _several(logs: Recording | Sequence[Recording]) -> Sequence[Recording]:
 def _measured(model: Model, logs: Sequence[Recording], span: Span) -> Iterator[_Read]:
     for log, name in zip(logs, _names(logs), strict=True):
         if isinstance(log, TimeSeries):
-            yield _of_series(model, log.window(start_s=span.start_s or 0.0, end_s=span.end_s), name, ())
+            yield _of_series(model, log.window(start_s=span.start_s or 0.0, end_s=span.end_s), name)
         elif isinstance(log, Log):
             yield _of_log(model, log, name, span)
         else:
@@ -145,6 +145,10 @@ def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
     # Only those: a log may hold a hundred other channels, at rates of their own.
     held = [channel.name for channel in log.channels]
     wanted = _listened_to(model)
+    if not held:
+        # The damage is known when all has been read, and nothing is left to read that would take long.
+        told = " ".join(damage_sentences(log.info().damage)) or "record at least one message with a number in it"
+        raise LogError(f"{name}: holds no channel that can be read; {told}")
     chosen = [channel for channel in held if channel in wanted]
     if not chosen:
         raise LogError(
@@ -152,12 +156,13 @@ def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
             f"{some_of(held, count=NAMES_TOLD)}, the model listens to {some_of(sorted(wanted), count=NAMES_TOLD)}"
         )
     series = log.read(chosen, start_s=span.start_s, end_s=span.end_s)
-    return _of_series(model, series, name, damage_sentences(log.damage))
+    measurement, remarks = measurement_of(model, series, log=name, held=held)
+    return _Read(measurement=measurement, remarks=(*damage_sentences(log.damage), *remarks))
 
 
-def _of_series(model: Model, series: TimeSeries, name: str, damage: tuple[str, ...]) -> _Read:
+def _of_series(model: Model, series: TimeSeries, name: str) -> _Read:
     measurement, remarks = measurement_of(model, series, log=name)
-    return _Read(measurement=measurement, remarks=(*damage, *remarks))
+    return _Read(measurement=measurement, remarks=remarks)
 
 
 def _listened_to(model: Model) -> set[str]:

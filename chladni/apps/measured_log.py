@@ -3,6 +3,7 @@
 import re
 import weakref
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 from chladni.apps.findings import damage_sentences
@@ -39,15 +40,15 @@ class OpenedLog:
             raise LogError(str(error).replace(str(path), title)) from error
         # Also when the program ends before the page is closed.
         self._removal = weakref.finalize(self, _remove, path) if private else None
-        try:
+        with ExitStack() as closing:
+            # Whatever goes wrong until it's known to hold something, nobody else will close it.
+            closing.callback(self.close)
             self.channels: tuple[Channel, ...] = self._log.channels
             info = self._log.info()
             self.duration_s: float = info.duration_s
             self.damage = damage_sentences(info.damage)
             self._require_channels()
-        except BaseException:
-            self.close()
-            raise
+            closing.pop_all()
 
     def _require_channels(self) -> None:
         if not self.channels:

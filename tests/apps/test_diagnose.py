@@ -110,6 +110,25 @@ def test_a_log_of_something_else_is_told_with_both_sides(
         chladni.diagnose_gap(files[0], tmp_path / "fan.mcap")
 
 
+def test_a_wrong_input_channel_is_told_with_all_that_the_log_holds(
+    engine: StandIn, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    force, *outputs = made.log_series().channels
+    renamed = made.log_series().with_channels([replace(force, name="/input.value"), *outputs])
+    write_mcap(renamed, tmp_path / "renamed.mcap")
+    with pytest.raises(LogError, match=r"which the log doesn't hold; it holds /input\.value, /column\.accel"):
+        chladni.diagnose_gap(files[0], tmp_path / "renamed.mcap")
+
+
+def test_a_log_of_which_nothing_can_be_read_is_told_with_its_damage(
+    engine: StandIn, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    stump = tmp_path / "stump.mcap"
+    stump.write_bytes(files[1].read_bytes()[:200])
+    with pytest.raises(LogError, match=r"stump\.mcap: holds no channel that can be read; Damage"):
+        chladni.diagnose_gap(files[0], stump)
+
+
 def test_without_a_log_there_is_nothing_to_say(engine: StandIn, files: tuple[Path, Path]) -> None:
     with pytest.raises(SetupError, match="no log"):
         chladni.diagnose_gap(files[0], [])

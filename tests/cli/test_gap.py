@@ -11,6 +11,7 @@ from chladni.models.files.model_file import load_model
 from tests import made_diagnosis as made
 from tests.cli.conftest import Run
 from tests.gap_stand_in import StandIn, put_in_place
+from tests.viewers.rrd import Contents
 
 
 @pytest.fixture
@@ -117,6 +118,18 @@ def test_pictures_are_written_where_they_were_asked_for(
     assert {path.name for path in (tmp_path / "figures").iterdir()} >= {"restoring-force.png", "signals.svg"}
     for name in ("gap.html", "gap.rrd", "gap.svg", "restoring-force.png"):
         assert name in outcome.out.replace("\n", "")
+
+
+def test_one_sensor_tells_no_sites_and_no_page_pretends_to(
+    run: Run, monkeypatch: pytest.MonkeyPatch, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    found = made.unknown()
+    put_in_place(monkeypatch, replace(found, where=replace(found.where, sites=())))
+    outcome = run("gap", *files, "--save", tmp_path / "gap.rrd")
+    assert outcome.code == 0, outcome.err
+    assert "71 % of it lies between" in outcome.out
+    assert "at one site can explain" not in outcome.out
+    assert "/structure/joints" not in Contents(tmp_path / "gap.rrd").entities()
 
 
 def test_a_simulated_log_takes_the_place_of_a_model(run: Run, files: tuple[Path, Path], tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.records.measurement import Measurement
+from chladni.io.log_info import some_of
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
 from chladni.models.core.port import Terminal
@@ -14,6 +15,7 @@ from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, ModelError, SetupError
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import si_factor
+from chladni.signals.wording import counted
 
 Matrix = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -47,7 +49,9 @@ class _Match:
         return self.terminal.channel or self.terminal.name
 
 
-def measurement_of(model: Model, recording: TimeSeries, *, log: str) -> tuple[Measurement, tuple[str, ...]]:
+def measurement_of(
+    model: Model, recording: TimeSeries, *, log: str, held: Sequence[str] | None = None
+) -> tuple[Measurement, tuple[str, ...]]:
     """Match the channels of a log to the inputs and outputs of a model.
 
     A terminal of the model listens to the channel that it names, else to the channel that has its own name. The
@@ -62,6 +66,8 @@ def measurement_of(model: Model, recording: TimeSeries, *, log: str) -> tuple[Me
         What `Log.read` gave: one rate for all channels.
     log
         Name of the log, for messages.
+    held
+        Names of all channels that the log holds, for messages; those of the recording if not given.
 
     Returns
     -------
@@ -81,10 +87,13 @@ def measurement_of(model: Model, recording: TimeSeries, *, log: str) -> tuple[Me
         When no input of the model could ever be found in a log, or units don't fit.
     """
     compiled = model.compile()
+    # What was read of a log may be a small part of it: the channel that was meant may be among the others.
+    told = some_of([one.name for one in recording.channels] if held is None else held, count=NAMES_TOLD)
     inputs = [_matched(terminal, recording) for terminal in compiled.inputs]
-    _require_inputs(inputs, recording, model.name, log)
+    _require_inputs(inputs, model.name, log, held=told)
+    outputs, remarks = _usable_outputs(compiled, recording, log)
+    _require_outputs(outputs, remarks, model.name, log, held=told)
     rows = [match.row for match in inputs if match.row is not None]
-    outputs, remarks = _usable_outputs(compiled, recording, model.name, log)
     rows += [match.row for match in outputs if match.row is not None]
     stretch, gaps = _whole_stretch(recording, rows, log)
     measurement = Measurement(
@@ -106,24 +115,22 @@ def _matched(terminal: Terminal, recording: TimeSeries) -> _Match:
     return _Match(terminal=terminal, row=found[0] if found else None)
 
 
-def _require_inputs(inputs: Sequence[_Match], recording: TimeSeries, model: str, log: str) -> None:
+def _require_inputs(inputs: Sequence[_Match], model: str, log: str, *, held: str) -> None:
     for match in inputs:
         # An input that names no channel isn't expected in a log; one that does is needed.
         if match.row is None and match.terminal.channel is not None:
             raise LogError(
                 f"{log}: input {match.terminal.name!r} of the model listens to channel {match.wanted!r}, which the "
-                f"log doesn't hold; it holds {_held(recording)}; correct the model's channel or log the input"
+                f"log doesn't hold; it holds {held}; correct the model's channel or log the input"
             )
     if inputs and all(match.row is None for match in inputs):
         raise ModelError(
-            f"model {model!r}: no input names a channel, and {log} has none of their names; it holds "
-            f"{_held(recording)}; give an [[input]] its channel"
+            f"model {model!r}: no input names a channel, and {log} has none of their names; it holds {held}; "
+            "give an [[input]] its channel"
         )
 
 
-def _usable_outputs(
-    compiled: CompiledModel, recording: TimeSeries, model: str, log: str
-) -> tuple[list[_Match], tuple[str, ...]]:
+def _usable_outputs(compiled: CompiledModel, recording: TimeSeries, log: str) -> tuple[list[_Match], tuple[str, ...]]:
     """Give outputs that were measured, and sentences on the others."""
     used: list[_Match] = []
     remarks: list[str] = []
@@ -134,13 +141,16 @@ def _usable_outputs(
             used.append(match)
         else:
             remarks.append(f"output {terminal.name!r} is left out: {reason}")
-    if not used:
-        told = "; ".join(remarks[:3]) or "the model has no output"
-        raise LogError(
-            f"{log}: nothing to compare model {model!r} with: {told}; the log holds {_held(recording)}; give an "
-            "[[output]] the channel that measured it"
-        )
     return used, tuple(remarks)
+
+
+def _require_outputs(used: Sequence[_Match], left_out: Sequence[str], model: str, log: str, *, held: str) -> None:
+    if not used:
+        told = "; ".join(left_out[:3]) or "the model has no output"
+        raise LogError(
+            f"{log}: nothing to compare model {model!r} with: {told}; the log holds {held}; give an [[output]] the "
+            "channel that measured it"
+        )
 
 
 def _why_unusable(match: _Match, recording: TimeSeries, log: str) -> str | None:
@@ -179,14 +189,14 @@ def _whole_stretch(recording: TimeSeries, rows: Sequence[int], log: str) -> tupl
         worst = recording.channels[rows[int(np.argmax(missing))]].name
         raise LogError(
             f"{log}: the longest stretch without missing samples is {(last - first) / rate_hz:g} s "
-            f"({last - first} samples) of {samples / rate_hz:g} s; at least half of the log and {FEWEST_SAMPLES} "
-            f"samples are needed; {max(missing)} are missing in {worst!r}; leave that channel out of the model, or "
-            "cut the log"
+            f"({counted(last - first, 'sample')}) of {samples / rate_hz:g} s; at least half of the log and "
+            f"{FEWEST_SAMPLES} samples are needed; {worst!r} lacks {counted(max(missing), 'sample')}; leave that "
+            "channel out of the model, or cut the log"
         )
     if last - first == samples:
         return slice(first, last), ()
     told = (
-        f"{int((~good).sum())} samples are missing in {log}; used is its longest stretch without gaps, "
+        f"{log} lacks {counted(int((~good).sum()), 'sample')}; used is its longest stretch without gaps, "
         f"{first / rate_hz:g} s to {last / rate_hz:g} s of {samples / rate_hz:g} s"
     )
     return slice(first, last), (told,)
@@ -238,8 +248,8 @@ def _limits(compiled: CompiledModel, measurement: Measurement) -> tuple[str, ...
     if modes_hz.size and rate_hz < SAMPLES_A_CYCLE * modes_hz.max():
         beyond = int(np.sum(rate_hz < SAMPLES_A_CYCLE * modes_hz))
         remarks.append(
-            f"{beyond} of the model's modes lie above {rate_hz / SAMPLES_A_CYCLE:.3g} Hz, where a log at "
-            f"{rate_hz:g} Hz can't follow them"
+            f"a log at {rate_hz:g} Hz can't follow {counted(beyond, 'mode')} of the model above "
+            f"{rate_hz / SAMPLES_A_CYCLE:.3g} Hz"
         )
     if not np.any(np.ptp(measurement.inputs, axis=1) > 0):
         remarks.append("no input moves in this log: only what starts in motion or isn't logged shows")
@@ -253,9 +263,3 @@ def _modes_hz(compiled: CompiledModel) -> Matrix:
     poles = np.linalg.eigvals(compiled.a)
     vibrating = poles.imag > AT_REST * float(np.abs(poles).max(initial=0.0))
     return np.asarray(np.abs(poles[vibrating]) / (2 * np.pi))
-
-
-def _held(recording: TimeSeries) -> str:
-    names = [channel.name for channel in recording.channels]
-    more = f" and {len(names) - NAMES_TOLD} more" if len(names) > NAMES_TOLD else ""
-    return f"{', '.join(names[:NAMES_TOLD])}{more}"

@@ -115,6 +115,11 @@ def test_an_input_that_the_log_lacks_is_an_error_that_says_what_it_holds(tmp_pat
         measurement_of(model_of(tmp_path), recording({"/wrist.accel": "m/s^2", "/b": "V"}), log="log.mcap")
     for part in ("log.mcap", "/hammer.force", "/wrist.accel, /b"):
         assert part in str(error.value)
+    with pytest.raises(LogError, match=r"it holds /axis\.effort, /wrist\.accel; correct"):
+        measurement_of(
+            model_of(tmp_path), recording({"/wrist.accel": "m/s^2"}), log="log.mcap",
+            held=["/axis.effort", "/wrist.accel"],
+        )  # fmt: skip
 
 
 def test_a_model_that_names_no_channel_of_an_input_is_an_error(tmp_path: Path) -> None:
@@ -159,6 +164,11 @@ def test_no_output_at_all_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="nothing to compare") as error:
         measurement_of(model_of(tmp_path), recording({"/hammer.force": "N"}), log="log.mcap")
     assert "/column.accel" in str(error.value)
+    with pytest.raises(LogError, match=r"the log holds /hammer\.force, /tip\.accel; give an"):
+        measurement_of(
+            model_of(tmp_path), recording({"/hammer.force": "N"}), log="log.mcap",
+            held=["/hammer.force", "/tip.accel"],
+        )  # fmt: skip
 
 
 @pytest.mark.parametrize("how", ["valid", "nan", "infinite"])
@@ -173,7 +183,13 @@ def test_gaps_leave_the_longest_stretch_and_are_told(tmp_path: Path, how: str) -
         gappy = TimeSeries(values=values, sample_rate_hz=RATE_HZ, channels=series.channels)
     found, remarks = measurement_of(model_of(tmp_path), gappy, log="log.mcap")
     np.testing.assert_array_equal(found.inputs[0], series.values[row, 320:])
-    assert [remark for remark in remarks if "20 samples are missing" in remark and "0.32 s to 1 s" in remark]
+    assert [remark for remark in remarks if "log.mcap lacks 20 samples" in remark and "0.32 s to 1 s" in remark]
+
+
+def test_one_missing_sample_is_one(tmp_path: Path) -> None:
+    gappy = with_gap(recording(WHOLE), "/hammer.force", slice(300, 301))
+    _, remarks = measurement_of(model_of(tmp_path), gappy, log="log.mcap")
+    assert remarks[0].startswith("log.mcap lacks 1 sample; used is its longest stretch")
 
 
 def test_a_gap_in_a_channel_that_is_not_used_does_not_matter(tmp_path: Path) -> None:
@@ -189,7 +205,7 @@ def test_gaps_all_over_are_an_error_that_names_the_worst_channel(tmp_path: Path)
         measurement_of(
             model_of(tmp_path), with_gap(recording(WHOLE), "/hammer.force", slice(0, SAMPLES, 100)), log="log.mcap"
         )
-    assert "10 are missing in '/hammer.force'" in str(error.value)
+    assert "'/hammer.force' lacks 10 samples" in str(error.value)
 
 
 def test_short_logs_are_told_and_very_short_ones_refused(tmp_path: Path) -> None:
@@ -203,7 +219,10 @@ def test_short_logs_are_told_and_very_short_ones_refused(tmp_path: Path) -> None
 
 def test_a_rate_too_low_for_the_modes_is_told(tmp_path: Path) -> None:
     _, remarks = measurement_of(model_of(tmp_path), recording(WHOLE, rate_hz=100.0), log="log.mcap")
-    assert any("modes lie above 40 Hz" in remark for remark in remarks)
+    # They are at 44 and 89 Hz.
+    assert "a log at 100 Hz can't follow 2 modes of the model above 40 Hz" in remarks
+    _, remarks = measurement_of(model_of(tmp_path), recording(WHOLE, rate_hz=200.0), log="log.mcap")
+    assert "a log at 200 Hz can't follow 1 mode of the model above 80 Hz" in remarks
 
 
 def test_a_closed_loop_is_driven_by_its_reference_and_gives_its_command(tmp_path: Path) -> None:
