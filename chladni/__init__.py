@@ -22,6 +22,7 @@ __version__ = "0.1.0"
 _HOME = {
     "analyse": "chladni.apps.analyse",
     "diagnose_gap": "chladni.apps.diagnose",
+    "locate_from_levels": "chladni.apps.level_location",
     "frf": "chladni.apps.spectra",
     "identify_modes": "chladni.apps.modes",
     "psd": "chladni.apps.spectra",
@@ -98,6 +99,7 @@ __all__ = [
     "influence",
     "load_model",
     "load_setup",
+    "locate_from_levels",
     "mac",
     "open_log",
     "optimise",
@@ -114,6 +116,7 @@ __all__ = [
 if TYPE_CHECKING:
     from chladni.apps.analyse import analyse
     from chladni.apps.diagnose import diagnose_gap
+    from chladni.apps.level_location import locate_from_levels
     from chladni.apps.modes import identify_modes
     from chladni.apps.show import show
     from chladni.apps.spectra import frf, psd

@@ -175,7 +175,8 @@ def _told(splits: list[_Split], names: tuple[str, ...], *, odd_only: bool) -> Di
     remarks = []
     if not odd_only:
         remarks.append(
-            "even lines are excited too, so even and odd distortion can't be told apart; excite odd lines only"
+            "even lines are excited too, so even and odd distortion can't be told apart inside the band; excite odd "
+            "lines only"
         )
     if not all(split.known for split in splits):
         remarks.append("too few lines are excited to tell distortion on them from the linear response")

@@ -10,6 +10,7 @@ from scipy import fft
 
 from chladni.gap.comparison.linear_approximation import moving_inputs, period_spectra
 from chladni.gap.comparison.local_rational import unreached
+from chladni.gap.comparison.motion_functions import even_functions, odd_functions
 from chladni.gap.comparison.periodicity import periods_of
 from chladni.gap.records.measurement import Measurement
 from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
@@ -26,8 +27,6 @@ TERMS = 2
 FEWEST_BLOCKS = 4
 # Blocks whose power isn't so many times that of the noise tell about the noise.
 LEAST_RATIO = 4.0
-# Dead zones of the basis, over the RMS of the motion.
-ZONES = (1.0, 2.0)
 # Shares below this come about by chance: three sigma for fifteen blocks of three outputs.
 LEAST_SHARE = 0.03
 INTEGRATIONS = {"m/s^2": 2, "rad/s^2": 2, "m/s": 1, "rad/s": 1}
@@ -138,13 +137,12 @@ def _explained(
     name: tuple[str, ...], motion: tuple[Matrix, Matrix], mean: Complex, index: NDArray[np.intp]
 ) -> ProductsOutside:
     d, s = motion
-    size = np.abs(d)
-    beyond = [np.maximum(size - zone, 0.0) for zone in ZONES]
-    even = fft.rfft(np.array([size, d**2, *beyond]), axis=1)
-    odd = fft.rfft(np.array([d * size, d**3, *(np.sign(d) * one for one in beyond), np.sign(s)]), axis=1)
+    even, odd = (fft.rfft(one, axis=1) for one in (even_functions(d), odd_functions(d, s)))
     targets = mean[:, index].transpose(1, 2, 0)
     shares = [_share(basis[:, index], targets) for basis in (even, odd, np.concatenate([even, odd]))]
-    return ProductsOutside(motion=name, even=shares[2] - shares[1], odd=shares[2] - shares[0], both=shares[2])
+    # Beyond chance, a share may come out below zero; the other's own part would then exceed the whole.
+    alone_even, alone_odd, both = (max(share, 0.0) for share in shares)
+    return ProductsOutside(motion=name, even=both - alone_odd, odd=both - alone_even, both=both)
 
 
 def _share(basis: Complex, targets: Complex) -> float:

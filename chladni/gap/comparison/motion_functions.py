@@ -1,0 +1,22 @@
+"""Functions of one motion that a static nonlinearity is made of, even ones apart from odd ones."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Matrix = NDArray[np.float64]
+
+# Dead zones, over the RMS of the motion.
+ZONES = (1.0, 2.0)
+
+
+def even_functions(displacement: Matrix) -> Matrix:
+    """``[function, ..., sample]`` of a displacement ``[..., sample]`` of about unit RMS: abs(d), d^2, dead zones."""
+    size = np.abs(displacement)
+    return np.array([size, displacement**2, *(np.maximum(size - zone, 0.0) for zone in ZONES)])
+
+
+def odd_functions(displacement: Matrix, velocity: Matrix) -> Matrix:
+    """``[function, ..., sample]``: d abs(d), d^3, dead zones with the sign of d, and the sign of the velocity."""
+    size, side = np.abs(displacement), np.sign(displacement)
+    beyond = [side * np.maximum(size - zone, 0.0) for zone in ZONES]
+    return np.array([displacement * size, displacement**3, *beyond, np.sign(velocity)])

@@ -1,0 +1,96 @@
+"""A force that follows one motion and reaches the sensors along a free path: both fitted as a product."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Matrix = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# Normal equations are loaded by this share of their mean: functions of one motion are alike.
+_LOADING = 1e-6
+_STEPS = 60
+_SETTLED = 1e-6
+_FOLDS = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Products:
+    """Normal equations of all products of a block of the path and a function of the motion.
+
+    ``gram [block, block', function, function']`` and ``right [block, function]``, real.
+    """
+
+    gram: Matrix
+    right: Matrix
+
+
+def unseen_losses(blocks: Complex, forces: Complex, change: Complex) -> Matrix:
+    """Square of what a force that follows a motion leaves of a change, on lines that the fit hasn't seen.
+
+    The model is ``change = sum_t p_t blocks_t  sum_f c_f forces_f`` with real p (the path) and c (the law), the same
+    at all lines and levels. Every other line is fitted, the rest predicted, and the other way round.
+
+    Parameters
+    ----------
+    blocks
+        ``[block, output, line]``, see `ModalPaths`.
+    forces
+        ``[level, function, line]``, see `LevelChange.forces_of`.
+    change
+        ``[level, output, line]``.
+
+    Returns
+    -------
+    ``[line]``
+    """
+    losses = np.sum(np.abs(change) ** 2, axis=(0, 1))
+    lines = np.arange(change.shape[2])
+    if not forces.shape[1]:
+        return np.asarray(losses)
+    for fold in range(_FOLDS):
+        seen, unseen = lines % _FOLDS != fold, lines % _FOLDS == fold
+        path, law = _fitted(_products(blocks[..., seen], forces[..., seen], change[..., seen]))
+        printed = _printed(path, law, blocks[..., unseen], forces[..., unseen])
+        losses[unseen] = np.sum(np.abs(change[..., unseen] - printed) ** 2, axis=(0, 1))
+    return np.asarray(losses)
+
+
+def _printed(path: Matrix, law: Matrix, blocks: Complex, forces: Complex) -> Complex:
+    """``[level, output, line]``."""
+    force = np.einsum("f,lfk->lk", law, forces)
+    return np.asarray(force[:, None] * np.tensordot(path, blocks, 1))
+
+
+def _products(blocks: Complex, forces: Complex, change: Complex) -> _Products:
+    along = np.einsum("tok,uok->tuk", blocks.conj(), blocks)
+    acting = np.einsum("lfk,lgk->fgk", forces.conj(), forces)
+    lines = along.shape[2]
+    gram = (along.reshape(-1, lines) @ acting.reshape(-1, lines).T).real
+    met = np.einsum("tok,lok->tlk", blocks.conj(), change)
+    right = np.einsum("tlk,lfk->tf", met, forces.conj()).real
+    return _Products(gram=gram.reshape(*along.shape[:2], *acting.shape[:2]), right=right)
+
+
+def _fitted(products: _Products) -> tuple[Matrix, Matrix]:
+    """Path and law whose product explains most: one after the other, from the best free product's first part."""
+    gram, right = products.gram, products.right
+    size = right.size
+    free = _solved(gram.transpose(0, 2, 1, 3).reshape(size, size), right.ravel(), loading=1e-4)
+    law = np.linalg.svd(free.reshape(right.shape), full_matrices=False)[2][0]
+    path, reached = np.zeros(len(right)), 0.0
+    for _ in range(_STEPS):
+        path = _solved(np.einsum("tufg,f,g->tu", gram, law, law, optimize=True), right @ law)
+        law = _solved(np.einsum("tufg,t,u->fg", gram, path, path, optimize=True), path @ right)
+        # At its least-squares law a path explains this much power.
+        explained = float(path @ right @ law)
+        if explained - reached <= _SETTLED * explained:
+            break
+        reached = explained
+    return path, law
+
+
+def _solved(gram: Matrix, right: Matrix, *, loading: float = _LOADING) -> Matrix:
+    loaded = gram + loading * (np.trace(gram) / len(gram) + np.finfo(float).tiny) * np.eye(len(gram))
+    return np.asarray(np.linalg.solve(loaded, right))
