@@ -66,6 +66,7 @@ COULOMB_FRICTION = EffectKind(
             formula="F = force w + offset, w' = (s - |s| w)/presliding",
             parameters=Parameters((PRESLIDING,)),
             odd=True,
+            fitted=("presliding",),
         ),
     ),
 )  # fmt: skip

@@ -63,6 +63,9 @@ class Variant:
         Those that only this variant has, beyond the effect's own; all have defaults.
     odd
         Whether the law claims ``F(-d, -s) = -F(d, s)``; tested with ``offset`` and ``phase`` at zero.
+    fitted
+        Names among `parameters` that make this form what it is: a fit moves them beside those that the effect
+        requires.
     """
 
     name: str
@@ -70,6 +73,7 @@ class Variant:
     formula: str
     parameters: Parameters = _NONE
     odd: bool = False
+    fitted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,6 +135,8 @@ class EffectKind:
         # A name used twice shows when the parameters are put together: now, not when someone picks the variant.
         for variant in self.variants:
             self.parameters_of(variant.name)
+            for name in variant.fitted:
+                variant.parameters.require(name)
         for name in (*self.optional, *self.neutral):
             self.parameters.require(name)
 

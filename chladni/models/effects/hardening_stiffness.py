@@ -14,6 +14,24 @@ def cubic(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: 
     return float(parameters[0] * d * d * d)
 
 
+def progressive(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    """Give ``cubic d^3 (1 + (d/range)^2)``; parameters cubic, range."""
+    return float(parameters[0] * d * d * d * (1.0 + (d / parameters[1]) * (d / parameters[1])))
+
+
+def asymmetric(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    """Give ``cubic d^3 + quadratic d^2``; parameters cubic, quadratic."""
+    return float((parameters[0] * d + parameters[1]) * d * d)
+
+
+def _asymmetric_numbers(values: Values, _port: Port) -> tuple[float, ...]:
+    return values["cubic"], values["quadratic"]
+
+
+def _progressive_numbers(values: Values, _port: Port) -> tuple[float, ...]:
+    return values["cubic"], values["range"]
+
+
 def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
     return (values["cubic"],)
 
@@ -29,5 +47,34 @@ HARDENING_STIFFNESS = EffectKind(
     neutral={"cubic": 0.0},
     variants=(
         Variant(name="cubic", attach=LawAtPort(law=cubic, numbers=_numbers), formula="F = cubic d^3", odd=True),
+        Variant(
+            name="progressive",
+            attach=LawAtPort(law=progressive, numbers=_progressive_numbers),
+            formula="F = cubic d^3 (1 + (d/range)^2)",
+            parameters=Parameters(
+                (
+                    Parameter(
+                        name="range", value=1e-2, unit="m", low=1e-5, high=1.0, minimum=1e-9, maximum=1e6,
+                        meaning="displacement at which the next term is as large as the cubic one",
+                    ),
+                )
+            ),
+            odd=True,
+            fitted=("range",),
+        ),
+        Variant(
+            name="asymmetric",
+            attach=LawAtPort(law=asymmetric, numbers=_asymmetric_numbers),
+            formula="F = cubic d^3 + quadratic d^2",
+            parameters=Parameters(
+                (
+                    Parameter(
+                        name="quadratic", value=0.0, unit="N/m^2", low=-1e10, high=1e10, minimum=-1e18, maximum=1e18,
+                        meaning="-3 cubic times how far the middle of the spring lies beside rest",
+                    ),
+                )
+            ),
+            fitted=("quadratic",),
+        ),
     ),
-)
+)  # fmt: skip

@@ -27,6 +27,14 @@ def cubic(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: 
     return float(parameters[0] * inside * inside * inside - parameters[1] * (d - inside))
 
 
+def yielding(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    """Give ``-lost k d (1 - 1/sqrt(1 + q d^2))``, about ``cubic d^3`` near rest; parameters lost k and q.
+
+    The joint's whole force k d + F never falls: it ends on a line of slope (1 - lost) k.
+    """
+    return float(-parameters[0] * d * (1.0 - 1.0 / sqrt(1.0 + parameters[1] * d * d)))
+
+
 def valid_range(cubic_stiffness: float, stiffness: float) -> float:
     """Give the largest valid displacement ``sqrt(k/(3 abs(cubic)))``: there the joint's stiffness has fallen to zero.
 
@@ -44,7 +52,16 @@ def _numbers(values: Values, port: Port) -> tuple[float, ...]:
     return values["cubic"], port.stiffness, valid_range(values["cubic"], port.stiffness)
 
 
+def _yielding_numbers(values: Values, port: Port) -> tuple[float, ...]:
+    _numbers(values, port)
+    lost = values["lost"] * port.stiffness
+    return lost, -2 * values["cubic"] / lost
+
+
 def _flags(port: Port, values: Values, simulation: Simulation) -> tuple[str, ...]:
+    # A spring that yields is valid everywhere.
+    if "lost" in values:
+        return ()
     end = valid_range(values["cubic"], port.stiffness)
     # The law keeps going beyond its range, so that a simulation ends; the user must know that it was left.
     reached = float(np.max(np.abs(simulation.motion(port.name).displacement), initial=0.0))
@@ -74,5 +91,20 @@ SOFTENING_STIFFNESS = EffectKind(
             formula="F = cubic d^3 up to |d| = sqrt(k/(3 |cubic|)); beyond, k d + F stays constant",
             odd=True,
         ),
+        Variant(
+            name="yielding",
+            attach=LawAtPort(law=yielding, numbers=_yielding_numbers),
+            formula="F = -lost k d (1 - 1/sqrt(1 + 2 |cubic| d^2/(lost k))), about cubic d^3 near rest",
+            parameters=Parameters(
+                (
+                    Parameter(
+                        name="lost", value=1.0, unit="1", low=0.1, high=1.0, minimum=1e-3, maximum=1.0,
+                        meaning="share of the joint's stiffness that is gone far out",
+                    ),
+                )
+            ),
+            odd=True,
+            fitted=("lost",),
+        ),
     ),
-)
+)  # fmt: skip

@@ -15,6 +15,27 @@ def test_is_a_cube_and_takes_no_energy() -> None:
     assert energy(*loop(law, 0.02, 5.0)) == pytest.approx(0.0, abs=1e-12)
 
 
+def test_a_progressive_spring_doubles_its_cube_at_the_range() -> None:
+    effect = attached("hardening_stiffness", "spring", {"cubic": 5e6, "range": 0.02}, variant="progressive")
+    law = law_of(effect, one_body())
+    assert force(law, d=0.02) == pytest.approx(80.0, rel=1e-14)
+    assert force(law, d=-0.01) == pytest.approx(-5.0 * 1.25, rel=1e-14)
+
+
+def test_a_cube_whose_middle_lies_beside_rest_is_asymmetric() -> None:
+    # cubic (d - e)^3 but for what is linear and constant in d.
+    cubic, beside = 5e6, 1e-3
+    law = law_of(
+        attached(
+            "hardening_stiffness", "spring", {"cubic": cubic, "quadratic": -3 * cubic * beside}, variant="asymmetric"
+        ),
+        one_body(),
+    )
+    for d in (0.01, -0.02):
+        shifted = cubic * ((d - beside) ** 3 - 3 * beside**2 * d + beside**3)
+        assert force(law, d=d) == pytest.approx(shifted, rel=1e-12)
+
+
 def test_the_free_vibration_has_the_period_of_duffings_closed_form() -> None:
     cubic, amplitude = 4e6, 0.02
     plant = one_body(damping=0.0)

@@ -57,3 +57,48 @@ def test_large_cycles_take_what_friction_with_elastic_reversals_takes() -> None:
 def test_turning_the_speed_of_a_cycle_changes_nothing() -> None:
     slow, fast = energy(*loop(_law(2.0), 3 * YIELD, 0.01)), energy(*loop(_law(2.0), 3 * YIELD, 100.0))
     assert slow == pytest.approx(fast, rel=1e-6)
+
+
+SLIP = 0.02
+
+
+def _creeping(**values: float):  # type: ignore[no-untyped-def]
+    given = {"force": FORCE, "yield": YIELD, "slip_speed": SLIP, **values}
+    return law_of(attached("hysteresis", "spring", given, variant="creeping"), one_body())
+
+
+@pytest.mark.parametrize(("speed", "share"), [(0.3, 0.3), (0.9, 0.9), (1.5, 1.0), (-4.0, -1.0)])
+def test_a_creeping_element_holds_what_its_dashpot_carries_and_no_more_than_its_force(
+    speed: float, share: float
+) -> None:
+    times_s = np.linspace(0, 100 * YIELD / SLIP, 21)
+    found = driven(_creeping(shape=3.0), lambda t: speed * SLIP * t, lambda _t: speed * SLIP, times_s)
+    assert found[-1] == pytest.approx(share * FORCE, rel=1e-6)
+
+
+def test_a_creeping_element_held_still_forgets_over_the_time_of_yield_and_slip_speed() -> None:
+    # At loop 1/2 the law unloads along its stiffness: spring and dashpot in series.
+    rates = [0.0]
+    law = _creeping(shape=2.0)
+    law.function(0.0, 0.0, 0.0, law.parameters, [0.6], rates)
+    assert rates[0] == pytest.approx(-0.6 * SLIP / YIELD, rel=1e-14)
+
+
+def test_without_a_dashpot_a_creeping_element_is_the_plain_one() -> None:
+    plain, creeping = loop(_law(2.0), 3 * YIELD, 5.0), loop(_creeping(shape=2.0, slip_speed=0.0), 3 * YIELD, 5.0)
+    np.testing.assert_allclose(creeping[1], plain[1], atol=1e-6 * FORCE)
+
+
+def test_the_loop_of_a_creeping_element_is_dahls_at_one() -> None:
+    # Dahl's friction unloads as it loaded: w' = (s - |s| w)/yield.
+    law = _creeping(loop=1.0, slip_speed=0.0)
+    for w in (-0.7, 0.2, 0.9):
+        for s in (-3.0, 2.0):
+            rates = [0.0]
+            law.function(0.0, s, 0.0, law.parameters, [w], rates)
+            assert rates[0] == pytest.approx((s - abs(s) * w) / YIELD, rel=1e-12)
+
+
+@pytest.mark.parametrize("speed", [0.05, 1.0, 20.0])
+def test_a_creeping_element_takes_energy_at_any_speed(speed: float) -> None:
+    assert energy(*loop(_creeping(loop=4.0), 2 * YIELD, speed * SLIP / (2 * YIELD))) > 0.0

@@ -20,6 +20,18 @@ def _total(d: float) -> float:
     return STIFFNESS * d + force(law_of(EFFECT, one_body()), d=d)
 
 
+def _moved(reached: float) -> Simulation:
+    """A simulation in which the joint got as far as that."""
+    channel = Channel(name="a", unit="m")
+    nothing = TimeSeries(values=np.zeros((1, 2)), sample_rate_hz=1.0, channels=(channel,))
+    moved = PortMotion(
+        name="spring", kind="joint", displacement=np.array([0.0, -reached]), velocity=np.zeros(2), force=np.zeros(2)
+    )
+    return Simulation(
+        model="m", inputs=nothing, outputs=nothing, states=np.zeros((0, 2)), state_names=(), motions=(moved,)
+    )
+
+
 def test_inside_the_range_it_is_a_cube() -> None:
     assert _total(0.5 * END) == pytest.approx(STIFFNESS * 0.5 * END + CUBIC * (0.5 * END) ** 3, rel=1e-14)
 
@@ -45,20 +57,36 @@ def test_a_joint_without_spring_cannot_soften() -> None:
         EFFECT.attach(one_body(stiffness=0.0))
 
 
+def test_a_yielding_spring_begins_as_the_cube_and_keeps_what_is_not_lost() -> None:
+    law = law_of(
+        attached("softening_stiffness", "spring", {"cubic": CUBIC, "lost": 0.7}, variant="yielding"), one_body()
+    )
+    near, far = 0.01 * END, 1e5 * END
+    assert force(law, d=near) == pytest.approx(CUBIC * near**3, rel=1e-3)
+    assert force(law, d=far) == pytest.approx(-0.7 * STIFFNESS * far, rel=1e-4)
+    whole = [STIFFNESS * d + force(law, d=d) for d in np.linspace(0.0, 50 * END, 500)]
+    assert np.all(np.diff(whole) > 0)
+
+
+def test_a_yielding_spring_that_loses_all_ends_at_a_force() -> None:
+    law = law_of(attached("softening_stiffness", "spring", {"cubic": CUBIC}, variant="yielding"), one_body())
+    far = 1e5 * END
+    plateau = STIFFNESS * np.sqrt(STIFFNESS / (-2 * CUBIC))
+    assert STIFFNESS * far + force(law, d=far) == pytest.approx(plateau, rel=1e-4)
+
+
 @pytest.mark.parametrize(("reached", "flagged"), [(0.9 * END, False), (1.2 * END, True)])
 def test_leaving_the_range_is_flagged(reached: float, flagged: bool) -> None:
-    channel = Channel(name="a", unit="m")
-    nothing = TimeSeries(values=np.zeros((1, 2)), sample_rate_hz=1.0, channels=(channel,))
-    moved = PortMotion(
-        name="spring", kind="joint", displacement=np.array([0.0, -reached]), velocity=np.zeros(2), force=np.zeros(2)
-    )
-    simulation = Simulation(
-        model="m", inputs=nothing, outputs=nothing, states=np.zeros((0, 2)), state_names=(), motions=(moved,)
-    )
-    flags = EFFECT.flags(one_body(), simulation)
+    flags = EFFECT.flags(one_body(), _moved(reached))
     assert len(flags) == int(flagged)
     if flagged:
         assert "softening_stiffness at spring: displacement 0.0139 m leaves the valid range of 0.0115 m" in flags[0]
+
+
+def test_a_yielding_spring_is_valid_everywhere() -> None:
+    simulation = _moved(40 * END)
+    effect = attached("softening_stiffness", "spring", {"cubic": CUBIC}, variant="yielding")
+    assert effect.flags(one_body(), simulation) == ()
 
 
 def test_other_effects_flag_nothing() -> None:
