@@ -160,7 +160,9 @@ def _unknown(found: Diagnosis) -> Iterator[str]:
         where.append(f"{percent(site.share)} of it can come from {site.name}")
     if found.where.bands:
         band = max(found.where.bands, key=lambda one: one.share)
-        where.append(f"{percent(band.share)} lies between {band.low_hz:.4g} and {band.high_hz:.4g} Hz")
+        # With one sensor there is no site to begin with.
+        of_it = "" if where else " of it"
+        where.append(f"{percent(band.share)}{of_it} lies between {band.low_hz:.4g} and {band.high_hz:.4g} Hz")
     if where:
         text = ", and ".join(where)
         yield f"{text[0].upper()}{text[1:]}."

@@ -118,6 +118,14 @@ def test_a_diagnosis_without_signals_still_has_its_bars() -> None:
     assert len(gap_sheet(gap_evidence(bare)).axes) == 1
 
 
+def test_without_shares_of_sites_the_other_bars_are_drawn() -> None:
+    where = replace(made.diagnosis().where, sites=())
+    one_sensor = gap_evidence(replace(made.diagnosis(), where=where))
+    titles = [axes.get_title(loc="left") for axes in gap_album(one_sensor).figures["where"].axes]
+    assert titles == ["In which band it lies", "While which variable is where"]
+    assert not any("site" in axes.get_title(loc="left") for axes in gap_sheet(one_sensor).axes)
+
+
 def test_nothing_at_all_is_drawn_as_nothing() -> None:
     where = replace(made.diagnosis().where, sites=(), bands=(), regimes=())
     bare = replace(made.diagnosis(), signals=None, restoring_force=None, where=where)

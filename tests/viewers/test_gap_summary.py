@@ -105,6 +105,9 @@ def test_an_unknown_gap_is_told_with_where_it_lies_and_what_is_nearest() -> None
     assert said[1] == "93 % of it can come from elbow, and 71 % lies between 8 and 16 Hz."
     assert said[2].startswith("Nearest, but not good enough: Coulomb friction at elbow, hysteresis at elbow")
     assert said[-1] == "Measure the wrist's rotation, too."
+    # One sensor tells bands, and no sites.
+    blind = replace(made.unknown(), where=replace(made.unknown().where, sites=()))
+    assert summary(blind)[1] == "71 % of it lies between 8 and 16 Hz."
 
 
 def test_how_it_was_measured_is_told_where_it_was_not_by_free_run() -> None:

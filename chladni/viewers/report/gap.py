@@ -67,7 +67,9 @@ def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
     yield _section("Answer", _answer(found))
     yield _section("Causes", _causes(found))
     yield _section("Evidence", _pictures(album, "signals", "errors", "spectra", "force"))
-    yield _section("Where it lies", _where(found) + _pictures(album, "shares", "map"))
+    # With one sensor no site can be told from another, and the picture of shares is empty.
+    places = ("shares", "map") if found.where.sites else ("map",)
+    yield _section("Where it lies", _where(found) + _pictures(album, *places))
     yield _section(
         "What was weighed", _tables((tables.ranking_table(found, count=RANKED), (2, 3, 4))) + _naive(found)
     )
