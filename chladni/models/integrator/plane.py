@@ -2,6 +2,7 @@
 
 import operator
 from collections.abc import Callable
+from functools import cache
 from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
@@ -135,13 +136,15 @@ def book(*records: NamedTuple) -> NDArray[np.int64]:
     return np.array(words, dtype=np.int64)
 
 
-def _planes(record: type) -> list[PlaneType]:
+@cache
+def _planes(record: type) -> tuple[PlaneType, ...]:
+    # Once for each kind of record: evaluating annotations takes longer than a short run.
     kinds = []
     for hint in get_type_hints(record, include_extras=True).values():
         array, axes = get_args(hint)
         number = types.int64 if array == NDArray[np.int64] else types.float64
         kinds.append(PlaneType(number, axes))
-    return kinds
+    return tuple(kinds)
 
 
 def opener(*records: type) -> Callable[[int], Any]:
