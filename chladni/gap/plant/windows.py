@@ -1,5 +1,6 @@
 """Windows for models that a free run leaves behind: free axes drift, unstable ones run away."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -65,6 +66,24 @@ def windows_for(model: Model, measurement: Measurement) -> tuple[tuple[int, int]
 def horizon_s(windows: tuple[tuple[int, int], ...], sample_rate_hz: float) -> float:
     """Mean length of the windows in seconds: how far ahead the model is asked to predict."""
     return float(np.mean([stop - start for start, stop in windows]) / sample_rate_hz)
+
+
+def training_in_windows(windows: Sequence[tuple[int, int]]) -> NDArray[np.bool_]:
+    """Give ``[sample]``: True where fits may look, False in the middle third of every window.
+
+    Each window begins at a state of its own, which only its own samples tell. A window that a fit hardly sees would
+    be predicted from a start that nothing determines; what comes before and after the middle does.
+
+    Examples
+    --------
+    >>> training_in_windows([(0, 6), (6, 9)]).astype(int)
+    array([1, 1, 0, 0, 1, 1, 1, 0, 1])
+    """
+    training = np.ones(windows[-1][1], dtype=np.bool_)
+    for start, stop in windows:
+        third = (stop - start) // 3
+        training[start + third : stop - third] = False
+    return training
 
 
 def _lasting(poles: NDArray[np.complex128], duration_s: float) -> NDArray[np.bool_]:

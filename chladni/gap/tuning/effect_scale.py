@@ -61,7 +61,8 @@ def effect_numbers(
     effects
         With the values that the fit starts from.
     fitted
-        Names for each effect; by default those that it can't do without, as far as they are numbers to fit at all.
+        Names for each effect, one that is given twice counts once; by default those that it can't do without, as far
+        as they are numbers to fit at all.
 
     Raises
     ------
@@ -75,13 +76,14 @@ def effect_numbers(
     return tuple(
         _number(place, effect.parameters.require(name))
         for place, (effect, names) in enumerate(zip(effects, fitted, strict=True))
-        for name in names
+        for name in dict.fromkeys(names)
     )
 
 
 def usually_fitted(effect: AttachedEffect) -> tuple[str, ...]:
     """Parameters that an effect can't do without; a choice such as the side of a stop isn't one to fit."""
-    return tuple(name for name in effect.kind.required if effect.parameters[name].role == "construction")
+    names = (*effect.kind.required, *effect.kind.variant(effect.variant).fitted)
+    return tuple(name for name in names if effect.parameters[name].role == "construction")
 
 
 def with_numbers(

@@ -11,6 +11,7 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.bounded_step import bounded_step
 from chladni.gap.tuning.effect_scale import effect_numbers
 from chladni.gap.tuning.fit_problem import Z_LIMIT, Evaluation, FitProblem, Point, Slopes
+from chladni.gap.tuning.law_error import with_law_error
 from chladni.gap.tuning.residual import Whitening
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.errors import EstimateError, ModelError
@@ -162,8 +163,9 @@ def fit_output_error(
     require_shape("training", training, (samples,), "the log")
     z = np.zeros(count) if start_z is None else np.asarray(start_z, dtype=np.float64)
     require_shape("start_z", z, (count,), "the tunable parameters")
+    seen = with_law_error(noise, np.std(run.measurement.outputs, axis=1))
     problem = FitProblem(
-        run, Whitening(noise, training, offsets=offsets), training,
+        run, Whitening(seen, training, offsets=offsets), training,
         effects=effects, numbers=effect_numbers(effects, fitted), tune=tune, z_limit=z_limit, start_z=z,
     )  # fmt: skip
     start = problem.start_of_windows() if problem.has_laws and len(run.windows) > 1 else problem.start()

@@ -86,7 +86,10 @@ class Whitening:
         white = self._kept(self.whitened(missed))
         offsets = np.einsum("os,os->o", white, self._constant) / self._size * self._offsets
         white = white - offsets[:, None] * self._constant
-        return Residual(white=white, power=np.mean(white**2, axis=1), offsets=offsets)
+        # A run that is leaving the numbers costs more than any other; that is all a fit has to know.
+        with np.errstate(over="ignore"):
+            power = np.mean(white**2, axis=1)
+        return Residual(white=white, power=power, offsets=offsets)
 
     def _kept(self, white: Matrix) -> Matrix:
         return white if self._whole else np.take(white, self._places, axis=-1)

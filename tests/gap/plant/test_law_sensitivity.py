@@ -20,6 +20,9 @@ LAWS = {
     "coulomb": attached("coulomb_friction", "j1", {"force": 8.0, "creep_speed": 1e-3}),
     "bristle": attached("coulomb_friction", "j1", {"force": 8.0, "presliding": 3e-5}, variant="bristle"),
     "bouc_wen": attached("hysteresis", "j0", {"force": 20.0, "yield": 5e-5, "shape": 2.0}),
+    "creeping": attached(
+        "hysteresis", "j0", {"force": 20.0, "yield": 5e-5, "slip_speed": 5e-3, "loop": 1.0}, variant="creeping"
+    ),
     "backlash": attached("backlash", "j1", {"gap": 2e-5}),
     "drift": attached("varying_stiffness", "j0", {"relative_change": 0.3, "time": 0.7}),
 }

@@ -1,12 +1,18 @@
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from chladni.gap.plant.windows import _horizon_s, _lasting, horizon_s, windows_for
+from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.windows import _horizon_s, _lasting, horizon_s, training_in_windows, windows_for
 from chladni.gap.records.measurement import Measurement
+from chladni.gap.tuning.output_error import fit_output_error
+from chladni.models.effects.attached_effect import attached
 from chladni.models.files.model_file import load_model
-from tests.gap.made_log import chain, three_bodies
+from chladni.models.integrator.integrator import Integrator
+from chladni.models.structures.structure_output import StructureOutput
+from tests.gap.made_log import chain, three_bodies, white_floor
 
 
 def log_of(model, samples=10_000, rate_hz=1000.0):
@@ -50,6 +56,37 @@ def test_what_grows_is_left_before_it_has_grown_far():
 def test_a_model_without_a_time_of_its_own_is_given_a_second():
     poles = np.zeros(2, dtype=complex)
     assert _horizon_s(poles, _lasting(poles, 10.0)) == 1.0
+
+
+def test_every_window_shows_its_start_and_its_end_to_a_fit():
+    model = chain([1.0, 1.0], [0.0, 5e3], [0.0, 1.0])
+    windows = windows_for(model, log_of(model))
+    training = training_in_windows(windows)
+    for start, stop in windows:
+        third = (stop - start) // 3
+        assert training[start : start + third].all()
+        assert training[stop - third : stop].all()
+        assert not training[start + third : stop - third].any()
+
+
+def test_a_fit_over_windows_predicts_what_it_did_not_see():
+    """A free body with friction: two thirds of each window tell the friction, whatever its start is."""
+    seen = (StructureOutput(name="d", measures="displacement", at="b0"),)
+    model = replace(chain([1.0], [0.0], [3.0]), outputs=seen)
+    rate_hz, count = 500.0, 4000
+    compiled = model.with_effects([attached("coulomb_friction", "j0", {"force": 2.0, "creep_speed": 1e-3})]).compile()
+    push = 8.0 * np.sin(2 * np.pi * 0.7 * np.arange(count) / rate_hz)[None]
+    outputs = Integrator(compiled, rate_hz).run(push).outputs
+    log = replace(log_of(model, count, rate_hz), inputs=push, outputs=outputs)
+    windows = windows_for(model, log)
+    start = attached("coulomb_friction", "j0", {"force": 1.5, "creep_speed": 1e-3})
+    fit = fit_output_error(
+        FreeRun(model, log, windows=windows), white_floor([1e-5]),
+        effects=[start], training=training_in_windows(windows), offsets=False,
+    )  # fmt: skip
+    assert fit.effects[0].values["force"] == pytest.approx(2.0, rel=0.02)
+    held = ~training_in_windows(windows)
+    assert np.std((outputs - fit.outputs)[:, held]) < 0.02 * np.std(outputs)
 
 
 def test_the_axis_of_a_robot(shared_data):

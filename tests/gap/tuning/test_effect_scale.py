@@ -44,6 +44,17 @@ def test_a_choice_is_not_fitted():
     assert usually_fitted(FRICTION) == ("force",)
 
 
+def test_what_makes_a_form_of_a_law_is_fitted_with_it():
+    values = {"force": 1.0, "yield": 1e-4}
+    assert usually_fitted(attached("hysteresis", "j", values)) == ("force", "yield")
+    creeping = attached("hysteresis", "j", values, variant="creeping")
+    assert usually_fitted(creeping) == ("force", "yield", "slip_speed", "loop")
+
+
+def test_a_name_that_is_given_twice_is_one_number():
+    assert len(effect_numbers([FRICTION], [["force", "offset", "force"]])) == 2
+
+
 def test_mistakes_are_named():
     with pytest.raises(ModelError, match="no parameter 'forze'; did you mean force"):
         effect_numbers([FRICTION], [["forze"]])

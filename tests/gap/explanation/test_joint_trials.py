@@ -1,0 +1,93 @@
+"""The screen at a joint: which word it puts first, and with which numbers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from chladni.gap.explanation.candidates import screened
+from chladni.gap.location.locate import locate
+from chladni.gap.plant.tunable import Tunables
+from chladni.gap.records.measurement import Measurement
+from chladni.models.effects.attached_effect import attached
+from chladni.models.structures.structure import Body, Joint, Structure
+from chladni.models.structures.structure_input import StructureInput
+from chladni.models.structures.structure_model import StructureModel
+from chladni.models.structures.structure_output import StructureOutput
+from tests.gap.made_log import band_noise, chain, measured, white_floor
+
+RATE_HZ, SAMPLES = 200.0, 1600
+STIFFNESS, DAMPING = 900.0, 3000.0
+
+
+def damper():
+    return StructureModel(
+        name="damper",
+        structure=Structure(
+            bodies=(Body(name="rod", mass=1.0),),
+            joints=(Joint(name="seal", between=("ground", "rod"), stiffness=1000.0, damping=3200.0),),
+        ),
+        inputs=(StructureInput(name="stroke", at="rod", kind="displacement"),),
+        outputs=(StructureOutput(name="force", measures="force", at="seal"),),
+    )
+
+
+def spencer(time_s, alpha, delta, c0, c1):
+    """Spencer's law of a damper (1997), n = 2, beta = gamma = delta/2: Bouc-Wen beside c0, both behind c1."""
+    omega = 2 * np.pi * 0.5
+
+    def rates(t, state):
+        z, v = state[1], 0.02 * omega * np.cos(omega * t)
+        behind = (alpha * z + c0 * v) / (c0 + c1)
+        return [behind, delta * (v - behind) - 0.5 * delta * (abs(v - behind) * z * abs(z) + (v - behind) * z * z)]
+
+    found = solve_ivp(rates, (0, time_s[-1]), [0.0, 0.0], t_eval=time_s, max_step=2e-3, rtol=1e-6)
+    return c1 * np.array([rates(t, state)[0] for t, state in zip(time_s, found.y.T, strict=True)])
+
+
+@pytest.fixture(scope="module")
+def found():
+    time_s = np.arange(SAMPLES) / RATE_HZ
+    stroke = 0.02 * np.sin(2 * np.pi * 0.5 * time_s)
+    force = STIFFNESS * stroke + spencer(time_s, alpha=800.0, delta=1500.0, c0=DAMPING, c1=6e4)
+    noise = 0.003 * np.std(force)
+    force = force + noise * np.random.default_rng(1).standard_normal(SAMPLES)
+    model = damper()
+    log = Measurement(
+        log="made", sample_rate_hz=RATE_HZ, inputs=stroke[None], outputs=force[None],
+        input_names=("stroke",), output_names=("force",), output_units=("N",),
+    )  # fmt: skip
+    location = locate(model, log, white_floor([noise]), Tunables.of(model))
+    return screened(location, location.ranked, frozenset(), {})
+
+
+def test_a_yielding_element_behind_a_dashpot_is_hysteresis(found):
+    best = found[0].trial
+    assert (best.effect, best.variant, best.site.name) == ("hysteresis", "creeping", "seal")
+    rival = next(one for one in found if one.trial.effect == "coulomb_friction")
+    assert rival.misfit > 2 * found[0].misfit
+
+
+def test_its_numbers_are_those_of_the_law_with_both_dashpots_in_one(found):
+    # c0 beside the element and c1 behind both are, with kappa = c1/(c0 + c1), a dashpot kappa c0 beside all and one
+    # of kappa c1 behind the element, whose force is kappa alpha and whose yield is 1/(delta kappa).
+    kappa = 6e4 / (DAMPING + 6e4)
+    values = found[0].values
+    assert values["force"] == pytest.approx(kappa * 800.0, rel=0.05)
+    assert values["slip_speed"] == pytest.approx(800.0 / 6e4, rel=0.2)
+    # The screen knows shape 1 only, which bends earlier than the shape of 2 that acts.
+    assert values["yield"] == pytest.approx(1 / (1500.0 * kappa), rel=0.4)
+
+
+def test_a_cube_whose_middle_lies_beside_rest_is_told_with_its_square():
+    seen = (StructureOutput(name="d", measures="displacement", at="b0"),)
+    model = replace(chain([1.0], [4e4], [8.0]), outputs=seen)
+    values = {"cubic": 3e8, "quadratic": -6e5}
+    machine = model.with_effects([attached("hardening_stiffness", "j0", values, variant="asymmetric")])
+    log, floor = measured(machine, band_noise(2000, rms=60.0), noise=2e-3)
+    location = locate(model, log, floor, Tunables.of(model))
+    (best, *_) = screened(location, location.ranked, frozenset(), {})
+    assert (best.trial.effect, best.trial.variant) == ("hardening_stiffness", "asymmetric")
+    assert best.values["cubic"] == pytest.approx(values["cubic"], rel=0.1)
+    assert best.values["quadratic"] == pytest.approx(values["quadratic"], rel=0.15)
