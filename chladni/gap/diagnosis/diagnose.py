@@ -6,8 +6,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.comparison.distortion import distortion_of
+from chladni.gap.comparison.distortion import Distortion, distortion_of
 from chladni.gap.comparison.levels import compare_levels
+from chladni.gap.comparison.outside_band import products_outside
+from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, regime_shares
 from chladni.gap.design.next_measurement import next_measurement
 from chladni.gap.design.what_is_missing import what_is_missing
@@ -22,7 +24,6 @@ from chladni.gap.plant.places import Site
 from chladni.gap.records.diagnosis import (
     Cause,
     Diagnosis,
-    DistortionShare,
     GapSignals,
     RestoringForce,
     SiteShare,
@@ -80,17 +81,16 @@ def diagnose(
     causes = causes_of(study, lambda done: tell("explaining", 0.3 + 0.6 * done))
     tell("measuring the closing", 0.9)
     found = _assembled(study, causes, [one.log for one in measurements], seed)
+    # Periods tell noise from distortion at every level, as they did for the first log.
+    levels = compare_levels([with_period(one) for one in measurements]) if len(measurements) > 1 else ()
     tell("measuring the closing", 1.0)
-    levels = tuple(compare_levels(measurements)) if len(measurements) > 1 else ()
-    return found if not levels else _with_levels(found, levels)
+    # What is said of a level there needn't be said of its log again.
+    remarks = tuple(one for one in found.remarks if not any(one in told for told in levels))
+    return replace(found, levels=levels, remarks=remarks)
 
 
 def _silent(_step: str, _share: float) -> None:
     pass
-
-
-def _with_levels(found: Diagnosis, levels: tuple[str, ...]) -> Diagnosis:
-    return replace(found, levels=levels)
 
 
 def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> Diagnosis:
@@ -108,18 +108,24 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         verdict=causes.verdict,
         causes=said,
         ranking=ranking_of(causes, said),
-        where=_where(study, before, motion),
+        where=_where(study, causes, before, motion),
         gap=closing_of(
-            study, before, causes.tuned.fit.outputs, after, cross_sensor=causes.shaken is not None, seed=seed
+            study,
+            causes.noise,
+            before,
+            causes.tuned.fit.outputs,
+            after,
+            cross_sensor=causes.shaken is not None,
+            seed=seed,
         ),
         tuned_parameters=tuned_numbers(study, shown.fit),
         next_measurement=_next(study, causes, seed),
         naive=naive_of(causes),
-        remarks=tuple(_remarks(study, causes)),
+        remarks=(*_remarks(study, causes), *_distortion_remarks(study.measurement, distortion)),
         advice=_advice(causes),
         restoring_force=_restoring(study, causes, motion),
-        signals=_signals(study, before, after),
-        distortion=distortion,
+        signals=_signals(study, causes, before, after),
+        distortion=() if distortion is None else distortion.shares,
     )
 
 
@@ -132,7 +138,7 @@ def _nominal(study: Study) -> Matrix:
         return run.outputs()
 
 
-def _where(study: Study, before: Matrix, motion: Recovered | None) -> Where:
+def _where(study: Study, causes: Causes, before: Matrix, motion: Recovered | None) -> Where:
     measurement = study.measurement
     residual = measurement.outputs - before
     shares = sorted(study.location.shares.items(), key=lambda one: -one[1])
@@ -143,9 +149,7 @@ def _where(study: Study, before: Matrix, motion: Recovered | None) -> Where:
             f"{motion.site.name}.velocity": motion.velocity,
         }
     return Where(
-        channels=channel_gaps(
-            residual, measurement.outputs, study.contest.noise, output_names=measurement.output_names
-        ),
+        channels=channel_gaps(residual, measurement.outputs, causes.noise, output_names=measurement.output_names),
         bands=band_shares(residual, measurement.outputs, sample_rate_hz=measurement.sample_rate_hz),
         sites=tuple(SiteShare(name=name, share=share) for name, share in shares),
         regimes=tuple(regime_shares(residual, measurement.outputs, variables)) if variables else (),
@@ -202,7 +206,7 @@ def _port(study: Study, site: Site) -> tuple[str, str]:
     return "1", "1"
 
 
-def _signals(study: Study, before: Matrix, after: Matrix) -> GapSignals:
+def _signals(study: Study, causes: Causes, before: Matrix, after: Matrix) -> GapSignals:
     measurement = study.measurement
     time_s, frequency_hz, density = gap_map(
         measurement.outputs - before, measurement.outputs, measurement.sample_rate_hz
@@ -215,7 +219,7 @@ def _signals(study: Study, before: Matrix, after: Matrix) -> GapSignals:
         measured=measurement.outputs,
         before=before,
         after=after,
-        noise_rms=study.contest.noise.rms,
+        noise_rms=causes.noise.rms,
         map_time_s=time_s,
         map_frequency_hz=frequency_hz,
         gap_map=density,
@@ -223,12 +227,19 @@ def _signals(study: Study, before: Matrix, after: Matrix) -> GapSignals:
     )
 
 
-def _distortion(measurement: Measurement) -> tuple[DistortionShare, ...]:
+def _distortion(measurement: Measurement) -> Distortion | None:
     try:
-        found = distortion_of(measurement)
+        return distortion_of(measurement)
     except EstimateError:
+        return None
+
+
+def _distortion_remarks(measurement: Measurement, distortion: Distortion | None) -> tuple[str, ...]:
+    """What the excitation doesn't allow to be told of distortion, and what the lines above its band tell."""
+    if distortion is None:
         return ()
-    return () if found is None else tuple(found.shares)
+    outside = products_outside(measurement)
+    return (*distortion.remarks, *(() if outside is None else (outside.sentence(),)))
 
 
 def _remarks(study: Study, causes: Causes) -> list[str]:
@@ -238,12 +249,14 @@ def _remarks(study: Study, causes: Causes) -> list[str]:
             "one output only: which site the missing force acts at can't be told from patterns, only from its law; "
             "a second sensor would tell"
         )
+    if study.repeating:
+        found.append(
+            f"{', '.join(study.repeating)}: many samples repeat the one before; the sensor is slower than the log"
+        )
     if causes.tuned.fit.undetermined:
         names = ", ".join(causes.tuned.fit.undetermined[:6])
         found.append(f"this log doesn't determine {names}: held near nominal")
-    if study.horizon_s is not None:
-        found.append(f"compared over windows of {study.horizon_s:.3g} s, each from its own estimated state")
-    if np.any(study.contest.noise.upper_bound):
+    if np.any(causes.noise.upper_bound):
         found.append("the noise floor of some outputs is an upper bound: distortion may be in it")
     return found
 
@@ -257,12 +270,10 @@ def _next(study: Study, causes: Causes, seed: int) -> str | None:
     close = sorted(close, key=lambda one: -one.log_evidence)
     near = [one for one in close if one.log_evidence > close[0].log_evidence - _STILL_CLOSE]
     if causes.verdict != "unknown" and len(near) > 1 and close[0] is not causes.tuned:
-        return next_measurement(
-            study.model, study.measurement, run.tunables, near[:4], study.contest.noise, seed=seed
-        )
+        return next_measurement(study.model, study.measurement, run.tunables, near[:4], causes.noise, seed=seed)
     if causes.verdict == "unknown":
         sites = [located.places[0].sites[0].name for located in study.location.ranked[:3]]
-        return what_is_missing(study.model, study.measurement, study.contest.noise, sites=sites)
+        return what_is_missing(study.model, study.measurement, causes.noise, sites=sites)
     return None
 
 

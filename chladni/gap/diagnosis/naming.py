@@ -29,40 +29,37 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
         taken = {(one.effect, one.site) for one in found}
         found += [
             _plain("quantization", name, _LATTICE, step=lattice.step, unit=_unit(study, name))
-            for name, lattice in causes.lattices.items()
+            for name, lattice in study.lattices.items()
             if ("quantization", name) not in taken
         ]
     return tuple(found)
 
 
 def ranking_of(causes: Causes, causes_said: Sequence[Cause]) -> tuple[Ranked, ...]:
-    """Give every candidate once, by falling probability; what is said as a cause comes first."""
-    rows: dict[tuple[str, str], Ranked] = {}
-    for said in causes_said:
-        rows[said.effect, said.site] = Ranked(
-            effect=said.effect, site=said.site, probability=said.probability, gap=None, log_evidence=None
-        )
-    for one, probability in zip(causes.ranked, causes.probabilities, strict=True):
+    """Give every candidate once, by falling probability; what is said as a cause keeps its probability."""
+    said = {(one.effect, one.site): one.probability for one in causes_said}
+    rows = {
+        key: Ranked(effect=key[0], site=key[1], probability=probability, gap=None, log_evidence=None)
+        for key, probability in said.items()
+    }
+    # By falling evidence: the first that names a candidate is its best form.
+    for one in reversed(causes.ranked):
         for candidate in one.hypothesis.named:
             key = (candidate.effect, candidate.site)
-            known = rows.get(key)
-            if known is None or known.gap is None:
-                said_probability = known.probability if known is not None else probability
-                rows[key] = Ranked(
-                    effect=key[0],
-                    site=key[1],
-                    probability=said_probability,
-                    gap=one.gap,
-                    log_evidence=one.log_evidence,
-                )
+            rows[key] = Ranked(
+                effect=key[0],
+                site=key[1],
+                probability=said.get(key, probability_of(causes, candidate)),
+                gap=one.gap,
+                log_evidence=one.log_evidence,
+            )
     return tuple(sorted(rows.values(), key=lambda row: -row.probability))
 
 
 def naive_of(causes: Causes) -> Candidate | None:
     """Give what the largest drop in RMS alone would name."""
-    if not causes.ranked:
-        return None
-    return min(causes.ranked, key=lambda one: one.gap).hypothesis.named[0]
+    singles = [one for one in causes.ranked if len(one.hypothesis.named) == 1]
+    return min(singles, key=lambda one: one.gap).hypothesis.named[0] if singles else None
 
 
 def tuned_numbers(study: Study, fit: OutputErrorFit) -> dict[str, FittedNumber]:
@@ -83,37 +80,37 @@ def tuned_numbers(study: Study, fit: OutputErrorFit) -> dict[str, FittedNumber]:
 def _cause(causes: Causes, place: int) -> Cause:
     best = causes.best
     candidate = best.hypothesis.named[place]
-    alone = len(best.hypothesis.named) == 1
-    same = [(one, p) for one, p in zip(causes.ranked, causes.probabilities, strict=True)]
-    close = [one for one, _ in same if alone and one.log_evidence > best.log_evidence - _CLOSE]
-    group = [one.hypothesis.named[0].site for one in close if one.hypothesis.named[0].effect == candidate.effect]
-    others = [
-        one.hypothesis.named[0]
-        for one in close
-        if len(one.hypothesis.named) == 1 and one.hypothesis.named[0].effect != candidate.effect
-    ]
+    near = _in_its_place(causes, candidate)
     effect = best.fit.effects[place] if place < len(best.fit.effects) else None
     return Cause(
         effect=candidate.effect,
         site=candidate.site,
-        probability=_probability(causes, best, candidate) if alone else 0.9,
-        group=tuple(dict.fromkeys([candidate.site, *group])),
-        alternatives=tuple(dict.fromkeys(others)),
+        probability=probability_of(causes, candidate),
+        group=tuple(dict.fromkeys([candidate.site, *(one.site for one in near if one.effect == candidate.effect)])),
+        alternatives=tuple(dict.fromkeys(one for one in near if one.effect != candidate.effect)),
         parameters=_numbers(best, place),
         variant=effect.variant if effect is not None else None,
         source=effect.source if effect is not None else None,
     )
 
 
-def _probability(causes: Causes, best: Contestant, candidate: Candidate) -> float:
-    """Probability of a word at a site, all forms of its law together."""
-    return float(
-        sum(
-            p
-            for one, p in zip(causes.ranked, causes.probabilities, strict=True)
-            if one is best or one.hypothesis.named == (candidate,)
-        )
-    )
+def _in_its_place(causes: Causes, candidate: Candidate) -> list[Candidate]:
+    """What could stand in a cause's place beside the other causes, as far as this log can tell."""
+    best = causes.best
+    kept = {one for one in best.hypothesis.named if one != candidate}
+    found = []
+    for one in causes.ranked:
+        named = one.hypothesis.named
+        close = one.log_evidence > best.log_evidence - _CLOSE
+        if close and len(named) == len(best.hypothesis.named) and kept.issubset(named):
+            found += [other for other in named if other not in kept]
+    return found
+
+
+def probability_of(causes: Causes, candidate: Candidate) -> float:
+    """Probability of a word at a site, all forms of its law and all that it stands beside together."""
+    pairs = zip(causes.ranked, causes.probabilities, strict=True)
+    return float(sum(share for one, share in pairs if candidate in one.hypothesis.named))
 
 
 def _numbers(found: Contestant, place: int) -> dict[str, FittedNumber]:

@@ -1,6 +1,6 @@
 """One log beside one model, made ready: noise, training stretches, free runs, location."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,18 +9,23 @@ from numpy.typing import NDArray
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.quiet_floor import quiet_floor
+from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.explanation.contest import Contest, training_mask
+from chladni.gap.explanation.lattice import Lattice, lattice_of
 from chladni.gap.location.locate import Location, locate
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.tunable import Tunables
-from chladni.gap.plant.windows import windows_for
+from chladni.gap.plant.windows import training_in_windows, windows_for
 from chladni.gap.records.measurement import Measurement
+from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
 from chladni.models.effects.effect_kind import EffectKind
 
 Matrix = NDArray[np.float64]
 #: Misfit over noise with which a record is followed from its start to its end.
 _FOLLOWS = 3.0
+#: Different values that are repeated, over all samples, of a sensor that holds them.
+_HELD = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,6 +42,10 @@ class Study:
         In which hypotheses are fitted.
     windows
         ``(start, stop)`` samples, None in free run.
+    lattices
+        Outputs whose samples stand on a lattice that is coarse beside their noise, by name.
+    repeating
+        Outputs that hold their samples, without standing on a lattice.
     leave_out, own
         Words that don't take part; the user's effects by name.
     """
@@ -46,6 +55,8 @@ class Study:
     location: Location
     contest: Contest
     windows: tuple[tuple[int, int], ...] | None
+    lattices: Mapping[str, Lattice]
+    repeating: tuple[str, ...]
     leave_out: frozenset[str]
     own: Mapping[str, EffectKind]
 
@@ -53,6 +64,11 @@ class Study:
     def held(self) -> NDArray[np.bool_]:
         """``[sample]`` that no fit sees."""
         return ~self.contest.training
+
+    def noise_gap(self, noise: NoiseFloor) -> float:
+        """Give a noise over the RMS of what was measured, on held-out samples, outputs pooled."""
+        measured = self.measurement.outputs[:, self.held]
+        return pooled_gap(np.broadcast_to(noise.rms[:, None], measured.shape), measured)
 
     @property
     def horizon_s(self) -> float | None:
@@ -70,16 +86,24 @@ def study_of(
     noise = estimate_noise(measurement)
     if len(measurement.output_names) < 2 and noise.upper_bound.any():
         noise = quiet_floor(measurement)
+    lattices = {} if "quantization" in leave_out else _lattices(measurement, noise)
+    noise = _with_rounding(noise, measurement.output_names, lattices)
     location = locate(model, measurement, noise, Tunables.of(model))
     windows = None if _runs_free(model, location) else windows_for(model, measurement)
     run = FreeRun(model, measurement, windows=windows)
-    training = training_mask(measurement.samples, measurement.sample_rate_hz, measurement.period_samples)
+    training = (
+        training_mask(measurement.samples, measurement.sample_rate_hz, measurement.period_samples)
+        if windows is None
+        else training_in_windows(windows)
+    )
     return Study(
         model=model,
         measurement=measurement,
         location=location,
         contest=Contest(run, location.problem.noise, training),
         windows=windows,
+        lattices=lattices,
+        repeating=_repeating(measurement),
         leave_out=leave_out,
         own=own,
     )
@@ -95,3 +119,25 @@ def _runs_free(model: Model, location: Location) -> bool:
     if growing > 1.0 or best is None or len(location.problem.measured) < 2:
         return False
     return min(best.profile.chi, location.tuned.chi) < _FOLLOWS
+
+
+def _lattices(measurement: Measurement, noise: NoiseFloor) -> dict[str, Lattice]:
+    found = {}
+    for name, signal, rms in zip(measurement.output_names, measurement.outputs, noise.rms, strict=True):
+        lattice = lattice_of(signal)
+        # Steps far below the noise are those of any converter.
+        if lattice is not None and lattice.rounding_rms > 0.5 * rms:
+            found[name] = lattice
+    return found
+
+
+def _repeating(measurement: Measurement) -> tuple[str, ...]:
+    """Names of outputs that repeat many of their values: of a rest, a range's end or a lattice they would be few."""
+    rows = zip(measurement.output_names, measurement.outputs, strict=True)
+    return tuple(name for name, row in rows if np.unique(row[1:][np.diff(row) == 0]).size > _HELD * row.size)
+
+
+def _with_rounding(noise: NoiseFloor, names: Sequence[str], lattices: Mapping[str, Lattice]) -> NoiseFloor:
+    """Give the floor with the rounding of coarse steps in it: no law of motion explains that."""
+    rounding = np.array([lattices[name].rounding_rms if name in lattices else 0.0 for name in names])
+    return noise.raised(rounding)

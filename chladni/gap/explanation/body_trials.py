@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from chladni.gap.explanation.tones import strongest_tones
-from chladni.gap.explanation.trial import Force, Shape, Trial, logarithms, numbers
+from chladni.gap.explanation.tones import strongest_resonances, strongest_tones
+from chladni.gap.explanation.trial import Force, Matrix, Numbers, Shape, Trial, logarithms, numbers
 from chladni.gap.location.recovered import Recovered
 
 
@@ -29,16 +29,29 @@ def body_trials(motion: Recovered, band_hz: tuple[float, float]) -> Iterator[Tri
         share = (omega**2 + 2 * damping * omega * s) / (s**2 + 2 * damping * omega * s + omega**2)
         return Force.of(-acceleration * share)
 
+    # A mount bends a little below its resonance; above the excitation it's a mass, whatever holds it.
+    yield Trial(
+        effect="added_mass", site=motion.site, variant="mounted", build=pull,
+        grid=logarithms((band_hz[1] * np.array([1.2, 2.0, 4.0])).tolist(), (0.05,)),
+        values=lambda shape, a: _oscillator(shape, a) if numbers(shape)[0] > band_hz[1] else None, parameters=3,
+    )  # fmt: skip
+    # A lightly damped oscillator pulls the other way a little beside its resonance: a grid alone may step over it.
+    rate = motion.lines.sample_rate_hz
+    heard = strongest_resonances(np.gradient(motion.velocity, 1.0 / rate), motion.force, rate)
+    spread = np.geomspace(max(band_hz[0], 0.5), band_hz[1], 40).tolist()
     yield Trial(
         effect="extra_mode", site=motion.site, build=pull,
-        grid=logarithms(np.geomspace(max(band_hz[0], 0.5), band_hz[1], 40).tolist(), (0.005, 0.03)),
-        values=lambda shape, a: (
-            {"mass": float(a[0]), "frequency": numbers(shape)[0], "damping_ratio": numbers(shape)[1]}
-            if a[0] > 0 else None
-        ),
-        parameters=3,
+        grid=logarithms([*spread, *heard], (0.003, 0.01, 0.03)),
+        values=lambda shape, a: _oscillator(shape, a) if numbers(shape)[0] <= band_hz[1] else None, parameters=3,
     )  # fmt: skip
     yield from tone_trials(motion)
+
+
+def _oscillator(shape: Shape, amplitudes: Matrix) -> Numbers | None:
+    if amplitudes[0] <= 0:
+        return None
+    frequency, damping = numbers(shape)
+    return {"mass": float(amplitudes[0]), "frequency": frequency, "damping_ratio": damping}
 
 
 def tone_trials(motion: Recovered) -> Iterator[Trial]:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 
 from chladni.gap.explanation.body_trials import body_trials
+from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.input_trials import input_trials
 from chladni.gap.explanation.joint_trials import joint_trials
 from chladni.gap.explanation.output_trials import output_trials
@@ -35,7 +36,7 @@ def screened(
         The user's effects by name.
     """
     problem = location.problem
-    band = excited_band_hz(problem)
+    band = excited_band_hz(problem.measurement)
     found: list[tuple[Screened, Screen]] = []
     for located in places:
         for site, others in sites_at(located):
@@ -63,14 +64,3 @@ def trials_at(problem: LinearProblem, motion: Recovered, site: Site, band_hz: tu
         yield from ripple_at_input(problem, motion, site)
     elif site.kind == "output":
         yield from output_trials(motion, problem.measurement)
-
-
-def excited_band_hz(problem: LinearProblem) -> tuple[float, float]:
-    """Band that holds 99 % of the outputs' power."""
-    measurement = problem.measurement
-    signals = measurement.outputs / np.maximum(np.std(measurement.outputs, axis=1, keepdims=True), 1e-300)
-    power = np.sum(np.abs(np.fft.rfft(signals - signals.mean(axis=1, keepdims=True), axis=1)) ** 2, axis=0)
-    total = np.cumsum(power) / max(float(power.sum()), 1e-300)
-    low, high = np.searchsorted(total, (0.005, 0.995))
-    step = measurement.sample_rate_hz / measurement.samples
-    return float(max(low, 1) * step), float(max(high, 2) * step)

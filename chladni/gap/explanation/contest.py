@@ -1,10 +1,12 @@
 """The contest: hypotheses fitted by output error on some stretches of a log, weighed on the others."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.records.noise_floor import NoiseFloor
@@ -79,7 +81,7 @@ class Contest:
             fit=fit,
             held=held,
             gap=held_gap(self.run.measurement.outputs, fit.outputs, ~self.training),
-            log_evidence=log_evidence(held, prior, hypothesis.freedom),
+            prior=prior,
         )
 
     def enter_all(
@@ -96,6 +98,22 @@ class Contest:
         return found
 
 
+def weighed(contestants: Sequence[Contestant]) -> list[Contestant]:
+    """Give contestants with their evidence, by falling evidence.
+
+    Noise that no fit saw can't be less than what the best of them leaves of it: where an effect at a sensor, such as
+    clipping, looked like noise at first, its floor is lowered to that, the same for all.
+    """
+    if not contestants:
+        return []
+    floor = np.minimum(np.min([one.held for one in contestants], axis=0), 1.0)
+    found = [
+        replace(one, log_evidence=log_evidence(one.held / floor, one.prior, one.hypothesis.freedom))
+        for one in contestants
+    ]
+    return sorted(found, key=lambda one: -one.log_evidence)
+
+
 def log_evidence(held: Matrix, prior: float, freedom: int) -> float:
     """Held-out predictive log likelihood in nats, with prior and a penalty for freedom (Schwarz 1978).
 
@@ -107,7 +125,5 @@ def log_evidence(held: Matrix, prior: float, freedom: int) -> float:
 
 
 def held_gap(measured: Matrix, simulated: Matrix, held: Mask) -> float:
-    """RMS of the residual over RMS of what was measured, outputs scaled by their own RMS; 1 when nothing fits."""
-    size = np.mean((measured - measured.mean(axis=1, keepdims=True))[:, held] ** 2, axis=1)
-    left = np.mean((measured - simulated)[:, held] ** 2, axis=1)
-    return float(np.sqrt(np.mean(left / np.maximum(size, 1e-300))))
+    """RMS of the residual over RMS of what was measured on held-out samples, outputs pooled; 1 when nothing fits."""
+    return pooled_gap((measured - simulated)[:, held], measured[:, held])

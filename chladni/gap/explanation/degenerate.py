@@ -5,12 +5,15 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.errors import ModelError
 
 Matrix = NDArray[np.float64]
+#: Of the usual way and pace of a joint: a yield below is friction's presliding, a presliding above a hysteresis loop.
+_FRICTION, _LOOP = 0.12, 0.3
 
 
 def is_degenerate(run: FreeRun, found: Contestant) -> bool:
@@ -24,6 +27,9 @@ def _degenerate(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool
         share = values["time"] / run.measurement.duration_s
         # A change that is over at once, or never comes, is a stiffness.
         return not (0.02 < share < 0.98 if effect.variant == "step" else share > 0.1)
+    if effect.effect == "extra_mode":
+        # Resonant above all that moved, it's a mass.
+        return values["frequency"] > excited_band_hz(run.measurement)[1]
     if effect.effect in (
         "hysteresis",
         "coulomb_friction",
@@ -39,12 +45,15 @@ def _degenerate(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool
 
 def _never_seen(word: str, values: Mapping[str, float], d: Matrix, s: Matrix) -> bool:
     reach = float(np.max(np.abs(d)))
+    usual, pace = float(np.std(d)), float(np.sqrt(np.mean(s**2)))
     if word == "stribeck_friction" and _is_coulomb(values, s):
         return True
     if word == "hysteresis":
-        return values["yield"] > 2.0 * reach
+        # A loop that has closed after a small part of the way is friction, one that never yields a spring.
+        stiff = values["yield"] < _FRICTION * usual and values.get("slip_speed", 0.0) < _FRICTION * pace
+        return stiff or values["yield"] > 2.0 * reach
     if word in ("coulomb_friction", "stribeck_friction"):
-        return values.get("presliding", 0.0) > 0.5 * reach
+        return values.get("presliding", 0.0) > _LOOP * usual
     if word == "backlash":
         return values["gap"] > 2.0 * reach
     if word == "one_sided_stop":

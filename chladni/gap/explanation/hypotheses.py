@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from chladni.gap.explanation.hypothesis import Hypothesis
 from chladni.gap.explanation.screen import Screened
 from chladni.gap.location.locate import Location, tuned_stepwise
+from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.tuning.effect_scale import usually_fitted
 from chladni.models.core.parameter import Parameter
 from chladni.models.effects.attached_effect import AttachedEffect, attached
@@ -20,15 +21,19 @@ Matrix = NDArray[np.float64]
 OUTSIDE = 3.0
 #: Numbers that shape a law without naming it: fitted only when that pays.
 _DETAILS: Mapping[str, tuple[str, ...]] = {
-    "coulomb_friction": ("offset", "creep_speed", "presliding"),
+    "coulomb_friction": ("offset", "creep_speed"),
     "stribeck_friction": ("creep_speed", "presliding", "bristle_damping"),
+    "added_mass": ("damping_ratio",),
     "hysteresis": ("shape",),
+    "lag": ("damping_ratio",),
     "one_sided_stop": ("dissipation",),
     "varying_stiffness": ("rise",),
     "rate_limit": ("tracking_time",),
     "ripple": ("phase",),
     "tonal_disturbance": ("phase",),
 }
+#: Speeds over the joint's RMS speed at which a Stribeck curve begins its search.
+_STRIBECK_SPEEDS = (0.1, 0.5)
 #: How far one may be searched for outside its tolerance, in sigmas.
 _FAR = 15.0
 
@@ -84,26 +89,36 @@ def effect_of(one: Screened, own: Mapping[str, EffectKind]) -> AttachedEffect | 
     return replace(plain, values=values)
 
 
-def with_siblings(found: Sequence[Hypothesis], leave_out: frozenset[str]) -> list[Hypothesis]:
+def with_siblings(found: Sequence[Hypothesis], run: FreeRun, leave_out: frozenset[str]) -> list[Hypothesis]:
     """Add to the best Coulomb friction the Stribeck friction that begins where it stands: nested laws compete."""
-    if "stribeck_friction" in leave_out:
-        return list(found)
     first = next((one for one in found if one.effects[0].effect == "coulomb_friction"), None)
-    if first is None:
+    if first is None or "stribeck_friction" in leave_out:
         return list(found)
     (plain,) = first.effects
+    try:
+        velocity = run.motion(first.start_z, first.effects, site=plain.site).velocity
+    except ModelError:
+        return list(found)
+    speed = float(np.sqrt(np.mean(velocity**2)))
+    siblings = [
+        _stribeck_beside(plain, variant, share * speed)
+        for variant, detail in (("bristle", "presliding"), ("regularised", "creep_speed"))
+        if detail in plain.values
+        for share in _STRIBECK_SPEEDS
+    ]
+    return [*found, *(hypothesis_of((one,), first.start_z, screened=first.screened) for one in siblings)]
+
+
+def _stribeck_beside(plain: AttachedEffect, variant: str, speed: float) -> AttachedEffect:
+    """Give the Stribeck friction of the same size as a Coulomb friction, somewhat higher at rest."""
     force = plain.values["force"]
-    added = []
-    for variant, detail in (("bristle", "presliding"), ("regularised", "creep_speed")):
-        if detail not in plain.values:
-            continue
-        for speed in (0.2, 1.0):
-            values = {"coulomb": 0.9 * force, "static": 1.3 * force, detail: plain.values[detail]}
-            reach = plain.values[detail] * (300.0 if detail == "creep_speed" else 3e4)
-            added.append(
-                attached("stribeck_friction", plain.site, {**values, "speed": speed * reach}, variant=variant)
-            )
-    return [*found, *(hypothesis_of((one,), first.start_z, screened=first.screened) for one in added)]
+    details = {name: plain.values[name] for name in ("presliding", "creep_speed") if name in plain.values}
+    return attached(
+        "stribeck_friction",
+        plain.site,
+        {"coulomb": 0.9 * force, "static": 1.3 * force, "speed": speed, **details},
+        variant=variant,
+    )
 
 
 def polished(coarse: Hypothesis, effects: tuple[AttachedEffect, ...], z: Matrix) -> Hypothesis | None:
@@ -117,7 +132,7 @@ def polished(coarse: Hypothesis, effects: tuple[AttachedEffect, ...], z: Matrix)
     return replace(coarse, effects=effects, fitted=fitted, start_z=np.clip(z, -OUTSIDE, OUTSIDE))
 
 
-def wrong_parameters(location: Location, *, most: int = 2, heavier_is_added: bool = True) -> Hypothesis | None:
+def wrong_parameters(location: Location, *, most: int = 2) -> Hypothesis | None:
     """Give the hypothesis that a few parameters are outside of their tolerance, None when none goes there.
 
     All may go far at first; those that do stay free, the others are held within their tolerance again.
@@ -126,19 +141,14 @@ def wrong_parameters(location: Location, *, most: int = 2, heavier_is_added: boo
     ----------
     most
         Parameters at once.
-    heavier_is_added
-        Whether a body that is heavier than its tolerance allows is left to the effect ``added_mass``.
     """
     problem, names = location.problem, location.problem.tunables.names
     steps = (*location.segments, problem)
     far = tuned_stepwise(steps, np.zeros(len(names)), _FAR)
     order = np.argsort(-np.abs(far.z))
     outside = [int(place) for place in order if abs(far.z[place]) > OUTSIDE]
-    if heavier_is_added:
-        # A body heavier than its tolerance carries something: that is an effect, not a wrong value.
-        outside = [
-            place for place in outside if not (names[place].endswith((".mass", ".inertia")) and far.z[place] > 0)
-        ]
+    # A body heavier than its tolerance carries something: that is an effect, not a wrong value.
+    outside = [place for place in outside if not (names[place].endswith((".mass", ".inertia")) and far.z[place] > 0)]
     if not outside:
         return None
     best = None

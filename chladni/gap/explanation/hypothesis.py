@@ -61,15 +61,18 @@ class Contestant:
         ``[output]`` mean square of the whitened residual on the samples that the fit didn't see; 1 is noise.
     gap
         RMS of the residual over RMS of what was measured, on those samples, outputs scaled by their RMS.
+    prior
+        What the parameters pay for their distance from nominal, ``z'z``.
     log_evidence
-        Nats, but for a constant that all hypotheses on this log share.
+        Nats, but for a constant that all hypotheses that were weighed together share.
     """
 
     hypothesis: Hypothesis
     fit: OutputErrorFit
     held: Matrix
     gap: float
-    log_evidence: float
+    prior: float
+    log_evidence: float = 0.0
 
     @property
     def chi(self) -> float:

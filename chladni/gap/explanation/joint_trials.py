@@ -11,7 +11,7 @@ from chladni.models.core.port import Port
 from chladni.models.core.port_law import LawFunction, PortLaw
 from chladni.models.drives.known_motion import force_along_motion
 from chladni.models.effects.coulomb_friction import bristle
-from chladni.models.effects.hysteresis import bouc_wen
+from chladni.models.effects.hysteresis import bouc_wen, creeping
 
 Matrix = NDArray[np.float64]
 
@@ -20,8 +20,10 @@ def joint_trials(motion: Recovered, port: Port) -> Iterator[Trial]:
     """Give every effect of the catalogue that acts at a joint, on grids of what enters it nonlinearly."""
     yield from _friction(motion)
     yield _hysteresis(motion)
+    yield _creeping(motion)
     yield from _polynomials(motion)
     if port.stiffness > 0:
+        yield _yielding(motion, port)
         yield _backlash(motion, port)
         yield from _varying(motion, port)
     yield from _stops(motion)
@@ -72,6 +74,26 @@ def _hysteresis(motion: Recovered) -> Trial:
     )  # fmt: skip
 
 
+def _creeping(motion: Recovered) -> Trial:
+    """Hysteresis behind a dashpot: loops over velocity, as those of fluid dampers and rubber."""
+    reach, speed, fastest = _rms(motion.displacement), _rms(motion.velocity), float(np.max(np.abs(motion.velocity)))
+
+    def build(shape: Shape) -> Force:
+        bend, slip = numbers(shape)
+        return Force.of(_along(creeping, (1.0, bend, 1.0, slip, 0.5), motion))
+
+    def values(shape: Shape, a: Matrix) -> Numbers | None:
+        bend, slip = numbers(shape)
+        # An element that the motion never makes yield is a spring and a dashpot in series.
+        return _positive(a, force=a[0], slip_speed=slip, **{"yield": bend}) if slip < fastest else None
+
+    return Trial(
+        effect="hysteresis", site=motion.site, variant="creeping", build=build,
+        grid=logarithms((0.02 * reach, 0.06 * reach, 0.2 * reach), (0.1 * speed, 0.3 * speed)),
+        values=values, parameters=4,
+    )  # fmt: skip
+
+
 def _polynomials(motion: Recovered) -> Iterator[Trial]:
     d, s = motion.displacement, motion.velocity
 
@@ -85,6 +107,34 @@ def _polynomials(motion: Recovered) -> Iterator[Trial]:
     yield of("quadratic_damping", s * np.abs(s), "coefficient", 1.0)
     yield of("hardening_stiffness", d**3, "cubic", 1.0)
     yield of("softening_stiffness", d**3, "cubic", -1.0)
+    yield Trial(
+        effect="hardening_stiffness", site=motion.site, variant="progressive",
+        build=lambda _: Force.of(motion.spectrum(d**3), motion.spectrum(d**5)),
+        values=lambda _, a: _positive(a, cubic=a[0], range=np.sqrt(a[0] / a[1])) if min(a) > 0 else None,
+        parameters=2,
+    )  # fmt: skip
+    yield Trial(
+        effect="hardening_stiffness", site=motion.site, variant="asymmetric",
+        build=lambda _: Force.of(motion.spectrum(d**3), motion.spectrum(d**2)),
+        values=lambda _, a: _positive(a, cubic=a[0], quadratic=a[1]), parameters=2,
+    )  # fmt: skip
+
+
+def _yielding(motion: Recovered, port: Port) -> Trial:
+    d, reach = motion.displacement, _rms(motion.displacement)
+
+    def build(shape: Shape) -> Force:
+        return Force.of(motion.spectrum(-d * (1.0 - 1.0 / np.sqrt(1.0 + (d / numbers(shape)[0]) ** 2))))
+
+    def values(shape: Shape, a: Matrix) -> Numbers | None:
+        lost = min(float(a[0]) / port.stiffness, 1.0)
+        return _positive(a, cubic=-0.5 * lost * port.stiffness / numbers(shape)[0] ** 2, lost=lost)
+
+    # From a spring that yields at once to one that only begins to.
+    return Trial(
+        effect="softening_stiffness", site=motion.site, variant="yielding", build=build,
+        grid=logarithms((reach * np.geomspace(0.01, 10.0, 7)).tolist()), values=values, parameters=2,
+    )  # fmt: skip
 
 
 def _backlash(motion: Recovered, port: Port) -> Trial:
@@ -115,11 +165,23 @@ def _varying(motion: Recovered, port: Port) -> Iterator[Trial]:
         build=lambda shape: Force.of(motion.spectrum(d * np.minimum(t / numbers(shape)[0], 1.0))),
         grid=logarithms((0.4 * length, length)), values=change, parameters=2,
     )  # fmt: skip
+    # From a jump to a change that takes half of the log.
+    rises = (0.01 * length, 0.15 * length, 0.5 * length)
+
+    def risen(shape: Shape) -> Force:
+        time, rise = numbers(shape)
+        u = np.clip((t - time) / rise + 0.5, 0.0, 1.0)
+        return Force.of(motion.spectrum(d * u**3 * (10.0 + u * (6.0 * u - 15.0))))
+
     yield Trial(
-        effect="varying_stiffness", site=motion.site, variant="step",
-        build=lambda shape: Force.of(motion.spectrum(d * (t > numbers(shape)[0]))),
-        grid=logarithms(np.linspace(0.1 * length, 0.9 * length, 9).tolist()), values=change, parameters=2,
+        effect="varying_stiffness", site=motion.site, variant="step", build=risen,
+        grid=logarithms(np.linspace(0.1 * length, 0.9 * length, 9).tolist(), rises),
+        values=lambda shape, a: _with_rise(change(shape, a), shape), parameters=3,
     )  # fmt: skip
+
+
+def _with_rise(values: Numbers | None, shape: Shape) -> Numbers | None:
+    return None if values is None else {**values, "rise": numbers(shape)[1]}
 
 
 def _stops(motion: Recovered) -> Iterator[Trial]:

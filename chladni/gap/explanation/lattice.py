@@ -11,6 +11,8 @@ _CLEAR = 0.9
 _BINS = 1 << 16
 #: Samples away from the level where most stand that are needed to see a lattice.
 _MOVING = 200
+#: Different values over samples, below which values repeat.
+_REPEATED = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,6 +21,11 @@ class Lattice:
 
     step: float
     strength: float
+
+    @property
+    def rounding_rms(self) -> float:
+        """RMS of the rounding, ``step/sqrt(12)`` (Widrow and Kollar, equation 1.6)."""
+        return self.step / float(np.sqrt(12.0))
 
 
 def lattice_of(signal: Matrix) -> Lattice | None:
@@ -44,15 +51,27 @@ def lattice_of(signal: Matrix) -> Lattice | None:
         return None
     place = first + int(high_enough[0])
     step, sharp = _sharpened(signal, span / place, span)
+    step = _coarsest(signal, step)
     if sharp < _CLEAR or _mostly_still(signal, step):
         return None
     return Lattice(step=step, strength=sharp)
 
 
+def _coarsest(signal: Matrix, step: float) -> float:
+    """Largest multiple of a step on which the samples stand too: steps that the signal spans a few times only."""
+    longest = float(np.ptp(signal))
+    for factor in (2, 3, 5):
+        while factor * step < longest and abs(np.mean(np.exp(2j * np.pi * signal / (factor * step)))) > _CLEAR:
+            step *= factor
+    return step
+
+
 def _mostly_still(signal: Matrix, step: float) -> bool:
     """Whether the samples seem to stand on a lattice because most of them stand at one level."""
     middle = float(np.median(signal))
-    moving = signal[np.abs(signal - middle) > 1.5 * step]
+    # A signal that repeats its values exactly has steps, however few; one that doesn't may rest beside a jump.
+    beyond = 0.5 if np.unique(signal).size < _REPEATED * signal.size else 1.5
+    moving = signal[np.abs(signal - middle) > beyond * step]
     if moving.size < _MOVING:
         return True
     return float(np.abs(np.mean(np.exp(2j * np.pi * moving / step)))) < _CLEAR

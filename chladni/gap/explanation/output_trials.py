@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from chladni.gap.explanation.body_trials import tone_trials
-from chladni.gap.explanation.trial import Force, Shape, Trial, logarithms, numbers
+from chladni.gap.explanation.trial import Force, Matrix, Numbers, Shape, Spectrum, Trial, logarithms, numbers
 from chladni.gap.location.recovered import Recovered
 from chladni.gap.records.measurement import Measurement
 
@@ -25,14 +25,7 @@ def output_trials(motion: Recovered, measurement: Measurement) -> Iterator[Trial
 
 def _filters(motion: Recovered) -> Iterator[Trial]:
     y, s, site, rate = motion.spectrum(motion.displacement), motion.s, motion.site, motion.lines.sample_rate_hz
-    offsets = (np.geomspace(0.03, 60.0, 24) / rate).tolist()
-    for sign in (1.0, -1.0):
-        yield Trial(
-            effect="time_offset", site=site,
-            build=lambda shape, sign=sign: Force.known(y * np.expm1(-s * sign * numbers(shape)[0])),  # type: ignore[misc]
-            values=lambda shape, _, sign=sign: {"offset": sign * numbers(shape)[0]},  # type: ignore[misc]
-            grid=logarithms(offsets), parameters=1,
-        )  # fmt: skip
+    yield from (_shift(motion, sign) for sign in (1.0, -1.0))
 
     def coupled(shape: Shape) -> Force:
         omega = 2 * np.pi * numbers(shape)[0]
@@ -55,6 +48,22 @@ def _filters(motion: Recovered) -> Iterator[Trial]:
     )  # fmt: skip
 
 
+def _shift(motion: Recovered, sign: float) -> Trial:
+    """Signal that comes late or, with a negative sign, early: shapes hold logarithms, which have none."""
+    y, s = motion.spectrum(motion.displacement), motion.s
+
+    def shifted(shape: Shape) -> Force:
+        return Force.known(y * np.expm1(-s * sign * numbers(shape)[0]))
+
+    def values(shape: Shape, _: Matrix) -> Numbers:
+        return {"offset": sign * numbers(shape)[0]}
+
+    offsets = (np.geomspace(0.03, 60.0, 24) / motion.lines.sample_rate_hz).tolist()
+    return Trial(
+        effect="time_offset", site=motion.site, build=shifted, values=values, grid=logarithms(offsets), parameters=1
+    )
+
+
 def _clipping(motion: Recovered, measurement: Measurement) -> Iterator[Trial]:
     y = motion.displacement
     measured = measurement.outputs[measurement.output_names.index(motion.site.name)]
@@ -74,9 +83,14 @@ def _cross_axes(motion: Recovered, measurement: Measurement) -> Iterator[Trial]:
     for place, name in enumerate(measurement.output_names):
         if name == motion.site.name or measurement.output_units[place] != measurement.output_units[own]:
             continue
-        spectrum = motion.spectrum(measurement.outputs[place])
-        yield Trial(
-            effect="cross_axis", site=motion.site, source=name, parameters=1,
-            build=lambda _, spectrum=spectrum: Force.of(spectrum),  # type: ignore[misc]
-            values=lambda _, a: {"coefficient": float(a[0])},
-        )  # fmt: skip
+        yield _cross_axis(motion, name, motion.spectrum(measurement.outputs[place]))
+
+
+def _cross_axis(motion: Recovered, source: str, spectrum: Spectrum) -> Trial:
+    def build(_: Shape) -> Force:
+        return Force.of(spectrum)
+
+    def values(_: Shape, amplitudes: Matrix) -> Numbers:
+        return {"coefficient": float(amplitudes[0])}
+
+    return Trial(effect="cross_axis", site=motion.site, source=source, build=build, values=values, parameters=1)

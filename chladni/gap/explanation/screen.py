@@ -17,6 +17,8 @@ Matrix = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
 #: Beyond this, whitened, a force is no force but a law that left the numbers; its square still is one.
 _RUNAWAY = 1e100
+#: Of the scaled normal matrix: twice as much as rounding makes of a matrix without full rank.
+_FLOOR = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,8 +85,12 @@ class Screen:
         self._rest = self._out.rest(residual)
         self._limit = limit
         self._slopes = slopes
-        # Parameters with their prior are eliminated once; each trial then costs a few inner products.
-        self._factor = cho_factor(slopes @ slopes.T + np.eye(len(slopes)) / 2) if len(slopes) else None
+        # Parameters with their prior are eliminated once; each trial then costs a few inner products. Scaled, and
+        # with a floor on what nothing determines: beside a transient that runs away slopes may be of any size.
+        normal = slopes @ slopes.T + np.eye(len(slopes)) / 2
+        self._size = np.sqrt(np.diag(normal))
+        scaled = normal / self._size / self._size[:, None] + _FLOOR * np.eye(len(slopes))
+        self._factor = cho_factor(scaled) if len(slopes) else None
         self._to_slopes = slopes @ self._rest - found.z / 2
 
     def nothing(self) -> float:
@@ -144,10 +150,7 @@ class Screen:
         size = np.linalg.norm(basis, axis=1)
         unit = basis[size > 0] / size[size > 0, None]
         own, to_slopes, cross = unit @ rest, self._slopes @ rest - self._z / 2, self._slopes @ unit.T
-        if self._factor is None:
-            shift, moved = np.zeros_like(cross), np.zeros(0)
-        else:
-            shift, moved = cho_solve(self._factor, cross), cho_solve(self._factor, to_slopes)
+        shift, moved = self._eliminated(cross), self._eliminated(to_slopes)
         scaled = np.linalg.lstsq(unit @ unit.T - cross.T @ shift, own - cross.T @ moved, rcond=1e-10)[0]
         step = moved - shift @ scaled
         if np.any(np.abs(self._z + step) > self._limit):
@@ -156,6 +159,13 @@ class Screen:
         amplitudes = np.zeros(len(basis))
         amplitudes[size > 0] = scaled / size[size > 0]
         return amplitudes, float(left @ left), self._z + step
+
+    def _eliminated(self, toward: Matrix) -> Matrix:
+        """Best step of the parameters toward ``[parameter]`` or ``[parameter, column]``."""
+        if self._factor is None:
+            return np.zeros_like(toward)
+        scale = self._size if toward.ndim == 1 else self._size[:, None]
+        return np.asarray(cho_solve(self._factor, toward / scale) / scale, dtype=np.float64)
 
     def _bounded(self, unit: Matrix, rest: Matrix) -> tuple[Matrix, Matrix]:
         """Amplitudes and step of the parameters where these may not leave their tolerance."""

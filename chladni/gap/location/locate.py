@@ -59,7 +59,8 @@ class Location:
     segments
         The problems on segments, short ones first.
     shares
-        Share of the misfit beyond noise that an unknown force at each site explains, by name.
+        Share of the misfit beyond noise that an unknown force at each site explains, by name; empty with one
+        sensor, which can't tell sites apart.
     """
 
     problem: LinearProblem
@@ -86,9 +87,9 @@ def locate(model: Model, measurement: Measurement, noise: NoiseFloor, tunables: 
     segments, tuned = _tuned_on_segments(model, whole)
     view = segments[-1].view(tuned.z)
     places = placed(view, sites_of(view.compiled, measurement.output_names), measurement.output_names)
-    rough = _on_segments(segments[-1], tuned, places)
     record = whole.on(_telling(whole))
     plain = profiled(record, (), tuned.z, iterations=6)
+    rough = _roughly((*segments, record), plain, places)
     ranked = _followed(record, _tied([one.chi for one, _ in rough], rough, _FOLLOWED))
     if ranked and ranked[0].profile.expected > 1 and _pays(plain, ranked[0].profile):
         record = record.with_noise(noise_behind(record, ranked[0].profile))
@@ -96,7 +97,7 @@ def locate(model: Model, measurement: Measurement, noise: NoiseFloor, tunables: 
         ranked = _followed(record, _tied([one.profile.chi for one in ranked], again, _FOLLOWED_AGAIN))
         plain = profiled(record, (), plain.z, iterations=4)
     return Location(
-        problem=record, tuned=plain, ranked=tuple(ranked), segments=segments, shares=_shares(tuned, rough)
+        problem=record, tuned=plain, ranked=tuple(ranked), segments=segments, shares=_shares(plain, rough)
     )
 
 
@@ -144,11 +145,24 @@ def _lowest_hz(model: Model, measurement: Measurement) -> float:
     return float(heard.min()) if heard.size else 20.0 / measurement.duration_s
 
 
-def _on_segments(segments: LinearProblem, tuned: Profile, places: Sequence[Place]) -> list[_Rough]:
-    if len(segments.measured) < 2:
-        return [(replace(tuned, sites=(place.sites[0],)), place) for place in places]
-    found = [(profiled(segments, (place.sites[0],), tuned.z, iterations=3), place) for place in places]
+def _roughly(problems: Sequence[LinearProblem], plain: Profile, places: Sequence[Place]) -> list[_Rough]:
+    """Profile every place in a few steps; by rising misfit on the whole record, the last of the problems.
+
+    An effect may have led a tuning without it far from the right parameters, so each place finds its own, on segments
+    first. But they don't rank: the states at the start of each segment would explain most of what an effect does.
+    """
+    if len(problems[-1].measured) < 2:
+        return [(replace(plain, sites=(place.sites[0],)), place) for place in places]
+    found = [(_rough_profile(problems, plain, place), place) for place in places]
     return sorted(found, key=lambda one: one[0].chi)
+
+
+def _rough_profile(problems: Sequence[LinearProblem], plain: Profile, place: Place) -> Profile:
+    sites, z = (place.sites[0],), np.zeros_like(plain.z)
+    for problem in problems[:-1]:
+        z = profiled(problem, sites, z, iterations=4).z
+    found = [profiled(problems[-1], sites, start, iterations=4) for start in (z, plain.z)]
+    return min(found, key=lambda one: one.cost)
 
 
 def _followed(record: LinearProblem, rough: Sequence[_Rough]) -> list[Located]:
@@ -183,6 +197,8 @@ def _shares(tuned: Profile, rough: Sequence[_Rough]) -> dict[str, float]:
     return {
         site.name: float(np.clip((tuned.chi - max(profile.chi, 1.0)) / gap, 0.0, 1.0))
         for profile, place in rough
+        # With one sensor no force was fitted anywhere: any would explain all, and none more than another.
+        if profile.forces
         for site in place.sites
     }
 

@@ -1,6 +1,6 @@
 """The noise of each measured output: its spectrum as an autoregressive model, and where the estimate comes from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,23 @@ class NoiseFloor(Value):
 
     def __post_init__(self) -> None:
         self._freeze()
+
+    def lowered(self, share: Matrix) -> "NoiseFloor":
+        """Give the floor with ``share [output]`` of its power left; shares above 1 change nothing."""
+        factor = np.sqrt(np.minimum(share, 1.0))
+        return replace(self, rms=self.rms * factor, innovation_rms=self.innovation_rms * factor)
+
+    def raised(self, rms: Matrix) -> "NoiseFloor":
+        """Give the floor with white noise of ``rms [output]`` where that is more than it was."""
+        louder = rms > self.rms
+        white = np.zeros_like(self.whitening)
+        white[:, 0] = 1.0
+        return replace(
+            self,
+            rms=np.where(louder, rms, self.rms),
+            innovation_rms=np.where(louder, rms, self.innovation_rms),
+            whitening=np.where(louder[:, None], white, self.whitening),
+        )
 
     def density(self, cycles: Matrix) -> Matrix:
         """Give ``[output, line]`` power density at `cycles` a sample, unit^2; over 0..1 its mean is rms^2."""

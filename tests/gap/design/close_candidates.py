@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from chladni.gap.explanation.contest import Contest, training_mask
+from chladni.gap.explanation.contest import Contest, training_mask, weighed
 from chladni.gap.explanation.hypotheses import hypothesis_of
 from chladni.gap.explanation.hypothesis import Hypothesis
 from chladni.gap.plant.free_run import FreeRun
@@ -31,7 +31,7 @@ def wrong(name):
 def fitted(model, log, floor, *hypotheses):
     """Candidates, best first."""
     contest = Contest(FreeRun(model, log), floor, training_mask(log.samples, log.sample_rate_hz))
-    return sorted((contest.enter(one) for one in hypotheses), key=lambda one: -one.log_evidence)
+    return weighed([contest.enter(one) for one in hypotheses])
 
 
 def contested(effect, *hypotheses, noise=0.02, outputs=None, signals=None):

@@ -9,10 +9,20 @@ import chladni
 from chladni.apps.gap_document import gap_document
 from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.gap.records.diagnosis import Diagnosis
+from chladni.gap.records.measurement import Measurement
+from chladni.models.effects.catalogue import CATALOGUE
+from chladni.models.structures.structure import Body, Joint, Structure
+from chladni.models.structures.structure_input import StructureInput
+from chladni.models.structures.structure_model import StructureModel
+from chladni.models.structures.structure_output import StructureOutput
+from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
-from tests.gap.arm import arm, measured, with_outputs
+from chladni.signals.time_series import TimeSeries
+from chladni.viewers.gap_summary import summary
+from tests.gap.arm import RATE_HZ, arm, measured, with_outputs
 
 FRICTION = chladni.attached("coulomb_friction", "elbow", {"force": 20.0})
+PERIOD, PERIODS = 2000, 3
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +123,65 @@ def test_without_its_word_the_cause_is_unknown_or_of_its_family() -> None:
 def test_one_sensor_is_said_to_limit_the_answer() -> None:
     found = diagnose(arm(), [with_outputs(measured((FRICTION,), seconds=4.0), ["acc_wrist"])])
     assert any("one output only" in remark for remark in found.remarks)
+    assert found.where.sites == ()
+
+
+def test_windows_are_told_once() -> None:
+    # Free to move away, so that no free run holds: mass and damping are all there is.
+    axis = StructureModel(
+        name="axis",
+        structure=Structure(
+            bodies=(Body(name="carriage", mass=95.0),),
+            joints=(Joint(name="guide", between=("ground", "carriage"), stiffness=0.0, damping=300.0),),
+        ),
+        inputs=(StructureInput(name="shaker", at="carriage"),),
+        outputs=(StructureOutput(name="position", measures="displacement", at="carriage"),),
+    )
+    found = diagnose(axis, [measured(model=axis, seconds=4.0)], leave_out=frozenset(CATALOGUE))
+    told = [sentence for sentence in (*summary(found), *found.remarks) if "windows of" in sentence]
+    assert len(told) == 1
+    assert found.where.sites == ()
+
+
+def repeated(rms: float, seed: int = 0) -> Measurement:
+    """Periods of a multisine from 5 to 80 Hz on an arm whose hand hardens, an odd law between arm and wrist."""
+    rng = np.random.default_rng(seed)
+    spectrum = np.zeros(PERIOD // 2 + 1, dtype=np.complex128)
+    spectrum[10:160] = np.exp(2j * np.pi * rng.random(150))
+    one = np.fft.irfft(spectrum, PERIOD)
+    force = np.tile(rms / one.std() * one, PERIODS + 1)
+    channel = Channel(name="shaker", unit="N", role="reference")
+    real = arm().with_effects((chladni.attached("hardening_stiffness", "hand", {"cubic": 3e10}),))
+    driven = TimeSeries(values=force[None], sample_rate_hz=RATE_HZ, channels=(channel,))
+    # The first period is its transient.
+    outputs = chladni.simulate(real, driven).outputs.values[:, PERIOD:]
+    noise = 2e-4 * outputs.std(axis=1, keepdims=True) * rng.standard_normal(outputs.shape)
+    return Measurement(
+        log=f"{rms:g} N.mcap",
+        sample_rate_hz=RATE_HZ,
+        inputs=force[None, PERIOD:],
+        outputs=outputs + noise,
+        input_names=("shaker",),
+        output_names=tuple(one.name for one in arm().outputs),
+        output_units=("m/s^2",) * 3,
+    )
+
+
+def test_what_a_period_tells_of_distortion_is_told() -> None:
+    # Not a single effect is weighed: of the cause nothing is asked here.
+    found = diagnose(arm(), [repeated(200.0)], leave_out=frozenset(CATALOGUE))
+    assert any("excite odd lines only" in remark for remark in found.remarks)
+    (outside,) = (remark for remark in found.remarks if "above the excited band" in remark)
+    assert "between acc_arm and acc_wrist" in outside
+    assert outside.endswith("(odd told from chance)")
+
+
+@pytest.mark.slow
+def test_distortion_of_a_level_is_told_once() -> None:
+    found = diagnose(arm(), [repeated(100.0), repeated(200.0, seed=1)], leave_out=frozenset(CATALOGUE))
+    told = [level for level in found.levels if "above the excited band" in level]
+    assert [level.split(" RMS ")[0] for level in told] == ["at 100", "at 200"]
+    assert not any("above the excited band" in remark for remark in found.remarks)
 
 
 def test_no_measurement_is_refused() -> None:

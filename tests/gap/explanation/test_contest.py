@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from chladni.gap.explanation.contest import EFFECTIVE_SAMPLES, SLACK, held_gap, log_evidence, training_mask
+from chladni.gap.explanation.contest import EFFECTIVE_SAMPLES, SLACK, held_gap, log_evidence, training_mask, weighed
+from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+
+
+def left(*held):
+    """A contestant that leaves these mean squares, in units of the noise."""
+    return Contestant(hypothesis=Hypothesis(start_z=np.zeros(0)), fit=None, held=np.array(held), gap=0.0, prior=0.0)
 
 
 def test_a_third_is_held_out_in_blocks_over_the_whole_log() -> None:
@@ -36,3 +42,19 @@ def test_evidence_is_that_of_the_formula() -> None:
 def test_the_gap_is_one_when_nothing_is_simulated() -> None:
     measured = np.random.default_rng(0).standard_normal((2, 5000)) * np.array([[1.0], [100.0]])
     assert held_gap(measured, np.zeros_like(measured), np.ones(5000, dtype=bool)) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_floor_that_the_best_gets_under_is_lowered_for_all() -> None:
+    # A sensor that clips looks noisy: of a floor 20 times too high, 2 % and 5 % left are far apart, not alike.
+    better, worse = weighed([left(1.0, 0.05), left(1.0, 0.02)])
+    assert better.held[1] == 0.02
+    assert better.log_evidence - worse.log_evidence == pytest.approx(
+        0.5 * EFFECTIVE_SAMPLES * np.log((2.5 + SLACK) / (1.0 + SLACK))
+    )
+
+
+def test_a_floor_is_never_raised() -> None:
+    better, worse = weighed([left(2.0, 1.0), left(3.0, 1.0)])
+    assert better.log_evidence - worse.log_evidence == pytest.approx(
+        0.5 * EFFECTIVE_SAMPLES * np.log((3.0 + SLACK) / (2.0 + SLACK))
+    )

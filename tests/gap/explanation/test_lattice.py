@@ -9,7 +9,7 @@ RNG = np.random.default_rng(1)
 SMOOTH = RNG.standard_normal(8000)
 
 
-@pytest.mark.parametrize("step", [0.05, 0.1, 0.23])
+@pytest.mark.parametrize("step", [0.05, 0.1, 0.23, 0.9, 1.4, 2.1])
 def test_the_step_is_found(step: float) -> None:
     found = lattice_of(step * np.round(SMOOTH / step))
     assert found is not None

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import chirp
 
 import chladni
 from chladni.gap.comparison.noise_estimate import estimate_noise
@@ -9,6 +10,8 @@ from chladni.gap.location.locate import Location, locate
 from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.tunable import Tunables
 from tests.gap.arm import arm, measured, with_outputs
+from tests.gap.made_log import RATE_HZ, chain
+from tests.gap.made_log import measured as measured_run
 
 
 @pytest.fixture(scope="module")
@@ -53,3 +56,19 @@ def test_with_one_sensor_every_place_stays_open() -> None:
     found = locate(arm(), log, estimate_noise(log), Tunables.of(arm()))
     names = {site.name for located in found.ranked for site in located.places[0].sites}
     assert {"shoulder", "elbow", "hand", "shaker", "acc_wrist"} <= names
+    # Each would explain all: a share, whether one or none, would say that the sensor can tell.
+    assert found.shares == {}
+
+
+def test_a_place_that_short_stretches_cannot_tell_is_found_on_the_record() -> None:
+    # Two sensors on five bodies: the states at the start of each short stretch could print all that a force does.
+    model = chain([2.0, 2.5, 3.0, 1.0, 1.5], [5e5, 6e5, 4e5, 3e5, 4e5], [20.0, 30.0, 20.0, 20.0, 20.0], at=2)
+    off = {
+        name: one.value * (1 + 0.03 * np.sin(5 * place)) for place, (name, one) in enumerate(model.parameters.items())
+    }
+    machine = model.with_values(off).with_effects((chladni.attached("hardening_stiffness", "j4", {"cubic": 4e13}),))
+    sweep = 100.0 * chirp(np.arange(8192) / RATE_HZ, 5.0, 8.0, 150.0)[None]
+    log = measured_run(machine, sweep, outputs=[0, 2])[0]
+    found = locate(model, log, estimate_noise(log), Tunables.of(model))
+    near = [located for located in found.ranked if located.profile.chi < 1.1]
+    assert "j4" in {name for located in near for name in located.places[0].names}

@@ -1,0 +1,143 @@
+"""The search for causes: hypotheses entered, a second effect looked for while the first leaves something."""
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+
+from chladni.gap.diagnosis.study import Study
+from chladni.gap.explanation.candidates import screened
+from chladni.gap.explanation.contest import weighed
+from chladni.gap.explanation.degenerate import is_degenerate
+from chladni.gap.explanation.hypotheses import (
+    effect_hypotheses,
+    hypothesis_of,
+    polished,
+    with_siblings,
+    wrong_parameters,
+)
+from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.gap.location.locate import Located, locate, located_pairs
+from chladni.signals.errors import EstimateError
+
+Step = Callable[[float], None]
+#: Fits of a first effect, of a second beside it, and of each of two at once.
+_FITTED, _SECOND, _EACH = 7, 4, 2
+#: A best fit that leaves more than this has details of laws worth a fit, those of the first few.
+_DETAILED, _POLISHED = 1.1, 4
+#: A first effect that leaves less than this, over the noise's power, is alone.
+ALONE = 1.3
+#: Two forces must leave less than this of what one leaves; pairs that are as good as the best are tried too.
+_PAIR_GAIN, _PAIR_TIE, _PAIRS = 0.6, 1.3, 2
+
+
+def without_cause(study: Study) -> Contestant:
+    """Give the tuned model alone."""
+    contest = study.contest
+    found = contest.enter(Hypothesis(start_z=study.location.tuned.z), max_iterations=20)
+    if found is None:
+        # Too sensitive to be fitted in free run: what the linear part said of the parameters has to do.
+        found = contest.enter(Hypothesis(start_z=study.location.tuned.z), tune=False)
+    if found is None:
+        raise EstimateError(
+            f"model {study.model.name!r} diverges on log {study.measurement.log!r} within its tolerances; "
+            "check the model's stability and the units of its inputs"
+        )
+    return found
+
+
+def single_causes(study: Study, progress: Step) -> list[Contestant]:
+    """Enter every effect that the screen holds plausible, and parameters beyond their tolerance; by evidence."""
+    location, contest = study.location, study.contest
+    candidates = screened(location, location.ranked, study.leave_out, study.own)
+    progress(0.3)
+    hypotheses = with_siblings(effect_hypotheses(candidates, study.own, count=_FITTED), contest.run, study.leave_out)
+    wrong = wrong_parameters(location)
+    entered = contest.enter_all([*hypotheses, *([wrong] if wrong else [])], lambda done: progress(0.3 + 0.5 * done))
+    ranked = weighed(_sound(study, entered))
+    if ranked and ranked[0].chi > _DETAILED:
+        # A detail of its law that was set by the screen's grid must not cost a word its place.
+        forms = _best_forms(ranked)
+        ranked = [*(_polished(study, one) for one in forms), *(one for one in ranked if one not in forms)]
+    return weighed(ranked)
+
+
+def second_causes(study: Study, first: Contestant) -> list[Contestant]:
+    """Enter a second effect beside a first one, looked for in what that leaves."""
+    contest = study.contest
+    # What the first effect did beyond the linear model is taken from the log: the rest is a gap of its own.
+    states = len(contest.run.compiled().states)
+    plain = contest.run.outputs(first.fit.z, (), first.fit.initial[:, :states])
+    bent = first.fit.outputs - first.fit.offsets[:, None] - plain
+    measurement = replace(study.measurement, outputs=study.measurement.outputs - bent)
+    location = locate(study.model, measurement, contest.noise.lowered(first.held), contest.run.tunables)
+    found = screened(location, location.ranked[:4], study.leave_out, study.own)
+    # At the same place a second word would mend the details of the first one's law.
+    taken = _same_places(study, {one.site for one in first.fit.effects})
+    singles = effect_hypotheses([one for one in found if one.trial.site.name not in taken], study.own, count=_SECOND)
+    both = [hypothesis_of((*first.fit.effects, *one.effects), first.fit.z, screened=one.screened) for one in singles]
+    return _sound(study, contest.enter_all(both))
+
+
+def paired_causes(study: Study) -> list[Contestant]:
+    """Enter two effects at two places at once, which one after the other may miss."""
+    pairs = located_pairs(study.location)
+    single = study.location.ranked[0].profile.chi if study.location.ranked else 0.0
+    if not pairs or pairs[0].profile.chi > _PAIR_GAIN * single:
+        return []
+    near = [one for one in pairs if one.profile.chi < _PAIR_TIE * pairs[0].profile.chi]
+    both = [one for pair in near[:_PAIRS] for one in _of_pair(study, pair)]
+    return _sound(study, study.contest.enter_all(both))
+
+
+def without_one(study: Study, both: Contestant) -> list[Contestant]:
+    """Enter each effect of several without one of the others, started from their common fit."""
+    effects = both.fit.effects
+    fewer = [
+        hypothesis_of((*effects[:place], *effects[place + 1 :]), both.fit.z, screened=both.hypothesis.screened)
+        for place in range(len(effects))
+        if len(effects) > 1
+    ]
+    return _sound(study, study.contest.enter_all(fewer))
+
+
+def detailed(study: Study, found: Contestant) -> Contestant:
+    """Give a contestant with the details of its laws fitted too, when it leaves enough for them to matter."""
+    return _polished(study, found) if found.chi > _DETAILED else found
+
+
+def _of_pair(study: Study, pair: Located) -> list[Hypothesis]:
+    found = screened(study.location, [pair], study.leave_out, study.own)
+    forms = []
+    for place in pair.places:
+        there = [one for one in found if one.trial.site.name in place.names]
+        forms.append(effect_hypotheses(there, study.own, count=_EACH))
+    return [
+        hypothesis_of((*first.effects, *second.effects), pair.profile.z) for first in forms[0] for second in forms[1]
+    ]
+
+
+def _same_places(study: Study, sites: Collection[str]) -> set[str]:
+    """Names of sites, and of those that these sensors can't tell from them."""
+    places = [located.places[0].names for located in study.location.ranked]
+    return {*sites, *(name for names in places if not set(sites).isdisjoint(names) for name in names)}
+
+
+def _best_forms(ranked: Sequence[Contestant]) -> list[Contestant]:
+    """The first few that differ in more than where their search began."""
+    forms: dict[object, Contestant] = {}
+    for one in ranked:
+        key = (one.hypothesis.named, tuple(effect.variant for effect in one.hypothesis.effects))
+        forms.setdefault(key, one)
+    return list(forms.values())[:_POLISHED]
+
+
+def _polished(study: Study, found: Contestant) -> Contestant:
+    """Let the details of the laws move too: creep, presliding, shape; kept when that pays."""
+    finer = polished(found.hypothesis, found.fit.effects, found.fit.z)
+    entered = study.contest.enter(finer) if finer is not None else None
+    if entered is None or is_degenerate(study.contest.run, entered):
+        return found
+    return weighed([found, entered])[0]
+
+
+def _sound(study: Study, entered: Sequence[Contestant]) -> list[Contestant]:
+    return [one for one in entered if not is_degenerate(study.contest.run, one)]
