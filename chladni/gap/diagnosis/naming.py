@@ -13,7 +13,7 @@ from chladni.gap.tuning.output_error import OutputErrorFit
 #: Nats within which this log can't tell two candidates apart.
 _CLOSE = 2.0
 #: Of a floor that shakes and of a lattice: neither is a contest of likelihoods.
-_SHAKEN, _LATTICE = 0.9, 0.97
+_SHAKEN, _LATTICE = 0.9, 0.92
 
 
 def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:

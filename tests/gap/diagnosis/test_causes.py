@@ -1,0 +1,44 @@
+"""What decides between a cause and an unknown one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chladni.gap.diagnosis.causes import completeness
+from chladni.gap.diagnosis.study import study_of
+from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from tests.gap.arm import arm, measured
+
+
+def left(chi: float) -> Contestant:
+    """A contestant that leaves this mean square, in units of the noise, on two outputs."""
+    return Contestant(hypothesis=Hypothesis(start_z=np.zeros(0)), fit=None, held=np.full(2, chi), gap=0.0, prior=0.0)
+
+
+def test_what_leaves_noise_is_complete_and_what_leaves_half_is_not() -> None:
+    gap = left(100.0)
+    assert completeness(gap, left(1.0)) > 0.99
+    assert completeness(gap, left(36.0)) < 0.01
+
+
+def test_details_of_a_law_are_forgiven_where_the_gap_is_large() -> None:
+    # Twice the noise left is little of a gap of fifty times the noise, and a lot of one of three times the noise.
+    assert completeness(left(2500.0), left(4.0)) > 0.98
+    assert completeness(left(9.0), left(4.0)) < 0.3
+
+
+def test_more_left_is_never_more_complete() -> None:
+    gap = left(40.0)
+    found = [completeness(gap, left(chi)) for chi in np.linspace(0.5, 60.0, 40)]
+    assert np.all(np.diff(found) <= 0)
+    assert completeness(left(1.0), left(1.0)) == pytest.approx(0.99, abs=0.01)
+
+
+def test_a_sensor_that_holds_its_samples_is_noticed_and_a_clipped_one_is_not() -> None:
+    log = measured(seconds=2.0)
+    outputs = log.outputs.copy()
+    outputs[1] = np.repeat(outputs[1, ::2], 2)[: outputs.shape[1]]
+    outputs[2] = np.clip(outputs[2], -0.5 * outputs[2].std(), 0.5 * outputs[2].std())
+    study = study_of(arm(), replace(log, outputs=outputs), leave_out=frozenset(), own={})
+    assert study.repeating == (log.output_names[1],)
