@@ -50,6 +50,7 @@ def gap_document(found: Diagnosis) -> Document:
                 "remarks": list(found.remarks),
                 "distortion": [_distortion(one) for one in found.distortion],
                 "levels": list(found.levels),
+                "elsewhere": [closing_document(one) for one in found.elsewhere],
             }
         ),
     }

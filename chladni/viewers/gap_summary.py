@@ -69,6 +69,7 @@ def _effects(found: Diagnosis) -> Iterator[str]:
         told = _listed([f"{cause_phrase(cause)} ({chance(cause.probability)})" for cause in causes])
         yield f"{_certainty(least)} {_COUNT.get(len(causes), 'several')} causes at once: {told}."
     yield _closing(found)
+    yield from _elsewhere(found)
     if found.gap.before < FAINT * found.gap.noise:
         yield f"The gap is faint: the error is {found.gap.before / found.gap.noise:.2g} times the noise."
     for cause in causes:
@@ -95,6 +96,14 @@ def _closing(found: Diagnosis) -> str:
     return text if explained else text[0].upper() + text[1:]
 
 
+def _elsewhere(found: Diagnosis) -> Iterator[str]:
+    """Other logs, judged with what the first one told."""
+    for gap in found.elsewhere:
+        log = gap.held_out[0].log if gap.held_out else "another log"
+        brings = f"from {percent(gap.before)} to {percent(gap.after)}, noise {percent(gap.noise)}"
+        yield f"On {log}, which nothing was fitted to, the error goes {brings}."
+
+
 def _reservations(cause: Cause) -> Iterator[str]:
     others = [site for site in cause.group if site != cause.site]
     if others:
@@ -112,6 +121,7 @@ def _parameters(found: Diagnosis) -> Iterator[str]:
     yield (
         f"With that the error falls from {percent(gap.before)} to {percent(gap.after)}, noise {percent(gap.noise)}."
     )
+    yield from _elsewhere(found)
     for cause in wrong:
         yield from _reservations(cause)
 

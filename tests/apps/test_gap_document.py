@@ -50,7 +50,7 @@ SCHEMA: Mapping[str, Any] = {
 }
 # What may stand beside the agreed keys, by the place it stands in.
 MORE = {
-    "": {"naive", "advice", "remarks", "distortion", "levels"},
+    "": {"naive", "advice", "remarks", "distortion", "levels", "elsewhere"},
     ".causes": {"variant", "from", "share"},
     ".gap": {"by", "horizon_s"},
 }

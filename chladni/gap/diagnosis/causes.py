@@ -33,8 +33,8 @@ _CLEAN = 1.6
 #: Share of the gap's RMS above the noise that a cause may leave, at even odds, and how sharply more speaks against
 #: it; what details of a law leave, over the noise's RMS, isn't counted.
 _LEFT, _SHARPNESS, _DETAIL = 0.25, 0.05, 0.25
-#: Probability that a cause is one of those that took part, or not imitated by one of them: of the names given with
-#: confidence to made machines, a seventh of which hid something else, eight to nine in a hundred were wrong so.
+#: Probability that a cause is one of those that took part, not one that they imitate: of the names that were given
+#: with confidence to made machines, a seventh of which hid something else, about nine in ten were right.
 _KNOWN = 0.92
 #: A floor that shakes: how well the place must explain, by what factor better than any other, and how little of the
 #: recovered motion may follow the inputs.

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,9 @@ from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, re
 from chladni.gap.design.next_measurement import next_measurement
 from chladni.gap.design.what_is_missing import what_is_missing
 from chladni.gap.diagnosis.causes import Causes, causes_of
-from chladni.gap.diagnosis.closing import closing_of
+from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
+from chladni.gap.diagnosis.other_logs import closing_elsewhere
 from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.explanation.shaken_ground import predicted_by_others
 from chladni.gap.location.profile import profile_at
@@ -82,11 +84,13 @@ def diagnose(
     tell("measuring the closing", 0.9)
     found = _assembled(study, causes, [one.log for one in measurements], seed)
     # Periods tell noise from distortion at every level, as they did for the first log.
+    others = [closing_elsewhere(study, causes, one, seed=seed) for one in measurements[1:]]
     levels = compare_levels([with_period(one) for one in measurements]) if len(measurements) > 1 else ()
     tell("measuring the closing", 1.0)
     # What is said of a level there needn't be said of its log again.
     remarks = tuple(one for one in found.remarks if not any(one in told for told in levels))
-    return replace(found, levels=levels, remarks=remarks)
+    elsewhere = tuple(one for one in others if one is not None)
+    return replace(found, elsewhere=elsewhere, levels=levels, remarks=remarks)
 
 
 def _silent(_step: str, _share: float) -> None:
@@ -109,15 +113,7 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         causes=said,
         ranking=ranking_of(causes, said),
         where=_where(study, causes, before, motion),
-        gap=closing_of(
-            study,
-            causes.noise,
-            before,
-            causes.tuned.fit.outputs,
-            after,
-            cross_sensor=causes.shaken is not None,
-            seed=seed,
-        ),
+        gap=closing_of(_yardstick(study, causes), before, causes.tuned.fit.outputs, after, seed=seed),
         tuned_parameters=tuned_numbers(study, shown.fit),
         next_measurement=_next(study, causes, seed),
         naive=naive_of(causes),
@@ -126,6 +122,19 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         restoring_force=_restoring(study, causes, motion),
         signals=_signals(study, causes, before, after),
         distortion=() if distortion is None else distortion.shares,
+    )
+
+
+def _yardstick(study: Study, causes: Causes) -> Yardstick:
+    by: Literal["free_run", "windows", "cross_sensor"] = "free_run" if study.windows is None else "windows"
+    if causes.shaken is not None:
+        by = "cross_sensor"
+    return Yardstick(
+        measurement=study.measurement,
+        held=study.held,
+        noise=causes.noise,
+        by=by,
+        horizon_s=study.horizon_s,
     )
 
 

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.quiet_floor import quiet_floor
-from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.explanation.contest import Contest, training_mask
 from chladni.gap.explanation.lattice import Lattice, lattice_of
 from chladni.gap.location.locate import Location, locate
@@ -65,11 +64,6 @@ class Study:
         """``[sample]`` that no fit sees."""
         return ~self.contest.training
 
-    def noise_gap(self, noise: NoiseFloor) -> float:
-        """Give a noise over the RMS of what was measured, on held-out samples, outputs pooled."""
-        measured = self.measurement.outputs[:, self.held]
-        return pooled_gap(np.broadcast_to(noise.rms[:, None], measured.shape), measured)
-
     @property
     def horizon_s(self) -> float | None:
         """Length of a window, None in free run."""
@@ -91,11 +85,7 @@ def study_of(
     location = locate(model, measurement, noise, Tunables.of(model))
     windows = None if _runs_free(model, location) else windows_for(model, measurement)
     run = FreeRun(model, measurement, windows=windows)
-    training = (
-        training_mask(measurement.samples, measurement.sample_rate_hz, measurement.period_samples)
-        if windows is None
-        else training_in_windows(windows)
-    )
+    training = training_of(measurement, windows)
     return Study(
         model=model,
         measurement=measurement,
@@ -107,6 +97,13 @@ def study_of(
         leave_out=leave_out,
         own=own,
     )
+
+
+def training_of(measurement: Measurement, windows: Sequence[tuple[int, int]] | None) -> NDArray[np.bool_]:
+    """Give ``[sample]``: True where fits may look, in one free run or over windows."""
+    if windows is None:
+        return training_mask(measurement.samples, measurement.sample_rate_hz, measurement.period_samples)
+    return training_in_windows(windows)
 
 
 def _runs_free(model: Model, location: Location) -> bool:

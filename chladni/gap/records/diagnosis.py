@@ -269,6 +269,8 @@ class Diagnosis:
         With a periodic input, output by output.
     levels
         With several logs: sentences on what changes with level.
+    elsewhere
+        With several logs: how far what the first one told closes the gap on the others, which no fit saw.
     """
 
     model: str
@@ -287,3 +289,4 @@ class Diagnosis:
     signals: GapSignals | None = None
     distortion: tuple[DistortionShare, ...] = ()
     levels: tuple[str, ...] = ()
+    elsewhere: tuple[Closing, ...] = ()

@@ -1,6 +1,7 @@
 """A hidden cause in a small machine is named, at its site, with its size; where there's none, none is named."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,6 +50,19 @@ def test_the_gap_closes_to_the_noise(friction: Diagnosis) -> None:
     assert friction.gap.closed > 0.98
     low, high = friction.gap.interval or (0.0, 0.0)
     assert low <= friction.gap.closed <= high
+
+
+@pytest.mark.slow
+def test_what_one_log_told_closes_the_gap_on_another() -> None:
+    # The same machine: the first log's seed draws its parameters.
+    off = {"elbow.stiffness": 1.04, "column.mass": 0.97, "hand.damping": 1.1}
+    first, other = (measured((FRICTION,), seed=seed, off=off, seconds=4.0) for seed in (3, 4))
+    found = diagnose(arm(), [first, replace(other, log="other.mcap")])
+    (gap,) = found.elsewhere
+    assert {one.log for one in gap.held_out} == {"other.mcap"}
+    assert gap.before > 0.1
+    assert gap.after == pytest.approx(0.01, rel=0.15)
+    assert gap.tuned > 3 * gap.after
 
 
 @pytest.mark.slow
@@ -109,6 +123,29 @@ def test_a_stiffness_far_outside_its_tolerance_is_a_parameter() -> None:
     assert found.verdict == "parameters"
     assert [(one.effect, one.site) for one in found.causes] == [("parameter", "elbow.stiffness")]
     assert found.tuned_parameters["elbow.stiffness"].value == pytest.approx(3e5, rel=0.02)
+
+
+@pytest.mark.slow
+def test_two_causes_at_once_are_both_named() -> None:
+    spring = chladni.attached("hardening_stiffness", "hand", {"cubic": 3e10})
+    sensor = chladni.attached("gain_error", "acc_column", {"gain": 1.3})
+    found = diagnose(arm(), [measured((spring, sensor), seed=9, seconds=5.0)])
+    assert {(one.effect, one.site) for one in found.causes} == {
+        ("hardening_stiffness", "hand"), ("gain_error", "acc_column")
+    }  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_sensor_that_clips_hard_is_named_although_it_looks_noisy() -> None:
+    log = measured(seconds=5.0, seed=8)
+    outputs = log.outputs.copy()
+    limit = 1.5 * np.std(outputs[0])
+    outputs[0] = np.clip(outputs[0], -limit, limit)
+    found = diagnose(arm(), [replace(log, outputs=outputs)])
+    assert [(one.effect, one.site) for one in found.causes] == [("clipping", "acc_column")]
+    assert found.causes[0].parameters["limit"].value == pytest.approx(limit, rel=0.01)
+    # What the clipping hid in the noise's estimate isn't told as noise.
+    assert found.where.channels[0].noise < 0.1
 
 
 @pytest.mark.slow

@@ -1,0 +1,70 @@
+"""What was found on one log, tried on others that nothing was fitted to."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.comparison.noise_estimate import estimate_noise
+from chladni.gap.comparison.periodicity import with_period
+from chladni.gap.diagnosis.causes import Causes
+from chladni.gap.diagnosis.closing import Yardstick, closing_of
+from chladni.gap.diagnosis.study import Study, training_of
+from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.windows import windows_for
+from chladni.gap.records.diagnosis import Closing
+from chladni.gap.records.measurement import Measurement
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.gap.tuning.output_error import fit_output_error
+from chladni.signals.errors import EstimateError, ModelError
+
+Matrix = NDArray[np.float64]
+
+
+def closing_elsewhere(study: Study, causes: Causes, measurement: Measurement, *, seed: int) -> Closing | None:
+    """Say how far the gap closes on another log, with parameters and effects as the first log told them.
+
+    Only the state that the log begins in (each window, as on the first log) and the outputs' constants are estimated,
+    on stretches that aren't judged.
+
+    Returns
+    -------
+    Closing or None
+        None where a floor shakes, or where the model diverges on that log.
+    """
+    if causes.shaken is not None:
+        return None
+    measurement = with_period(measurement)
+    windows = None if study.windows is None else windows_for(study.model, measurement)
+    run, noise = FreeRun(study.model, measurement, windows=windows), estimate_noise(measurement)
+    training = training_of(measurement, windows)
+    believed = causes.best if causes.verdict in ("effect", "parameters") else causes.tuned
+    horizon = None if windows is None else max(stop - start for start, stop in windows) / measurement.sample_rate_hz
+    yardstick = Yardstick(
+        measurement=measurement,
+        held=~training,
+        noise=noise,
+        by="free_run" if windows is None else "windows",
+        horizon_s=horizon,
+    )
+    try:
+        runs = [_as_told(run, noise, training, one) for one in (None, causes.tuned, believed)]
+    except (ModelError, EstimateError):
+        return None
+    return closing_of(yardstick, *runs, seed=seed)
+
+
+def _as_told(run: FreeRun, noise: NoiseFloor, training: NDArray[np.bool_], told: Contestant | None) -> Matrix:
+    """``[output, sample]`` of the nominal model (None), or of what a contestant says, from the best initial state."""
+    effects = () if told is None else told.fit.effects
+    return fit_output_error(
+        run,
+        noise,
+        effects=effects,
+        fitted=((),) * len(effects),
+        training=training,
+        start_z=None if told is None else told.fit.z,
+        # They stay where they are, wherever that is.
+        z_limit=1e3,
+        tune=False,
+        offsets=len(run.windows) == 1,
+    ).outputs
