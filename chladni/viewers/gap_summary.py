@@ -53,6 +53,7 @@ def _sentences(found: Diagnosis) -> Iterator[str]:
     # Where nothing was named, nothing closes.
     if found.verdict in ("effect", "parameters"):
         yield from _closed(found.gap)
+        yield from _elsewhere(found)
     yield from _how(found.gap)
     if found.advice:
         yield found.advice
@@ -69,7 +70,6 @@ def _effects(found: Diagnosis) -> Iterator[str]:
         told = _listed([f"{cause_phrase(cause)} ({chance(cause.probability)})" for cause in causes])
         yield f"{_certainty(least)} {_COUNT.get(len(causes), 'several')} causes at once: {told}."
     yield _closing(found)
-    yield from _elsewhere(found)
     if found.gap.before < FAINT * found.gap.noise:
         yield f"The gap is faint: the error is {found.gap.before / found.gap.noise:.2g} times the noise."
     for cause in causes:
@@ -121,7 +121,6 @@ def _parameters(found: Diagnosis) -> Iterator[str]:
     yield (
         f"With that the error falls from {percent(gap.before)} to {percent(gap.after)}, noise {percent(gap.noise)}."
     )
-    yield from _elsewhere(found)
     for cause in wrong:
         yield from _reservations(cause)
 
