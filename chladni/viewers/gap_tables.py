@@ -12,6 +12,8 @@ Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 RANKED = 5
 # A parameter that moved by less than its own sigma, and by less than this, didn't move.
 MOVED = 1e-3
+# A sigma so many times the value tells nothing of it.
+WIDE = 100.0
 
 
 def channel_table(where: Where) -> Table:
@@ -87,8 +89,11 @@ def distortion_table(found: Diagnosis) -> Table:
 
 
 def _value(number: FittedNumber) -> str:
-    told = engineering(number.value, number.std, number.unit)
-    return told if number.std is not None else f"{told} (held)"
+    if number.std is None:
+        return f"{engineering(number.value, None, number.unit)} (held)"
+    # Such as a constant force that only accelerometers saw: its value would be read, its sigma not.
+    wide = number.std > WIDE * abs(number.value)
+    return "not determined" if wide else engineering(number.value, number.std, number.unit)
 
 
 def _nominal(number: FittedNumber) -> str:

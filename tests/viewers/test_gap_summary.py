@@ -188,3 +188,10 @@ def test_percents_have_two_digits(share: float, printed: str) -> None:
 def test_another_log_is_told_with_its_own_numbers() -> None:
     told = summary(made.periodic())
     assert "On louder.mcap, which nothing was fitted to, the error goes from 28 % to 3.1 %, noise 1.0 %." in told
+
+
+def test_a_number_that_nothing_tells_is_not_shown_as_one() -> None:
+    found = made.diagnosis()
+    loose = FittedNumber(value=-0.0087, std=2e3, unit="N", nominal=None)
+    cause = replace(found.causes[0], parameters={"offset": loose})
+    assert tables.cause_table(replace(found, causes=(cause,)))[1][0][-1] == "not determined"
