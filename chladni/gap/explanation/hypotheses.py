@@ -148,7 +148,7 @@ def wrong_parameters(location: Location, *, most: int = 2) -> Hypothesis | None:
     order = np.argsort(-np.abs(far.z))
     outside = [int(place) for place in order if abs(far.z[place]) > OUTSIDE]
     # A body heavier than its tolerance carries something: that is an effect, not a wrong value.
-    outside = [place for place in outside if not (names[place].endswith((".mass", ".inertia")) and far.z[place] > 0)]
+    outside = [place for place in outside if not (_is_inertia(names[place]) and far.z[place] > 0)]
     if not outside:
         return None
     best = None
@@ -163,6 +163,17 @@ def wrong_parameters(location: Location, *, most: int = 2) -> Hypothesis | None:
         return None
     chosen, found = best
     return Hypothesis(wide=dict.fromkeys(chosen, _FAR), start_z=found.z, screened=found.chi)
+
+
+def _is_inertia(name: str) -> bool:
+    """Whether a parameter is what a body resists acceleration with, in a structure or a drive.
+
+    Examples
+    --------
+    >>> [_is_inertia(name) for name in ("arm.mass", "reduced_mass", "inertia", "arm.damping")]
+    [True, True, True, False]
+    """
+    return name.split(".")[-1] in ("mass", "inertia", "reduced_mass")
 
 
 def _inside(parameter: Parameter) -> float:
