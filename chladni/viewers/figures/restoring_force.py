@@ -4,6 +4,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from chladni.gap.records.diagnosis import RestoringForce
 from chladni.viewers.engineering import axis_scale
@@ -95,6 +96,6 @@ def _colour_bar(figure: Figure, axes: Axes, surface: RestoringForce, shown: Over
     scale, unit = axis_scale(motion(surface, shown), motion_unit(surface, shown))
     reach = motion_reach(surface, shown) / scale
     colours = ScalarMappable(norm=Normalize(-reach, reach), cmap=_COLOURS)
-    bar = figure.colorbar(colours, ax=axes, location="top", aspect=25, pad=0.02)
+    bar = figure.colorbar(colours, ax=axes, location="top", aspect=25, pad=0.02, ticks=MaxNLocator(4))
     bar.set_label(f"{shown} [{unit}]", fontsize=7.5)
     bar.outline.set_linewidth(0.0)
