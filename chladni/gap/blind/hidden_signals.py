@@ -77,10 +77,13 @@ def _mount(machine: Machine, hidden: Hidden, signal: Sum) -> Expression:
 
 
 def _coupling(machine: Machine, hidden: Hidden, signal: Sum) -> Expression:
-    """Second-order high-pass, as of two coupling stages."""
+    """Third-order high-pass, as of three coupling stages of which one is slow."""
     omega, ratio = 2 * pi * hidden.numbers["corner"], hidden.numbers["damping_ratio"]
+    slow = machine.assembly.filtered(
+        f"{hidden.site}.slow", signal, (1.0, 0.0, 0.0), (1.0, hidden.numbers["slow"] * omega, 0.0)
+    )
     return machine.assembly.filtered(
-        f"{hidden.site}.coupling", signal, (1.0, 0.0, 0.0), (1.0, 2 * ratio * omega, omega**2)
+        f"{hidden.site}.coupling", slow, (1.0, 0.0, 0.0), (1.0, 2 * ratio * omega, omega**2)
     )
 
 

@@ -98,10 +98,10 @@ def mounting_resonance(scene: Scene, site: str) -> Draft:
 
 
 def ac_coupling(scene: Scene, site: str) -> Draft:
-    """Two coupling stages."""
-    lowest, ratio = scene.bench.modes_hz[0], scene.between(0.6, 1.2)
+    """Three coupling stages: two alike, and a slow one."""
+    lowest, ratio, slow = scene.bench.modes_hz[0], scene.between(0.6, 1.2), scene.between(0.05, 0.25)
     return _draft("ac_coupling", site, "coupling", lambda size: {
-        "corner": 0.05 * size * lowest, "damping_ratio": ratio}, least=0.02, most=16.0)  # fmt: skip
+        "corner": 0.05 * size * lowest, "damping_ratio": ratio, "slow": slow}, least=0.02, most=16.0)  # fmt: skip
 
 
 def time_offset(scene: Scene, site: str) -> Draft:

@@ -1,7 +1,8 @@
 """The search for causes: hypotheses entered, a second effect looked for while the first leaves something."""
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
+
+import numpy as np
 
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.candidates import screened
@@ -11,12 +12,14 @@ from chladni.gap.explanation.hypotheses import (
     effect_hypotheses,
     hypothesis_of,
     polished,
-    with_siblings,
+    siblings,
     wrong_parameters,
 )
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.gap.explanation.known_effect import KnownEffect
 from chladni.gap.location.locate import Located, locate, located_pairs
-from chladni.signals.errors import EstimateError
+from chladni.gap.tuning.law_error import with_law_error
+from chladni.signals.errors import EstimateError, ModelError
 
 Step = Callable[[float], None]
 #: Fits of a first effect, of a second beside it, and of each of two at once.
@@ -49,10 +52,10 @@ def single_causes(study: Study, progress: Step) -> list[Contestant]:
     location, contest = study.location, study.contest
     candidates = screened(location, location.ranked, study.leave_out, study.own)
     progress(0.3)
-    hypotheses = with_siblings(effect_hypotheses(candidates, study.own, count=_FITTED), contest.run, study.leave_out)
+    hypotheses = effect_hypotheses(candidates, study.own, count=_FITTED)
     wrong = wrong_parameters(location)
     entered = contest.enter_all([*hypotheses, *([wrong] if wrong else [])], lambda done: progress(0.3 + 0.5 * done))
-    ranked = weighed(_sound(study, entered))
+    ranked = weighed(_sound(study, [*entered, *_siblings(study, entered)]))
     if ranked and ranked[0].chi > _DETAILED:
         # A detail of its law that was set by the screen's grid must not cost a word its place.
         forms = _best_forms(ranked)
@@ -63,13 +66,14 @@ def single_causes(study: Study, progress: Step) -> list[Contestant]:
 def second_causes(study: Study, first: Contestant) -> list[Contestant]:
     """Enter a second effect beside a first one, looked for in what that leaves."""
     contest = study.contest
-    # What the first effect did beyond the linear model is taken from the log: the rest is a gap of its own.
-    states = len(contest.run.compiled().states)
-    plain = contest.run.outputs(first.fit.z, (), first.fit.initial[:, :states])
-    bent = first.fit.outputs - first.fit.offsets[:, None] - plain
-    measurement = replace(study.measurement, outputs=study.measurement.outputs - bent)
-    location = locate(study.model, measurement, contest.noise.lowered(first.held), contest.run.tunables)
-    found = screened(location, location.ranked[:4], study.leave_out, study.own)
+    try:
+        known = KnownEffect.of(contest.run, first)
+    except ModelError:
+        return []
+    # It leaves details of its law, which a quiet band of coloured noise would make more of than of any effect.
+    floor = with_law_error(contest.noise.lowered(first.held), np.std(study.measurement.outputs, axis=1))
+    location = locate(study.model, known.without(study.measurement), floor, contest.run.tunables, first.fit.z)
+    found = screened(location, location.ranked[:4], study.leave_out, study.own, known)
     # At the same place a second word would mend the details of the first one's law.
     taken = _same_places(study, {one.site for one in first.fit.effects})
     singles = effect_hypotheses([one for one in found if one.trial.site.name not in taken], study.own, count=_SECOND)
@@ -102,6 +106,15 @@ def without_one(study: Study, both: Contestant) -> list[Contestant]:
 def detailed(study: Study, found: Contestant) -> Contestant:
     """Give a contestant with the details of its laws fitted too, when it leaves enough for them to matter."""
     return _polished(study, found) if found.chi > _DETAILED else found
+
+
+def _siblings(study: Study, entered: Sequence[Contestant]) -> list[Contestant]:
+    """Enter the laws that the best Coulomb friction is a special case of."""
+    if "stribeck_friction" in study.leave_out:
+        return []
+    sound = [one for one in _sound(study, entered) if one.fit.effects]
+    plain = [one for one in sound if one.fit.effects[0].effect == "coulomb_friction"]
+    return study.contest.enter_all(siblings(weighed(plain)[0], study.contest.run)) if plain else []
 
 
 def _of_pair(study: Study, pair: Located) -> list[Hypothesis]:

@@ -1,6 +1,6 @@
 """Candidates: every effect of the catalogue at every plausible site, by the screen."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from chladni.gap.explanation.body_trials import body_trials
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.input_trials import input_trials
 from chladni.gap.explanation.joint_trials import joint_trials
+from chladni.gap.explanation.known_effect import KnownEffect
 from chladni.gap.explanation.output_trials import output_trials
 from chladni.gap.explanation.own_trials import own_trials
 from chladni.gap.explanation.ripple_trials import ripple_at_input
@@ -17,14 +18,19 @@ from chladni.gap.location.locate import Located, Location, sites_at
 from chladni.gap.location.recovered import Recovered, recovered
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
+from chladni.gap.records.measurement import Measurement
 from chladni.models.effects.effect_kind import EffectKind
 
-#: Screened forms that are searched beyond their grid.
-_REFINED = 16
+#: Screened forms that are searched beyond their grid: of all, and of each site.
+_REFINED, _REFINED_EACH = 16, 3
 
 
 def screened(
-    location: Location, places: Iterable[Located], leave_out: frozenset[str], own: Mapping[str, EffectKind]
+    location: Location,
+    places: Iterable[Located],
+    leave_out: frozenset[str],
+    own: Mapping[str, EffectKind],
+    known: KnownEffect | None = None,
 ) -> list[Screened]:
     """Weigh every effect at the sites of some places; the best of each form, by rising cost.
 
@@ -34,26 +40,48 @@ def screened(
         Words that don't take part.
     own
         The user's effects by name.
+    known
+        What was taken from the log before it was located, when another effect is known already.
     """
     problem = location.problem
+    measurement = problem.measurement if known is None else known.behind(problem.measurement)
     band = excited_band_hz(problem.measurement)
     found: list[tuple[Screened, Screen]] = []
     for located in places:
         for site, others in sites_at(located):
             motion = recovered(problem, located.profile, site)
+            motion = motion if known is None else known.along(motion, problem.measurement)
             screen = Screen(problem, located.profile, site, others=others)
-            trials = [*trials_at(problem, motion, site, band), *own_trials(problem, motion, site, own)]
+            trials = [*trials_at(problem, measurement, motion, band), *own_trials(problem, motion, site, own)]
             found += [(one, screen) for one in screen.run(one for one in trials if one.effect not in leave_out)]
     found.sort(key=lambda one: one[0].cost)
     best: dict[tuple[str, str, str | None, str | None], tuple[Screened, Screen]] = {}
     for one, screen in found:
         best.setdefault((one.trial.effect, one.trial.site.name, one.trial.variant, one.trial.source), (one, screen))
-    refined = [screen.refined(one) if place < _REFINED else one for place, (one, screen) in enumerate(best.values())]
+    worth = _worth_a_search([one.trial.site for one, _ in best.values()])
+    refined = [screen.refined(one) if place in worth else one for place, (one, screen) in enumerate(best.values())]
     return sorted(refined, key=lambda one: one.cost)
 
 
-def trials_at(problem: LinearProblem, motion: Recovered, site: Site, band_hz: tuple[float, float]) -> Iterator[Trial]:
-    """Give the trials of a site."""
+def _worth_a_search(sites: Sequence[Site]) -> set[int]:
+    """Places of the first few of all, and of each site: a grid may step over a law that is sharp in its numbers."""
+    worth = set(range(min(_REFINED, len(sites))))
+    for site in set(sites):
+        worth.update([place for place, one in enumerate(sites) if one == site][:_REFINED_EACH])
+    return worth
+
+
+def trials_at(
+    problem: LinearProblem, measurement: Measurement, motion: Recovered, band_hz: tuple[float, float]
+) -> Iterator[Trial]:
+    """Give the trials of a motion's site.
+
+    Parameters
+    ----------
+    measurement
+        What sensors showed in all, even where the problem is of a part of it.
+    """
+    site = motion.site
     compiled = problem.view(np.zeros(len(problem.tunables.names))).compiled
     if site.kind == "joint":
         yield from joint_trials(motion, compiled.ports[compiled.port_index(site.name, "joint")])
@@ -63,4 +91,4 @@ def trials_at(problem: LinearProblem, motion: Recovered, site: Site, band_hz: tu
         yield from input_trials(motion)
         yield from ripple_at_input(problem, motion, site)
     elif site.kind == "output":
-        yield from output_trials(motion, problem.measurement)
+        yield from output_trials(motion, measurement)

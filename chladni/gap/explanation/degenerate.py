@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.explanation.body_trials import STIFF_MOUNT
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
@@ -28,8 +29,8 @@ def _degenerate(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool
         # A change that is over at once, or never comes, is a stiffness.
         return not (0.02 < share < 0.98 if effect.variant == "step" else share > 0.1)
     if effect.effect == "extra_mode":
-        # Resonant above all that moved, it's a mass.
-        return values["frequency"] > excited_band_hz(run.measurement)[1]
+        # Resonant well above all that moved, it's a mass.
+        return values["frequency"] > STIFF_MOUNT * excited_band_hz(run.measurement)[1]
     if effect.effect in (
         "hysteresis",
         "coulomb_friction",

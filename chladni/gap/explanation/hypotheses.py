@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.explanation.hypothesis import Hypothesis
+from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.screen import Screened
 from chladni.gap.location.locate import Location, tuned_stepwise
 from chladni.gap.plant.free_run import FreeRun
@@ -89,35 +89,31 @@ def effect_of(one: Screened, own: Mapping[str, EffectKind]) -> AttachedEffect | 
     return replace(plain, values=values)
 
 
-def with_siblings(found: Sequence[Hypothesis], run: FreeRun, leave_out: frozenset[str]) -> list[Hypothesis]:
-    """Add to the best Coulomb friction the Stribeck friction that begins where it stands: nested laws compete."""
-    first = next((one for one in found if one.effects[0].effect == "coulomb_friction"), None)
-    if first is None or "stribeck_friction" in leave_out:
-        return list(found)
-    (plain,) = first.effects
+def siblings(found: Contestant, run: FreeRun) -> list[Hypothesis]:
+    """Give the Stribeck frictions that begin where a Coulomb friction ended: nested laws compete."""
+    if [one.effect for one in found.fit.effects] != ["coulomb_friction"]:
+        return []
+    (plain,) = found.fit.effects
     try:
-        velocity = run.motion(first.start_z, first.effects, site=plain.site).velocity
+        velocity = run.motion(found.fit.z, found.fit.effects, site=plain.site).velocity
     except ModelError:
-        return list(found)
+        return []
     speed = float(np.sqrt(np.mean(velocity**2)))
-    siblings = [
-        _stribeck_beside(plain, variant, share * speed)
-        for variant, detail in (("bristle", "presliding"), ("regularised", "creep_speed"))
-        if detail in plain.values
+    return [
+        hypothesis_of((_stribeck_beside(plain, share * speed),), found.fit.z, screened=found.hypothesis.screened)
         for share in _STRIBECK_SPEEDS
     ]
-    return [*found, *(hypothesis_of((one,), first.start_z, screened=first.screened) for one in siblings)]
 
 
-def _stribeck_beside(plain: AttachedEffect, variant: str, speed: float) -> AttachedEffect:
-    """Give the Stribeck friction of the same size as a Coulomb friction, somewhat higher at rest."""
+def _stribeck_beside(plain: AttachedEffect, speed: float) -> AttachedEffect:
+    """Give the Stribeck friction of the same size and form as a Coulomb friction, somewhat higher at rest."""
     force = plain.values["force"]
     details = {name: plain.values[name] for name in ("presliding", "creep_speed") if name in plain.values}
     return attached(
         "stribeck_friction",
         plain.site,
         {"coulomb": 0.9 * force, "static": 1.3 * force, "speed": speed, **details},
-        variant=variant,
+        variant=plain.variant,
     )
 
 

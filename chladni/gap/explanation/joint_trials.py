@@ -14,6 +14,8 @@ from chladni.models.effects.coulomb_friction import bristle
 from chladni.models.effects.hysteresis import bouc_wen, creeping
 
 Matrix = NDArray[np.float64]
+#: Most steps between two samples along a recovered motion.
+_STEPS = 64
 
 
 def joint_trials(motion: Recovered, port: Port) -> Iterator[Trial]:
@@ -42,7 +44,7 @@ def _friction(motion: Recovered) -> Iterator[Trial]:
         return Force.of(motion.spectrum(unit), motion.spectrum(unit * np.exp(-((s / at) ** 2))))
 
     def bristles(shape: Shape) -> Force:
-        return Force.of(_along(bristle, (1.0, 0.0, *numbers(shape)), motion))
+        return Force.of(_along(bristle, (1.0, 0.0, *numbers(shape)), numbers(shape)[0], motion))
 
     creeps = (0.003 * speed, 0.03 * speed, 0.15 * speed)
     yield Trial(
@@ -63,9 +65,14 @@ def _friction(motion: Recovered) -> Iterator[Trial]:
 
 def _hysteresis(motion: Recovered) -> Trial:
     reach = _rms(motion.displacement)
+
+    def build(shape: Shape) -> Force:
+        bend, power = numbers(shape)
+        return Force.of(_along(bouc_wen, (1.0, bend, max(power, 1.0)), bend, motion))
+
     return Trial(
         effect="hysteresis", site=motion.site,
-        build=lambda shape: Force.of(_along(bouc_wen, (1.0, numbers(shape)[0], max(numbers(shape)[1], 1.0)), motion)),
+        build=build,
         grid=logarithms((0.1 * reach, 0.3 * reach, 0.7 * reach, 1.5 * reach), (1.0, 2.0)),
         values=lambda shape, a: _positive(
             a, force=a[0], **{"yield": numbers(shape)[0], "shape": max(numbers(shape)[1], 1.0)}
@@ -80,7 +87,7 @@ def _creeping(motion: Recovered) -> Trial:
 
     def build(shape: Shape) -> Force:
         bend, slip = numbers(shape)
-        return Force.of(_along(creeping, (1.0, bend, 1.0, slip, 0.5), motion))
+        return Force.of(_along(creeping, (1.0, bend, 1.0, slip, 0.5), bend, motion))
 
     def values(shape: Shape, a: Matrix) -> Numbers | None:
         bend, slip = numbers(shape)
@@ -145,7 +152,7 @@ def _backlash(motion: Recovered, port: Port) -> Trial:
         return Force.known(motion.spectrum(-port.stiffness * np.clip(d, -half, half)))
 
     # From hardly any play to one that the motion barely crosses.
-    gaps = 2 * reach * np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0])
+    gaps = 2 * reach * np.geomspace(5e-4, 2.0, 24)
     return Trial(
         effect="backlash", site=motion.site, build=build, grid=logarithms(gaps.tolist()),
         values=lambda shape, _: {"gap": numbers(shape)[0]}, parameters=1,
@@ -239,9 +246,15 @@ def _stribeck(shape: Shape, amplitudes: Matrix) -> Numbers | None:
     return {"coulomb": coulomb, "static": coulomb + more, "speed": speed, "creep_speed": creep}
 
 
-def _along(law: LawFunction, parameters: tuple[float, ...], motion: Recovered) -> Spectrum:
+def _along(law: LawFunction, parameters: tuple[float, ...], bend: float, motion: Recovered) -> Spectrum:
+    """Spectrum of a law with a state that turns round within a way of about `bend`."""
     port_law = PortLaw(port=0, function=law, parameters=parameters, state=(0.0,))
-    return motion.spectrum(force_along_motion(port_law, motion.displacement, motion.velocity, motion.time_s))
+    # Steps longer than the bend run away, and some a little shorter are wrong.
+    furthest = float(np.max(np.abs(motion.velocity))) / motion.lines.sample_rate_hz
+    steps = int(np.clip(np.ceil(2.0 * furthest / bend), 4, _STEPS))
+    return motion.spectrum(
+        force_along_motion(port_law, motion.displacement, motion.velocity, motion.time_s, substeps=steps)
+    )
 
 
 def _rms(signal: Matrix) -> float:

@@ -5,9 +5,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from chladni.gap.explanation.body_trials import tone_trials
+from chladni.gap.explanation.resonances import resonances
 from chladni.gap.explanation.trial import Force, Matrix, Numbers, Shape, Spectrum, Trial, logarithms, numbers
 from chladni.gap.location.recovered import Recovered
 from chladni.gap.records.measurement import Measurement
+
+#: Damping ratio of two coupling stages that are as good as one.
+_UNLIKE = 3.0
 
 
 def output_trials(motion: Recovered, measurement: Measurement) -> Iterator[Trial]:
@@ -29,23 +33,46 @@ def _filters(motion: Recovered) -> Iterator[Trial]:
 
     def coupled(shape: Shape) -> Force:
         omega = 2 * np.pi * numbers(shape)[0]
-        return Force.known(-y * omega / (s + omega))
+        # A slow corner still remembers the start at the end.
+        return Force(fixed=-y * omega / (s + omega), basis=np.stack([omega / (s + omega)]))
+
+    def coupled_twice(shape: Shape) -> Force:
+        corner, damping = numbers(shape)
+        omega = 2 * np.pi * corner
+        turning = s**2 + 2 * damping * omega * s + omega**2
+        return Force(fixed=y * (s**2 / turning - 1), basis=np.stack([omega / turning, s / turning]))
 
     def ride(shape: Shape) -> Force:
         frequency, damping = numbers(shape)
         omega = 2 * np.pi * frequency
-        return Force.known(y * (omega**2 / (s**2 + 2 * damping * omega * s + omega**2) - 1))
+        turning = s**2 + 2 * damping * omega * s + omega**2
+        return Force(fixed=y * (omega**2 / turning - 1), basis=np.stack([omega / turning, s / turning]))
 
+    corners = np.geomspace(5e-4 * rate, 0.15 * rate, 20).tolist()
     yield Trial(
-        effect="ac_coupling", site=site, build=coupled,
-        grid=logarithms(np.geomspace(5e-4 * rate, 0.15 * rate, 20).tolist()),
+        effect="ac_coupling", site=site, build=coupled, grid=logarithms(corners),
         values=lambda shape, _: {"corner": numbers(shape)[0]}, parameters=1,
     )  # fmt: skip
     yield Trial(
+        effect="ac_coupling", site=site, variant="second_order", build=coupled_twice,
+        grid=logarithms(corners, (0.7, 1.2)),
+        values=_two_stages, parameters=2,
+    )  # fmt: skip
+    measured = y + motion.spectrum(motion.force)
+    yield Trial(
         effect="mounting_resonance", site=site, build=ride,
-        grid=logarithms(np.geomspace(0.02 * rate, 2.0 * rate, 30).tolist(), (0.02, 0.1, 0.4)),
+        grid=[
+            *logarithms(np.geomspace(0.02 * rate, 2.0 * rate, 30).tolist(), (0.02, 0.1, 0.4)),
+            *resonances(measured, y, motion.believed, motion.lines.frequency_hz, (0.0, 0.5 * rate)),
+        ],
         values=lambda shape, _: {"frequency": numbers(shape)[0], "damping_ratio": numbers(shape)[1]}, parameters=2,
     )  # fmt: skip
+
+
+def _two_stages(shape: Shape, _: Matrix) -> Numbers | None:
+    corner, damping = numbers(shape)
+    # Far apart, the upper corner is one stage's and the lower one shows nowhere.
+    return {"corner": corner, "damping_ratio": damping} if damping < _UNLIKE else None
 
 
 def _shift(motion: Recovered, sign: float) -> Trial:

@@ -5,12 +5,19 @@ from numpy.typing import NDArray
 from scipy.signal import csd, find_peaks, welch
 
 Matrix = NDArray[np.float64]
+#: Power over that of the lines around it, itself among them, of a line that stands out.
+_SHARP = 4.0
 
 
 def strongest_tones(signal: Matrix, sample_rate_hz: float, count: int = 3) -> list[float]:
-    """Give frequencies in Hz of the strongest lines, to a fraction of a line.
+    """Give frequencies in Hz of the sharpest lines and of the highest sharp ones, to a fraction of a line.
 
     By the Hann-windowed transform and a parabola through the logarithm of its peak (Gasior and Gonzalez 2004).
+
+    Parameters
+    ----------
+    count
+        At most so many of either kind.
     """
     size = signal.size
     power = np.abs(np.fft.rfft(signal * np.hanning(size))) ** 2
@@ -19,15 +26,15 @@ def strongest_tones(signal: Matrix, sample_rate_hz: float, count: int = 3) -> li
     around = np.convolve(np.pad(power, width, mode="reflect"), np.full(2 * width + 1, 1 / (2 * width + 1)), "valid")
     sharp = power / np.maximum(around, 1e-300)
     sharp[: max(3, size // 5000)] = 0.0
-    found: list[float] = []
-    strength = sharp * (power > 1e-6 * power.max())
-    for place in np.argsort(strength)[::-1][: 20 * count]:
-        if len(found) == count:
-            break
-        if not 0 < place < power.size - 1 or power[place] < max(power[place - 1], power[place + 1]):
-            continue
-        found.append((place + _offset(power[place - 1 : place + 2])) * sample_rate_hz / size)
-    return found
+    peaks = find_peaks(power)[0]
+    peaks = peaks[(power[peaks] > 1e-6 * power.max()) & (sharp[peaks] > 0)]
+    # A motor's speed wanders a little, so its line is less sharp than a spike of noise; but it's higher.
+    high = peaks[sharp[peaks] > _SHARP]
+    chosen = [*peaks[np.argsort(-sharp[peaks])][:count], *high[np.argsort(-power[high])][:count]]
+    return [
+        float((place + _offset(power[place - 1 : place + 2])) * sample_rate_hz / size)
+        for place in dict.fromkeys(chosen)
+    ]
 
 
 def strongest_resonances(motion: Matrix, force: Matrix, sample_rate_hz: float, count: int = 6) -> list[float]:

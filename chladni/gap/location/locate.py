@@ -75,21 +75,29 @@ class Location:
         return self.ranked[0] if self.ranked else None
 
 
-def locate(model: Model, measurement: Measurement, noise: NoiseFloor, tunables: Scaled) -> Location:
+def locate(
+    model: Model, measurement: Measurement, noise: NoiseFloor, tunables: Scaled, start_z: Matrix | None = None
+) -> Location:
     """Profile an unknown force at every place of a model.
 
     Parameters are refitted within their tolerance under each hypothesis, so that a tuning that swallowed part of an
     effect can't mislead. With one sensor any force explains anything: then every place is handed on.
+
+    Parameters
+    ----------
+    start_z
+        ``[parameter]`` where the parameters are thought to be, zero without.
     """
     whole = LinearProblem(
         model, measurement, noise, tunables, all_lines(measurement.samples, measurement.sample_rate_hz)
     )
-    segments, tuned = _tuned_on_segments(model, whole)
+    start = np.zeros(len(tunables.names)) if start_z is None else np.clip(start_z, -3.0, 3.0)
+    segments, tuned = _tuned_on_segments(model, whole, start)
     view = segments[-1].view(tuned.z)
     places = placed(view, sites_of(view.compiled, measurement.output_names), measurement.output_names)
     record = whole.on(_telling(whole))
     plain = profiled(record, (), tuned.z, iterations=6)
-    rough = _roughly((*segments, record), plain, places)
+    rough = _roughly((*segments, record), plain, places, start)
     ranked = _followed(record, _tied([one.chi for one, _ in rough], rough, _FOLLOWED))
     if ranked and ranked[0].profile.expected > 1 and _pays(plain, ranked[0].profile):
         record = record.with_noise(noise_behind(record, ranked[0].profile))
@@ -116,7 +124,9 @@ def located_pairs(location: Location, rough: int = 5) -> list[Located]:
     return sorted(found, key=lambda one: one.profile.chi)
 
 
-def _tuned_on_segments(model: Model, whole: LinearProblem) -> tuple[tuple[LinearProblem, ...], Profile]:
+def _tuned_on_segments(
+    model: Model, whole: LinearProblem, start: Matrix
+) -> tuple[tuple[LinearProblem, ...], Profile]:
     measurement = whole.measurement
     period = measurement.sample_rate_hz / _lowest_hz(model, measurement)
     problems = []
@@ -126,7 +136,7 @@ def _tuned_on_segments(model: Model, whole: LinearProblem) -> tuple[tuple[Linear
             length, samples=measurement.samples, sample_rate_hz=measurement.sample_rate_hz, count=_SEGMENT_LINES
         )
         problems.append(whole.on(lines))
-    return tuple(problems), tuned_stepwise(problems, np.zeros(len(whole.tunables.names)))
+    return tuple(problems), tuned_stepwise(problems, start)
 
 
 def tuned_stepwise(problems: Sequence[LinearProblem], z: Matrix, limit: float | Matrix = 3.0) -> Profile:
@@ -145,7 +155,9 @@ def _lowest_hz(model: Model, measurement: Measurement) -> float:
     return float(heard.min()) if heard.size else 20.0 / measurement.duration_s
 
 
-def _roughly(problems: Sequence[LinearProblem], plain: Profile, places: Sequence[Place]) -> list[_Rough]:
+def _roughly(
+    problems: Sequence[LinearProblem], plain: Profile, places: Sequence[Place], start: Matrix
+) -> list[_Rough]:
     """Profile every place in a few steps; by rising misfit on the whole record, the last of the problems.
 
     An effect may have led a tuning without it far from the right parameters, so each place finds its own, on segments
@@ -153,15 +165,15 @@ def _roughly(problems: Sequence[LinearProblem], plain: Profile, places: Sequence
     """
     if len(problems[-1].measured) < 2:
         return [(replace(plain, sites=(place.sites[0],)), place) for place in places]
-    found = [(_rough_profile(problems, plain, place), place) for place in places]
+    found = [(_rough_profile(problems, plain, place, start), place) for place in places]
     return sorted(found, key=lambda one: one[0].chi)
 
 
-def _rough_profile(problems: Sequence[LinearProblem], plain: Profile, place: Place) -> Profile:
-    sites, z = (place.sites[0],), np.zeros_like(plain.z)
+def _rough_profile(problems: Sequence[LinearProblem], plain: Profile, place: Place, start: Matrix) -> Profile:
+    sites, z = (place.sites[0],), start
     for problem in problems[:-1]:
         z = profiled(problem, sites, z, iterations=4).z
-    found = [profiled(problems[-1], sites, start, iterations=4) for start in (z, plain.z)]
+    found = [profiled(problems[-1], sites, each, iterations=4) for each in (z, plain.z)]
     return min(found, key=lambda one: one.cost)
 
 

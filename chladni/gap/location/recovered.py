@@ -59,6 +59,11 @@ class Recovered(Value):
         """``[line]`` j omega."""
         return np.asarray(2j * np.pi * self.lines.frequency_hz, dtype=np.complex128)
 
+    @property
+    def believed(self) -> Matrix:
+        """``[line]`` of `lines`: share of the force's power that is no noise."""
+        return np.asarray(self.reliable[self.lines.index - 1], dtype=np.float64)
+
     def position_at(self, problem: LinearProblem, port: int) -> Matrix:
         """``[sample]`` displacement at another port, under the same force."""
         lines = all_lines(problem.measurement.samples, problem.measurement.sample_rate_hz)

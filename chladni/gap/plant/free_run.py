@@ -13,6 +13,7 @@ from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Effect, Model
+from chladni.models.core.port import PortKind
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.hold import hold_of
 from chladni.models.integrator.input_rows import input_rows
@@ -148,14 +149,28 @@ class FreeRun:
         ModelError
             When the site has no port; see `outputs` too.
         """
-        compiled = self.compiled(z, effects)
-        port = compiled.port_index(site)
-        parts = [
-            _port_motion(compiled, port, integration, self._columns(compiled, window))
-            for window, integration in self.integrations(z, effects, initial)
-        ]
-        displacement, velocity, force = np.concatenate(parts, axis=1)
-        return SiteMotion(site=site, displacement=displacement, velocity=velocity, force=force)
+        return self._motions(z, effects, initial, [self.compiled(z, effects).port_index(site)])[0]
+
+    def motions(
+        self, z: Matrix | None = None, effects: Sequence[AttachedEffect] = (), initial: Matrix | None = None
+    ) -> dict[tuple[str, PortKind], SiteMotion]:
+        """Motion at every port of the model during one run, by name and kind; see `outputs`."""
+        ports = self.compiled(z, effects).ports
+        found = self._motions(z, effects, initial, range(len(ports)))
+        return {(port.name, port.kind): motion for port, motion in zip(ports, found, strict=True)}
+
+    def _motions(
+        self, z: Matrix | None, effects: Sequence[AttachedEffect], initial: Matrix | None, ports: Sequence[int]
+    ) -> list[SiteMotion]:
+        compiled, runs = self.compiled(z, effects), self.integrations(z, effects, initial)
+        columns = [self._columns(compiled, window) for window, _ in runs]
+        found = []
+        for port in ports:
+            parts = [_port_motion(compiled, port, one, u) for (_, one), u in zip(runs, columns, strict=True)]
+            displacement, velocity, force = np.concatenate(parts, axis=1)
+            site = compiled.ports[port].name
+            found.append(SiteMotion(site=site, displacement=displacement, velocity=velocity, force=force))
+        return found
 
     def integrations(
         self, z: Matrix | None, effects: Sequence[AttachedEffect], initial: Matrix | None

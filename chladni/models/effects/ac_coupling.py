@@ -6,10 +6,10 @@ from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.effects.attaching import pass_through
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
-from chladni.models.effects.linear_filter import high_pass
+from chladni.models.effects.linear_filter import high_pass, two_stage_high_pass
 
 
-def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
+def attach_first_order(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
     """Put ``p/(p + w_c)`` behind the sensor."""
     # Down to zero nothing is held back; the state would stay at rest and only cost time.
     if values["corner"] == 0:
@@ -17,22 +17,43 @@ def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel
     return pass_through(compiled, site, high_pass(2 * pi * values["corner"]))
 
 
+def attach_second_order(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
+    """Put ``p^2/(p^2 + 2 zeta w_c p + w_c^2)`` behind the sensor."""
+    if values["corner"] == 0:
+        return compiled
+    return pass_through(compiled, site, two_stage_high_pass(2 * pi * values["corner"], values["damping_ratio"]))
+
+
 AC_COUPLING = EffectKind(
     name="ac_coupling",
     family="sensor",
-    meaning="first-order high-pass in the amplifier or the sensor",
+    meaning="high-pass in the amplifier or the sensor",
     sites=("output",),
     parameters=Parameters(
         (
             Parameter(
                 name="corner", value=0.5, unit="Hz", low=0.0, high=20.0, minimum=0.0, maximum=1e7,
-                meaning="where 3 dB are lost",
+                meaning="where 3 dB are lost; second order: 1/(2 damping_ratio)",
             ),
         )
     ),
     neutral={"corner": 0.0},
     linear=True,
     variants=(
-        Variant(name="first_order", attach=attach, formula="y_recorded/y = p/(p + 2 pi corner)"),
+        Variant(name="first_order", attach=attach_first_order, formula="y_recorded/y = p/(p + 2 pi corner)"),
+        Variant(
+            name="second_order",
+            attach=attach_second_order,
+            formula="y_recorded/y = p^2/(p^2 + 2 damping_ratio w p + w^2), w = 2 pi corner",
+            parameters=Parameters(
+                (
+                    Parameter(
+                        name="damping_ratio", value=1.0, unit="1", low=0.3, high=2.0, minimum=1e-6, maximum=1e3,
+                        meaning="1 for two equal stages, more for unlike ones",
+                    ),
+                )
+            ),
+            fitted=("damping_ratio",),
+        ),
     ),
 )  # fmt: skip

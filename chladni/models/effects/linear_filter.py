@@ -81,3 +81,15 @@ def high_pass(corner_rad_s: float) -> LinearFilter:
     return LinearFilter(
         a=np.array([[-corner_rad_s]]), b=np.array([corner_rad_s]), c=-np.ones(1), d=1.0, states=("mean",)
     )
+
+
+def two_stage_high_pass(natural_frequency_rad_s: float, damping_ratio: float) -> LinearFilter:
+    """Give ``s^2/(s^2 + 2 zeta omega s + omega^2)``: one less `second_order` and its rate."""
+    omega = natural_frequency_rad_s
+    return LinearFilter(
+        a=omega * np.array([[0.0, 1.0], [-1.0, -2 * damping_ratio]]),
+        b=omega * np.array([0.0, 1.0]),
+        c=np.array([-1.0, -2 * damping_ratio]),
+        d=1.0,
+        states=("mean", "drift"),
+    )

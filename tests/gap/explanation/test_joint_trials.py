@@ -91,3 +91,17 @@ def test_a_cube_whose_middle_lies_beside_rest_is_told_with_its_square():
     assert (best.trial.effect, best.trial.variant) == ("hardening_stiffness", "asymmetric")
     assert best.values["cubic"] == pytest.approx(values["cubic"], rel=0.1)
     assert best.values["quadratic"] == pytest.approx(values["quadratic"], rel=0.15)
+
+
+def test_bristles_that_bend_within_a_sample_are_found():
+    model = chain([1.0], [4e4], [20.0])
+    dahl = attached("coulomb_friction", "j0", {"force": 20.0, "presliding": 2e-6}, variant="bristle")
+    log, floor = measured(model.with_effects((dahl,)), band_noise(6000, rms=100.0), noise=0.002)
+    location = locate(model, log, floor, Tunables.of(model))
+    forms = {
+        (one.trial.effect, one.trial.variant): one for one in screened(location, location.ranked, frozenset(), {})
+    }
+    found = forms["coulomb_friction", "bristle"].values
+    # Between two samples it moves ten times as far as the bristles bend.
+    assert found["presliding"] == pytest.approx(2e-6, rel=0.3)
+    assert found["force"] == pytest.approx(20.0, rel=0.1)

@@ -22,3 +22,13 @@ def test_an_oscillator_between_two_signals_is_found() -> None:
     force = lfilter([1.0], [1.0, -2 * radius * np.cos(angle), radius**2], motion)
     hum = 30.0 * np.sin(2 * np.pi * 0.1 * np.arange(motion.size))
     assert strongest_resonances(motion, force + hum, 1000.0)[0] == pytest.approx(38.4, abs=0.3)
+
+
+def test_a_motor_that_wanders_stands_behind_no_spike() -> None:
+    t = np.arange(8000) / 512.0
+    rng = np.random.default_rng(5)
+    wander = 0.5 * np.cumsum(rng.standard_normal(t.size)) / np.sqrt(t.size)
+    motor = 5.0 * np.sin(2 * np.pi * 22.29 * t + wander)
+    spikes = sum(0.1 * np.sin(2 * np.pi * at_hz * t) for at_hz in (61.0, 120.0, 159.6))
+    noise = 1e-3 * rng.standard_normal(t.size)
+    assert min(abs(one - 22.29) for one in strongest_tones(motor + spikes + noise, 512.0)) < 0.1

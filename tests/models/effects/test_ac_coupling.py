@@ -26,3 +26,15 @@ def test_the_response_is_that_of_a_first_order_high_pass() -> None:
 def test_a_corner_at_zero_leaves_the_model_as_it_is() -> None:
     plant = one_body()
     assert attached("ac_coupling", "acc", {"corner": 0.0}).attach(plant) is plant
+
+
+def test_two_stages_multiply() -> None:
+    frequency_hz = np.linspace(0.0, 30.0, 50)
+    s, first, second = 2j * pi * frequency_hz, 2 * pi * 0.4, 2 * pi * 0.9
+    # Corners of 0.4 and 0.9 Hz are one of 0.6 Hz, their geometric mean, damped by their arithmetic over it.
+    coupled = attached(
+        "ac_coupling", "place", {"corner": 0.6, "damping_ratio": 0.65 / 0.6}, variant="second_order"
+    ).attach(one_body())
+    before = one_body().frequency_response(frequency_hz)[2, 0]
+    expected = before * s / (s + first) * s / (s + second)
+    np.testing.assert_allclose(coupled.frequency_response(frequency_hz)[2, 0], expected, rtol=1e-10, atol=1e-18)

@@ -1,0 +1,57 @@
+"""A second effect acts along the whole motion, not along what the linear model says of it."""
+
+import numpy as np
+import pytest
+
+from chladni.gap.explanation.candidates import screened
+from chladni.gap.explanation.contest import Contest, training_mask
+from chladni.gap.explanation.hypotheses import hypothesis_of
+from chladni.gap.explanation.known_effect import KnownEffect
+from chladni.gap.location.locate import locate
+from chladni.gap.plant.free_run import FreeRun
+from chladni.models.effects.attached_effect import attached
+from tests.gap.made_log import band_noise, measured, three_bodies
+
+SAMPLES = 6000
+STOP = attached("hardening_stiffness", "j1", {"cubic": 4e12})
+MOUNT = attached("mounting_resonance", "a0", {"frequency": 140.0, "damping_ratio": 0.01})
+
+
+@pytest.fixture(scope="module")
+def made():
+    signals = band_noise(SAMPLES, rms=150.0)
+    log, floor = measured(three_bodies().with_effects((STOP, MOUNT)), signals)
+    run = FreeRun(three_bodies(), log)
+    contest = Contest(run, floor, training_mask(log.samples, log.sample_rate_hz))
+    first = contest.enter(hypothesis_of((STOP,), np.zeros(len(run.tunables.names))), tune=False)
+    return log, floor, contest, first
+
+
+def test_what_is_left_and_what_was_taken_make_the_log(made) -> None:
+    log, _, contest, first = made
+    known = KnownEffect.of(contest.run, first)
+    # A cubic spring did something, or the rest of these tests say nothing.
+    assert np.std(known.outputs[0]) > 0.1 * np.std(log.outputs[0])
+    np.testing.assert_allclose(known.behind(known.without(log)).outputs, log.outputs, atol=1e-9)
+
+
+def test_ports_move_as_with_the_effect(made) -> None:
+    _, _, contest, first = made
+    known, fit = KnownEffect.of(contest.run, first), first.fit
+    start = fit.initial[:, : len(contest.run.compiled().states)]
+    plain = contest.run.motion(fit.z, (), start, site="j1").displacement
+    bent = contest.run.motion(fit.z, fit.effects, fit.initial, site="j1").displacement
+    np.testing.assert_allclose(plain + known.displacement["j1", "joint"], bent, atol=1e-12)
+
+
+def test_a_sensor_s_mount_is_found_behind_a_spring(made) -> None:
+    log, floor, contest, first = made
+    known = KnownEffect.of(contest.run, first)
+    location = locate(three_bodies(), known.without(log), floor, contest.run.tunables, first.fit.z)
+    (place,) = [one for one in location.ranked if "a0" in one.places[0].names]
+    found = [one for one in screened(location, [place], frozenset(), {}, known) if one.trial.site.name == "a0"]
+    assert found[0].trial.effect == "mounting_resonance"
+    assert found[0].values["frequency"] == pytest.approx(140.0, rel=0.02)
+    # Along the linear model's share of the motion the same law explains far less.
+    blind = [one for one in screened(location, [place], frozenset(), {}) if one.trial.effect == "mounting_resonance"]
+    assert found[0].misfit < 0.5 * blind[0].misfit
