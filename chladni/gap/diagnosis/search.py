@@ -12,7 +12,7 @@ from chladni.gap.explanation.hypotheses import (
     effect_hypotheses,
     hypothesis_of,
     polished,
-    siblings,
+    sibling,
     wrong_parameters,
 )
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
@@ -109,12 +109,14 @@ def detailed(study: Study, found: Contestant) -> Contestant:
 
 
 def _siblings(study: Study, entered: Sequence[Contestant]) -> list[Contestant]:
-    """Enter the laws that the best Coulomb friction is a special case of."""
-    if "stribeck_friction" in study.leave_out:
+    """Enter the law that Coulomb friction is a special case of, when that leads."""
+    sound = weighed(_sound(study, entered))
+    if "stribeck_friction" in study.leave_out or not sound:
         return []
-    sound = [one for one in _sound(study, entered) if one.fit.effects]
-    plain = [one for one in sound if one.fit.effects[0].effect == "coulomb_friction"]
-    return study.contest.enter_all(siblings(weighed(plain)[0], study.contest.run)) if plain else []
+    if [one.effect for one in sound[0].hypothesis.effects] != ["coulomb_friction"]:
+        return []
+    found = sibling(sound[0], study.contest.run)
+    return study.contest.enter_all([found] if found is not None else [])
 
 
 def _of_pair(study: Study, pair: Located) -> list[Hypothesis]:

@@ -32,8 +32,8 @@ _DETAILS: Mapping[str, tuple[str, ...]] = {
     "ripple": ("phase",),
     "tonal_disturbance": ("phase",),
 }
-#: Speeds over the joint's RMS speed at which a Stribeck curve begins its search.
-_STRIBECK_SPEEDS = (0.1, 0.5)
+#: Speed over the joint's RMS speed at which a Stribeck curve begins its search.
+_STRIBECK_SPEED = 0.2
 #: How far one may be searched for outside its tolerance, in sigmas.
 _FAR = 15.0
 
@@ -89,20 +89,15 @@ def effect_of(one: Screened, own: Mapping[str, EffectKind]) -> AttachedEffect | 
     return replace(plain, values=values)
 
 
-def siblings(found: Contestant, run: FreeRun) -> list[Hypothesis]:
-    """Give the Stribeck frictions that begin where a Coulomb friction ended: nested laws compete."""
-    if [one.effect for one in found.fit.effects] != ["coulomb_friction"]:
-        return []
+def sibling(found: Contestant, run: FreeRun) -> Hypothesis | None:
+    """Give the Stribeck friction that begins where a Coulomb friction ended: nested laws compete."""
     (plain,) = found.fit.effects
     try:
         velocity = run.motion(found.fit.z, found.fit.effects, site=plain.site).velocity
     except ModelError:
-        return []
-    speed = float(np.sqrt(np.mean(velocity**2)))
-    return [
-        hypothesis_of((_stribeck_beside(plain, share * speed),), found.fit.z, screened=found.hypothesis.screened)
-        for share in _STRIBECK_SPEEDS
-    ]
+        return None
+    speed = _STRIBECK_SPEED * float(np.sqrt(np.mean(velocity**2)))
+    return hypothesis_of((_stribeck_beside(plain, speed),), found.fit.z, screened=found.hypothesis.screened)
 
 
 def _stribeck_beside(plain: AttachedEffect, speed: float) -> AttachedEffect:

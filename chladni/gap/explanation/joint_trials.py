@@ -5,17 +5,19 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.explanation.bristles import bristles_along
 from chladni.gap.explanation.trial import Force, Numbers, Shape, Spectrum, Trial, logarithms, numbers
 from chladni.gap.location.recovered import Recovered
 from chladni.models.core.port import Port
 from chladni.models.core.port_law import LawFunction, PortLaw
 from chladni.models.drives.known_motion import force_along_motion
-from chladni.models.effects.coulomb_friction import bristle
 from chladni.models.effects.hysteresis import bouc_wen, creeping
 
 Matrix = NDArray[np.float64]
 #: Most steps between two samples along a recovered motion.
-_STEPS = 64
+_STEPS = 32
+#: Yields over the way's RMS below which there's no loop to be seen, without and with creep.
+_LEAST_YIELD, _LEAST_CREEPING = 0.05, 0.01
 
 
 def joint_trials(motion: Recovered, port: Port) -> Iterator[Trial]:
@@ -44,7 +46,7 @@ def _friction(motion: Recovered) -> Iterator[Trial]:
         return Force.of(motion.spectrum(unit), motion.spectrum(unit * np.exp(-((s / at) ** 2))))
 
     def bristles(shape: Shape) -> Force:
-        return Force.of(_along(bristle, (1.0, 0.0, *numbers(shape)), numbers(shape)[0], motion))
+        return Force.of(motion.spectrum(bristles_along(s, motion.lines.sample_rate_hz, numbers(shape)[0])))
 
     creeps = (0.003 * speed, 0.03 * speed, 0.15 * speed)
     yield Trial(
@@ -67,17 +69,22 @@ def _hysteresis(motion: Recovered) -> Trial:
     reach = _rms(motion.displacement)
 
     def build(shape: Shape) -> Force:
+        bend, power = _bouc_wen(shape)
+        return Force.of(_along(bouc_wen, (1.0, bend, power), bend, motion))
+
+    def values(shape: Shape, a: Matrix) -> Numbers | None:
+        bend, power = _bouc_wen(shape)
+        return _positive(a, force=a[0], shape=power, **{"yield": bend})
+
+    def _bouc_wen(shape: Shape) -> tuple[float, float]:
         bend, power = numbers(shape)
-        return Force.of(_along(bouc_wen, (1.0, bend, max(power, 1.0)), bend, motion))
+        return max(bend, _LEAST_YIELD * reach), max(power, 1.0)
 
     return Trial(
         effect="hysteresis", site=motion.site,
         build=build,
         grid=logarithms((0.1 * reach, 0.3 * reach, 0.7 * reach, 1.5 * reach), (1.0, 2.0)),
-        values=lambda shape, a: _positive(
-            a, force=a[0], **{"yield": numbers(shape)[0], "shape": max(numbers(shape)[1], 1.0)}
-        ),
-        parameters=3,
+        values=values, parameters=3,
     )  # fmt: skip
 
 
@@ -86,11 +93,11 @@ def _creeping(motion: Recovered) -> Trial:
     reach, speed, fastest = _rms(motion.displacement), _rms(motion.velocity), float(np.max(np.abs(motion.velocity)))
 
     def build(shape: Shape) -> Force:
-        bend, slip = numbers(shape)
+        bend, slip = max(numbers(shape)[0], _LEAST_CREEPING * reach), numbers(shape)[1]
         return Force.of(_along(creeping, (1.0, bend, 1.0, slip, 0.5), bend, motion))
 
     def values(shape: Shape, a: Matrix) -> Numbers | None:
-        bend, slip = numbers(shape)
+        bend, slip = max(numbers(shape)[0], _LEAST_CREEPING * reach), numbers(shape)[1]
         # An element that the motion never makes yield is a spring and a dashpot in series.
         return _positive(a, force=a[0], slip_speed=slip, **{"yield": bend}) if slip < fastest else None
 
@@ -249,9 +256,9 @@ def _stribeck(shape: Shape, amplitudes: Matrix) -> Numbers | None:
 def _along(law: LawFunction, parameters: tuple[float, ...], bend: float, motion: Recovered) -> Spectrum:
     """Spectrum of a law with a state that turns round within a way of about `bend`."""
     port_law = PortLaw(port=0, function=law, parameters=parameters, state=(0.0,))
-    # Steps longer than the bend run away, and some a little shorter are wrong.
+    # Steps of more than 2.8 bends run away; where the motion is that fast the law slides anyway.
     furthest = float(np.max(np.abs(motion.velocity))) / motion.lines.sample_rate_hz
-    steps = int(np.clip(np.ceil(2.0 * furthest / bend), 4, _STEPS))
+    steps = int(np.clip(np.ceil(0.7 * furthest / bend), 4, _STEPS))
     return motion.spectrum(
         force_along_motion(port_law, motion.displacement, motion.velocity, motion.time_s, substeps=steps)
     )
