@@ -4,7 +4,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from chladni.gap.diagnosis.completeness import completeness
+from chladni.gap.diagnosis.own_signal import share_of_own_signal
 from chladni.gap.diagnosis.search import (
     ALONE,
     detailed,
@@ -15,7 +18,7 @@ from chladni.gap.diagnosis.search import (
     without_one,
 )
 from chladni.gap.diagnosis.study import Study
-from chladni.gap.explanation.contest import weighed
+from chladni.gap.explanation.contest import lowest, weighed
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.explanation.shaken_ground import follows_inputs
 from chladni.gap.location.locate import Located
@@ -23,6 +26,7 @@ from chladni.gap.location.recovered import recovered
 from chladni.gap.records.diagnosis import Verdict
 from chladni.gap.records.noise_floor import NoiseFloor
 
+Matrix = NDArray[np.float64]
 Step = Callable[[float], None]
 #: Nats that a wrong parameter must bring to be named, and an effect: what is modelled is doubted before something is
 #: added. And those that a second effect must bring beside the first: a law that differs from the machine's leaves
@@ -30,12 +34,13 @@ Step = Callable[[float], None]
 WRONG, NAMED, ADDED = 3.0, 6.0, 100.0
 #: A fit that leaves less than this, over the noise's power, leaves nothing to be explained.
 _CLEAN = 1.6
-#: Share of the gap's RMS above the noise that a cause may leave, at even odds, and how sharply more speaks against
-#: it; what details of a law leave, over the noise's RMS, isn't counted.
-_LEFT, _SHARPNESS, _DETAIL = 0.25, 0.05, 0.25
 #: Probability that a cause is one of those that took part, not one that they imitate: of the names that were given
 #: with confidence to made machines, a seventh of which hid something else, about nine in ten were right.
 _KNOWN = 0.92
+#: An unknown force that leaves less than this explains all; with more than so many sensors that says something.
+_ONE_FORCE, _PATTERN_SENSORS = 1.15, 2
+#: Share of what a sensor leaves that follows its own signal's square or cube: more is no noise.
+_DISTORTED = 0.2
 #: A floor that shakes: how well the place must explain, by what factor better than any other, and how little of the
 #: recovered motion may follow the inputs.
 _SHAKEN_CHI, _SHAKEN_MARGIN, _SHAKEN_COHERENCE = 1.5, 1.1, 0.5
@@ -61,6 +66,8 @@ class Causes:
         The ground's profile when the floor shakes, else None.
     noise
         The floor, lowered to what `best` leaves of it where that is less.
+    distorted
+        Outputs of an unknown cause whose residual follows their own signal's square or cube.
     """
 
     verdict: Verdict
@@ -70,6 +77,7 @@ class Causes:
     probabilities: tuple[float, ...]
     shaken: Located | None
     noise: NoiseFloor
+    distorted: tuple[str, ...]
 
 
 def causes_of(study: Study, progress: Step) -> Causes:
@@ -82,14 +90,16 @@ def causes_of(study: Study, progress: Step) -> Causes:
     tuned = next(one for one in together if one.fit is nothing.fit)
     best = _best(together, tuned)
     noise = study.contest.noise.lowered(best.held)
-    verdict = _verdict(tuned, best)
+    floor = lowest(together)
+    verdict = _verdict(tuned, best, floor)
     shaken = _shaken(study) if verdict == "unknown" else None
     if shaken is not None or (verdict == "none" and study.lattices):
         verdict = "effect"
-    if verdict == "none" and study.repeating:
+    distorted = _distorted(study, tuned)
+    if verdict == "none" and (study.repeating or distorted):
         # A sensor that holds its samples moves nothing, and looks like noise; but it's no noise.
         verdict = "unknown"
-    probabilities = _probabilities(together, tuned)
+    probabilities = _probabilities(together, tuned, floor)
     ranked = [(one, share) for one, share in zip(together, probabilities, strict=True) if one is not tuned]
     return Causes(
         verdict=verdict,
@@ -99,26 +109,17 @@ def causes_of(study: Study, progress: Step) -> Causes:
         probabilities=tuple(share for _, share in ranked),
         shaken=shaken,
         noise=noise,
+        distorted=distorted if verdict == "unknown" else (),
     )
-
-
-def completeness(tuned: Contestant, found: Contestant) -> float:
-    """Probability that what a hypothesis leaves is noise and details of its laws, not another cause.
-
-    Logistic in the share of the gap's RMS above noise that is left on held-out samples, all whitened. Its middle and
-    width were set on campaigns, see docs/methods/gap-explanation.md.
-    """
-    gap = np.sqrt(tuned.chi) - 1.0
-    left = np.sqrt(found.chi) - 1.0 - _DETAIL
-    share = left / gap if gap > left > 0 else float(left > 0)
-    return float(1.0 / (1.0 + np.exp((share - _LEFT) / _SHARPNESS)))
 
 
 def _searched(study: Study, nothing: Contestant, progress: Step) -> list[Contestant]:
     """Every contestant with a cause: single ones, and two where one leaves something."""
     found = single_causes(study, progress)
     best = _best(weighed([nothing, *found]), nothing)
-    if best.hypothesis.effects and best.chi > ALONE:
+    if best.chi < ALONE or _is_one_force(study):
+        return found
+    if best.hypothesis.effects:
         found += second_causes(study, best)
         best = _best(weighed([nothing, *found]), nothing)
     if best.chi > ALONE:
@@ -127,6 +128,13 @@ def _searched(study: Study, nothing: Contestant, progress: Step) -> list[Contest
     if len(best.hypothesis.effects) > 1:
         found += [detailed(study, best), *without_one(study, best)]
     return found
+
+
+def _is_one_force(study: Study) -> bool:
+    """Whether an unknown force at one place leaves nothing: then two known ones elsewhere would only imitate it."""
+    location = study.location
+    known = location.best is not None and len(location.problem.measured) > _PATTERN_SENSORS
+    return known and location.ranked[0].profile.chi < _ONE_FORCE
 
 
 def _best(together: Sequence[Contestant], nothing: Contestant) -> Contestant:
@@ -157,17 +165,25 @@ def _shaken(study: Study) -> Located | None:
     return first if follows_inputs(study.location.problem, motion.force) < _SHAKEN_COHERENCE else None
 
 
-def _verdict(tuned: Contestant, best: Contestant) -> Verdict:
+def _distorted(study: Study, tuned: Contestant) -> tuple[str, ...]:
+    measured = study.measurement.outputs
+    shares = share_of_own_signal(measured[:, study.held], (measured - tuned.fit.outputs)[:, study.held])
+    return tuple(
+        name for name, share in zip(study.measurement.output_names, shares, strict=True) if share > _DISTORTED
+    )
+
+
+def _verdict(tuned: Contestant, best: Contestant, floor: Matrix) -> Verdict:
     if best is tuned:
         # With no candidate that pays: is there anything to explain?
         return "none" if tuned.chi < _CLEAN else "unknown"
-    if completeness(tuned, best) < 0.5:
+    if completeness(tuned, best, floor) < 0.5:
         return "unknown"
     return "effect" if best.hypothesis.effects else "parameters"
 
 
-def _probabilities(contestants: Sequence[Contestant], tuned: Contestant) -> list[float]:
+def _probabilities(contestants: Sequence[Contestant], tuned: Contestant, floor: Matrix) -> list[float]:
     evidence = np.array([_paid(one) for one in contestants])
     weight = np.exp(evidence - evidence.max())
-    complete = np.array([1.0 if one is tuned else _KNOWN * completeness(tuned, one) for one in contestants])
+    complete = np.array([1.0 if one is tuned else _KNOWN * completeness(tuned, one, floor) for one in contestants])
     return [float(one) for one in weight / weight.sum() * complete]

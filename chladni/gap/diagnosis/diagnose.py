@@ -260,8 +260,11 @@ def _remarks(study: Study, causes: Causes) -> list[str]:
         )
     if study.repeating:
         found.append(
-            f"{', '.join(study.repeating)}: many samples repeat the one before; the sensor is slower than the log"
+            f"{', '.join(study.repeating)}: samples repeat the one before; the sensor is slower than the log, or "
+            "messages were lost"
         )
+    if causes.distorted:
+        found.append(f"{', '.join(causes.distorted)}: what is left follows the square or the cube of its own signal")
     if causes.tuned.fit.undetermined:
         names = ", ".join(causes.tuned.fit.undetermined[:6])
         found.append(f"this log doesn't determine {names}: held near nominal")

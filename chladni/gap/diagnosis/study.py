@@ -19,6 +19,9 @@ from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
 from chladni.models.effects.effect_kind import EffectKind
+from chladni.signals.channel import Channel
+from chladni.signals.sensor_quality import sensor_quality
+from chladni.signals.time_series import TimeSeries
 
 Matrix = NDArray[np.float64]
 #: Misfit over noise with which a record is followed from its start to its end.
@@ -129,9 +132,23 @@ def _lattices(measurement: Measurement, noise: NoiseFloor) -> dict[str, Lattice]
 
 
 def _repeating(measurement: Measurement) -> tuple[str, ...]:
-    """Names of outputs that repeat many of their values: of a rest, a range's end or a lattice they would be few."""
-    rows = zip(measurement.output_names, measurement.outputs, strict=True)
-    return tuple(name for name, row in rows if np.unique(row[1:][np.diff(row) == 0]).size > _HELD * row.size)
+    """Names of outputs that hold samples: often, by values that repeat, or long, by the rule for dropouts.
+
+    Of a rest, a range's end or a lattice the values that repeat would be few.
+    """
+    names, outputs = measurement.output_names, measurement.outputs
+    often = {name for name, row in zip(names, outputs, strict=True) if _values_held(row) > _HELD * row.size}
+    channels = tuple(
+        Channel(name=name, unit=unit) for name, unit in zip(names, measurement.output_units, strict=True)
+    )
+    series = TimeSeries(values=outputs, sample_rate_hz=measurement.sample_rate_hz, channels=channels)
+    long = {fault.channel for fault in sensor_quality(series) if fault.kind == "dropouts"}
+    return tuple(name for name in names if name in often | long)
+
+
+def _values_held(signal: Matrix) -> int:
+    """How many different values a signal repeats at once."""
+    return int(np.unique(signal[1:][np.diff(signal) == 0]).size)
 
 
 def _with_rounding(noise: NoiseFloor, names: Sequence[str], lattices: Mapping[str, Lattice]) -> NoiseFloor:

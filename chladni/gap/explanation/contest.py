@@ -106,12 +106,17 @@ def weighed(contestants: Sequence[Contestant]) -> list[Contestant]:
     """
     if not contestants:
         return []
-    floor = np.minimum(np.min([one.held for one in contestants], axis=0), 1.0)
+    floor = lowest(contestants)
     found = [
         replace(one, log_evidence=log_evidence(one.held / floor, one.prior, one.hypothesis.freedom))
         for one in contestants
     ]
     return sorted(found, key=lambda one: -one.log_evidence)
+
+
+def lowest(contestants: Sequence[Contestant]) -> Matrix:
+    """Give ``[output]`` what the best of contestants leave, over the noise's estimate; at most 1."""
+    return np.asarray(np.minimum(np.min([one.held for one in contestants], axis=0), 1.0), dtype=np.float64)
 
 
 def log_evidence(held: Matrix, prior: float, freedom: int) -> float:

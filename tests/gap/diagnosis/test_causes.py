@@ -5,10 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.gap.diagnosis.causes import completeness
+from chladni.gap.diagnosis.completeness import completeness as completeness_over
 from chladni.gap.diagnosis.study import study_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.models.effects.attached_effect import attached
 from tests.gap.arm import arm, measured
+
+
+def completeness(gap: Contestant, found: Contestant) -> float:
+    """Over the noise as it was estimated."""
+    return completeness_over(gap, found, np.ones(2))
 
 
 def left(chi: float) -> Contestant:
@@ -35,10 +41,35 @@ def test_more_left_is_never_more_complete() -> None:
     assert completeness(left(1.0), left(1.0)) == pytest.approx(0.99, abs=0.01)
 
 
+def test_a_factor_has_no_details_that_could_be_left() -> None:
+    gain = attached("gain_error", "a", {"gain": 2.0})
+    factor = replace(left(225.0), hypothesis=Hypothesis(effects=(gain,), fitted=((),), start_z=np.zeros(0)))
+    drag = attached("quadratic_damping", "a", {"coefficient": 2.0})
+    law = replace(left(225.0), hypothesis=Hypothesis(effects=(drag,), fitted=((),), start_z=np.zeros(0)))
+    # A seventh of the gap's RMS.
+    assert completeness(left(1e4), factor) < 0.5 < completeness(left(1e4), law)
+
+
+def test_one_sensor_that_is_not_explained_is_not_hidden_by_many_that_are() -> None:
+    quiet = np.ones(5)
+    gap, rest = quiet.copy(), quiet.copy()
+    gap[1], rest[1] = 2.9, 2.5
+    assert completeness_over(replace(left(1.0), held=gap), replace(left(1.0), held=rest), quiet) < 0.1
+
+
 def test_a_sensor_that_holds_its_samples_is_noticed_and_a_clipped_one_is_not() -> None:
     log = measured(seconds=2.0)
     outputs = log.outputs.copy()
     outputs[1] = np.repeat(outputs[1, ::2], 2)[: outputs.shape[1]]
     outputs[2] = np.clip(outputs[2], -0.5 * outputs[2].std(), 0.5 * outputs[2].std())
+    study = study_of(arm(), replace(log, outputs=outputs), leave_out=frozenset(), own={})
+    assert study.repeating == (log.output_names[1],)
+
+
+def test_a_few_long_holds_are_noticed() -> None:
+    log = measured(seconds=2.0)
+    outputs = log.outputs.copy()
+    for start in (300, 700, 1100):
+        outputs[1, start : start + 12] = outputs[1, start]
     study = study_of(arm(), replace(log, outputs=outputs), leave_out=frozenset(), own={})
     assert study.repeating == (log.output_names[1],)

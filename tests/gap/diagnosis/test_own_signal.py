@@ -1,0 +1,22 @@
+"""A sensor's distortion is told from noise by the signal that it follows."""
+
+import numpy as np
+import pytest
+
+from chladni.gap.diagnosis.own_signal import share_of_own_signal
+
+
+def test_a_squared_share_is_seen_and_a_gain_and_noise_are_not() -> None:
+    rng = np.random.default_rng(7)
+    signal, noise = rng.standard_normal((3, 20_000)), 0.1 * rng.standard_normal((3, 20_000))
+    residual = noise.copy()
+    # As much power as the noise: half of what is left.
+    residual[0] += 0.1 / np.sqrt(2) * (signal[0] ** 2 - 1.0)
+    residual[1] += 0.3 * signal[1]
+    found = share_of_own_signal(5.0 + signal, residual)
+    assert found[0] == pytest.approx(0.5, abs=0.03)
+    assert np.all(found[1:] < 0.01)
+
+
+def test_a_sensor_that_shows_nothing_follows_nothing() -> None:
+    assert share_of_own_signal(np.zeros((1, 50)), np.zeros((1, 50)))[0] == 0.0
