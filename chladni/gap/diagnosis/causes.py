@@ -17,12 +17,10 @@ from chladni.gap.diagnosis.search import (
     without_cause,
     without_one,
 )
+from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.contest import lowest, weighed
 from chladni.gap.explanation.hypothesis import Contestant
-from chladni.gap.explanation.shaken_ground import follows_inputs
-from chladni.gap.location.locate import Located
-from chladni.gap.location.recovered import recovered
 from chladni.gap.records.diagnosis import Verdict
 from chladni.gap.records.noise_floor import NoiseFloor
 
@@ -41,9 +39,6 @@ _KNOWN = 0.92
 _ONE_FORCE, _PATTERN_SENSORS = 1.15, 2
 #: Share of what a sensor leaves that follows its own signal's square or cube: more is no noise.
 _DISTORTED = 0.2
-#: A floor that shakes: how well the place must explain, by what factor better than any other, and how little of the
-#: recovered motion may follow the inputs.
-_SHAKEN_CHI, _SHAKEN_MARGIN, _SHAKEN_COHERENCE = 1.5, 1.1, 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +58,7 @@ class Causes:
     probabilities
         Of each of `ranked`, in order; what is missing to one is that of no cause, or of one that isn't among them.
     shaken
-        The ground's profile when the floor shakes, else None.
+        The ground when the floor shakes, with the places that can't be told from it, else None.
     noise
         The floor, lowered to what `best` leaves of it where that is less.
     distorted
@@ -75,7 +70,7 @@ class Causes:
     best: Contestant
     ranked: tuple[Contestant, ...]
     probabilities: tuple[float, ...]
-    shaken: Located | None
+    shaken: ShakenGround | None
     noise: NoiseFloor
     distorted: tuple[str, ...]
 
@@ -92,7 +87,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
     noise = study.contest.noise.lowered(best.held)
     floor = lowest(together)
     verdict = _verdict(tuned, best, floor)
-    shaken = _shaken(study) if verdict == "unknown" else None
+    shaken = shaken_by(study) if verdict == "unknown" else None
     if shaken is not None or (verdict == "none" and study.lattices):
         verdict = "effect"
     distorted = _distorted(study, tuned)
@@ -148,21 +143,6 @@ def _paid(one: Contestant) -> float:
     effects = len(one.hypothesis.effects)
     first = NAMED if effects else WRONG * bool(one.hypothesis.wide)
     return one.log_evidence - first - ADDED * max(effects - 1, 0)
-
-
-def _shaken(study: Study) -> Located | None:
-    """Give the ground's profile when only a floor that shakes explains the gap."""
-    if "base_vibration" in study.leave_out or len(study.measurement.output_names) < 2:
-        return None
-    ranked = study.location.ranked
-    first = ranked[0]
-    ground = [site for site in first.places[0].sites if site.kind == "ground"]
-    if not ground or first.profile.chi > _SHAKEN_CHI:
-        return None
-    if len(ranked) > 1 and ranked[1].profile.chi < _SHAKEN_MARGIN * first.profile.chi:
-        return None
-    motion = recovered(study.location.problem, first.profile, ground[0])
-    return first if follows_inputs(study.location.problem, motion.force) < _SHAKEN_COHERENCE else None
 
 
 def _distorted(study: Study, tuned: Contestant) -> tuple[str, ...]:

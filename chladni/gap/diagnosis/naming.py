@@ -21,7 +21,7 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
     if causes.verdict not in ("effect", "parameters"):
         return ()
     if causes.shaken is not None:
-        return (_plain("base_vibration", "ground", _SHAKEN, group=causes.shaken.places[0].names),)
+        return (_plain("base_vibration", "ground", _SHAKEN, group=causes.shaken.group),)
     found: list[Cause] = []
     if causes.best is not causes.tuned:
         found += [_cause(causes, place) for place in range(len(causes.best.hypothesis.named))]
