@@ -29,7 +29,7 @@ _DETAILED, _POLISHED = 1.1, 4
 #: A first effect that leaves less than this, over the noise's power, is alone.
 ALONE = 1.3
 #: Two forces must leave less than this of what one leaves; pairs that are as good as the best are tried too.
-_PAIR_GAIN, _PAIR_TIE, _PAIRS = 0.6, 1.3, 2
+_PAIR_GAIN, _PAIR_TIE, _PAIRS = 0.6, 1.3, 3
 
 
 def without_cause(study: Study) -> Contestant:

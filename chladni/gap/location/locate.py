@@ -61,6 +61,8 @@ class Location:
     shares
         Share of the misfit beyond noise that an unknown force at each site explains, by name; empty with one
         sensor, which can't tell sites apart.
+    places
+        All, by rising misfit of a first look.
     """
 
     problem: LinearProblem
@@ -68,6 +70,7 @@ class Location:
     ranked: tuple[Located, ...]
     segments: tuple[LinearProblem, ...]
     shares: dict[str, float]
+    places: tuple[Place, ...] = ()
 
     @property
     def best(self) -> Located | None:
@@ -105,22 +108,38 @@ def locate(
         ranked = _followed(record, _tied([one.profile.chi for one in ranked], again, _FOLLOWED_AGAIN))
         plain = profiled(record, (), plain.z, iterations=4)
     return Location(
-        problem=record, tuned=plain, ranked=tuple(ranked), segments=segments, shares=_shares(plain, rough)
+        problem=record,
+        tuned=plain,
+        ranked=tuple(ranked),
+        segments=segments,
+        shares=_shares(plain, rough),
+        places=tuple(place for _, place in rough),
     )
 
 
-def located_pairs(location: Location, rough: int = 5) -> list[Located]:
-    """Profile forces at two of the followed places at a time; by rising misfit, none with too few sensors."""
+def located_pairs(location: Location, rough: int = 5, leading: int = 2) -> list[Located]:
+    """Profile forces at two places at a time; by rising misfit, none with too few sensors.
+
+    Parameters
+    ----------
+    rough
+        Followed places that are paired with each other.
+    leading
+        Followed places that are paired with every other one: beside the strongest force the place of a second one
+        may explain nothing alone.
+    """
     problem = location.problem
     if len(problem.measured) < _PAIR_SENSORS:
         return []
+    followed = list(location.ranked[:rough])
+    known = {one.places[0] for one in followed}
+    pairs = [(one, other.places[0]) for place, one in enumerate(followed) for other in followed[place + 1 :]]
+    pairs += [(one, other) for one in followed[:leading] for other in location.places if other not in known]
     found = []
-    places = list(location.ranked[:rough])
-    for place, first in enumerate(places):
-        for second in places[place + 1 :]:
-            sites = (first.places[0].sites[0], second.places[0].sites[0])
-            profile = profiled(problem, sites, first.profile.z, iterations=2)
-            found.append(Located(places=(first.places[0], second.places[0]), profile=profile))
+    for first, second in pairs:
+        sites = (first.places[0].sites[0], second.sites[0])
+        profile = profiled(problem, sites, first.profile.z, iterations=2)
+        found.append(Located(places=(first.places[0], second), profile=profile))
     return sorted(found, key=lambda one: one.profile.chi)
 
 
