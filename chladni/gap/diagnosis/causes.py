@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.diagnosis.completeness import completeness
+from chladni.gap.diagnosis.completeness import completeness, known_share
 from chladni.gap.diagnosis.own_signal import share_of_own_signal
 from chladni.gap.diagnosis.search import (
     ALONE,
@@ -32,9 +32,6 @@ Step = Callable[[float], None]
 WRONG, NAMED, ADDED = 3.0, 6.0, 100.0
 #: A fit that leaves less than this, over the noise's power, leaves nothing to be explained.
 _CLEAN = 1.6
-#: Probability that a cause is one of those that took part, not one that they imitate: of the names that were given
-#: with confidence to made machines, a seventh of which hid something else, about nine in ten were right.
-_KNOWN = 0.92
 #: An unknown force that leaves less than this explains all; with more than so many sensors that says something.
 _ONE_FORCE, _PATTERN_SENSORS = 1.15, 2
 #: Share of what a sensor leaves that follows its own signal's square or cube: more is no noise.
@@ -165,5 +162,6 @@ def _verdict(tuned: Contestant, best: Contestant, floor: Matrix) -> Verdict:
 def _probabilities(contestants: Sequence[Contestant], tuned: Contestant, floor: Matrix) -> list[float]:
     evidence = np.array([_paid(one) for one in contestants])
     weight = np.exp(evidence - evidence.max())
-    complete = np.array([1.0 if one is tuned else _KNOWN * completeness(tuned, one, floor) for one in contestants])
+    known = known_share(tuned, floor)
+    complete = np.array([1.0 if one is tuned else known * completeness(tuned, one, floor) for one in contestants])
     return [float(one) for one in weight / weight.sum() * complete]

@@ -23,6 +23,8 @@ from chladni.models.effects.effect_kind import EffectKind
 
 #: Screened forms that are searched beyond their grid: of all, and of each site.
 _REFINED, _REFINED_EACH = 16, 3
+#: Misfit over the best form's beyond which a form is not searched; over the best place's up to which a place is.
+_HOPELESS, _PLAUSIBLE = 100.0, 3.0
 
 
 def screened(
@@ -47,6 +49,9 @@ def screened(
     measurement = problem.measurement if known is None else known.behind(problem.measurement)
     band = excited_band_hz(problem.measurement)
     found: list[tuple[Screened, Screen]] = []
+    places = list(places)
+    enough = _PLAUSIBLE * min((one.profile.chi for one in places), default=0.0)
+    plausible = {site for one in places if one.profile.chi < enough for site, _ in sites_at(one)}
     for located in places:
         for site, others in sites_at(located):
             motion = recovered(problem, located.profile, site)
@@ -58,16 +63,19 @@ def screened(
     best: dict[tuple[str, str, str | None, str | None], tuple[Screened, Screen]] = {}
     for one, screen in found:
         best.setdefault((one.trial.effect, one.trial.site.name, one.trial.variant, one.trial.source), (one, screen))
-    worth = _worth_a_search([one.trial.site for one, _ in best.values()])
+    worth = _worth_a_search([one for one, _ in best.values()], plausible)
     refined = [screen.refined(one) if place in worth else one for place, (one, screen) in enumerate(best.values())]
     return sorted(refined, key=lambda one: one.cost)
 
 
-def _worth_a_search(sites: Sequence[Site]) -> set[int]:
-    """Places of the first few of all, and of each site: a grid may step over a law that is sharp in its numbers."""
-    worth = set(range(min(_REFINED, len(sites))))
-    for site in set(sites):
-        worth.update([place for place, one in enumerate(sites) if one == site][:_REFINED_EACH])
+def _worth_a_search(found: Sequence[Screened], plausible: set[Site]) -> set[int]:
+    """Places of the first few that are not hopeless, and of each plausible site whatever they leave.
+
+    A grid may step over a law that is sharp in its numbers; where an unknown force explains most, it's looked for.
+    """
+    worth = {place for place, one in enumerate(found[:_REFINED]) if one.misfit < _HOPELESS * found[0].misfit}
+    for site in plausible:
+        worth.update([place for place, one in enumerate(found) if one.trial.site == site][:_REFINED_EACH])
     return worth
 
 

@@ -15,7 +15,7 @@ from chladni.models.effects.hysteresis import bouc_wen, creeping
 
 Matrix = NDArray[np.float64]
 #: Most steps between two samples along a recovered motion.
-_STEPS = 32
+_STEPS = 16
 #: Yields over the way's RMS below which there's no loop to be seen, without and with creep.
 _LEAST_YIELD, _LEAST_CREEPING = 0.05, 0.01
 

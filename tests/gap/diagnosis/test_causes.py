@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.gap.diagnosis.completeness import completeness as completeness_over
+from chladni.gap.diagnosis.completeness import known_share
 from chladni.gap.diagnosis.study import study_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.models.effects.attached_effect import attached
@@ -55,6 +56,12 @@ def test_one_sensor_that_is_not_explained_is_not_hidden_by_many_that_are() -> No
     gap, rest = quiet.copy(), quiet.copy()
     gap[1], rest[1] = 2.9, 2.5
     assert completeness_over(replace(left(1.0), held=gap), replace(left(1.0), held=rest), quiet) < 0.1
+
+
+def test_a_name_for_a_faint_gap_is_less_sure() -> None:
+    sure = [known_share(left(chi), np.ones(2)) for chi in (1.0, 1.5, 4.0, 1e4)]
+    assert np.all(np.diff(sure) > 0)
+    assert sure[0] < 0.75 < 0.91 < sure[-1] < 0.93
 
 
 def test_a_sensor_that_holds_its_samples_is_noticed_and_a_clipped_one_is_not() -> None:
