@@ -6,14 +6,14 @@ from numpy.typing import NDArray
 from chladni.gap.explanation.hypothesis import Contestant
 
 Matrix = NDArray[np.float64]
-#: Words whose law has no details that a machine's could differ in: a factor, a shift of time, a line, a mass, a
-#: value.
+#: Words whose law has no details that a machine's could differ in: a factor, a shift of time, a line, a mass, an
+#: oscillator, a value.
 _EXACT = frozenset(
-    {"gain_error", "cross_axis", "time_offset", "delay", "tonal_disturbance", "added_mass", "parameter"}
+    {"gain_error", "cross_axis", "time_offset", "delay", "tonal_disturbance", "added_mass", "extra_mode", "parameter"}
 )
 #: Share of the gap's RMS above the noise that a cause may leave at even odds, and what it may leave over the noise's
 #: RMS without that being counted; of laws with details, and of those without.
-_LEFT, _DETAIL = (0.25, 0.1), (0.25, 0.1)
+_LEFT, _DETAIL = (0.35, 0.1), (0.25, 0.1)
 #: How sharply more speaks against it.
 _SHARPNESS = 0.2
 

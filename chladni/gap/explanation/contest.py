@@ -82,7 +82,13 @@ class Contest:
             held=held,
             gap=held_gap(self.run.measurement.outputs, fit.outputs, ~self.training),
             prior=prior,
+            starts=self._starts(fit),
         )
+
+    def _starts(self, fit: OutputErrorFit) -> int:
+        """States that effects begin windows with, beyond those of the first one: free numbers, all of them."""
+        added = fit.initial.shape[-1] - len(self.run.compiled().states)
+        return int(max(added, 0) * (len(self.run.windows) - 1))
 
     def enter_all(
         self, hypotheses: Sequence[Hypothesis], progress: Callable[[float], None] | None = None
@@ -108,7 +114,7 @@ def weighed(contestants: Sequence[Contestant]) -> list[Contestant]:
         return []
     floor = lowest(contestants)
     found = [
-        replace(one, log_evidence=log_evidence(one.held / floor, one.prior, one.hypothesis.freedom))
+        replace(one, log_evidence=log_evidence(one.held / floor, one.prior, one.hypothesis.freedom + one.starts))
         for one in contestants
     ]
     return sorted(found, key=lambda one: -one.log_evidence)

@@ -65,6 +65,8 @@ class Contestant:
         What the parameters pay for their distance from nominal, ``z'z``.
     log_evidence
         Nats, but for a constant that all hypotheses that were weighed together share.
+    starts
+        States that its effects begin windows with, beyond those of the first: they are fitted too.
     """
 
     hypothesis: Hypothesis
@@ -73,6 +75,7 @@ class Contestant:
     gap: float
     prior: float
     log_evidence: float = 0.0
+    starts: int = 0
 
     @property
     def chi(self) -> float:

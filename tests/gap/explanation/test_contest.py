@@ -1,5 +1,7 @@
 """Held-out blocks and the evidence that is taken from them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -57,4 +59,12 @@ def test_a_floor_is_never_raised() -> None:
     better, worse = weighed([left(2.0, 1.0), left(3.0, 1.0)])
     assert better.log_evidence - worse.log_evidence == pytest.approx(
         0.5 * EFFECTIVE_SAMPLES * np.log((3.0 + SLACK) / (2.0 + SLACK))
+    )
+
+
+def test_states_that_windows_begin_with_are_paid_for() -> None:
+    free = replace(left(1.0, 1.0), starts=24)
+    assert (
+        log_evidence(np.ones(2), 0.0, 24)
+        == next(one for one in weighed([left(1.0, 1.0), free]) if one.starts).log_evidence
     )
