@@ -11,6 +11,7 @@ from chladni.gap.diagnosis.own_signal import share_of_own_signal
 from chladni.gap.diagnosis.search import (
     ALONE,
     detailed,
+    is_one_force,
     paired_causes,
     second_causes,
     single_causes,
@@ -32,8 +33,6 @@ Step = Callable[[float], None]
 WRONG, NAMED, ADDED = 3.0, 6.0, 100.0
 #: A fit that leaves less than this, over the noise's power, leaves nothing to be explained.
 _CLEAN = 1.6
-#: An unknown force that leaves less than this explains all; with more than so many sensors that says something.
-_ONE_FORCE, _PATTERN_SENSORS = 1.15, 2
 #: Share of what a sensor leaves that follows its own signal's square or cube: more is no noise.
 _DISTORTED = 0.2
 
@@ -109,7 +108,7 @@ def _searched(study: Study, nothing: Contestant, progress: Step) -> list[Contest
     """Every contestant with a cause: single ones, and two where one leaves something."""
     found = single_causes(study, progress)
     best = _best(weighed([nothing, *found]), nothing)
-    if best.chi < ALONE or _is_one_force(study):
+    if best.chi < ALONE or is_one_force(study.location):
         return found
     if best.hypothesis.effects:
         found += second_causes(study, best)
@@ -120,13 +119,6 @@ def _searched(study: Study, nothing: Contestant, progress: Step) -> list[Contest
     if len(best.hypothesis.effects) > 1:
         found += [detailed(study, best), *without_one(study, best)]
     return found
-
-
-def _is_one_force(study: Study) -> bool:
-    """Whether an unknown force at one place leaves nothing: then two known ones elsewhere would only imitate it."""
-    location = study.location
-    known = location.best is not None and len(location.problem.measured) > _PATTERN_SENSORS
-    return known and location.ranked[0].profile.chi < _ONE_FORCE
 
 
 def _best(together: Sequence[Contestant], nothing: Contestant) -> Contestant:

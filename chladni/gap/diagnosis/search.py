@@ -17,7 +17,7 @@ from chladni.gap.explanation.hypotheses import (
 )
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.known_effect import KnownEffect
-from chladni.gap.location.locate import Located, locate, located_pairs
+from chladni.gap.location.locate import Located, Location, locate, located_pairs
 from chladni.gap.tuning.law_error import with_law_error
 from chladni.signals.errors import EstimateError, ModelError
 
@@ -28,8 +28,28 @@ _FITTED, _SECOND, _EACH = 7, 4, 2
 _DETAILED, _POLISHED = 1.1, 4
 #: A first effect that leaves less than this, over the noise's power, is alone.
 ALONE = 1.3
+#: An unknown force that leaves less than this explains all; with more than so many sensors that says something. A
+#: place at which it leaves so many times more is another one.
+_ONE_FORCE, _PATTERN_SENSORS, _SAME_PLACE = 1.15, 2, 1.25
 #: Two forces must leave less than this of what one leaves; pairs that are as good as the best are tried too.
 _PAIR_GAIN, _PAIR_TIE, _PAIRS = 0.6, 1.3, 3
+
+
+def is_one_force(location: Location) -> bool:
+    """Whether an unknown force at one place leaves nothing, where there are sensors enough for that to say something.
+
+    Then two known ones elsewhere would only imitate it, and so would one.
+    """
+    best = location.best
+    return best is not None and len(location.problem.measured) > _PATTERN_SENSORS and best.profile.chi < _ONE_FORCE
+
+
+def plausible_places(location: Location) -> list[Located]:
+    """Give the places at which the cause may be: all, unless one alone leaves nothing that another can match."""
+    if not is_one_force(location):
+        return list(location.ranked)
+    enough = _SAME_PLACE * location.ranked[0].profile.chi
+    return [one for one in location.ranked if one.profile.chi < enough]
 
 
 def without_cause(study: Study) -> Contestant:
@@ -50,7 +70,8 @@ def without_cause(study: Study) -> Contestant:
 def single_causes(study: Study, progress: Step) -> list[Contestant]:
     """Enter every effect that the screen holds plausible, and parameters beyond their tolerance; by evidence."""
     location, contest = study.location, study.contest
-    candidates = screened(location, location.ranked, study.leave_out, study.own)
+    places = plausible_places(location)
+    candidates = screened(location, places, study.leave_out, study.own)
     progress(0.3)
     hypotheses = effect_hypotheses(candidates, study.own, count=_FITTED)
     wrong = wrong_parameters(location)

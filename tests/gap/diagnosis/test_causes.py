@@ -7,6 +7,7 @@ import pytest
 
 from chladni.gap.diagnosis.completeness import completeness as completeness_over
 from chladni.gap.diagnosis.completeness import known_share
+from chladni.gap.diagnosis.search import plausible_places
 from chladni.gap.diagnosis.study import study_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.models.effects.attached_effect import attached
@@ -80,3 +81,17 @@ def test_a_few_long_holds_are_noticed() -> None:
         outputs[1, start : start + 12] = outputs[1, start]
     study = study_of(arm(), replace(log, outputs=outputs), leave_out=frozenset(), own={})
     assert study.repeating == (log.output_names[1],)
+
+
+def test_a_place_that_explains_less_than_another_one_is_left_out() -> None:
+    log = measured(seconds=4.0)
+    study = study_of(arm(), log, leave_out=frozenset(), own={})
+    location = study.location
+    first = replace(
+        location.ranked[0], profile=replace(location.ranked[0].profile, misfit=location.ranked[0].profile.expected)
+    )
+    second = replace(first, profile=replace(first.profile, misfit=1.5 * first.profile.expected))
+    assert plausible_places(replace(location, ranked=(first, second))) == [first]
+    # Where even the best place leaves something, the force between samples is taken for straight: all may be.
+    first = replace(first, profile=replace(first.profile, misfit=1.4 * first.profile.expected))
+    assert len(plausible_places(replace(location, ranked=(first, second)))) == 2
