@@ -137,7 +137,11 @@ def run_laws(equation: Equations, windows: Windows, initial: Matrix, sample_rate
         records.append(record)
     if failed > _MAY_FAIL * len(equation.rows):
         raise ModelError(f"laws are missed by {failed} of {len(equation.rows)} steps")
-    parts = [_outputs(equation, record) for record in records]
+    # A law's force may leave all numbers where the states didn't yet.
+    with np.errstate(over="ignore", invalid="ignore"):
+        parts = [_outputs(equation, record) for record in records]
+    if not all(np.all(np.isfinite(part)) for part in parts):
+        raise ModelError("the model diverges: a law's force leaves all numbers")
     return Marched(tuple(records), parts[0] if len(parts) == 1 else np.hstack(parts))
 
 
