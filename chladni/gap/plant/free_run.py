@@ -112,6 +112,11 @@ class FreeRun:
             When parameters are impossible or the model diverges.
         """
         compiled, rate = self.compiled(z, effects), self.measurement.sample_rate_hz
+        in_time = [one for one in effects if one.effect != "time_offset"]
+        if len(self.windows) > 1 and len(in_time) < len(effects):
+            # A clock that is early or late reads from the window after or before, not from beyond its own's ends.
+            offsets_s = np.subtract(compiled.output_offsets_s, self.compiled(z, in_time).output_offsets_s)
+            return _read_late(self.outputs(z, in_time, initial), offsets_s[self.rows], rate)
         if is_plain(compiled):
             starts = initial_states(initial, len(self.windows), len(compiled.states))
             found = self._linear.outputs(compiled, self.rows, self.windows, starts)
@@ -218,6 +223,18 @@ def mapped_outputs(
         for row in np.flatnonzero(rows == place):
             mapped[row] = sample_map(mapped[row], sample_rate_hz)
     return mapped
+
+
+def _read_late(outputs: Matrix, offsets_s: Matrix, sample_rate_hz: float) -> Matrix:
+    """``[output, sample]`` as read by clocks that are late by `offsets_s` each; before the start as at the start."""
+    from scipy.interpolate import CubicSpline
+
+    times_s = np.arange(outputs.shape[1]) / sample_rate_hz
+    read = outputs.copy()
+    for row in np.flatnonzero(offsets_s):
+        asked = np.clip(times_s - offsets_s[row], 0.0, times_s[-1])
+        read[row] = CubicSpline(times_s, outputs[row])(asked)
+    return read
 
 
 def effect_key(effect: AttachedEffect) -> tuple[object, ...]:
