@@ -95,9 +95,9 @@ def backlash(scene: Scene, site: str) -> Draft:
 
 
 def stop(scene: Scene, site: str) -> Draft:
-    """Hertz contact, or a spring, with Hunt and Crossley's damping."""
+    """Contact of rough or round bodies, or a spring, with Hunt and Crossley's damping."""
     d, force = scene.moving[f"{site}.d"], scene.force_at(site)
-    clearance, exponent = scene.between(0.3, 1.6) * d, 1.5 if scene.rng.random() < 0.7 else 1.0
+    clearance, exponent = scene.between(0.3, 1.6) * d, scene.between(1.2, 1.8) if scene.rng.random() < 0.7 else 1.0
     side, loss = scene.sign(), scene.between(0.05, 0.5) / scene.moving[f"{site}.s"]
     return _draft("one_sided_stop", site, "contact", lambda size: {
         "stiffness": size * force / d**exponent, "clearance": clearance, "side": side, "dissipation": loss,

@@ -22,8 +22,9 @@ from chladni.gap.tuning.law_error import with_law_error
 from chladni.signals.errors import EstimateError, ModelError
 
 Step = Callable[[float], None]
-#: Fits of a first effect, of a second beside it, and of each of two at once.
-_FITTED, _SECOND, _EACH = 7, 4, 2
+#: Fits of a first effect, so many more while all leave something (along a motion that isn't quite the machine's the
+#: screen may rank a law low that fits), of a second beside it, and of each of two at once.
+_FITTED, _AGAIN, _SECOND, _EACH = 7, 16, 4, 2
 #: A best fit that leaves more than this has details of laws worth a fit, those of the first few.
 _DETAILED, _POLISHED = 1.1, 4
 #: A first effect that leaves less than this, over the noise's power, is alone.
@@ -76,6 +77,8 @@ def single_causes(study: Study, progress: Step) -> list[Contestant]:
     hypotheses = effect_hypotheses(candidates, study.own, count=_FITTED)
     wrong = wrong_parameters(location)
     entered = contest.enter_all([*hypotheses, *([wrong] if wrong else [])], lambda done: progress(0.3 + 0.5 * done))
+    if min((one.chi for one in _sound(study, entered)), default=np.inf) > ALONE:
+        entered += contest.enter_all(_others(effect_hypotheses(candidates, study.own, count=_AGAIN), hypotheses))
     ranked = weighed(_sound(study, [*entered, *_siblings(study, entered)]))
     if ranked and ranked[0].chi > _DETAILED:
         # A detail of its law that was set by the screen's grid must not cost a word its place.
@@ -127,6 +130,12 @@ def without_one(study: Study, both: Contestant) -> list[Contestant]:
 def detailed(study: Study, found: Contestant) -> Contestant:
     """Give a contestant with the details of its laws fitted too, when it leaves enough for them to matter."""
     return _polished(study, found) if found.chi > _DETAILED else found
+
+
+def _others(found: Sequence[Hypothesis], tried: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Those that name what none of the tried ones does."""
+    names = {one.named for one in tried}
+    return [one for one in found if one.named not in names]
 
 
 def _siblings(study: Study, entered: Sequence[Contestant]) -> list[Contestant]:

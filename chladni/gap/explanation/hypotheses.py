@@ -34,6 +34,8 @@ _DETAILS: Mapping[str, tuple[str, ...]] = {
 }
 #: Speed over the joint's RMS speed at which a Stribeck curve begins its search.
 _STRIBECK_SPEED = 0.2
+#: Misfit over another's up to which a screened form is as good, and how many of those are tried too.
+_TIED, _TIES = 1.02, 2
 #: How far one may be searched for outside its tolerance, in sigmas.
 _FAR = 15.0
 
@@ -48,7 +50,7 @@ def effect_hypotheses(
     own
         Effects of the user's by name; others are taken from the catalogue.
     count
-        At most so many, of each effect and site at most two forms.
+        So many and a few that are as good as the last of them, of each effect and site at most two forms.
     margin
         Trials whose misfit is so many times that of the best are left out.
     """
@@ -56,18 +58,19 @@ def effect_hypotheses(
     seen: dict[tuple[str, str], int] = {}
     if not screened:
         return found
-    enough = margin * min(one.chi for one in screened)
+    enough, last = margin * min(one.chi for one in screened), 0.0
     for one in screened:
         key = (one.trial.effect, one.trial.site.name)
         if seen.get(key, 0) >= 2 or one.chi > enough:
             continue
+        if len(found) >= count and (one.chi > _TIED * last or len(found) >= count + _TIES):
+            break
         effect = effect_of(one, own)
         if effect is None:
             continue
         seen[key] = seen.get(key, 0) + 1
         found.append(hypothesis_of((effect,), one.z, screened=one.chi))
-        if len(found) == count:
-            break
+        last = max(last, one.chi) if len(found) <= count else last
     return found
 
 

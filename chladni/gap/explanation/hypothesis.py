@@ -45,8 +45,9 @@ class Hypothesis:
 
     @property
     def freedom(self) -> int:
-        """Numbers that it adds to the tuned model."""
-        return sum(len(names) for names in self.fitted) + len(self.wide)
+        """Numbers that it adds to the tuned model; which other output an effect listens to is one more."""
+        chosen = sum(effect.source is not None for effect in self.effects)
+        return sum(len(names) for names in self.fitted) + len(self.wide) + chosen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

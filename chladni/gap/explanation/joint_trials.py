@@ -200,24 +200,32 @@ def _with_rise(values: Numbers | None, shape: Shape) -> Numbers | None:
 
 def _stops(motion: Recovered) -> Iterator[Trial]:
     for side in (1.0, -1.0):
-        yield _stop(motion, side)
+        yield _stop(motion, side, "spring", 1.0)
+        yield _stop(motion, side, "hertz_damper", 1.5)
 
 
-def _stop(motion: Recovered, side: float) -> Trial:
-    d = side * motion.displacement
+def _stop(motion: Recovered, side: float, variant: str, power: float) -> Trial:
+    d, s = side * motion.displacement, side * motion.velocity
     # How much of the way to the furthest point is free, so that a search can't leave the motion.
     low, high = float(np.quantile(d, 0.3)), float(np.max(d))
+    depth = 0.1 * (high - low)
 
     def clearance(shape: Shape) -> float:
         return high - (high - low) * min(numbers(shape)[0], 1.0)
 
     def build(shape: Shape) -> Force:
-        return Force.of(motion.spectrum(side * np.maximum(d - clearance(shape), 0.0)))
+        pressed = side * np.maximum(d - clearance(shape), 0.0) ** power
+        return Force.of(*(motion.spectrum(one) for one in ([pressed] if power == 1.0 else [pressed, pressed * s])))
+
+    def values(shape: Shape, a: Matrix) -> Numbers | None:
+        if power == 1.0:
+            return _positive(a, stiffness=a[0], clearance=clearance(shape), side=side)
+        stiffness, loss = a[0] * np.sqrt(depth), max(a[1] / a[0], 0.0) if a[0] > 0 else 0.0
+        return _positive(a, stiffness=stiffness, clearance=clearance(shape), side=side, depth=depth, dissipation=loss)
 
     return Trial(
-        effect="one_sided_stop", site=motion.site, variant="spring", build=build,
-        grid=logarithms((0.08, 0.2, 0.35, 0.5, 0.7, 0.9)),
-        values=lambda shape, a: _positive(a, stiffness=a[0], clearance=clearance(shape), side=side), parameters=2,
+        effect="one_sided_stop", site=motion.site, variant=variant, build=build,
+        grid=logarithms((0.08, 0.2, 0.35, 0.5, 0.7, 0.9)), values=values, parameters=2 if power == 1.0 else 3,
     )  # fmt: skip
 
 
