@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chladni.gap.explanation.candidates import screened
+from chladni.gap.explanation.hypotheses import effect_hypotheses, hypothesis_of
 from chladni.gap.location.locate import locate
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
@@ -105,3 +106,30 @@ def test_bristles_that_bend_within_a_sample_are_found():
     # Between two samples it moves ten times as far as the bristles bend.
     assert found["presliding"] == pytest.approx(2e-6, rel=0.3)
     assert found["force"] == pytest.approx(20.0, rel=0.1)
+
+
+def test_a_round_contact_is_a_stop_and_no_spring_that_hardens_to_one_side():
+    seen = (StructureOutput(name="d", measures="displacement", at="b0"),)
+    model = replace(chain([1.0], [4e4], [20.0]), outputs=seen)
+    contact = {"stiffness": 6e4, "clearance": 1.5e-3, "depth": 1e-3, "dissipation": 0.3}
+    machine = model.with_effects([attached("one_sided_stop", "j0", contact, variant="hertz_damper")])
+    log, floor = measured(machine, band_noise(3000, rms=60.0), noise=2e-3)
+    location = locate(model, log, floor, Tunables.of(model))
+    best = screened(location, location.ranked, frozenset(), {})[0]
+    assert (best.trial.effect, best.trial.variant, best.values["side"]) == ("one_sided_stop", "hertz_damper", 1.0)
+    assert best.values["clearance"] == pytest.approx(1.5e-3, rel=0.2)
+    # Stiffness at another depth is the same law: compared as N/m^1.5.
+    found = best.values["stiffness"] / np.sqrt(best.values["depth"])
+    assert found == pytest.approx(6e4 / np.sqrt(1e-3), rel=0.3)
+
+
+def test_a_few_forms_that_are_as_good_as_the_last_one_are_tried_too(found):
+    plain = [replace(one, misfit=float(place + 1) * one.expected) for place, one in enumerate(found[:6])]
+    assert len(effect_hypotheses(plain, {}, count=3)) == 3
+    tied = [*plain[:3], *(replace(one, misfit=plain[2].misfit) for one in plain[3:])]
+    assert len(effect_hypotheses(tied, {}, count=3)) == 5
+
+
+def test_which_output_an_effect_listens_to_is_a_number_more():
+    share = attached("cross_axis", "force", {"coefficient": 0.1}, source="way")
+    assert hypothesis_of((share,), np.zeros(0)).freedom == 2
