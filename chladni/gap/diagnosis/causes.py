@@ -58,7 +58,7 @@ class Causes:
     noise
         The floor, lowered to what `best` leaves of it where that is less.
     distorted
-        Outputs of an unknown cause whose residual follows their own signal's square or cube.
+        Outputs whose residual, when nothing is named, follows their own signal's square or cube.
     """
 
     verdict: Verdict
@@ -86,7 +86,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
     shaken = shaken_by(study) if verdict == "unknown" else None
     if shaken is not None or (verdict == "none" and study.lattices):
         verdict = "effect"
-    distorted = _distorted(study, tuned)
+    distorted = _distorted(study, tuned) if verdict in ("none", "unknown") else ()
     if verdict == "none" and (study.repeating or distorted):
         # A sensor that holds its samples moves nothing, and looks like noise; but it's no noise.
         verdict = "unknown"
@@ -100,7 +100,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
         probabilities=tuple(share for _, share in ranked),
         shaken=shaken,
         noise=noise,
-        distorted=distorted if verdict == "unknown" else (),
+        distorted=distorted,
     )
 
 

@@ -16,7 +16,6 @@ _EXACT = frozenset(
 _LEFT, _DETAIL = (0.35, 0.1), (0.25, 0.1)
 #: How sharply more speaks against it.
 _SHARPNESS = 0.2
-
 #: Probability that the cause of a large gap is one of those that took part, and how much smaller a faint gap's is.
 _KNOWN, _FAINT = 0.92, 0.2
 

@@ -77,9 +77,11 @@ def single_causes(study: Study, progress: Step) -> list[Contestant]:
     hypotheses = effect_hypotheses(candidates, study.own, count=_FITTED)
     wrong = wrong_parameters(location)
     entered = contest.enter_all([*hypotheses, *([wrong] if wrong else [])], lambda done: progress(0.3 + 0.5 * done))
-    if min((one.chi for one in _sound(study, entered)), default=np.inf) > ALONE:
-        entered += contest.enter_all(_others(effect_hypotheses(candidates, study.own, count=_AGAIN), hypotheses))
-    ranked = weighed(_sound(study, [*entered, *_siblings(study, entered)]))
+    sound = _sound(study, entered)
+    if min((one.chi for one in sound), default=np.inf) > ALONE:
+        others = _others(effect_hypotheses(candidates, study.own, count=_AGAIN), hypotheses)
+        sound += _sound(study, contest.enter_all(others))
+    ranked = weighed([*sound, *_siblings(study, sound)])
     if ranked and ranked[0].chi > _DETAILED:
         # A detail of its law that was set by the screen's grid must not cost a word its place.
         forms = _best_forms(ranked)
@@ -138,15 +140,15 @@ def _others(found: Sequence[Hypothesis], tried: Sequence[Hypothesis]) -> list[Hy
     return [one for one in found if one.named not in names]
 
 
-def _siblings(study: Study, entered: Sequence[Contestant]) -> list[Contestant]:
+def _siblings(study: Study, sound: Sequence[Contestant]) -> list[Contestant]:
     """Enter the law that Coulomb friction is a special case of, when that leads."""
-    sound = weighed(_sound(study, entered))
-    if "stribeck_friction" in study.leave_out or not sound:
+    leads = weighed(sound)[:1]
+    if "stribeck_friction" in study.leave_out:
         return []
-    if [one.effect for one in sound[0].hypothesis.effects] != ["coulomb_friction"]:
+    if [one.effect for lead in leads for one in lead.hypothesis.effects] != ["coulomb_friction"]:
         return []
-    found = sibling(sound[0], study.contest.run)
-    return study.contest.enter_all([found] if found is not None else [])
+    found = sibling(leads[0], study.contest.run)
+    return _sound(study, study.contest.enter_all([found] if found is not None else []))
 
 
 def _of_pair(study: Study, pair: Located) -> list[Hypothesis]:

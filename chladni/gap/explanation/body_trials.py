@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from chladni.gap.explanation.resonances import resonances
-from chladni.gap.explanation.tones import strongest_resonances, strongest_tones
+from chladni.gap.explanation.tones import strongest_tones
 from chladni.gap.explanation.trial import Force, Matrix, Numbers, Shape, Trial, logarithms, numbers
 from chladni.gap.location.recovered import Recovered
 
@@ -44,8 +44,6 @@ def body_trials(motion: Recovered, band_hz: tuple[float, float]) -> Iterator[Tri
         values=lambda shape, a: _oscillator(shape, a) if numbers(shape)[0] > stiff_hz else None, parameters=3,
     )  # fmt: skip
     # A lightly damped oscillator pulls the other way a little beside its resonance: a grid alone may step over it.
-    rate = motion.lines.sample_rate_hz
-    heard = strongest_resonances(np.gradient(motion.velocity, 1.0 / rate), motion.force, rate)
     estimated = resonances(
         motion.spectrum(motion.force),
         -acceleration,
@@ -56,7 +54,7 @@ def body_trials(motion: Recovered, band_hz: tuple[float, float]) -> Iterator[Tri
     spread = np.geomspace(max(band_hz[0], 0.5), stiff_hz, 45).tolist()
     yield Trial(
         effect="extra_mode", site=motion.site, build=pull,
-        grid=[*logarithms([*spread, *heard], (0.003, 0.01, 0.03)), *estimated],
+        grid=[*logarithms(spread, (0.003, 0.01, 0.03)), *estimated],
         values=lambda shape, a: _oscillator(shape, a) if numbers(shape)[0] <= stiff_hz else None, parameters=3,
     )  # fmt: skip
     yield from tone_trials(motion)

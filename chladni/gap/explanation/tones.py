@@ -1,8 +1,8 @@
-"""Tones in a signal, sharp lines that stand out of what is around them; and resonances between two signals."""
+"""Tones in a signal: sharp lines that stand out of what is around them."""
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import csd, find_peaks, welch
+from scipy.signal import find_peaks
 
 Matrix = NDArray[np.float64]
 #: Power over that of the lines around it, itself among them, of a line that stands out.
@@ -35,26 +35,6 @@ def strongest_tones(signal: Matrix, sample_rate_hz: float, count: int = 3) -> li
         float((place + _offset(power[place - 1 : place + 2])) * sample_rate_hz / size)
         for place in dict.fromkeys(chosen)
     ]
-
-
-def strongest_resonances(motion: Matrix, force: Matrix, sample_rate_hz: float, count: int = 6) -> list[float]:
-    """Give frequencies in Hz at which a force answers a motion most: peaks of the coherent output power.
-
-    ``abs(S_mf)^2/S_mm^1.5`` of Welch's estimates: what answers the motion, as a force for each unit of its density,
-    so that neither a line that only the force has nor a dip of the motion stands out.
-
-    Parameters
-    ----------
-    motion, force
-        ``[sample]``, such as the acceleration of a body and what an attached oscillator pulls it with.
-    """
-    length = max(force.size // 4, min(force.size, 256))
-    frequency_hz, cross = csd(motion, force, sample_rate_hz, nperseg=length)
-    own = welch(motion, sample_rate_hz, nperseg=length)[1]
-    strength = np.abs(cross) / np.sqrt(np.maximum(own, 1e-12 * own.max(initial=1e-300)))
-    places = find_peaks(strength)[0]
-    order = places[np.argsort(strength[places])[::-1]]
-    return [float(frequency_hz[place]) for place in order[:count] if place > 0]
 
 
 def _offset(three: Matrix) -> float:

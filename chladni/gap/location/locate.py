@@ -70,7 +70,7 @@ class Location:
     ranked: tuple[Located, ...]
     segments: tuple[LinearProblem, ...]
     shares: dict[str, float]
-    places: tuple[Place, ...] = ()
+    places: tuple[Place, ...]
 
     @property
     def best(self) -> Located | None:

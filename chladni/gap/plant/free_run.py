@@ -2,7 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +81,7 @@ class FreeRun:
         compiled = model.compile()
         self.rows = _rows(compiled, measurement)
         self._linear = LinearRuns(measurement.inputs, measurement.sample_rate_hz)
-        self._kept: OrderedDict[object, tuple[CompiledModel, Integrator]] = OrderedDict()
+        self._kept: OrderedDict[object, Integrator] = OrderedDict()
 
     def compiled(self, z: Matrix | None = None, effects: Sequence[Effect] = ()) -> CompiledModel:
         """Equations of the model at some parameters, with these effects behind those that it has."""
@@ -112,24 +112,31 @@ class FreeRun:
             When parameters are impossible or the model diverges.
         """
         compiled, rate = self.compiled(z, effects), self.measurement.sample_rate_hz
-        in_time = [one for one in effects if one.effect != "time_offset"]
-        if len(self.windows) > 1 and len(in_time) < len(effects):
-            # A clock that is early or late reads from the window after or before, not from beyond its own's ends.
-            offsets_s = np.subtract(compiled.output_offsets_s, self.compiled(z, in_time).output_offsets_s)
-            return _read_late(self.outputs(z, in_time, initial), offsets_s[self.rows], rate)
+        late_s = np.asarray(compiled.output_offsets_s)[self.rows]
+        if len(self.windows) == 1 or not np.any(late_s):
+            return self._run(compiled, _key(z, effects), initial)
+        # A clock that is early or late reads from the window after or before, not from beyond its own's ends.
+        in_time = replace(compiled, output_offsets_s=(0.0,) * len(compiled.outputs), output_maps=())
+        read = self._run(in_time, ("in time", _key(z, effects)), initial)
+        return mapped_outputs(compiled, self.rows, _read_late(read, late_s, rate), rate)
+
+    def _run(self, compiled: CompiledModel, key: object, initial: Matrix | None) -> Matrix:
+        rate = self.measurement.sample_rate_hz
         if is_plain(compiled):
             starts = initial_states(initial, len(self.windows), len(compiled.states))
             found = self._linear.outputs(compiled, self.rows, self.windows, starts)
             return mapped_outputs(compiled, self.rows, found, rate)
-        marched = self.marched(z, effects, initial)
+        marched = self._marched(compiled, initial)
         if marched is not None:
             return mapped_outputs(compiled, self.rows, marched.outputs, rate)
-        parts = [integration.outputs[self.rows] for _, integration in self.integrations(z, effects, initial)]
+        parts = [integration.outputs[self.rows] for _, integration in self._integrations(compiled, key, initial)]
         return parts[0] if len(parts) == 1 else np.hstack(parts)
 
     def marched(self, z: Matrix | None, effects: Sequence[AttachedEffect], initial: Matrix | None) -> Marched | None:
         """Windows of a model with laws, outputs before maps of samples; None where `integrations` does it better."""
-        compiled = self.compiled(z, effects)
+        return self._marched(self.compiled(z, effects), initial)
+
+    def _marched(self, compiled: CompiledModel, initial: Matrix | None) -> Marched | None:
         rate = self.measurement.sample_rate_hz
         hold = hold_of(compiled, rate)
         # An integrator counts time from the start of its own window; a law may want the log's.
@@ -181,20 +188,23 @@ class FreeRun:
         self, z: Matrix | None, effects: Sequence[AttachedEffect], initial: Matrix | None
     ) -> list[tuple[tuple[int, int], Integration]]:
         """Give each window with its run; arguments and errors are those of `outputs`."""
-        compiled, integrator = self._integrator(z, effects)
+        return self._integrations(self.compiled(z, effects), _key(z, effects), initial)
+
+    def _integrations(
+        self, compiled: CompiledModel, key: object, initial: Matrix | None
+    ) -> list[tuple[tuple[int, int], Integration]]:
+        integrator = self._integrator(compiled, key)
         starts = initial_states(initial, len(self.windows), len(compiled.states))
         return [
             (window, integrator.run(self.measurement.inputs[:, slice(*window)], initial=start))
             for window, start in zip(self.windows, starts, strict=True)
         ]
 
-    def _integrator(self, z: Matrix | None, effects: Sequence[AttachedEffect]) -> tuple[CompiledModel, Integrator]:
-        key = (None if z is None else np.asarray(z).tobytes(), tuple(effect_key(effect) for effect in effects))
+    def _integrator(self, compiled: CompiledModel, key: object) -> Integrator:
         if key in self._kept:
             self._kept.move_to_end(key)
             return self._kept[key]
-        compiled = self.compiled(z, effects)
-        made = compiled, Integrator(compiled, self.measurement.sample_rate_hz, tolerance=self.tolerance)
+        made = Integrator(compiled, self.measurement.sample_rate_hz, tolerance=self.tolerance)
         self._kept[key] = made
         if len(self._kept) > _KEPT:
             self._kept.popitem(last=False)
@@ -235,6 +245,11 @@ def _read_late(outputs: Matrix, offsets_s: Matrix, sample_rate_hz: float) -> Mat
         asked = np.clip(times_s - offsets_s[row], 0.0, times_s[-1])
         read[row] = CubicSpline(times_s, outputs[row])(asked)
     return read
+
+
+def _key(z: Matrix | None, effects: Sequence[AttachedEffect]) -> object:
+    """What tells one run's integrator from another's."""
+    return None if z is None else np.asarray(z).tobytes(), tuple(effect_key(effect) for effect in effects)
 
 
 def effect_key(effect: AttachedEffect) -> tuple[object, ...]:

@@ -33,7 +33,7 @@ AC_COUPLING = EffectKind(
         (
             Parameter(
                 name="corner", value=0.5, unit="Hz", low=0.0, high=20.0, minimum=0.0, maximum=1e7,
-                meaning="where 3 dB are lost; second order: 1/(2 damping_ratio)",
+                meaning="where 3 dB are lost; second order: where 1/(2 damping_ratio) is left",
             ),
         )
     ),

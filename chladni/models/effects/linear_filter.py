@@ -1,6 +1,6 @@
 """A linear filter that a signal passes: what lags, mounts and couplings do, in state space."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,11 +85,5 @@ def high_pass(corner_rad_s: float) -> LinearFilter:
 
 def two_stage_high_pass(natural_frequency_rad_s: float, damping_ratio: float) -> LinearFilter:
     """Give ``s^2/(s^2 + 2 zeta omega s + omega^2)``: one less `second_order` and its rate."""
-    omega = natural_frequency_rad_s
-    return LinearFilter(
-        a=omega * np.array([[0.0, 1.0], [-1.0, -2 * damping_ratio]]),
-        b=omega * np.array([0.0, 1.0]),
-        c=np.array([-1.0, -2 * damping_ratio]),
-        d=1.0,
-        states=("mean", "drift"),
-    )
+    low = second_order(natural_frequency_rad_s, damping_ratio)
+    return replace(low, c=np.array([-1.0, -2 * damping_ratio]), d=1.0, states=("mean", "drift"))

@@ -10,6 +10,7 @@ from chladni.gap.diagnosis.completeness import known_share
 from chladni.gap.diagnosis.search import plausible_places
 from chladni.gap.diagnosis.study import study_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.gap.location.locate import located_pairs
 from chladni.models.effects.attached_effect import attached
 from tests.gap.arm import arm, measured
 
@@ -95,3 +96,10 @@ def test_a_place_that_explains_less_than_another_one_is_left_out() -> None:
     # Where even the best place leaves something, the force between samples is taken for straight: all may be.
     first = replace(first, profile=replace(first.profile, misfit=1.4 * first.profile.expected))
     assert len(plausible_places(replace(location, ranked=(first, second)))) == 2
+
+
+def test_the_leading_place_is_paired_with_those_that_were_not_followed() -> None:
+    study = study_of(arm(), measured(seconds=2.0), leave_out=frozenset(), own={})
+    first = study.location.ranked[0]
+    pairs = located_pairs(replace(study.location, ranked=(first,)))
+    assert {pair.places[1] for pair in pairs} == set(study.location.places) - {first.places[0]}

@@ -149,6 +149,18 @@ def test_a_sensor_that_clips_hard_is_named_although_it_looks_noisy() -> None:
 
 
 @pytest.mark.slow
+def test_a_sensor_s_square_passes_for_no_noise() -> None:
+    log = measured(seconds=5.0, seed=12)
+    outputs = log.outputs.copy()
+    scale = np.std(outputs[1])
+    # Three times the noise, and with a floor that is what no linear model explains it looks like noise.
+    outputs[1] += 0.03 / np.sqrt(2.0) * ((outputs[1] / scale) ** 2 - 1.0) * scale
+    found = diagnose(arm(), [replace(log, outputs=outputs)])
+    assert found.verdict == "unknown"
+    assert any(remark.startswith("acc_arm: what is left follows the square") for remark in found.remarks)
+
+
+@pytest.mark.slow
 def test_without_its_word_the_cause_is_unknown_or_of_its_family() -> None:
     stop = chladni.attached("one_sided_stop", "hand", {"stiffness": 5e5, "clearance": 1e-4})
     found = diagnose(arm(), [measured((stop,), seed=7, seconds=5.0)], leave_out=frozenset({"one_sided_stop"}))

@@ -1,10 +1,9 @@
-"""Tones and resonances are found to a fraction of a line."""
+"""Tones are found to a fraction of a line."""
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
-from chladni.gap.explanation.tones import strongest_resonances, strongest_tones
+from chladni.gap.explanation.tones import strongest_tones
 
 
 def test_a_tone_in_noise_is_found() -> None:
@@ -12,16 +11,6 @@ def test_a_tone_in_noise_is_found() -> None:
     signal = np.sin(2 * np.pi * 50.037 * t) + 0.5 * np.random.default_rng(2).standard_normal(t.size)
     # A line is 0.125 Hz wide; the parabola is good to some hundredths of it.
     assert strongest_tones(signal, 1000.0)[0] == pytest.approx(50.037, abs=0.01)
-
-
-def test_an_oscillator_between_two_signals_is_found() -> None:
-    rng = np.random.default_rng(3)
-    motion = rng.standard_normal(16_000)
-    # Poles at 38.4 Hz with half a per cent of damping, 1000 samples a second.
-    angle, radius = 2 * np.pi * 0.0384, np.exp(-0.005 * 2 * np.pi * 0.0384)
-    force = lfilter([1.0], [1.0, -2 * radius * np.cos(angle), radius**2], motion)
-    hum = 30.0 * np.sin(2 * np.pi * 0.1 * np.arange(motion.size))
-    assert strongest_resonances(motion, force + hum, 1000.0)[0] == pytest.approx(38.4, abs=0.3)
 
 
 def test_a_motor_that_wanders_stands_behind_no_spike() -> None:
