@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from chladni.gap.explanation.hypothesis import Contestant
 
@@ -38,7 +39,7 @@ def completeness(tuned: Contestant, found: Contestant, floor: Matrix) -> float:
     gap = _above(tuned.held / floor, 0.0)
     left = _above(found.held / floor, _DETAIL[exact])
     share = left / gap if gap > 0 else float(left > 0)
-    return float(1.0 / (1.0 + np.exp((share / _LEFT[exact] - 1.0) / _SHARPNESS)))
+    return float(expit((1.0 - share / _LEFT[exact]) / _SHARPNESS))
 
 
 def known_share(tuned: Contestant, floor: Matrix) -> float:

@@ -92,13 +92,18 @@ def single_causes(study: Study, progress: Step) -> list[Contestant]:
 def second_causes(study: Study, first: Contestant) -> list[Contestant]:
     """Enter a second effect beside a first one, looked for in what that leaves."""
     contest = study.contest
-    try:
-        known = KnownEffect.of(contest.run, first)
-    except ModelError:
-        return []
     # It leaves details of its law, which a quiet band of coloured noise would make more of than of any effect.
     floor = with_law_error(contest.noise.lowered(first.held), np.std(study.measurement.outputs, axis=1))
-    location = locate(study.model, known.without(study.measurement), floor, contest.run.tunables, first.fit.z)
+    model, known = study.model, None
+    if all(one.kind.linear for one in first.fit.effects):
+        model = model.with_effects((*model.effects, *first.fit.effects))
+    else:
+        try:
+            known = KnownEffect.of(contest.run, first)
+        except ModelError:
+            return []
+    rest = study.measurement if known is None else known.without(study.measurement)
+    location = locate(model, rest, floor, contest.run.tunables, first.fit.z)
     found = screened(location, location.ranked[:4], study.leave_out, study.own, known)
     # At the same place a second word would mend the details of the first one's law.
     taken = _same_places(study, {one.site for one in first.fit.effects})

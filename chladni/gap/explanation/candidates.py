@@ -6,6 +6,7 @@ import numpy as np
 
 from chladni.gap.explanation.body_trials import body_trials
 from chladni.gap.explanation.excited_band import excited_band_hz
+from chladni.gap.explanation.followed import followed
 from chladni.gap.explanation.input_trials import input_trials
 from chladni.gap.explanation.joint_trials import joint_trials
 from chladni.gap.explanation.known_effect import KnownEffect
@@ -54,7 +55,7 @@ def screened(
     plausible = {site for one in places if one.profile.chi < enough for site, _ in sites_at(one)}
     for located in places:
         for site, others in sites_at(located):
-            motion = recovered(problem, located.profile, site)
+            motion = recovered(problem, located.profile, site, others)
             motion = motion if known is None else known.along(motion, problem.measurement)
             screen = Screen(problem, located.profile, site, others=others)
             trials = [*trials_at(problem, measurement, motion, band), *own_trials(problem, motion, site, own)]
@@ -64,8 +65,19 @@ def screened(
     for one, screen in found:
         best.setdefault((one.trial.effect, one.trial.site.name, one.trial.variant, one.trial.source), (one, screen))
     worth = _worth_a_search([one for one, _ in best.values()], plausible)
-    refined = [screen.refined(one) if place in worth else one for place, (one, screen) in enumerate(best.values())]
-    return sorted(refined, key=lambda one: one.cost)
+    searched = {place: _searched(one, screen) for place, (one, screen) in enumerate(best.values()) if place in worth}
+    sure = [one for one in searched.values() if one is not None]
+    # What others leave is a promise of the linearisation at their place.
+    promised = [one for place, (one, _) in enumerate(best.values()) if searched.get(place) is None]
+    return [*sorted(sure, key=lambda one: one.cost), *sorted(promised, key=lambda one: one.cost)]
+
+
+def _searched(start: Screened, screen: Screen) -> Screened | None:
+    """Search what enters a trial nonlinearly, and its parameters, in turn; None when it is no such effect there."""
+    first = followed(screen, start)
+    found, there = first if first is not None else (start, screen)
+    second = followed(there, there.refined(found))
+    return min((one for one, _ in filter(None, (first, second))), key=lambda one: one.cost, default=None)
 
 
 def _worth_a_search(found: Sequence[Screened], plausible: set[Site]) -> set[int]:

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
+from chladni.gap.explanation.held_site import HeldSite
 from chladni.gap.explanation.trial import Numbers, Shape, Trial
-from chladni.gap.location.profile import Elimination, Profile, bounded_minimum
+from chladni.gap.location.profile import Profile, bounded_minimum
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 
 Matrix = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
 #: Beyond this, whitened, a force is no force but a law that left the numbers; its square still is one.
 _RUNAWAY = 1e100
 #: Of the scaled normal matrix: twice as much as rounding makes of a matrix without full rank.
@@ -75,15 +75,11 @@ class Screen:
     def __init__(
         self, problem: LinearProblem, found: Profile, site: Site, *, others: Sequence[Site] = (), limit: float = 3.0
     ) -> None:
-        view = problem.view(found.z)
-        self._problem, self._z = problem, found.z
-        self._pattern = problem.pattern(view, site)
-        self._out = Elimination([problem.pattern(view, one) for one in others], problem.transients(view))
-        residual = problem.measured * problem.weight - problem.response(found.z, np.zeros_like(found.transient), ())
+        self.problem, self.site, self.others, self.limit = problem, site, tuple(others), limit
+        self.z = found.z
+        self._held = HeldSite(problem, found.z, site, others)
         forces = list(zip(found.sites, found.forces, strict=True))
-        slopes = self._out.rest(problem.slopes(found.z, found.transient, forces))
-        self._rest = self._out.rest(residual)
-        self._limit = limit
+        slopes = self._held.out.rest(problem.slopes(found.z, found.transient, forces))
         self._slopes = slopes
         # Parameters with their prior are eliminated once; each trial then costs a few inner products. Scaled, and
         # with a floor on what nothing determines: beside a transient that runs away slopes may be of any size.
@@ -91,11 +87,10 @@ class Screen:
         self._size = np.sqrt(np.diag(normal))
         scaled = normal / self._size / self._size[:, None] + _FLOOR * np.eye(len(slopes))
         self._factor = cho_factor(scaled) if len(slopes) else None
-        self._to_slopes = slopes @ self._rest - found.z / 2
 
     def nothing(self) -> float:
         """Misfit and prior without any force."""
-        return self._solved(np.zeros((0, self._rest.size)), self._rest)[1]
+        return self._solved(np.zeros((0, self._held.rest.size)), self._held.rest)[1]
 
     def run(self, trials: Iterable[Trial]) -> list[Screened]:
         """Weigh trials on their grids; those whose amplitudes make no such effect are left out."""
@@ -128,8 +123,7 @@ class Screen:
     def weigh(self, trial: Trial, shape: Shape) -> Screened | None:
         """Regress on one shape of a trial; None when no amplitudes make this effect."""
         force = trial.build(shape)
-        basis = self._printed(force.basis)
-        rest = self._rest if force.fixed is None else self._rest - self._printed(force.fixed[None])[0]
+        basis, rest = self._held.printed(force.basis), self._held.unexplained(force)
         # A law that ran away along the recovered motion prints nothing that could be weighed.
         if not (np.all(np.abs(basis) < _RUNAWAY) and np.all(np.abs(rest) < _RUNAWAY)):
             return None
@@ -137,28 +131,22 @@ class Screen:
         values = trial.values(shape, amplitudes)
         if values is None or not np.all(np.isfinite(list(values.values()))):
             return None
-        expected = float(self._problem.scale)
+        expected = float(self.problem.scale)
         return Screened(trial=trial, shape=shape, values=values, misfit=misfit, expected=expected, z=z)
-
-    def _printed(self, spectra: Spectrum) -> Matrix:
-        """``[signal, number]``: what forces of these spectra ``[signal, line]`` print, without transients."""
-        if not len(spectra):
-            return np.zeros((0, self._rest.size))
-        return self._out.rest(np.asarray(self._pattern * spectra[:, None, None], dtype=np.complex128))
 
     def _solved(self, basis: Matrix, rest: Matrix) -> tuple[Matrix, float, Matrix]:
         size = np.linalg.norm(basis, axis=1)
         unit = basis[size > 0] / size[size > 0, None]
-        own, to_slopes, cross = unit @ rest, self._slopes @ rest - self._z / 2, self._slopes @ unit.T
+        own, to_slopes, cross = unit @ rest, self._slopes @ rest - self.z / 2, self._slopes @ unit.T
         shift, moved = self._eliminated(cross), self._eliminated(to_slopes)
         scaled = np.linalg.lstsq(unit @ unit.T - cross.T @ shift, own - cross.T @ moved, rcond=1e-10)[0]
         step = moved - shift @ scaled
-        if np.any(np.abs(self._z + step) > self._limit):
+        if np.any(np.abs(self.z + step) > self.limit):
             scaled, step = self._bounded(unit, rest)
         left = rest - scaled @ unit - step @ self._slopes
         amplitudes = np.zeros(len(basis))
         amplitudes[size > 0] = scaled / size[size > 0]
-        return amplitudes, float(left @ left), self._z + step
+        return amplitudes, float(left @ left), self.z + step
 
     def _eliminated(self, toward: Matrix) -> Matrix:
         """Best step of the parameters toward ``[parameter]`` or ``[parameter, column]``."""
@@ -174,8 +162,8 @@ class Screen:
         free = np.concatenate([np.zeros(count), np.full(size, 0.5)])
         normal = both @ both.T + np.diag(free) + 1e-12 * np.eye(count + size)
         toward = both @ rest
-        toward[count:] -= self._z / 2
-        low = np.concatenate([np.full(count, -np.inf), -self._limit - self._z])
-        high = np.concatenate([np.full(count, np.inf), self._limit - self._z])
+        toward[count:] -= self.z / 2
+        low = np.concatenate([np.full(count, -np.inf), -self.limit - self.z])
+        high = np.concatenate([np.full(count, np.inf), self.limit - self.z])
         found = bounded_minimum(normal, toward, low, high)
         return found[:count], found[count:]

@@ -1,11 +1,12 @@
 """The force that a model lacks at a site, and the motion there, recovered from all sensors."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.location.profile import Profile
+from chladni.gap.location.profile import Elimination, Profile
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import RecordLines, all_lines
@@ -15,6 +16,9 @@ Matrix = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
 #: Lines over which the power of an unknown force is taken for the same.
 _SMOOTH = 31
+#: Power over that of the lines that tell the force well, beyond which a line is not believed: where a pattern fades,
+#: a little more noise than was thought would make a force of any size.
+_STRONGEST = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,7 +81,7 @@ class Recovered(Value):
         return np.asarray(self.lines.spectrum(signal)[0], dtype=np.complex128)
 
 
-def recovered(problem: LinearProblem, found: Profile, site: Site) -> Recovered:
+def recovered(problem: LinearProblem, found: Profile, site: Site, others: Sequence[Site] = ()) -> Recovered:
     """Recover force and motion at a site, with the parameters of a profile of that place.
 
     On each line the force is the one that explains most, held back where noise would make most of it (Wiener's
@@ -87,48 +91,78 @@ def recovered(problem: LinearProblem, found: Profile, site: Site) -> Recovered:
     ----------
     problem
         Of the whole record; its lines are those that trials will be weighed on.
+    others
+        Sites whose force may be anything meanwhile; what they move is part of the motion.
     """
     measurement = problem.measurement
     lines = all_lines(measurement.samples, measurement.sample_rate_hz)
     whole = problem.on(lines)
     view = whole.view(found.z)
-    pattern = whole.pattern(view, site)[:, 0]
+    patterns = [whole.pattern(view, one)[:, 0] for one in (site, *others)]
     residual = ((whole.measured - view.forced()) * whole.weight)[:, 0]
     transients = whole.transients(view)[:, :, 0]
-    strength = np.sum(np.abs(pattern) ** 2, axis=0)
-    noise = 1.0 / np.where(strength > 0, strength, 1e-300)
-    transient = found.transient
-    for _ in range(2):
-        left = residual - np.tensordot(transient[:, 0], transients, axes=1)
-        plain = np.sum(pattern.conj() * left, axis=0) * noise
-        # Neighbours count by how well they tell the force: where a pattern fades, as that of a force on
-        # accelerometers does toward 0 Hz, those that still see it speak for those that don't.
-        say = 1.0 / noise**2
-        power = np.maximum(_smooth(say * (np.abs(plain) ** 2 - noise)) / np.maximum(_smooth(say), 1e-300), 0.0)
-        reliable = power / (power + noise)
-        # What force and transient could both print goes to whichever needs less of itself for it.
-        transient = _transient(transients, pattern, residual, reliable * noise)
-    force = (reliable * plain)[None]
-    way = whole.way(view, site)
-    if site.kind == "output" and way.port is None:
+    first, *beside = (
+        _unknown(pattern, [*patterns[:place], *patterns[place + 1 :]], residual, transients, found.transient)
+        for place, pattern in enumerate(patterns)
+    )
+    ways = [whole.way(view, one) for one in (site, *others)]
+    acting = [(way, one.force[None]) for way, one in zip(ways, (first, *beside), strict=True)]
+    force = lines.signal(first.force[None])[0]
+    if site.kind == "output" and ways[0].port is None:
         row = measurement.output_names.index(site.name)
-        displacement, velocity = measurement.outputs[row] - lines.signal(force)[0], np.zeros(lines.samples)
-    elif site.kind == "input" and way.port is None:
+        displacement, velocity = measurement.outputs[row] - force, np.zeros(lines.samples)
+    elif site.kind == "input" and ways[0].port is None:
         row = measurement.input_names.index(site.name)
         displacement, velocity = measurement.inputs[row], np.zeros(lines.samples)
     else:
-        motion = view.motion(view.compiled.port_index(site.name, site.kind), transient, [(way, force)])
+        motion = view.motion(view.compiled.port_index(site.name, site.kind), first.transient, acting)
         displacement, velocity = (lines.signal(one)[0] for one in motion)
     return Recovered(
         site=site,
         lines=problem.lines,
-        force=lines.signal(force)[0],
+        force=force,
         displacement=displacement,
         velocity=velocity,
-        reliable=reliable,
+        reliable=first.reliable,
         z=found.z,
-        transient=transient,
+        transient=first.transient,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Unknown:
+    """A force ``[line]``, how far it's believed, and the transients ``[state, 1]`` beside it."""
+
+    force: Spectrum
+    reliable: Matrix
+    transient: Matrix
+
+
+def _unknown(
+    pattern: Spectrum, beside: Sequence[Spectrum], residual: Spectrum, transients: Spectrum, transient: Matrix
+) -> _Unknown:
+    """Recover the force along a pattern ``[output, line]`` with what lies along those beside it taken away."""
+    away = Elimination([one[:, None] for one in beside], transients[:, :, None]).away if beside else None
+    if away is not None:
+        pattern, residual = away(pattern[:, None])[:, 0], away(residual[:, None])[:, 0]
+        transients = away(transients[:, :, None])[:, :, 0]
+    strength = np.sum(np.abs(pattern) ** 2, axis=0)
+    thought = 1.0 / np.maximum(strength, 1e-200)
+    for _ in range(2):
+        left = residual - np.tensordot(transient[:, 0], transients, axes=1)
+        plain = np.sum(pattern.conj() * left, axis=0) * thought
+        # What no force explains says how much noise there is, where that is more than was thought.
+        across = np.sum(np.abs(left) ** 2, axis=0) - np.abs(plain) ** 2 * strength
+        noise = thought * np.maximum(_smooth(np.maximum(across, 0.0)) / max(len(pattern) - 1 - len(beside), 1), 1.0)
+        # Neighbours count by how well they tell the force: where a pattern fades, as that of a force on
+        # accelerometers does toward 0 Hz, those that still see it speak for those that don't.
+        say = 1.0 / noise**2
+        power = np.maximum(_smooth(say * (np.abs(plain) ** 2 - noise)) / np.maximum(_smooth(say), 1e-300), 0.0)
+        power = np.minimum(power, _STRONGEST * _told(power, noise))
+        reliable = power / (power + noise)
+        # What force and transient could both print goes to whichever needs less of itself for it.
+        transient = _transient(transients, pattern, residual, reliable * thought)
+    return _Unknown(force=np.asarray(reliable * plain, dtype=np.complex128), reliable=reliable, transient=transient)
 
 
 def _transient(transients: Spectrum, pattern: Spectrum, residual: Spectrum, held: Matrix) -> Matrix:
@@ -146,6 +180,12 @@ def _transient(transients: Spectrum, pattern: Spectrum, residual: Spectrum, held
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     scaled = np.linalg.lstsq(normal / size[:, None] / size, toward / size, rcond=1e-9)[0]
     return np.asarray(scaled / size, dtype=np.float64)[:, None]
+
+
+def _told(power: Matrix, noise: Matrix) -> float:
+    """Mean power of a force ``[line]``, each line counted by how well it tells it."""
+    say = power / noise
+    return float(say @ power / max(float(np.sum(say)), 1e-300))
 
 
 def _smooth(power: Matrix) -> Matrix:

@@ -1,0 +1,52 @@
+"""Force and motion at a site: not made of noise where sensors hardly see them, and beside another unknown force."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chladni.gap.location.profile import profiled
+from chladni.gap.location.recovered import recovered
+from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.places import Site
+from chladni.gap.plant.record_lines import all_lines
+from chladni.models.effects.attached_effect import attached
+from tests.gap.made_log import RATE_HZ, band_noise, measured, three_bodies
+
+SAMPLES = 6000
+SPRING = attached("hardening_stiffness", "j1", {"cubic": 4e12})
+JOINT = Site(name="j1", kind="joint")
+
+
+def located(machine, *, drift=0.0, others=()):
+    """A log with noise below 4 Hz that its floor knows nothing of, and a profile of the spring's joint."""
+    log, floor = measured(machine, band_noise(SAMPLES, rms=150.0))
+    slow = np.fft.rfft(np.random.default_rng(7).standard_normal(log.outputs.shape))
+    slow[:, np.fft.rfftfreq(SAMPLES, 1.0 / RATE_HZ) > 4.0] = 0.0
+    log = replace(log, outputs=log.outputs + drift * floor.rms[:, None] * np.fft.irfft(slow))
+    run = FreeRun(three_bodies(), log)
+    problem = LinearProblem(three_bodies(), log, floor, run.tunables, all_lines(SAMPLES, RATE_HZ))
+    return problem, profiled(problem, (JOINT, *others), np.zeros(len(run.tunables.names)))
+
+
+def true_motion(problem, effects):
+    return FreeRun(three_bodies(), problem.measurement).motion(None, effects, site="j1").displacement
+
+
+@pytest.mark.parametrize("drift", [0.0, 5.0])
+def test_motion_is_not_made_of_noise_where_accelerometers_hardly_see_a_force(drift: float) -> None:
+    problem, profile = located(three_bodies().with_effects((SPRING,)), drift=drift)
+    found = recovered(problem, profile, JOINT).displacement
+    truth = true_motion(problem, (SPRING,))
+    assert np.std(found - truth) < 0.2 * np.std(truth)
+
+
+def test_another_force_is_neither_taken_for_this_one_nor_left_out_of_the_motion() -> None:
+    blow = attached("tonal_disturbance", "b2", {"frequency": 60.0, "amplitude": 150.0, "phase": 0.0})
+    other = Site(name="b2", kind="body")
+    problem, profile = located(three_bodies().with_effects((SPRING, blow)), others=(other,))
+    truth = true_motion(problem, (SPRING, blow))
+    both, alone = (recovered(problem, profile, JOINT, others).displacement for others in ((other,), ()))
+    assert np.std(both - truth) < 0.3 * np.std(truth)
+    assert np.std(both - truth) < 0.65 * np.std(alone - truth)
