@@ -8,16 +8,8 @@ from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.completeness import completeness, known_share
 from chladni.gap.diagnosis.own_signal import share_of_own_signal
-from chladni.gap.diagnosis.search import (
-    ALONE,
-    detailed,
-    is_one_force,
-    paired_causes,
-    second_causes,
-    single_causes,
-    without_cause,
-    without_one,
-)
+from chladni.gap.diagnosis.pairs import added_nats, exchanged, paired_causes, second_causes, without_one
+from chladni.gap.diagnosis.search import ALONE, detailed, is_one_force, sibling_causes, single_causes, without_cause
 from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.contest import lowest, weighed
@@ -28,9 +20,10 @@ from chladni.gap.records.noise_floor import NoiseFloor
 Matrix = NDArray[np.float64]
 Step = Callable[[float], None]
 #: Nats that a wrong parameter must bring to be named, and an effect: what is modelled is doubted before something is
-#: added. And those that a second effect must bring beside the first: a law that differs from the machine's leaves
-#: what another effect could mend a little.
-WRONG, NAMED, ADDED = 3.0, 6.0, 100.0
+#: added.
+WRONG, NAMED = 3.0, 6.0
+#: First effects beside which a second one is looked for while all leave something.
+_LEADS = 2
 #: A fit that leaves less than this, over the noise's power, leaves nothing to be explained.
 _CLEAN = 1.6
 #: Share of what a sensor leaves that follows its own signal's square or cube: more is no noise.
@@ -79,7 +72,8 @@ def causes_of(study: Study, progress: Step) -> Causes:
     progress(1.0)
     together = weighed([nothing, *entered])
     tuned = next(one for one in together if one.fit is nothing.fit)
-    best = _best(together, tuned)
+    added = added_nats(study.location)
+    best = _best(together, tuned, added)
     noise = study.contest.noise.lowered(best.held)
     floor = lowest(together)
     verdict = _verdict(tuned, best, floor)
@@ -90,7 +84,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
     if verdict == "none" and (study.repeating or distorted):
         # A sensor that holds its samples moves nothing, and looks like noise; but it's no noise.
         verdict = "unknown"
-    probabilities = _probabilities(together, tuned, floor)
+    probabilities = _probabilities(together, tuned, floor, added)
     ranked = [(one, share) for one, share in zip(together, probabilities, strict=True) if one is not tuned]
     return Causes(
         verdict=verdict,
@@ -106,32 +100,46 @@ def causes_of(study: Study, progress: Step) -> Causes:
 
 def _searched(study: Study, nothing: Contestant, progress: Step) -> list[Contestant]:
     """Every contestant with a cause: single ones, and two where one leaves something."""
+    added = added_nats(study.location)
     found = single_causes(study, progress)
-    best = _best(weighed([nothing, *found]), nothing)
-    if best.chi < ALONE or is_one_force(study.location):
+
+    def best() -> Contestant:
+        return _best(weighed([nothing, *found]), nothing, added)
+
+    if best().chi < ALONE or is_one_force(study.location):
         return found
-    if best.hypothesis.effects:
-        found += second_causes(study, best)
-        best = _best(weighed([nothing, *found]), nothing)
-    if best.chi > ALONE:
+    for lead in _leads(weighed(found)):
+        if best().chi > ALONE:
+            found += second_causes(study, lead)
+    if best().chi > ALONE:
         found += paired_causes(study)
-        best = _best(weighed([nothing, *found]), nothing)
-    if len(best.hypothesis.effects) > 1:
-        found += [detailed(study, best), *without_one(study, best)]
+    if len(best().hypothesis.effects) > 1:
+        found += exchanged(study, best())
+        found += sibling_causes(study, [best()])
+        found += [detailed(study, best()), *without_one(study, best())]
     return found
 
 
-def _best(together: Sequence[Contestant], nothing: Contestant) -> Contestant:
+def _leads(ranked: Sequence[Contestant]) -> list[Contestant]:
+    """The best two effects at different sites: of two causes either may look like the first."""
+    leads: dict[str, Contestant] = {}
+    for one in ranked:
+        if len(one.hypothesis.effects) == 1:
+            leads.setdefault(one.hypothesis.effects[0].site, one)
+    return list(leads.values())[:_LEADS]
+
+
+def _best(together: Sequence[Contestant], nothing: Contestant, added: float) -> Contestant:
     """The most probable; `nothing` where no cause pays."""
-    found = max(together, key=_paid)
+    found = max(together, key=lambda one: _paid(one, added))
     return found if found.hypothesis.named else nothing
 
 
-def _paid(one: Contestant) -> float:
+def _paid(one: Contestant, added: float) -> float:
     """Evidence in nats less what a cause, and every further effect, must bring to be named."""
     effects = len(one.hypothesis.effects)
     first = NAMED if effects else WRONG * bool(one.hypothesis.wide)
-    return one.log_evidence - first - ADDED * max(effects - 1, 0)
+    return one.log_evidence - first - added * max(effects - 1, 0)
 
 
 def _distorted(study: Study, tuned: Contestant) -> tuple[str, ...]:
@@ -151,8 +159,8 @@ def _verdict(tuned: Contestant, best: Contestant, floor: Matrix) -> Verdict:
     return "effect" if best.hypothesis.effects else "parameters"
 
 
-def _probabilities(contestants: Sequence[Contestant], tuned: Contestant, floor: Matrix) -> list[float]:
-    evidence = np.array([_paid(one) for one in contestants])
+def _probabilities(contestants: Sequence[Contestant], tuned: Contestant, floor: Matrix, added: float) -> list[float]:
+    evidence = np.array([_paid(one, added) for one in contestants])
     weight = np.exp(evidence - evidence.max())
     known = known_share(tuned, floor)
     complete = np.array([1.0 if one is tuned else known * completeness(tuned, one, floor) for one in contestants])

@@ -12,9 +12,9 @@ Matrix = NDArray[np.float64]
 _EXACT = frozenset(
     {"gain_error", "cross_axis", "time_offset", "delay", "tonal_disturbance", "added_mass", "extra_mode", "parameter"}
 )
-#: Share of the gap's RMS above the noise that a cause may leave at even odds, and what it may leave over the noise's
-#: RMS without that being counted; of laws with details, and of those without.
-_LEFT, _DETAIL = (0.35, 0.1), (0.25, 0.1)
+#: Share of the gap's RMS beyond the noise that a cause may leave at even odds, of laws with details and of those
+#: without; what it may leave over the noise's power without that being counted.
+_LEFT, _UNCOUNTED = (0.38, 0.16), 0.05
 #: How sharply more speaks against it.
 _SHARPNESS = 0.2
 #: Probability that the cause of a large gap is one of those that took part, and how much smaller a faint gap's is.
@@ -24,8 +24,8 @@ _KNOWN, _FAINT = 0.92, 0.2
 def completeness(tuned: Contestant, found: Contestant, floor: Matrix) -> float:
     """Probability that what a hypothesis leaves is noise and details of its laws, not another cause.
 
-    Logistic in the share of the gap's RMS above the noise that is left on held-out samples, root sum square of all
-    outputs. Its middle and width were set on campaigns, see docs/methods/gap-explanation.md.
+    Logistic in the share of the gap's RMS that is left on held-out samples, noise taken from both as power, root sum
+    square of all outputs. Its middle and width were set on campaigns, see docs/methods/gap-explanation.md.
 
     Parameters
     ----------
@@ -36,8 +36,8 @@ def completeness(tuned: Contestant, found: Contestant, floor: Matrix) -> float:
     """
     named = found.hypothesis.named
     exact = int(bool(named) and all(one.effect in _EXACT for one in named))
-    gap = _above(tuned.held / floor, 0.0)
-    left = _above(found.held / floor, _DETAIL[exact])
+    gap = _beyond(tuned.held / floor)
+    left = _beyond(found.held / floor - _UNCOUNTED)
     share = left / gap if gap > 0 else float(left > 0)
     return float(expit((1.0 - share / _LEFT[exact]) / _SHARPNESS))
 
@@ -53,9 +53,10 @@ def known_share(tuned: Contestant, floor: Matrix) -> float:
     tuned, floor
         As of `completeness`.
     """
-    return _KNOWN * (1.0 - _FAINT * float(np.exp(-_above(tuned.held / floor, 0.0))))
+    above = np.maximum(np.sqrt(tuned.held / floor) - 1.0, 0.0)
+    return _KNOWN * (1.0 - _FAINT * float(np.exp(-np.linalg.norm(above))))
 
 
-def _above(held: Matrix, slack: float) -> float:
-    """RMS above the noise's, root sum square of all outputs ``[output]`` mean squares over noise."""
-    return float(np.sqrt(np.sum(np.maximum(np.sqrt(held) - 1.0 - slack, 0.0) ** 2)))
+def _beyond(held: Matrix) -> float:
+    """RMS beyond the noise, root sum square of all outputs, from ``[output]`` mean squares over noise."""
+    return float(np.sqrt(np.sum(np.maximum(held - 1.0, 0.0))))

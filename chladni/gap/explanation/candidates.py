@@ -46,20 +46,10 @@ def screened(
     known
         What was taken from the log before it was located, when another effect is known already.
     """
-    problem = location.problem
-    measurement = problem.measurement if known is None else known.behind(problem.measurement)
-    band = excited_band_hz(problem.measurement)
-    found: list[tuple[Screened, Screen]] = []
     places = list(places)
+    found = _weighed(location, places, leave_out, own, known)
     enough = _PLAUSIBLE * min((one.profile.chi for one in places), default=0.0)
     plausible = {site for one in places if one.profile.chi < enough for site, _ in sites_at(one)}
-    for located in places:
-        for site, others in sites_at(located):
-            motion = recovered(problem, located.profile, site, others)
-            motion = motion if known is None else known.along(motion, problem.measurement)
-            screen = Screen(problem, located.profile, site, others=others)
-            trials = [*trials_at(problem, measurement, motion, band), *own_trials(problem, motion, site, own)]
-            found += [(one, screen) for one in screen.run(one for one in trials if one.effect not in leave_out)]
     found.sort(key=lambda one: one[0].cost)
     best: dict[tuple[str, str, str | None, str | None], tuple[Screened, Screen]] = {}
     for one, screen in found:
@@ -70,6 +60,38 @@ def screened(
     # What others leave is a promise of the linearisation at their place.
     promised = [one for place, (one, _) in enumerate(best.values()) if searched.get(place) is None]
     return [*sorted(sure, key=lambda one: one.cost), *sorted(promised, key=lambda one: one.cost)]
+
+
+def promised(location: Location, pair: Located, leave_out: frozenset[str]) -> float:
+    """Least cost that a law at each of two places promises while the other's force is free; of both, the larger."""
+    found = _weighed(location, [pair], leave_out, {}, None)
+    best = [
+        min((one.cost for one, _ in found if one.trial.site.name in place.names), default=np.inf)
+        for place in pair.places
+    ]
+    return max(best)
+
+
+def _weighed(
+    location: Location,
+    places: Iterable[Located],
+    leave_out: frozenset[str],
+    own: Mapping[str, EffectKind],
+    known: KnownEffect | None,
+) -> list[tuple[Screened, Screen]]:
+    """Every form at the sites of some places at the best point of its grid, with the screen that weighed it."""
+    problem = location.problem
+    measurement = problem.measurement if known is None else known.behind(problem.measurement)
+    band = excited_band_hz(problem.measurement)
+    found: list[tuple[Screened, Screen]] = []
+    for located in places:
+        for site, others in sites_at(located):
+            motion = recovered(problem, located.profile, site, others)
+            motion = motion if known is None else known.along(motion, problem.measurement)
+            screen = Screen(problem, located.profile, site, others=others)
+            trials = [*trials_at(problem, measurement, motion, band), *own_trials(problem, motion, site, own)]
+            found += [(one, screen) for one in screen.run(one for one in trials if one.effect not in leave_out)]
+    return found
 
 
 def _searched(start: Screened, screen: Screen) -> Screened | None:

@@ -92,15 +92,20 @@ def effect_of(one: Screened, own: Mapping[str, EffectKind]) -> AttachedEffect | 
     return replace(plain, values=values)
 
 
-def sibling(found: Contestant, run: FreeRun) -> Hypothesis | None:
-    """Give the Stribeck friction that begins where a Coulomb friction ended: nested laws compete."""
-    (plain,) = found.fit.effects
-    try:
-        velocity = run.motion(found.fit.z, found.fit.effects, site=plain.site).velocity
-    except ModelError:
-        return None
-    speed = _STRIBECK_SPEED * float(np.sqrt(np.mean(velocity**2)))
-    return hypothesis_of((_stribeck_beside(plain, speed),), found.fit.z, screened=found.hypothesis.screened)
+def siblings(found: Contestant, run: FreeRun) -> list[Hypothesis]:
+    """Give the Stribeck friction that begins where a Coulomb friction ended, for each: nested laws compete."""
+    fit, hypotheses = found.fit, []
+    for place, plain in enumerate(fit.effects):
+        if plain.effect != "coulomb_friction":
+            continue
+        try:
+            velocity = run.motion(fit.z, fit.effects, site=plain.site).velocity
+        except ModelError:
+            continue
+        richer = _stribeck_beside(plain, _STRIBECK_SPEED * float(np.sqrt(np.mean(velocity**2))))
+        effects = (*fit.effects[:place], richer, *fit.effects[place + 1 :])
+        hypotheses.append(hypothesis_of(effects, fit.z, screened=found.hypothesis.screened))
+    return hypotheses
 
 
 def _stribeck_beside(plain: AttachedEffect, speed: float) -> AttachedEffect:

@@ -7,11 +7,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.location.recovered import Recovered
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.records.measurement import Measurement
+from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.core.port import PortKind
+from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.value import Value
 
 Matrix = NDArray[np.float64]
@@ -37,19 +38,22 @@ class KnownEffect(Value):
         self._freeze()
 
     @classmethod
-    def of(cls, run: FreeRun, found: Contestant) -> Self:
-        """Give what the effects of a fit did.
+    def of(cls, run: FreeRun, fit: OutputErrorFit, effects: tuple[AttachedEffect, ...]) -> Self:
+        """Give what effects of a fit did; where they aren't all of it, their own states begin at rest.
 
         Raises
         ------
         ModelError
-            When the model diverges without them.
+            When the model diverges with or without them.
         """
-        fit = found.fit
         start = fit.initial[:, : len(run.compiled().states)]
-        plain, bent = run.motions(fit.z, (), start), run.motions(fit.z, fit.effects, fit.initial)
+        bent_start = fit.initial
+        if len(effects) < len(fit.effects):
+            own = len(run.compiled(fit.z, effects).states) - start.shape[1]
+            bent_start = np.hstack([start, np.zeros((len(start), own))])
+        plain, bent = run.motions(fit.z, (), start), run.motions(fit.z, effects, bent_start)
         return cls(
-            outputs=fit.outputs - fit.offsets[:, None] - run.outputs(fit.z, (), start),
+            outputs=run.outputs(fit.z, effects, bent_start) - run.outputs(fit.z, (), start),
             displacement={
                 key: bent[key].displacement - one.displacement for key, one in plain.items() if key in bent
             },

@@ -37,19 +37,3 @@ def predicted_by_others(problem: LinearProblem, found: Profile) -> Matrix:
     predicted = linear[:, 0] + pattern / whole.weight[:, 0] * force * share
     mean = measurement.outputs.mean(axis=1, keepdims=True)
     return np.asarray(lines.signal(predicted[:, None])[:, 0] + mean, dtype=np.float64)
-
-
-def follows_inputs(problem: LinearProblem, force: Matrix) -> float:
-    """Largest coherence, averaged over the band of the force, between an unknown force and an input, 0 to 1."""
-    from scipy.signal import coherence
-
-    measurement = problem.measurement
-    length = int(min(1024, measurement.samples // 8))
-    found = [0.0]
-    spectrum = np.abs(np.fft.rfft(force[: force.size // length * length].reshape(-1, length), axis=1)) ** 2
-    weight = spectrum.mean(axis=0)
-    for row in measurement.inputs:
-        if np.any(row):
-            share = coherence(row, force, nperseg=length, noverlap=0, window="hann")[1]
-            found.append(float(np.sum(np.nan_to_num(share) * weight) / np.sum(weight)))
-    return max(found)

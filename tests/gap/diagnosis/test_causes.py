@@ -46,10 +46,10 @@ def test_more_left_is_never_more_complete() -> None:
 
 def test_a_factor_has_no_details_that_could_be_left() -> None:
     gain = attached("gain_error", "a", {"gain": 2.0})
-    factor = replace(left(225.0), hypothesis=Hypothesis(effects=(gain,), fitted=((),), start_z=np.zeros(0)))
+    factor = replace(left(400.0), hypothesis=Hypothesis(effects=(gain,), fitted=((),), start_z=np.zeros(0)))
     drag = attached("quadratic_damping", "a", {"coefficient": 2.0})
-    law = replace(left(225.0), hypothesis=Hypothesis(effects=(drag,), fitted=((),), start_z=np.zeros(0)))
-    # A seventh of the gap's RMS.
+    law = replace(left(400.0), hypothesis=Hypothesis(effects=(drag,), fitted=((),), start_z=np.zeros(0)))
+    # A fifth of the gap's RMS.
     assert completeness(left(1e4), factor) < 0.5 < completeness(left(1e4), law)
 
 

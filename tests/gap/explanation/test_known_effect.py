@@ -29,7 +29,7 @@ def made():
 
 def test_what_is_left_and_what_was_taken_make_the_log(made) -> None:
     log, _, contest, first = made
-    known = KnownEffect.of(contest.run, first)
+    known = KnownEffect.of(contest.run, first.fit, first.fit.effects)
     # A cubic spring did something, or the rest of these tests say nothing.
     assert np.std(known.outputs[0]) > 0.1 * np.std(log.outputs[0])
     np.testing.assert_allclose(known.behind(known.without(log)).outputs, log.outputs, atol=1e-9)
@@ -37,7 +37,7 @@ def test_what_is_left_and_what_was_taken_make_the_log(made) -> None:
 
 def test_ports_move_as_with_the_effect(made) -> None:
     _, _, contest, first = made
-    known, fit = KnownEffect.of(contest.run, first), first.fit
+    known, fit = KnownEffect.of(contest.run, first.fit, first.fit.effects), first.fit
     start = fit.initial[:, : len(contest.run.compiled().states)]
     plain = contest.run.motion(fit.z, (), start, site="j1").displacement
     bent = contest.run.motion(fit.z, fit.effects, fit.initial, site="j1").displacement
@@ -46,7 +46,7 @@ def test_ports_move_as_with_the_effect(made) -> None:
 
 def test_a_sensor_s_mount_is_found_behind_a_spring(made) -> None:
     log, floor, contest, first = made
-    known = KnownEffect.of(contest.run, first)
+    known = KnownEffect.of(contest.run, first.fit, first.fit.effects)
     location = locate(three_bodies(), known.without(log), floor, contest.run.tunables, first.fit.z)
     (place,) = [one for one in location.ranked if "a0" in one.places[0].names]
     found = [one for one in screened(location, [place], frozenset(), {}, known) if one.trial.site.name == "a0"]

@@ -1,0 +1,125 @@
+"""The search for two causes at once: one beside another, both at once, and each again beside the other."""
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from chladni.gap.diagnosis.search import sound
+from chladni.gap.diagnosis.study import Study
+from chladni.gap.explanation.candidates import promised, screened
+from chladni.gap.explanation.hypotheses import effect_hypotheses, hypothesis_of
+from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.gap.explanation.known_effect import KnownEffect
+from chladni.gap.location.locate import Located, Location, locate, located_pairs
+from chladni.gap.tuning.law_error import with_law_error
+from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.signals.errors import ModelError
+
+#: Fits of a second effect beside a first, and of each of two at once; places at which a second is looked for.
+_SECOND, _EACH, _PLACES = 4, 2, 4
+#: Two forces must leave less than this of what one leaves; pairs that are as good as the best are screened too, so
+#: many, and those searched whose laws promise most.
+_PAIR_GAIN, _PAIR_TIE, _SCREENED, _PAIRS = 0.6, 1.3, 8, 3
+#: An unknown force at the best place that leaves more than this, over the noise, isn't alone: of made machines with
+#: one effect one in twenty leaves as much, of those with two four in five.
+_TWO_FORCES = 1.2
+#: Nats that a second effect must bring beside the first: a law that differs from the machine's leaves what another
+#: effect could mend a little. Where no force at one place could, it needn't bring more than a first one.
+_ADDED, _ADDED_BY_PLACE = 100.0, 12.0
+
+
+def added_nats(location: Location) -> float:
+    """Nats that a second effect must bring beside the first."""
+    best = location.best
+    apart = best is not None and bool(best.profile.forces) and best.profile.chi > _TWO_FORCES
+    return _ADDED_BY_PLACE if apart else _ADDED
+
+
+def second_causes(
+    study: Study, found: Contestant, effects: Sequence[AttachedEffect] | None = None
+) -> list[Contestant]:
+    """Enter a second effect beside a first one, looked for in what that leaves.
+
+    Parameters
+    ----------
+    found
+        The first, or a fit of several.
+    effects
+        Those of the fit that are taken for known, all by default.
+    """
+    kept = tuple(found.fit.effects if effects is None else effects)
+    behind = _behind(study, found, kept)
+    if behind is None:
+        return []
+    location, known = behind
+    trials = screened(location, location.ranked[:_PLACES], study.leave_out, study.own, known)
+    # At the same place a second word would mend the details of the first one's law.
+    taken = _same_places(study, {one.site for one in kept})
+    singles = effect_hypotheses([one for one in trials if one.trial.site.name not in taken], study.own, count=_SECOND)
+    both = [hypothesis_of((*kept, *one.effects), found.fit.z, screened=one.screened) for one in singles]
+    return sound(study, study.contest.enter_all(both))
+
+
+def paired_causes(study: Study) -> list[Contestant]:
+    """Enter two effects at two places at once, which one after the other may miss."""
+    pairs = located_pairs(study.location)
+    single = study.location.ranked[0].profile.chi if study.location.ranked else 0.0
+    if not pairs or pairs[0].profile.chi > _PAIR_GAIN * single:
+        return []
+    near = [one for one in pairs if one.profile.chi < _PAIR_TIE * pairs[0].profile.chi][:_SCREENED]
+    if len(near) > _PAIRS:
+        near.sort(key=lambda pair: promised(study.location, pair, study.leave_out))
+    both = [one for pair in near[:_PAIRS] for one in _of_pair(study, pair)]
+    return sound(study, study.contest.enter_all(both))
+
+
+def exchanged(study: Study, both: Contestant) -> list[Contestant]:
+    """Enter other effects beside each of several: the first was found while the second was not known."""
+    effects = both.fit.effects
+    return [one for kept in effects for one in second_causes(study, both, (kept,)) if len(effects) > 1]
+
+
+def without_one(study: Study, both: Contestant) -> list[Contestant]:
+    """Enter each effect of several without one of the others, started from their common fit."""
+    effects = both.fit.effects
+    fewer = [
+        hypothesis_of((*effects[:place], *effects[place + 1 :]), both.fit.z, screened=both.hypothesis.screened)
+        for place in range(len(effects))
+        if len(effects) > 1
+    ]
+    return sound(study, study.contest.enter_all(fewer))
+
+
+def _behind(
+    study: Study, found: Contestant, kept: tuple[AttachedEffect, ...]
+) -> tuple[Location, KnownEffect | None] | None:
+    """Where the rest of the gap lies when some effects of a fit are known; None when the model diverges without."""
+    contest, model, known = study.contest, study.model, None
+    # They leave details of their laws, which a quiet band of coloured noise would make more of than of any effect.
+    floor = with_law_error(contest.noise.lowered(found.held), np.std(study.measurement.outputs, axis=1))
+    if all(one.kind.linear for one in kept):
+        model = model.with_effects((*model.effects, *kept))
+    else:
+        try:
+            known = KnownEffect.of(contest.run, found.fit, kept)
+        except ModelError:
+            return None
+    rest = study.measurement if known is None else known.without(study.measurement)
+    return locate(model, rest, floor, contest.run.tunables, found.fit.z), known
+
+
+def _of_pair(study: Study, pair: Located) -> list[Hypothesis]:
+    found = screened(study.location, [pair], study.leave_out, study.own)
+    forms = []
+    for place in pair.places:
+        there = [one for one in found if one.trial.site.name in place.names]
+        forms.append(effect_hypotheses(there, study.own, count=_EACH))
+    return [
+        hypothesis_of((*first.effects, *second.effects), pair.profile.z) for first in forms[0] for second in forms[1]
+    ]
+
+
+def _same_places(study: Study, sites: Collection[str]) -> set[str]:
+    """Names of sites, and of those that these sensors can't tell from them."""
+    places = [located.places[0].names for located in study.location.ranked]
+    return {*sites, *(name for names in places if not set(sites).isdisjoint(names) for name in names)}
