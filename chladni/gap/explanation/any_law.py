@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from chladni.gap.explanation.followed import followed
 from chladni.gap.explanation.screen import Screen
@@ -16,14 +17,17 @@ from chladni.gap.plant.places import Site
 Matrix = NDArray[np.float64]
 #: Points of a law of the way, and of one of the pace beside it; of a law of both along each; samples of a filter.
 _WAY, _PACE, _BOTH, _FILTER = 60, 16, 8, 24
+#: Lines that a tone must stand out of; the first that is one and no drift.
+_NEIGHBOURS, _FIRST = 201, 3
 
 
 def left_by_any_law(location: Location, located: Located, site: Site) -> float:
     """Share of the gap that a force at a site leaves which follows the motion there, or the inputs.
 
-    At a joint the force is the sum of any function of the displacement and any of the velocity, or any smooth
-    function of both; at an input any function of the command and any filter of all inputs; elsewhere such a filter.
-    Functions are sums of hats whose amplitudes are found by the screen, with the parameters refitted under them.
+    At a joint the force is the sum of any function of the displacement and any of the velocity, any smooth function
+    of both, or the displacement times a tone, as of a stiffness that turns with a shaft; at an input any function of
+    the command and any filter of all inputs; elsewhere such a filter. Functions are sums of hats whose amplitudes are
+    found by the screen, with the parameters refitted under them.
 
     Returns
     -------
@@ -47,9 +51,25 @@ def _forces(problem: LinearProblem, motion: Recovered) -> Iterator[Force]:
     if motion.site.kind == "joint":
         yield _force(motion, [*_hats(way, _WAY), *_hats(pace, _PACE)])
         yield _force(motion, [one * other for one in _hats(way, _BOTH) for other in _hats(pace, _BOTH)])
+        yield _force(motion, [way * tone for tone in _tones(motion)])
         return
     delayed = [np.roll(row, late) for row in problem.measurement.inputs for late in range(_FILTER)]
     yield _force(motion, [*delayed, *(_hats(way, _PACE) if motion.site.kind == "input" else [])])
+
+
+def _tones(motion: Recovered) -> list[Matrix]:
+    """Cosine and sine, and their octave's, of the tone that stands out of force times displacement."""
+    count = motion.force.size
+    product = motion.force * motion.displacement
+    power = np.abs(np.fft.rfft((product - product.mean()) * np.hanning(count))) ** 2
+    above = power / np.maximum(uniform_filter1d(power, _NEIGHBOURS, mode="reflect"), np.finfo(np.float64).tiny)
+    line = int(np.argmax(above[_FIRST:-1])) + _FIRST
+    # Between lines by a parabola through the logarithms: over hundreds of turns a line's width is too much.
+    below, at, beyond = np.log(np.maximum(power[line - 1 : line + 2], np.finfo(np.float64).tiny))
+    bend = below - 2.0 * at + beyond
+    turns = line + (0.5 * (below - beyond) / bend if bend < 0 else 0.0)
+    angle = 2.0 * np.pi * turns * np.arange(count) / count
+    return [np.cos(angle), np.sin(angle), np.cos(2.0 * angle), np.sin(2.0 * angle)]
 
 
 def _force(motion: Recovered, parts: list[Matrix]) -> Force:

@@ -58,8 +58,8 @@ def screened(
     searched = {place: _searched(one, screen) for place, (one, screen) in enumerate(best.values()) if place in worth}
     sure = [one for one in searched.values() if one is not None]
     # What others leave is a promise of the linearisation at their place.
-    promised = [one for place, (one, _) in enumerate(best.values()) if searched.get(place) is None]
-    return [*sorted(sure, key=lambda one: one.cost), *sorted(promised, key=lambda one: one.cost)]
+    unsure = [one for place, (one, _) in enumerate(best.values()) if searched.get(place) is None]
+    return [*sorted(sure, key=lambda one: one.cost), *sorted(unsure, key=lambda one: one.cost)]
 
 
 def promised(location: Location, pair: Located, leave_out: frozenset[str]) -> float:

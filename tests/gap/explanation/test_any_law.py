@@ -1,5 +1,8 @@
 """What tells a law of a joint's motion from a floor that shakes under it."""
 
+from typing import Any
+
+import numpy as np
 import pytest
 
 import chladni
@@ -7,6 +10,9 @@ from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.explanation.any_law import left_by_any_law
 from chladni.gap.location.locate import locate
 from chladni.gap.plant.tunable import Tunables
+from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.effect_kind import EffectKind, Variant
 from tests.gap.arm import arm, measured
 
 LAWS = [
@@ -27,6 +33,38 @@ def left_at(effect, name: str) -> float:
 @pytest.mark.parametrize(("word", "values"), LAWS)
 def test_a_law_of_the_joint_is_followed_whatever_its_name(word: str, values: dict[str, float]) -> None:
     assert left_at(chladni.attached(word, "shoulder", values), "shoulder") < 0.12
+
+
+def turning(d: float, _s: float, t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    """Give ``change cos(2 pi frequency t) d``."""
+    return float(parameters[0] * np.cos(2.0 * np.pi * parameters[1] * t) * d)
+
+
+TURNING_STIFFNESS = EffectKind(
+    name="turning_stiffness",
+    family="stiffness",
+    meaning="stiffness of a shaft with a keyway",
+    sites=("joint",),
+    parameters=Parameters(
+        (
+            Parameter(name="change", value=1e4, unit="N/m", low=0.0, high=1e9, minimum=0.0, maximum=1e12),
+            Parameter(name="frequency", value=9.0, unit="Hz", low=0.1, high=1e3, minimum=1e-3, maximum=1e6),
+        )
+    ),
+    neutral={"change": 0.0},
+    variants=(
+        Variant(
+            name="harmonic",
+            attach=LawAtPort(law=turning, numbers=lambda values, _: (values["change"], values["frequency"])),
+            formula="F = change cos(2 pi frequency t) d",
+        ),
+    ),
+)
+
+
+def test_a_stiffness_that_turns_with_a_shaft_is_followed() -> None:
+    shaft = chladni.attached(TURNING_STIFFNESS, "shoulder", {"change": 6e4, "frequency": 9.37})
+    assert left_at(shaft, "shoulder") < 0.12
 
 
 def test_a_filter_of_the_command_is_followed() -> None:
