@@ -16,8 +16,8 @@ Matrix = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
 #: Lines over which the power of an unknown force is taken for the same.
 _SMOOTH = 31
-#: Power over that of the lines that tell the force well, beyond which a line is believed only for what so many times
-#: the noise would not make: where a pattern fades, a little more noise than was thought makes a force of any size.
+#: Power over that of the lines that tell the force well, beyond which a line is believed only when it's so many times
+#: its noise: where a pattern fades, a little more noise than was thought makes a force of any size.
 _STRONGEST, _DOUBTED = 3.0, 30.0
 
 
@@ -158,7 +158,8 @@ def _unknown(
         # accelerometers does toward 0 Hz, those that still see it speak for those that don't.
         say = 1.0 / noise**2
         power = np.maximum(_smooth(say * (np.abs(plain) ** 2 - noise)) / np.maximum(_smooth(say), 1e-300), 0.0)
-        power = np.maximum(np.minimum(power, _STRONGEST * _told(power, noise)), power - _DOUBTED * noise)
+        sure = power > _DOUBTED * noise
+        power = np.where(sure, power, np.minimum(power, _STRONGEST * _told(power, noise)))
         reliable = power / (power + noise)
         # What force and transient could both print goes to whichever needs less of itself for it.
         transient = _transient(transients, pattern, residual, reliable * thought)
