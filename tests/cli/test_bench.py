@@ -22,7 +22,14 @@ PROGRAM = "import typer; from chladni.cli.bench import bench; typer.run(bench)"
 
 def test_serves_this_computer_only_says_so_and_ends_with_ctrl_c() -> None:
     arguments = [sys.executable, "-u", "-c", PROGRAM, "pneumatic-motor", "--no-open"]
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+    with subprocess.Popen(
+        arguments,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # Whoever runs the tests in the background has it ignored, and what is started would inherit that.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as program:
         assert program.stdout is not None
         address = program.stdout.readline().strip()
         assert address.startswith("http://127.0.0.1:")
