@@ -85,7 +85,9 @@ def single_causes(study: Study, progress: Step) -> list[Contestant]:
 
 def _begun_again(study: Study, ranked: Sequence[Contestant]) -> list[Contestant]:
     """Begin fits that lead but got stuck again, with their effects at the screen's parameters, while that helps."""
-    found = []
+    found: list[Contestant] = []
+    if not ranked or ranked[0].chi < ALONE:
+        return found
     for one in ranked[:_STUCK]:
         best, start_z = one, one.hypothesis.start_z
         for _ in range(_AGAIN_MOST):
