@@ -1,7 +1,6 @@
 """The search for one cause: every plausible effect entered, more while all leave something."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -20,8 +19,6 @@ Step = Callable[[float], None]
 _FITTED, _AGAIN = 7, 16
 #: A best fit that leaves more than this has details of laws worth a fit, those of the first few.
 _DETAILED, _POLISHED = 1.1, 4
-#: Fits that are begun again where they got stuck, how often, and how much less each time must leave.
-_STUCK, _AGAIN_MOST, _BETTER = 2, 3, 0.97
 #: A first effect that leaves less than this, over the noise's power, is alone.
 ALONE = 1.3
 #: An unknown force that leaves less than this explains all; with more than so many sensors that says something. A
@@ -75,30 +72,11 @@ def single_causes(study: Study, progress: Step) -> list[Contestant]:
         others = _others(effect_hypotheses(candidates, study.own, count=_AGAIN), hypotheses)
         found += sound(study, contest.enter_all(others))
     ranked = weighed([*found, *sibling_causes(study, weighed(found))])
-    ranked = weighed([*ranked, *_begun_again(study, ranked)])
     if ranked and ranked[0].chi > _DETAILED:
         # A detail of its law that was set by the screen's grid must not cost a word its place.
         forms = _best_forms(ranked)
         ranked = [*(_polished(study, one) for one in forms), *(one for one in ranked if one not in forms)]
     return weighed(ranked)
-
-
-def _begun_again(study: Study, ranked: Sequence[Contestant]) -> list[Contestant]:
-    """Begin fits that lead but got stuck again, with their effects at the screen's parameters, while that helps."""
-    found: list[Contestant] = []
-    if not ranked or ranked[0].chi < ALONE:
-        return found
-    for one in ranked[:_STUCK]:
-        best, start_z = one, one.hypothesis.start_z
-        for _ in range(_AGAIN_MOST):
-            if best.fit.converged or best.chi < ALONE:
-                break
-            again = study.contest.enter(replace(best.hypothesis, effects=best.fit.effects, start_z=start_z))
-            if again is None or again.chi > _BETTER * best.chi:
-                break
-            best = again
-        found += [] if best is one else sound(study, [best])
-    return found
 
 
 def _others(found: Sequence[Hypothesis], tried: Sequence[Hypothesis]) -> list[Hypothesis]:
