@@ -6,7 +6,6 @@ or twenty to diagnose on one core.
 
 import argparse
 import json
-import os
 import statistics
 import sys
 from collections.abc import Iterator
@@ -14,8 +13,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-# Processes share the cores; threads of BLAS in each would only get into each other's way.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from chladni.apps.blind import make_campaign, run_campaign, score_campaign
 from chladni.gap.blind.score_table import (

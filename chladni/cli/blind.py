@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from chladni.cli import options
-from chladni.cli.linear_algebra import take_one_thread
 from chladni.cli.output import Output
 from chladni.cli.words import count as counted
 
@@ -33,7 +32,6 @@ def make(
     json: options.Json = None,
 ) -> None:
     """Make cases: random machines with hidden effects, and their sealed truths; what is there stays."""
-    take_one_thread()
     from chladni.apps.blind import make_campaign
 
     to = Output(json)
@@ -54,7 +52,6 @@ def run(
     json: options.Json = None,
 ) -> None:
     """Diagnose every case that has no result yet; the truths are never opened."""
-    take_one_thread()
     from chladni.apps.blind import run_campaign
 
     to = Output(json)

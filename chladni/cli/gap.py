@@ -9,7 +9,6 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.gap_rows import print_comparison, print_diagnosis
-from chladni.cli.linear_algebra import take_one_thread
 from chladni.cli.output import Output
 
 if TYPE_CHECKING:
@@ -87,7 +86,6 @@ def gap(
     write_model: ExplainedModel = None,
 ) -> None:
     """Where a model and a log disagree, which effect was left out, and how far the gap closes with it."""
-    take_one_thread()
     from chladni.io.log import open_log
 
     out = Output(json)

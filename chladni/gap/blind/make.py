@@ -14,6 +14,7 @@ from chladni.gap.blind.composition import DEFAULT, orders
 from chladni.gap.blind.model_text import model_text
 from chladni.gap.blind.performance import measured
 from chladni.gap.blind.seal import seal_case, write_json
+from chladni.gap.linear_algebra import in_one_thread
 from chladni.io.atomic import atomic_write
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
@@ -97,6 +98,7 @@ def _keep_to_one(path: Path, told: dict[str, Any]) -> None:
         write_json(path, {"format": CAMPAIGN_FORMAT, **told})
 
 
+@in_one_thread()
 def make_case(task: CaseTask) -> str:
     """Draw, simulate, write and seal one case; give its name."""
     case = draw_case(task.order, np.random.default_rng(task.seed))

@@ -20,6 +20,7 @@ from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tun
 from chladni.gap.diagnosis.other_logs import closing_elsewhere
 from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.explanation.shaken_ground import predicted_by_others
+from chladni.gap.linear_algebra import in_one_thread
 from chladni.gap.location.profile import profile_at
 from chladni.gap.location.recovered import Recovered, recovered
 from chladni.gap.plant.places import Site
@@ -43,6 +44,7 @@ StepProgress = Callable[[str, float], None]
 _STILL_CLOSE = 8.0
 
 
+@in_one_thread()
 def diagnose(
     model: Model,
     measurements: Sequence[Measurement],
