@@ -26,8 +26,8 @@ def left_by_any_law(location: Location, located: Located, site: Site) -> float:
 
     At a joint the force is the sum of any function of the displacement and any of the velocity, any smooth function
     of both, or the displacement times a tone, as of a stiffness that turns with a shaft; at an input any function of
-    the command and any filter of all inputs; elsewhere such a filter. Functions are sums of hats whose amplitudes are
-    found by the screen, with the parameters refitted under them.
+    the command, any smooth one of it and its slope, and any filter of all inputs; elsewhere such a filter. Functions
+    are sums of hats whose amplitudes are found by the screen, with the parameters refitted under them.
 
     Returns
     -------
@@ -50,11 +50,18 @@ def _forces(problem: LinearProblem, motion: Recovered) -> Iterator[Force]:
     way, pace = motion.displacement, motion.velocity
     if motion.site.kind == "joint":
         yield _force(motion, [*_hats(way, _WAY), *_hats(pace, _PACE)])
-        yield _force(motion, [one * other for one in _hats(way, _BOTH) for other in _hats(pace, _BOTH)])
+        yield _force(motion, _both(way, pace))
         yield _force(motion, [way * tone for tone in _tones(motion)])
         return
     delayed = [np.roll(row, late) for row in problem.measurement.inputs for late in range(_FILTER)]
-    yield _force(motion, [*delayed, *(_hats(way, _PACE) if motion.site.kind == "input" else [])])
+    if motion.site.kind == "input":
+        # A limit of slew follows the command's way and pace.
+        delayed += [*_hats(way, _PACE), *_both(way, np.gradient(way))]
+    yield _force(motion, delayed)
+
+
+def _both(way: Matrix, pace: Matrix) -> list[Matrix]:
+    return [one * other for one in _hats(way, _BOTH) for other in _hats(pace, _BOTH)]
 
 
 def _tones(motion: Recovered) -> list[Matrix]:

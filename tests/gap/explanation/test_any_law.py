@@ -67,8 +67,9 @@ def test_a_stiffness_that_turns_with_a_shaft_is_followed() -> None:
     assert left_at(shaft, "shoulder") < 0.12
 
 
-def test_a_filter_of_the_command_is_followed() -> None:
-    assert left_at(chladni.attached("lag", "shaker", {"time_constant": 1e-3}), "shaker") < 0.12
+@pytest.mark.parametrize(("word", "values"), [("lag", {"time_constant": 1e-3}), ("rate_limit", {"rate": 2e4})])
+def test_what_an_actuator_does_with_the_command_is_followed(word: str, values: dict[str, float]) -> None:
+    assert left_at(chladni.attached(word, "shaker", values), "shaker") < 0.12
 
 
 @pytest.mark.parametrize("name", ["shoulder", "ground"])
