@@ -26,7 +26,7 @@ WRONG, NAMED = 3.0, 6.0
 _LEADS = 2
 #: A fit that leaves less than this, over the noise's power, leaves nothing to be explained.
 _CLEAN = 1.6
-#: Share of what a sensor leaves that follows its own signal's square or cube: more is no noise.
+#: Share of what a sensor leaves that follows its own signal in a curve: more is no noise.
 _DISTORTED = 0.2
 
 
@@ -51,7 +51,7 @@ class Causes:
     noise
         The floor, lowered to what `best` leaves of it where that is less.
     distorted
-        Outputs whose residual, when nothing is named, follows their own signal's square or cube.
+        Outputs whose residual, when nothing is named, follows their own signal in a curve.
     """
 
     verdict: Verdict
@@ -143,8 +143,8 @@ def _paid(one: Contestant, added: float) -> float:
 
 
 def _distorted(study: Study, tuned: Contestant) -> tuple[str, ...]:
-    measured = study.measurement.outputs
-    shares = share_of_own_signal(measured[:, study.held], (measured - tuned.fit.outputs)[:, study.held])
+    simulated = tuned.fit.outputs[:, study.held]
+    shares = share_of_own_signal(simulated, study.measurement.outputs[:, study.held] - simulated)
     return tuple(
         name for name, share in zip(study.measurement.output_names, shares, strict=True) if share > _DISTORTED
     )

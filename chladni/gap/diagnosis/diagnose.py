@@ -266,7 +266,7 @@ def _remarks(study: Study, causes: Causes) -> list[str]:
             "messages were lost"
         )
     if causes.distorted:
-        found.append(f"{', '.join(causes.distorted)}: what is left follows the square or the cube of its own signal")
+        found.append(f"{', '.join(causes.distorted)}: what is left follows its own signal in a curve or in steps")
     if causes.tuned.fit.undetermined:
         names = ", ".join(causes.tuned.fit.undetermined[:6])
         found.append(f"this log doesn't determine {names}: held near nominal")

@@ -3,34 +3,36 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.explanation.hats import hats
+
 Matrix = NDArray[np.float64]
+#: Points of the function. Of a few thousand samples of noise it explains a few per cent.
+_POINTS = 60
 
 
-def share_of_own_signal(measured: Matrix, residual: Matrix) -> Matrix:
-    """Share of each residual's power that the square and the cube of what the sensor showed explain.
+def share_of_own_signal(simulated: Matrix, residual: Matrix) -> Matrix:
+    """Share of each residual's power that some function of what the sensor should show explains, and no straight line.
 
-    A noise floor that comes from what no linear model explains holds a sensor's distortion too, and nothing would
-    ever stand out of it. The cube is taken without the share of it that is the signal itself, which a gain is.
+    A noise floor that comes from what no linear model explains holds a sensor's distortion and its steps too, and
+    nothing would ever stand out of it. What the signal itself explains is a gain's or a parameter's and doesn't count.
 
     Parameters
     ----------
-    measured, residual
+    simulated, residual
         ``[output, sample]``.
 
     Returns
     -------
     ``[output]`` 0 to 1.
     """
-    found = np.zeros(len(measured))
-    for row, (signal, left) in enumerate(zip(measured, residual, strict=True)):
-        scaled = (signal - signal.mean()) / max(float(np.std(signal)), 1e-300)
-        columns = np.stack([np.ones_like(scaled), scaled, scaled**2, scaled**3], axis=1)
-        # What the signal itself explains is a gain's or a parameter's and counts for nothing here.
-        plain, full = (_left(columns[:, :count], left) for count in (2, 4))
-        found[row] = 1.0 - full / plain if plain > 0 else 0.0
+    found = np.zeros(len(simulated))
+    for row, (signal, left) in enumerate(zip(simulated, residual, strict=True)):
+        plain = _left([np.ones_like(signal), signal], left)
+        found[row] = 1.0 - _left(hats(signal, _POINTS), left) / plain if plain > 0 else 0.0
     return found
 
 
-def _left(columns: Matrix, target: Matrix) -> float:
+def _left(functions: list[Matrix], target: Matrix) -> float:
+    columns = np.stack(functions, axis=1)
     rest = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
     return float(rest @ rest)

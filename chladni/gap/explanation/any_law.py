@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from chladni.gap.explanation.followed import followed
+from chladni.gap.explanation.hats import hats
 from chladni.gap.explanation.screen import Screen
 from chladni.gap.explanation.trial import Force, Trial
 from chladni.gap.location.locate import Located, Location
@@ -49,19 +50,19 @@ def left_by_any_law(location: Location, located: Located, site: Site) -> float:
 def _forces(problem: LinearProblem, motion: Recovered) -> Iterator[Force]:
     way, pace = motion.displacement, motion.velocity
     if motion.site.kind == "joint":
-        yield _force(motion, [*_hats(way, _WAY), *_hats(pace, _PACE)])
+        yield _force(motion, [*hats(way, _WAY), *hats(pace, _PACE)])
         yield _force(motion, _both(way, pace))
         yield _force(motion, [way * tone for tone in _tones(motion)])
         return
     delayed = [np.roll(row, late) for row in problem.measurement.inputs for late in range(_FILTER)]
     if motion.site.kind == "input":
         # A limit of slew follows the command's way and pace.
-        delayed += [*_hats(way, _PACE), *_both(way, np.gradient(way))]
+        delayed += [*hats(way, _PACE), *_both(way, np.gradient(way))]
     yield _force(motion, delayed)
 
 
 def _both(way: Matrix, pace: Matrix) -> list[Matrix]:
-    return [one * other for one in _hats(way, _BOTH) for other in _hats(pace, _BOTH)]
+    return [one * other for one in hats(way, _BOTH) for other in hats(pace, _BOTH)]
 
 
 def _tones(motion: Recovered) -> list[Matrix]:
@@ -88,8 +89,3 @@ def _trial(site: Site, force: Force) -> Trial:
         effect="any law", site=site, build=lambda _: force, values=lambda *_: {}, parameters=len(force.basis)
     )
 
-
-def _hats(signal: Matrix, count: int) -> list[Matrix]:
-    """Hat functions of a signal ``[sample]`` between points with equally many samples."""
-    points = np.unique(np.quantile(signal, np.linspace(0.0, 1.0, count)))
-    return [np.interp(signal, points, one) for one in np.eye(points.size)]

@@ -6,16 +6,18 @@ import pytest
 from chladni.gap.diagnosis.own_signal import share_of_own_signal
 
 
-def test_a_squared_share_is_seen_and_a_gain_and_noise_are_not() -> None:
+def test_curves_and_steps_are_seen_and_a_gain_and_noise_are_not() -> None:
     rng = np.random.default_rng(7)
-    signal, noise = rng.standard_normal((3, 20_000)), 0.1 * rng.standard_normal((3, 20_000))
+    signal, noise = rng.standard_normal((4, 20_000)), 0.1 * rng.standard_normal((4, 20_000))
     residual = noise.copy()
     # As much power as the noise: half of what is left.
     residual[0] += 0.1 / np.sqrt(2) * (signal[0] ** 2 - 1.0)
-    residual[1] += 0.3 * signal[1]
+    residual[1] = 0.5 * np.floor(signal[1] / 0.5) - signal[1] + 0.01 * noise[1]
+    residual[2] += 0.3 * signal[2]
     found = share_of_own_signal(5.0 + signal, residual)
     assert found[0] == pytest.approx(0.5, abs=0.03)
-    assert np.all(found[1:] < 0.01)
+    assert found[1] > 0.7
+    assert np.all(found[2:] < 0.01)
 
 
 def test_a_sensor_that_shows_nothing_follows_nothing() -> None:
