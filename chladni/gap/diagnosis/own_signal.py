@@ -11,10 +11,10 @@ _POINTS = 60
 
 
 def share_of_own_signal(simulated: Matrix, residual: Matrix) -> Matrix:
-    """Share of each residual's power that some function of what the sensor should show explains, and no straight line.
+    """Share of each residual's power that a curve over what the sensor should show explains, but for straight lines.
 
     A noise floor that comes from what no linear model explains holds a sensor's distortion and its steps too, and
-    nothing would ever stand out of it. What the signal itself explains is a gain's or a parameter's and doesn't count.
+    nothing would ever stand out of it. What the signal itself explains is a gain's or a parameter's.
 
     Parameters
     ----------

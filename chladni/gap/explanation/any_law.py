@@ -88,4 +88,3 @@ def _trial(site: Site, force: Force) -> Trial:
     return Trial(
         effect="any law", site=site, build=lambda _: force, values=lambda *_: {}, parameters=len(force.basis)
     )
-

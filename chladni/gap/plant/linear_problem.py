@@ -1,7 +1,7 @@
 """A measurement beside the linear part of a model: residual spectra, and how they move with the parameters."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from chladni.gap.plant.view_slopes import same_frame, view_slopes
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.compiled_model import CompiledModel
-from chladni.models.core.model import Model
 
 Matrix = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
@@ -34,6 +33,16 @@ class Scaled(Protocol):
         """Values ``nominal exp(tolerance z)`` by name."""
 
 
+class Varied(Protocol):
+    """A model as far as its equations and numbers go."""
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """Give the model with some parameters replaced."""
+
+    def compile(self) -> CompiledModel:
+        """Give the equations."""
+
+
 class LinearProblem:
     """One measurement, one model, some lines; linearised wherever it's asked for.
 
@@ -41,26 +50,21 @@ class LinearProblem:
     ----------
     model, measurement, noise, tunables, lines
         What is compared, and where.
-    changed
-        ``changed(model) -> compiled``: how the model is compiled, for instance with an effect in it.
     """
 
     def __init__(
         self,
-        model: Model,
+        model: Varied,
         measurement: Measurement,
         noise: NoiseFloor,
         tunables: Scaled,
         lines: RecordLines,
-        *,
-        changed: Callable[[Model], CompiledModel] | None = None,
     ) -> None:
         self.model, self.measurement, self.tunables, self.lines = model, measurement, tunables, lines
         self.noise = noise
         self._inputs: dict[tuple[float, ...], Spectrum] = {}
         self._view: tuple[bytes, LinearView] | None = None
-        self._compile = changed or _compiled
-        compiled = self._compile(model)
+        compiled = model.compile()
         names = [terminal.name for terminal in compiled.outputs]
         self.rows = tuple(names.index(name) for name in measurement.output_names)
         self.weight = 1.0 / np.sqrt(noise.density(lines.cycles))[:, None]
@@ -73,11 +77,11 @@ class LinearProblem:
 
     def on(self, lines: RecordLines) -> "LinearProblem":
         """Give the same problem on other lines."""
-        return LinearProblem(self.model, self.measurement, self.noise, self.tunables, lines, changed=self._compile)
+        return LinearProblem(self.model, self.measurement, self.noise, self.tunables, lines)
 
     def with_noise(self, noise: NoiseFloor) -> "LinearProblem":
         """Give the same problem with another noise."""
-        return LinearProblem(self.model, self.measurement, noise, self.tunables, self.lines, changed=self._compile)
+        return LinearProblem(self.model, self.measurement, noise, self.tunables, self.lines)
 
     def view(self, z: Matrix) -> LinearView:
         """Give the linear part at parameters z."""
@@ -118,7 +122,7 @@ class LinearProblem:
         count = max(1, _AT_ONCE // (max(1, len(view.compiled.states)) * self.measured[0].size))
         for first in range(0, z.size, count):
             places = range(first, min(first + count, z.size))
-            changed = {place: self._compile(base.with_values(self.tunables.values(steps[place]))) for place in places}
+            changed = {place: base.with_values(self.tunables.values(steps[place])).compile() for place in places}
             plain = [place for place in places if same_frame(view.compiled, changed[place])]
             slopes = view_slopes(view, [changed[place] for place in plain], _STEP, transient, ways)
             found[plain] = slopes * self.weight
@@ -138,8 +142,4 @@ class LinearProblem:
         return np.asarray(slope, dtype=np.complex128)
 
     def _at(self, z: Matrix) -> CompiledModel:
-        return self._compile(self.model.with_values(self.tunables.values(z)) if z.size else self.model)
-
-
-def _compiled(model: Model) -> CompiledModel:
-    return model.compile()
+        return (self.model.with_values(self.tunables.values(z)) if z.size else self.model).compile()

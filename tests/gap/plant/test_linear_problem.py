@@ -1,6 +1,7 @@
 """Slopes of the response against differences, for all that a parameter can move."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -105,24 +106,31 @@ def test_slopes_are_the_limit_of_differences(name, segments):
     assert np.sum(size > 1e3 * rounding) >= 3
 
 
-def test_a_parameter_that_is_a_dead_time_has_a_slope_too():
+@dataclass
+class Late:
     """A model that compiles a parameter into the delay of its input."""
+
+    model: Any
+
+    def with_values(self, values):
+        return Late(self.model.with_values(values))
+
+    def compile(self):
+        delay = 1e-8 * self.model.parameters["j0.stiffness"].value
+        return replace(self.model.compile(), input_delays_s=(delay,))
+
+
+def test_a_parameter_that_is_a_dead_time_has_a_slope_too():
     problem = problem_of(three_bodies())
-
-    def late(model):
-        compiled = model.compile()
-        return replace(compiled, input_delays_s=(1e-8 * model.parameters["j0.stiffness"].value,))
-
-    problem = LinearProblem(
-        problem.model, problem.measurement, problem.noise, problem.tunables, problem.lines, changed=late
-    )
+    late = Late(problem.model)
+    problem = LinearProblem(late, problem.measurement, problem.noise, problem.tunables, problem.lines)
     z, transient, forces = drawn(problem, [])
     found = problem.slopes(z, transient, forces)
     wanted = central(problem, z, transient, forces)
     error = np.abs(found - wanted).max(axis=(1, 2, 3)) / np.abs(wanted).max(axis=(1, 2, 3))
     # One is a one-sided difference: first order in its step of 1e-4.
     assert np.all(error < 1e-3)
-    plain = LinearProblem(problem.model, problem.measurement, problem.noise, problem.tunables, problem.lines)
+    plain = LinearProblem(late.model, problem.measurement, problem.noise, problem.tunables, problem.lines)
     place = problem.tunables.names.index("j0.stiffness")
     assert np.abs(plain.slopes(z, transient, forces)[place] - wanted[place]).max() > 0.1 * np.abs(wanted[place]).max()
 

@@ -1,0 +1,138 @@
+"""Whether velocities of bodies that push each other explain a gap: a linear law, whatever joins the bodies."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.location.locate import Location, tuned_stepwise
+from chladni.gap.plant.linear_problem import LinearProblem, Scaled, Varied
+from chladni.models.core.compiled_model import CompiledModel
+
+Matrix = NDArray[np.float64]
+_Pair = tuple[str, str]
+#: Of the damping that would make a body's own oscillation critical: a step of a coefficient.
+_STEP = 0.05
+#: Steps that a coefficient may take from zero, and those of its tolerance that a parameter may.
+_FREE, _BOUNDED = 1e4, 3.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coupling:
+    """Forces ``f_i = -sum_j C_ij v_j`` of bodies' velocities beside those of the model.
+
+    Attributes
+    ----------
+    chi
+        Misfit over what noise alone leaves, with the parameters refitted under it.
+    first, second
+        The two bodies that push each other most.
+    on_first, on_second
+        C from the second's velocity to the force on the first, and the other way round, SI: equal as of a damper
+        between them, opposite as where a wheel spins.
+    """
+
+    chi: float
+    first: str
+    second: str
+    on_first: float
+    on_second: float
+
+
+def any_coupling(location: Location) -> Coupling | None:
+    """Fit a force on each body from each body's velocity; None for a model of fewer than two bodies.
+
+    It is linear in what moves, so no parameters of bodies and joints, sensors or inputs do the same but by chance:
+    errors of a sensor leave the others alone, and a late command acts along its own way.
+    """
+    nominal = location.problem.model.compile()
+    bodies = [port.name for port in nominal.ports if port.kind == "body"]
+    if len(bodies) < 2:
+        return None
+    steps = _steps(nominal, bodies)
+    there = np.concatenate([location.tuned.z, np.zeros(len(steps))])
+    limit = np.repeat([_BOUNDED, _FREE], [location.tuned.z.size, len(steps)])
+    problems = [_coupled(one, steps) for one in (*location.segments, location.problem)]
+    found = tuned_stepwise(problems, there, limit)
+    size = dict(zip(steps, found.z[location.tuned.z.size :].tolist(), strict=True))
+    # In steps, so that heavy bodies' coefficients don't hide those of light ones.
+    pairs = [(one, other) for place, one in enumerate(bodies) for other in bodies[place + 1 :]]
+    first, second = max(pairs, key=lambda pair: abs(size[pair]) + abs(size[pair[::-1]]))
+    return Coupling(
+        chi=found.chi,
+        first=first,
+        second=second,
+        on_first=size[first, second] * steps[first, second],
+        on_second=size[second, first] * steps[second, first],
+    )
+
+
+def _steps(compiled: CompiledModel, bodies: list[str]) -> dict[_Pair, float]:
+    """Step of each coefficient, SI: of the pair's mass at the middle one of the natural frequencies."""
+    rates = np.abs(np.linalg.eigvals(compiled.a))
+    moving = rates[rates > 1e-6 * rates.max(initial=0.0)]
+    omega = float(np.median(moving)) if moving.size else 1.0
+    places = [compiled.port_index(name, "body") for name in bodies]
+    # What a force adds to its own body's velocity is one over its mass.
+    light = np.einsum("bs,sb->b", compiled.velocity_state[places], compiled.g[:, places])
+    root = dict(zip(bodies, (light**-0.5).tolist(), strict=True))
+    return {(one, other): _STEP * omega * root[one] * root[other] for one in bodies for other in bodies}
+
+
+def _coupled(problem: LinearProblem, steps: Mapping[_Pair, float]) -> LinearProblem:
+    model = _CoupledModel(model=problem.model, coefficients=dict.fromkeys(steps, 0.0))
+    scaled = _WithCoefficients(tunables=problem.tunables, steps=steps)
+    return LinearProblem(model, problem.measurement, problem.noise, scaled, problem.lines)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _WithCoefficients:
+    """Parameters of a model, then the coefficients in steps."""
+
+    tunables: Scaled
+    steps: Mapping[_Pair, float]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*self.tunables.names, *(_name(pair) for pair in self.steps))
+
+    def values(self, z: Matrix) -> dict[str, float]:
+        own = len(self.tunables.names)
+        numbers = zip(self.steps.items(), z[own:].tolist(), strict=True)
+        added = {_name(pair): one * step for (pair, step), one in numbers}
+        return {**self.tunables.values(z[:own]), **added}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _CoupledModel:
+    """A model whose bodies' velocities push each other."""
+
+    model: Varied
+    coefficients: Mapping[_Pair, float]
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        own = {pair: values.get(_name(pair), one) for pair, one in self.coefficients.items()}
+        names = {_name(pair) for pair in own}
+        rest = {name: one for name, one in values.items() if name not in names}
+        return replace(self, model=self.model.with_values(rest), coefficients=own)
+
+    def compile(self) -> CompiledModel:
+        compiled = self.model.compile()
+        names = list(dict.fromkeys(one for one, _ in self.coefficients))
+        at = [compiled.port_index(name, "body") for name in names]
+        matrix = np.array([[self.coefficients[one, other] for other in names] for one in names])
+        state, column = matrix @ compiled.velocity_state[at], matrix @ compiled.velocity_column[at]
+        return replace(
+            compiled,
+            a=compiled.a - compiled.g[:, at] @ state,
+            b=compiled.b - compiled.g[:, at] @ column,
+            c=compiled.c - compiled.h[:, at] @ state,
+            d=compiled.d - compiled.h[:, at] @ column,
+        )
+
+
+def _name(pair: _Pair) -> str:
+    """Name of a coefficient: no parameter of a model has an arrow in it."""
+    return f"{pair[0]} <- {pair[1]}"
