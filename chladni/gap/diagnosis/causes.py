@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.completeness import completeness, known_share
+from chladni.gap.diagnosis.instead import Instead, explained_instead
 from chladni.gap.diagnosis.own_signal import share_of_own_signal
 from chladni.gap.diagnosis.pairs import added_nats, exchanged, paired_causes, second_causes, without_one
 from chladni.gap.diagnosis.search import ALONE, detailed, is_one_force, sibling_causes, single_causes, without_cause
 from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
 from chladni.gap.diagnosis.study import Study
-from chladni.gap.explanation.any_coupling import Coupling, any_coupling
 from chladni.gap.explanation.contest import lowest, weighed
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.diagnosis import Verdict
@@ -29,9 +29,6 @@ _LEADS = 2
 _CLEAN = 1.6
 #: Share of what a sensor leaves that follows its own signal in a curve: more is no noise.
 _DISTORTED = 0.2
-#: What velocities that push each other may leave of what the believed cause leaves beyond the noise's power, and of
-#: the gap, to be believed in its place; asked for where that cause leaves so much of the noise's power.
-_COUPLED, _OF_GAP, _ASKED = 0.5, 0.05, 1.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,8 +53,8 @@ class Causes:
         The floor, lowered to what `best` leaves of it where that is less.
     distorted
         Outputs whose residual, when nothing is named, follows their own signal in a curve.
-    coupled
-        Bodies whose velocities push each other, when that explains what no word names.
+    instead
+        What explains the gap better without being a word; nothing is named then.
     """
 
     verdict: Verdict
@@ -68,14 +65,14 @@ class Causes:
     shaken: ShakenGround | None
     noise: NoiseFloor
     distorted: tuple[str, ...]
-    coupled: Coupling | None = None
+    instead: Instead | None = None
 
 
 def causes_of(study: Study, progress: Step) -> Causes:
     """Enter hypotheses and judge."""
     nothing = without_cause(study)
     progress(0.1)
-    entered, coupled = _searched(study, nothing, progress)
+    entered, instead = _searched(study, nothing, progress)
     progress(1.0)
     together = weighed([nothing, *entered])
     tuned = next(one for one in together if one.fit is nothing.fit)
@@ -84,10 +81,9 @@ def causes_of(study: Study, progress: Step) -> Causes:
     noise = study.contest.noise.lowered(best.held)
     floor = lowest(together)
     verdict = _verdict(tuned, best, floor)
-    if coupled is not None:
-        # A late sensor and a mount do much the same, but leave more.
+    if instead is not None:
         verdict = "unknown"
-    shaken = shaken_by(study) if verdict == "unknown" and coupled is None else None
+    shaken = shaken_by(study) if verdict == "unknown" and instead is None else None
     if shaken is not None or (verdict == "none" and study.lattices):
         verdict = "effect"
     distorted = _distorted(study, tuned) if verdict in ("none", "unknown") else ()
@@ -105,21 +101,21 @@ def causes_of(study: Study, progress: Step) -> Causes:
         shaken=shaken,
         noise=noise,
         distorted=distorted,
-        coupled=coupled,
+        instead=instead,
     )
 
 
-def _searched(study: Study, nothing: Contestant, progress: Step) -> tuple[list[Contestant], Coupling | None]:
-    """Every contestant with a cause: single ones, and two where one leaves something that no coupling explains."""
+def _searched(study: Study, nothing: Contestant, progress: Step) -> tuple[list[Contestant], Instead | None]:
+    """Every contestant with a cause: single ones, and two where one leaves something that nothing else explains."""
     added = added_nats(study.location)
     found = single_causes(study, progress)
 
     def best() -> Contestant:
         return _best(weighed([nothing, *found]), nothing, added)
 
-    coupled = _coupled(study, best())
-    if best().chi < ALONE or is_one_force(study.location) or coupled is not None:
-        return found, coupled
+    instead = explained_instead(study, best())
+    if best().chi < ALONE or is_one_force(study.location) or instead is not None:
+        return found, instead
     for lead in _leads(weighed(found)):
         if best().chi > ALONE:
             found += second_causes(study, lead)
@@ -160,15 +156,6 @@ def _distorted(study: Study, tuned: Contestant) -> tuple[str, ...]:
     return tuple(
         name for name, share in zip(study.measurement.output_names, shares, strict=True) if share > _DISTORTED
     )
-
-
-def _coupled(study: Study, best: Contestant) -> Coupling | None:
-    """Bodies whose velocities push each other, when that leaves much less than the believed cause."""
-    if best.chi < _ASKED:
-        return None
-    found = any_coupling(study.location)
-    most = min(_COUPLED * (best.chi - 1.0), _OF_GAP * (study.location.tuned.chi - 1.0))
-    return found if found is not None and found.chi - 1.0 < most else None
 
 
 def _verdict(tuned: Contestant, best: Contestant, floor: Matrix) -> Verdict:

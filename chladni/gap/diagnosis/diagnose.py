@@ -268,8 +268,13 @@ def _remarks(study: Study, causes: Causes) -> list[str]:
         )
     if causes.distorted:
         found.append(f"{', '.join(causes.distorted)}: what is left follows its own signal in a curve or in steps")
-    if causes.coupled is not None:
-        found.append(_coupling(causes.coupled))
+    if causes.instead is not None and causes.instead.coupled is not None:
+        found.append(_coupling(causes.instead.coupled))
+    if causes.instead is not None and causes.instead.loopless is not None:
+        found.append(
+            f"the force at {causes.instead.loopless} is a function of displacement and velocity; "
+            "a loop of hysteresis comes near to it, and leaves more"
+        )
     if causes.tuned.fit.undetermined:
         names = ", ".join(causes.tuned.fit.undetermined[:6])
         found.append(f"this log doesn't determine {names}: held near nominal")

@@ -1,0 +1,52 @@
+"""What explains a gap better than the believed cause, without being a word of the catalogue."""
+
+from dataclasses import dataclass
+
+from chladni.gap.diagnosis.study import Study
+from chladni.gap.explanation.any_coupling import Coupling, any_coupling
+from chladni.gap.explanation.any_law import left_by_any_law
+from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.location.locate import Location
+
+#: Of what the believed cause leaves beyond the noise's power: what leaves less than this share of it is better.
+_BETTER = 0.5
+#: What a coupling may leave of the gap; most of the noise's power with which nothing else is asked for.
+_OF_GAP, _ASKED = 0.05, 1.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Instead:
+    """Velocities of bodies that push each other, or the joint whose force is a function where a loop was named."""
+
+    coupled: Coupling | None = None
+    loopless: str | None = None
+
+
+def explained_instead(study: Study, best: Contestant) -> Instead | None:
+    """Give what leaves less than half of what the believed cause does, None when nothing of it does.
+
+    A late sensor and a mount do much the same as a wheel that spins between two bodies, but leave more. A loop of
+    hysteresis does much the same as a function of displacement and velocity, which is no loop, but leaves more.
+    """
+    if best.chi < _ASKED:
+        return None
+    left = _BETTER * (best.chi - 1.0)
+    gap = study.location.tuned.chi - 1.0
+    found = any_coupling(study.location)
+    if found is not None and found.chi - 1.0 < min(left, _OF_GAP * gap):
+        return Instead(coupled=found)
+    effects = best.hypothesis.effects
+    if len(effects) == 1 and effects[0].effect == "hysteresis":
+        share = _left_by_function(study.location, effects[0].site)
+        if share is not None and share * gap < left:
+            return Instead(loopless=effects[0].site)
+    return None
+
+
+def _left_by_function(location: Location, name: str) -> float | None:
+    """Share of the gap that any function of displacement and velocity leaves, None where no force is told."""
+    for located in location.ranked:
+        for site in located.places[0].sites:
+            if site.name == name:
+                return left_by_any_law(location, located, site)
+    return None
