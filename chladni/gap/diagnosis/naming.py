@@ -17,14 +17,15 @@ _SHAKEN, _LATTICE = 0.9, 0.92
 
 
 def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
-    """Give the causes that a verdict names, the surest first."""
+    """Give the causes that a verdict names; of several the one first that alone leaves least."""
     if causes.verdict not in ("effect", "parameters"):
         return ()
     if causes.shaken is not None:
         return (_plain("base_vibration", "ground", _SHAKEN, group=causes.shaken.group),)
     found: list[Cause] = []
     if causes.best is not causes.tuned:
-        found += [_cause(causes, place) for place in range(len(causes.best.hypothesis.named))]
+        places = range(len(causes.best.hypothesis.named))
+        found += [_cause(causes, place) for place in sorted(places, key=lambda place: _left_alone(causes, place))]
     if causes.verdict == "effect":
         taken = {(one.effect, one.site) for one in found}
         found += [
@@ -92,6 +93,12 @@ def _cause(causes: Causes, place: int) -> Cause:
         variant=effect.variant if effect is not None else None,
         source=effect.source if effect is not None else None,
     )
+
+
+def _left_alone(causes: Causes, place: int) -> float:
+    """Least that one of the believed causes leaves when it's the only one."""
+    candidate = causes.best.hypothesis.named[place]
+    return min((one.chi for one in causes.ranked if one.hypothesis.named == (candidate,)), default=np.inf)
 
 
 def _in_its_place(causes: Causes, candidate: Candidate) -> list[Candidate]:
