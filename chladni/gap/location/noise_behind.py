@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from chladni.gap.comparison.autoregressive import noise_floor_of
-from chladni.gap.location.profile import Elimination, Profile
+from chladni.gap.location.profile import Profile, Projection
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.record_lines import all_lines
 from chladni.gap.records.noise_floor import NoiseFloor
@@ -31,7 +31,7 @@ def noise_behind(problem: LinearProblem, found: Profile) -> NoiseFloor:
     whole = problem.on(all_lines(measurement.samples, measurement.sample_rate_hz))
     view = whole.view(found.z)
     patterns = [whole.pattern(view, site) for site in found.sites]
-    out = Elimination(patterns, whole.transients(view))
+    out = Projection(patterns)
     residual = (whole.measured - view.response(found.transient, ())) * whole.weight
     left = np.abs(out.away(residual)[:, 0]) ** 2
     size = len(left)

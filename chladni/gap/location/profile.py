@@ -59,6 +59,26 @@ class Profile:
         return 2.0 * self.misfit + self.prior
 
 
+class Projection:
+    """Takes from whitened spectra what forces of any shape at some sites can print.
+
+    Parameters
+    ----------
+    patterns
+        ``[output, 1, line]`` of each site.
+    """
+
+    def __init__(self, patterns: Sequence[Spectrum]) -> None:
+        self._unit = _orthonormal(patterns)
+
+    def away(self, spectra: Spectrum) -> Spectrum:
+        """Take the forces from ``[..., output, segment, line]``."""
+        for known in self._unit:
+            share = np.einsum("ol,...osl->...sl", known[:, 0].conj(), spectra)
+            spectra = spectra - known * share[..., None, :, :]
+        return spectra
+
+
 class Elimination:
     """Takes from whitened spectra what forces of any shape at some sites, and transients, can print.
 
@@ -72,7 +92,7 @@ class Elimination:
 
     def __init__(self, patterns: Sequence[Spectrum], transients: Spectrum) -> None:
         self._patterns = np.asarray(patterns, dtype=np.complex128)
-        self._unit = _orthonormal(patterns)
+        self.away = Projection(patterns).away
         self._transients = transients
         stacked = _real(self.away(transients))[:, 0]
         size = np.sqrt(np.einsum("sn,sn->s", stacked, stacked))
@@ -84,13 +104,6 @@ class Elimination:
         left, values, _ = np.linalg.svd(self._upper)
         kept = left[:, : values.size][:, values > _RANK * max(values.max(initial=0.0), 1e-300)]
         self._kept = kept @ kept.T
-
-    def away(self, spectra: Spectrum) -> Spectrum:
-        """Take the forces from ``[..., output, segment, line]``."""
-        for known in self._unit:
-            share = np.einsum("ol,...osl->...sl", known[:, 0].conj(), spectra)
-            spectra = spectra - known * share[..., None, :, :]
-        return spectra
 
     def rest(self, spectra: Spectrum) -> Matrix:
         """Take forces and transients; give real numbers ``[..., number]``."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.location.profile import Elimination, Profile
+from chladni.gap.location.profile import Profile, Projection
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import RecordLines, all_lines
@@ -142,10 +142,9 @@ def _unknown(
     pattern: Spectrum, beside: Sequence[Spectrum], residual: Spectrum, transients: Spectrum, transient: Matrix
 ) -> _Unknown:
     """Recover the force along a pattern ``[output, line]`` with what lies along those beside it taken away."""
-    away = Elimination([one[:, None] for one in beside], transients[:, :, None]).away if beside else None
-    if away is not None:
-        pattern, residual = away(pattern[:, None])[:, 0], away(residual[:, None])[:, 0]
-        transients = away(transients[:, :, None])[:, :, 0]
+    away = Projection([one[:, None] for one in beside]).away
+    pattern, residual = away(pattern[:, None])[:, 0], away(residual[:, None])[:, 0]
+    transients = away(transients[:, :, None])[:, :, 0]
     strength = np.sum(np.abs(pattern) ** 2, axis=0)
     thought = 1.0 / np.maximum(strength, 1e-200)
     for _ in range(2):
