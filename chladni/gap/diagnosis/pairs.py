@@ -6,7 +6,7 @@ import numpy as np
 
 from chladni.gap.diagnosis.search import sound
 from chladni.gap.diagnosis.study import Study
-from chladni.gap.explanation.candidates import promised, screened
+from chladni.gap.explanation.candidates import Form, forms_at, promised, screened, searched
 from chladni.gap.explanation.hypotheses import effect_hypotheses, hypothesis_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.known_effect import KnownEffect
@@ -67,9 +67,9 @@ def paired_causes(study: Study) -> list[Contestant]:
     if not pairs or pairs[0].profile.chi > _PAIR_GAIN * single:
         return []
     near = [one for one in pairs if one.profile.chi < _PAIR_TIE * pairs[0].profile.chi][:_SCREENED]
-    if len(near) > _PAIRS:
-        near.sort(key=lambda pair: promised(study.location, pair, study.leave_out))
-    both = [one for pair in near[:_PAIRS] for one in _of_pair(study, pair)]
+    weighed = [(pair, forms_at(study.location, [pair], study.leave_out, study.own)) for pair in near]
+    weighed.sort(key=lambda one: promised(*one))
+    both = [one for pair, forms in weighed[:_PAIRS] for one in _of_pair(study, pair, forms)]
     return sound(study, study.contest.enter_all(both))
 
 
@@ -108,8 +108,8 @@ def _behind(
     return locate(model, rest, floor, contest.run.tunables, found.fit.z), known
 
 
-def _of_pair(study: Study, pair: Located) -> list[Hypothesis]:
-    found = screened(study.location, [pair], study.leave_out, study.own)
+def _of_pair(study: Study, pair: Located, weighed: Sequence[Form]) -> list[Hypothesis]:
+    found = searched([pair], weighed)
     forms = []
     for place in pair.places:
         there = [one for one in found if one.trial.site.name in place.names]

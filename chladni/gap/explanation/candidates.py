@@ -27,6 +27,9 @@ _REFINED, _REFINED_EACH = 16, 3
 #: Misfit over the best form's beyond which a form is not searched; over the best place's up to which a place is.
 _HOPELESS, _PLAUSIBLE = 100.0, 3.0
 
+#: A form of a law, and the screen that weighed it.
+Form = tuple[Screened, Screen]
+
 
 def screened(
     location: Location,
@@ -47,43 +50,43 @@ def screened(
         What was taken from the log before it was located, when another effect is known already.
     """
     places = list(places)
-    found = _weighed(location, places, leave_out, own, known)
+    return searched(places, forms_at(location, places, leave_out, own, known))
+
+
+def searched(places: Sequence[Located], forms: Sequence[Form]) -> list[Screened]:
+    """Search the most promising of the forms at some places beyond their grid; the best of each, by rising cost."""
+    found = sorted(forms, key=lambda one: one[0].cost)
     enough = _PLAUSIBLE * min((one.profile.chi for one in places), default=0.0)
     plausible = {site for one in places if one.profile.chi < enough for site, _ in sites_at(one)}
-    found.sort(key=lambda one: one[0].cost)
-    best: dict[tuple[str, str, str | None, str | None], tuple[Screened, Screen]] = {}
+    best: dict[tuple[str, str, str | None, str | None], Form] = {}
     for one, screen in found:
         best.setdefault((one.trial.effect, one.trial.site.name, one.trial.variant, one.trial.source), (one, screen))
     worth = _worth_a_search([one for one, _ in best.values()], plausible)
-    searched = {place: _searched(one, screen) for place, (one, screen) in enumerate(best.values()) if place in worth}
-    sure = [one for one in searched.values() if one is not None]
+    ends = {place: _searched(one, screen) for place, (one, screen) in enumerate(best.values()) if place in worth}
+    sure = [one for one in ends.values() if one is not None]
     # What others leave is a promise of the linearisation at their place.
-    unsure = [one for place, (one, _) in enumerate(best.values()) if searched.get(place) is None]
+    unsure = [one for place, (one, _) in enumerate(best.values()) if ends.get(place) is None]
     return [*sorted(sure, key=lambda one: one.cost), *sorted(unsure, key=lambda one: one.cost)]
 
 
-def promised(location: Location, pair: Located, leave_out: frozenset[str]) -> float:
+def promised(pair: Located, forms: Iterable[Form]) -> float:
     """Least cost that a law at each of two places promises while the other's force is free; of both, the larger."""
-    found = _weighed(location, [pair], leave_out, {}, None)
-    best = [
-        min((one.cost for one, _ in found if one.trial.site.name in place.names), default=np.inf)
-        for place in pair.places
-    ]
-    return max(best)
+    costs = [(one.trial.site.name, one.cost) for one, _ in forms]
+    return max(min((cost for name, cost in costs if name in place.names), default=np.inf) for place in pair.places)
 
 
-def _weighed(
+def forms_at(
     location: Location,
     places: Iterable[Located],
     leave_out: frozenset[str],
     own: Mapping[str, EffectKind],
-    known: KnownEffect | None,
-) -> list[tuple[Screened, Screen]]:
-    """Every form at the sites of some places at the best point of its grid, with the screen that weighed it."""
+    known: KnownEffect | None = None,
+) -> list[Form]:
+    """Give every form at the sites of some places at the best point of its grid, with the screen that weighed it."""
     problem = location.problem
     measurement = problem.measurement if known is None else known.behind(problem.measurement)
     band = excited_band_hz(problem.measurement)
-    found: list[tuple[Screened, Screen]] = []
+    found: list[Form] = []
     for located in places:
         for site, others in sites_at(located):
             motion = recovered(problem, located.profile, site, others)
