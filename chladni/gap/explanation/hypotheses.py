@@ -32,8 +32,8 @@ _DETAILS: Mapping[str, tuple[str, ...]] = {
     "ripple": ("phase",),
     "tonal_disturbance": ("phase",),
 }
-#: Speed over the joint's RMS speed at which a Stribeck curve begins its search.
-_STRIBECK_SPEED = 0.2
+#: Speeds over the joint's RMS speed at which a Stribeck curve begins its search: from one it may end as Coulomb's.
+_STRIBECK_SPEEDS = (0.2, 0.6)
 #: Misfit over another's up to which a screened form is as good, and how many of those are tried too.
 _TIED, _TIES = 1.02, 2
 #: How far one may be searched for outside its tolerance, in sigmas.
@@ -93,7 +93,7 @@ def effect_of(one: Screened, own: Mapping[str, EffectKind]) -> AttachedEffect | 
 
 
 def siblings(found: Contestant, run: FreeRun) -> list[Hypothesis]:
-    """Give the Stribeck friction that begins where a Coulomb friction ended, for each: nested laws compete."""
+    """Give the Stribeck frictions that begin where a Coulomb friction ended, for each: nested laws compete."""
     fit, hypotheses = found.fit, []
     for place, plain in enumerate(fit.effects):
         if plain.effect != "coulomb_friction":
@@ -102,9 +102,10 @@ def siblings(found: Contestant, run: FreeRun) -> list[Hypothesis]:
             velocity = run.motion(fit.z, fit.effects, site=plain.site).velocity
         except ModelError:
             continue
-        richer = _stribeck_beside(plain, _STRIBECK_SPEED * float(np.sqrt(np.mean(velocity**2))))
-        effects = (*fit.effects[:place], richer, *fit.effects[place + 1 :])
-        hypotheses.append(hypothesis_of(effects, fit.z, screened=found.hypothesis.screened))
+        for share in _STRIBECK_SPEEDS:
+            richer = _stribeck_beside(plain, share * float(np.sqrt(np.mean(velocity**2))))
+            effects = (*fit.effects[:place], richer, *fit.effects[place + 1 :])
+            hypotheses.append(hypothesis_of(effects, fit.z, screened=found.hypothesis.screened))
     return hypotheses
 
 
