@@ -19,7 +19,7 @@ Matrix = NDArray[np.float64]
 _Rough = tuple[Profile, Place]
 #: Lengths of the segments on which parameters are found, in periods of the lowest mode, one after another: short
 #: ones forgive a resonance that lies elsewhere, long ones tell it exactly.
-_SEGMENTS = (8.0, 24.0)
+_SEGMENTS = (2.0, 8.0, 24.0)
 _SEGMENT_LINES = 1500
 _RECORD_LINES = 1500
 #: Places that are followed to the end: so many, and more where the segments don't tell them apart.
