@@ -19,7 +19,6 @@ from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
 from chladni.gap.diagnosis.other_logs import closing_elsewhere
 from chladni.gap.diagnosis.study import Study, study_of
-from chladni.gap.explanation.any_coupling import Coupling
 from chladni.gap.explanation.shaken_ground import predicted_by_others
 from chladni.gap.linear_algebra import in_one_thread
 from chladni.gap.location.profile import profile_at
@@ -268,28 +267,12 @@ def _remarks(study: Study, causes: Causes) -> list[str]:
         )
     if causes.distorted:
         found.append(f"{', '.join(causes.distorted)}: what is left follows its own signal in a curve or in steps")
-    if causes.instead is not None and causes.instead.coupled is not None:
-        found.append(_coupling(causes.instead.coupled))
-    if causes.instead is not None and causes.instead.loopless is not None:
-        found.append(
-            f"the force at {causes.instead.loopless} is a function of displacement and velocity; "
-            "a loop of hysteresis comes near to it, and leaves more"
-        )
     if causes.tuned.fit.undetermined:
         names = ", ".join(causes.tuned.fit.undetermined[:6])
         found.append(f"this log doesn't determine {names}: held near nominal")
     if np.any(causes.noise.upper_bound):
         found.append("the noise floor of some outputs is an upper bound: distortion may be in it")
     return found
-
-
-def _coupling(found: Coupling) -> str:
-    told = f"{found.on_first:.4g} on {found.first} and {found.on_second:.4g} on {found.second}"
-    return (
-        f"forces that follow the velocities of bodies explain the gap, most of all between {found.first} and "
-        f"{found.second}: -C v of the other with C = {told} (SI); equal ones are a damper's that the model lacks, "
-        "opposite ones a spinning wheel's"
-    )
 
 
 def _next(study: Study, causes: Causes, seed: int) -> str | None:
@@ -309,8 +292,10 @@ def _next(study: Study, causes: Causes, seed: int) -> str | None:
 
 
 def _advice(causes: Causes) -> str | None:
+    if causes.instead is not None:
+        return causes.instead.sentence()
     if causes.verdict == "unknown":
-        return "no effect of the catalogue explains the gap; the site and the recovered force say where to look"
+        return "No effect of the catalogue explains the gap; the site and the recovered force say where to look."
     if causes.verdict == "none" and causes.tuned.chi > 1.2:
-        return "what is left beside the noise is too little to be named"
+        return "What is left beside the noise is too little to be named."
     return None

@@ -21,6 +21,15 @@ class Instead:
     coupled: Coupling | None = None
     loopless: str | None = None
 
+    def sentence(self) -> str:
+        """Say what fits."""
+        if self.coupled is not None:
+            return f"What fits is no effect of the catalogue: {self.coupled.sentence()}."
+        return (
+            f"The force at {self.loopless} is a function of displacement and velocity: "
+            "a loop of hysteresis comes near, and leaves more."
+        )
+
 
 def explained_instead(study: Study, best: Contestant) -> Instead | None:
     """Give what leaves less than half of what the believed cause does, None when nothing of it does.

@@ -17,6 +17,8 @@ _Pair = tuple[str, str]
 _STEP = 0.05
 #: Steps that a coefficient may take from zero, and those of its tolerance that a parameter may.
 _FREE, _BOUNDED = 1e4, 3.0
+#: Coefficients that differ by less than this share are the same.
+_NEARLY = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +34,8 @@ class Coupling:
     on_first, on_second
         C from the second's velocity to the force on the first, and the other way round, SI: equal as of a damper
         between them, opposite as where a wheel spins.
+    units
+        Of these two.
     """
 
     chi: float
@@ -39,6 +43,26 @@ class Coupling:
     second: str
     on_first: float
     on_second: float
+    units: tuple[str, str]
+
+    def sentence(self) -> str:
+        """Say which force acts where, and what does that."""
+        first, second = (
+            f"{-size:.3g} {unit} times the velocity of {other} on {body}"
+            for size, unit, body, other in (
+                (self.on_first, self.units[0], self.first, self.second),
+                (self.on_second, self.units[1], self.second, self.first),
+            )
+        )
+        return f"forces of {first} and {second}{self._meaning()}"
+
+    def _meaning(self) -> str:
+        larger = max(abs(self.on_first), abs(self.on_second))
+        if abs(self.on_first - self.on_second) < _NEARLY * larger:
+            return ", as of a damper between them that the model lacks"
+        if abs(self.on_first + self.on_second) < _NEARLY * larger:
+            return ", as where a wheel spins between them"
+        return ""
 
 
 def any_coupling(location: Location) -> Coupling | None:
@@ -66,7 +90,13 @@ def any_coupling(location: Location) -> Coupling | None:
         second=second,
         on_first=size[first, second] * steps[first, second],
         on_second=size[second, first] * steps[second, first],
+        units=(_unit(nominal, first, second), _unit(nominal, second, first)),
     )
+
+
+def _unit(compiled: CompiledModel, on: str, of: str) -> str:
+    forced, moving = (compiled.ports[compiled.port_index(name, "body")] for name in (on, of))
+    return f"{forced.unit} s/{moving.displacement_unit}"
 
 
 def _steps(compiled: CompiledModel, bodies: list[str]) -> dict[_Pair, float]:

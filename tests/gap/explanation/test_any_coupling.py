@@ -74,6 +74,7 @@ def test_velocities_explain_no_other_effect(word: str, site: str, values: dict[s
 def test_a_wheel_is_no_effect_of_the_catalogue_and_the_answer_says_what_fits() -> None:
     found = diagnose(arm(), [measured((Wheel(),), seed=3)])
     assert found.verdict == "unknown"
-    (told,) = (one for one in found.remarks if "velocities of bodies" in one)
-    assert "column" in told
-    assert "wrist" in told
+    assert found.advice is not None
+    assert "times the velocity of wrist on column" in found.advice
+    assert "N s/m" in found.advice
+    assert "wheel" in found.advice
