@@ -11,7 +11,7 @@ from chladni.gap.location.locate import Location
 #: Of what the believed cause leaves beyond the noise's power: what leaves less than this share of it is better.
 _BETTER = 0.5
 #: What a coupling may leave of the gap; most of the noise's power with which nothing else is asked for.
-_OF_GAP, _ASKED = 0.05, 1.1
+_OF_GAP, _ASKED = 0.01, 1.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,48 @@
+"""A loop of hysteresis isn't believed where a function of displacement and velocity leaves less."""
+
+import numpy as np
+import pytest
+
+from chladni.gap.diagnosis.instead import explained_instead
+from chladni.gap.diagnosis.study import Study, study_of
+from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.models.effects.attached_effect import AttachedEffect, attached
+from tests.gap.arm import arm, measured
+
+LOOP = attached("hysteresis", "elbow", {"force": 20.0, "yield": 1e-4, "shape": 2.0})
+DRAG = attached("quadratic_damping", "elbow", {"coefficient": 300.0})
+
+
+def study(effect: AttachedEffect) -> Study:
+    return study_of(arm(), measured((effect,), seed=5), leave_out=frozenset(), own={})
+
+
+def believed(effect: AttachedEffect, left: float) -> Contestant:
+    """An effect that leaves this mean square, in units of the noise."""
+    hypothesis = Hypothesis(effects=(effect,), fitted=((),), start_z=np.zeros(0))
+    return Contestant(hypothesis=hypothesis, fit=None, held=np.full(3, left), gap=0.0, prior=0.0)
+
+
+@pytest.fixture(scope="module")
+def dragged() -> Study:
+    return study(DRAG)
+
+
+def test_drag_is_no_loop(dragged: Study) -> None:
+    gap = dragged.location.tuned.chi
+    assert gap > 10.0
+    found = explained_instead(dragged, believed(LOOP, 1.0 + 0.05 * gap))
+    assert found is not None
+    assert found.loopless == "elbow"
+    assert "elbow" in found.sentence()
+
+
+def test_other_words_are_not_contradicted_by_a_function(dragged: Study) -> None:
+    assert explained_instead(dragged, believed(DRAG, 1.0 + 0.05 * dragged.location.tuned.chi)) is None
+
+
+def test_a_loop_that_leaves_little_stays() -> None:
+    looped = study(LOOP)
+    assert looped.location.tuned.chi > 10.0
+    assert explained_instead(looped, believed(LOOP, 1.0 + 0.02 * looped.location.tuned.chi)) is None
+    assert explained_instead(looped, believed(LOOP, 1.05)) is None
