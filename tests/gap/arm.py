@@ -48,6 +48,7 @@ def measured(
     off: dict[str, float] | None = None,
     colour: float = 0.0,
     model: StructureModel | None = None,
+    force: NDArray[np.float64] | None = None,
 ) -> Measurement:
     """Simulate the real machine and measure it.
 
@@ -59,6 +60,8 @@ def measured(
         True values of parameters over the nominal ones; by default each is off by a few per cent.
     colour
         Coefficient of a first-order autoregressive noise; 0 for white.
+    force
+        ``[sample]`` of the shaker, N; low-passed noise by default.
     """
     rng = np.random.default_rng(seed)
     nominal = model or arm()
@@ -67,7 +70,7 @@ def measured(
     )
     real = nominal.with_values({name: nominal.parameters[name].value * factor for name, factor in factors.items()})
     count = round(seconds * RATE_HZ)
-    force = _low_passed(200.0 * rng.standard_normal(count))
+    force = _low_passed(200.0 * rng.standard_normal(count)) if force is None else force
     series = TimeSeries(
         values=force[None], sample_rate_hz=RATE_HZ, channels=(Channel(name="shaker", unit="N", role="reference"),)
     )

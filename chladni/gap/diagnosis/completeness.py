@@ -18,7 +18,7 @@ _LEFT, _UNCOUNTED = (0.38, 0.16), 0.05
 #: How sharply more speaks against it.
 _SHARPNESS = 0.2
 #: Probability that the cause of a large gap is one of those that took part, and how much smaller a faint gap's is.
-_KNOWN, _FAINT = 0.92, 0.2
+_KNOWN, _FAINT = 0.95, 0.2
 
 
 def completeness(tuned: Contestant, found: Contestant, floor: Matrix) -> float:
@@ -45,8 +45,8 @@ def completeness(tuned: Contestant, found: Contestant, floor: Matrix) -> float:
 def known_share(tuned: Contestant, floor: Matrix) -> float:
     """Probability that a cause is one of those that took part, not one that they imitate.
 
-    Of the names that were given with confidence to made machines, a tenth of which hid something else, about nine in
-    ten were right; where the gap is no larger than the noise, three in four.
+    Of the names that were given with confidence to made machines, a tenth of which hid something else, about nineteen
+    in twenty were right; where the gap is no larger than the noise, three in four.
 
     Parameters
     ----------

@@ -2,16 +2,22 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.any_coupling import Coupling, any_coupling
 from chladni.gap.explanation.any_law import left_by_any_law
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.location.locate import Location
+from chladni.gap.location.recovered import Recovered, recovered
 
 #: Of what the believed cause leaves beyond the noise's power: what leaves less than this share of it is better.
 _BETTER = 0.5
 #: What a coupling may leave of the gap; most of the noise's power with which nothing else is asked for.
 _OF_GAP, _ASKED = 0.01, 1.1
+#: Intervals of displacement and of velocity with equally many samples, and the share of their pairs in which a motion
+#: must be for a fifth of an equal share of the time: along one orbit every force is a function of both.
+_INTERVALS, _VISITED, _OFTEN = 8, 0.8, 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,9 +59,17 @@ def explained_instead(study: Study, best: Contestant) -> Instead | None:
 
 
 def _left_by_function(location: Location, name: str) -> float | None:
-    """Share of the gap that any function of displacement and velocity leaves, None where no force is told."""
+    """Share of the gap that any function of displacement and velocity leaves; None where that says nothing."""
     for located in location.ranked:
         for site in located.places[0].sites:
-            if site.name == name:
+            if site.name == name and _visited(recovered(location.problem, located.profile, site)) > _VISITED:
                 return left_by_any_law(location, located, site)
     return None
+
+
+def _visited(motion: Recovered) -> float:
+    """Share of pairs of intervals, of displacement and of velocity, in which a motion often is."""
+    shares = np.linspace(0.0, 1.0, _INTERVALS + 1)[1:-1]
+    way, pace = (np.digitize(one, np.quantile(one, shares)) for one in (motion.displacement, motion.velocity))
+    count = np.bincount(_INTERVALS * way + pace, minlength=_INTERVALS**2)
+    return float(np.mean(count > _OFTEN * count.mean()))

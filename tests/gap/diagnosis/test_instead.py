@@ -7,7 +7,7 @@ from chladni.gap.diagnosis.instead import explained_instead
 from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.models.effects.attached_effect import AttachedEffect, attached
-from tests.gap.arm import arm, measured
+from tests.gap.arm import RATE_HZ, arm, measured
 
 LOOP = attached("hysteresis", "elbow", {"force": 20.0, "yield": 1e-4, "shape": 2.0})
 DRAG = attached("quadratic_damping", "elbow", {"coefficient": 300.0})
@@ -46,3 +46,11 @@ def test_a_loop_that_leaves_little_stays() -> None:
     assert looped.location.tuned.chi > 10.0
     assert explained_instead(looped, believed(LOOP, 1.0 + 0.02 * looped.location.tuned.chi)) is None
     assert explained_instead(looped, believed(LOOP, 1.05)) is None
+
+
+def test_along_one_orbit_any_force_is_a_function_and_nothing_is_contradicted() -> None:
+    turns = 2.0 * np.pi * 11.3 * np.arange(4000) / RATE_HZ
+    force = 200.0 * np.sin(turns)
+    log = measured((DRAG,), seed=5, force=force)
+    orbit = study_of(arm(), log, leave_out=frozenset(), own={})
+    assert explained_instead(orbit, believed(LOOP, 1.0 + 0.05 * orbit.location.tuned.chi)) is None
