@@ -79,7 +79,7 @@ class Projection:
         return spectra
 
 
-class Elimination:
+class Elimination(Projection):
     """Takes from whitened spectra what forces of any shape at some sites, and transients, can print.
 
     Parameters
@@ -91,8 +91,8 @@ class Elimination:
     """
 
     def __init__(self, patterns: Sequence[Spectrum], transients: Spectrum) -> None:
+        super().__init__(patterns)
         self._patterns = np.asarray(patterns, dtype=np.complex128)
-        self.away = Projection(patterns).away
         self._transients = transients
         stacked = _real(self.away(transients))[:, 0]
         size = np.sqrt(np.einsum("sn,sn->s", stacked, stacked))

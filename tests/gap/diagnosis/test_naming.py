@@ -18,7 +18,7 @@ def contestant(chi: float, *effects: AttachedEffect) -> Contestant:
     """A fit of some effects that leaves this mean square, in units of the noise."""
     fit = SimpleNamespace(effects=effects, effect_std=tuple({} for _ in effects))
     hypothesis = Hypothesis(effects=effects, fitted=((),) * len(effects), start_z=np.zeros(0))
-    return Contestant(hypothesis=hypothesis, fit=fit, held=np.full(2, chi), gap=0.0, prior=0.0)  # type: ignore[arg-type]
+    return Contestant(hypothesis=hypothesis, fit=fit, held=np.full(2, chi), gap=0.0, prior=0.0)
 
 
 @pytest.mark.parametrize(("lag", "mount", "first"), [(5.0, 50.0, "lag"), (50.0, 5.0, "mounting_resonance")])
@@ -31,9 +31,9 @@ def test_the_cause_that_alone_leaves_least_comes_first(lag: float, mount: float,
         ranked=(both, contestant(lag, LAG), contestant(mount, MOUNT)),
         probabilities=(0.9, 0.05, 0.05),
         shaken=None,
-        noise=None,  # type: ignore[arg-type]
+        noise=None,
         distorted=(),
     )
-    named = causes_named(SimpleNamespace(lattices={}), causes)  # type: ignore[arg-type]
+    named = causes_named(SimpleNamespace(lattices={}), causes)
     assert named[0].effect == first
     assert len(named) == 2
