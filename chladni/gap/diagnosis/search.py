@@ -10,6 +10,7 @@ from chladni.gap.explanation.contest import weighed
 from chladni.gap.explanation.degenerate import is_degenerate
 from chladni.gap.explanation.hypotheses import effect_hypotheses, polished, siblings, wrong_parameters
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.gap.explanation.linear_words import linear_hypotheses
 from chladni.gap.location.locate import Located, Location
 from chladni.signals.errors import EstimateError
 
@@ -68,7 +69,10 @@ def single_causes(study: Study, progress: Step) -> list[Contestant]:
     wrong = wrong_parameters(location)
     entered = contest.enter_all([*hypotheses, *([wrong] if wrong else [])], lambda done: progress(0.3 + 0.5 * done))
     found = sound(study, entered)
-    if min((one.chi for one in found), default=np.inf) > ALONE:
+    if _lowest(found) > ALONE:
+        linear = linear_hypotheses(study.model, location, candidates, study.own)
+        found += sound(study, contest.enter_all(linear))
+    if _lowest(found) > ALONE:
         others = _others(effect_hypotheses(candidates, study.own, count=_AGAIN), hypotheses)
         found += sound(study, contest.enter_all(others))
     ranked = weighed([*found, *sibling_causes(study, weighed(found))])
@@ -77,6 +81,10 @@ def single_causes(study: Study, progress: Step) -> list[Contestant]:
         forms = _best_forms(ranked)
         ranked = [*(_polished(study, one) for one in forms), *(one for one in ranked if one not in forms)]
     return weighed(ranked)
+
+
+def _lowest(found: Sequence[Contestant]) -> float:
+    return min((one.chi for one in found), default=np.inf)
 
 
 def _others(found: Sequence[Hypothesis], tried: Sequence[Hypothesis]) -> list[Hypothesis]:

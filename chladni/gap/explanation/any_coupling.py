@@ -1,14 +1,14 @@
 """Whether velocities of bodies that push each other explain a gap: a linear law, whatever joins the bodies."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.location.locate import Location, tuned_stepwise
-from chladni.gap.plant.linear_problem import LinearProblem, Scaled, Varied
+from chladni.gap.plant.further_numbers import with_further
+from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.models.core.compiled_model import CompiledModel
 
 Matrix = NDArray[np.float64]
@@ -112,57 +112,25 @@ def _steps(compiled: CompiledModel, bodies: list[str]) -> dict[_Pair, float]:
 
 
 def _coupled(problem: LinearProblem, steps: Mapping[_Pair, float]) -> LinearProblem:
-    model = _CoupledModel(model=problem.model, coefficients=dict.fromkeys(steps, 0.0))
-    scaled = _WithCoefficients(tunables=problem.tunables, steps=steps)
-    return LinearProblem(model, problem.measurement, problem.noise, scaled, problem.lines)
+    """Give the problem with coefficients in steps behind its parameters."""
+    bodies = list(dict.fromkeys(one for one, _ in steps))
+    size = np.array(list(steps.values()))
+
+    def make(parameters: Mapping[str, float], numbers: Matrix) -> CompiledModel:
+        compiled = problem.model.with_values(parameters).compile()
+        return _with_forces(compiled, bodies, (size * numbers).reshape(len(bodies), len(bodies)))
+
+    return with_further(problem, len(steps), make)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _WithCoefficients:
-    """Parameters of a model, then the coefficients in steps."""
-
-    tunables: Scaled
-    steps: Mapping[_Pair, float]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return (*self.tunables.names, *(_name(pair) for pair in self.steps))
-
-    def values(self, z: Matrix) -> dict[str, float]:
-        own = len(self.tunables.names)
-        numbers = zip(self.steps.items(), z[own:].tolist(), strict=True)
-        added = {_name(pair): one * step for (pair, step), one in numbers}
-        return {**self.tunables.values(z[:own]), **added}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _CoupledModel:
-    """A model whose bodies' velocities push each other."""
-
-    model: Varied
-    coefficients: Mapping[_Pair, float]
-
-    def with_values(self, values: Mapping[str, float]) -> Self:
-        own = {pair: values.get(_name(pair), one) for pair, one in self.coefficients.items()}
-        names = {_name(pair) for pair in own}
-        rest = {name: one for name, one in values.items() if name not in names}
-        return replace(self, model=self.model.with_values(rest), coefficients=own)
-
-    def compile(self) -> CompiledModel:
-        compiled = self.model.compile()
-        names = list(dict.fromkeys(one for one, _ in self.coefficients))
-        at = [compiled.port_index(name, "body") for name in names]
-        matrix = np.array([[self.coefficients[one, other] for other in names] for one in names])
-        state, column = matrix @ compiled.velocity_state[at], matrix @ compiled.velocity_column[at]
-        return replace(
-            compiled,
-            a=compiled.a - compiled.g[:, at] @ state,
-            b=compiled.b - compiled.g[:, at] @ column,
-            c=compiled.c - compiled.h[:, at] @ state,
-            d=compiled.d - compiled.h[:, at] @ column,
-        )
-
-
-def _name(pair: _Pair) -> str:
-    """Name of a coefficient: no parameter of a model has an arrow in it."""
-    return f"{pair[0]} <- {pair[1]}"
+def _with_forces(compiled: CompiledModel, bodies: Sequence[str], matrix: Matrix) -> CompiledModel:
+    """Let velocities of bodies push each other."""
+    at = [compiled.port_index(name, "body") for name in bodies]
+    state, column = matrix @ compiled.velocity_state[at], matrix @ compiled.velocity_column[at]
+    return replace(
+        compiled,
+        a=compiled.a - compiled.g[:, at] @ state,
+        b=compiled.b - compiled.g[:, at] @ column,
+        c=compiled.c - compiled.h[:, at] @ state,
+        d=compiled.d - compiled.h[:, at] @ column,
+    )

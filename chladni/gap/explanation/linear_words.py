@@ -1,0 +1,113 @@
+"""Linear effects beside the parameters of a model, fitted where both are linear: over segments first."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.explanation.hypotheses import OUTSIDE, effect_of, hypothesis_of
+from chladni.gap.explanation.hypothesis import Hypothesis
+from chladni.gap.explanation.screen import Screened
+from chladni.gap.location.locate import Located, Location, tuned_stepwise
+from chladni.gap.plant.further_numbers import with_further
+from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.tuning.effect_scale import EffectNumber, effect_numbers, with_numbers
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.model import Model
+from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.models.effects.effect_kind import EffectKind
+from chladni.signals.errors import ModelError
+
+Matrix = NDArray[np.float64]
+#: Misfit over the best place's up to which a place is looked at.
+_PLAUSIBLE = 3.0
+#: Screened forms that are fitted, and of those the best that enter the contest.
+_FITTED, _ENTERED = 12, 3
+#: Factors on a frequency where its search begins too: what swings above half the rate shows folded down.
+_OCTAVES = (0.5, 1.0, 2.0)
+#: Of an effect's number in a fit's own units (e-folds of what is positive): so that its prior is none.
+_STEP = 3.0
+_UNBOUNDED = 1e3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Fitted:
+    effect: AttachedEffect
+    z: Matrix
+    chi: float
+
+
+def linear_hypotheses(
+    model: Model, location: Location, screened: Sequence[Screened], own: Mapping[str, EffectKind]
+) -> list[Hypothesis]:
+    """Fit the linear effects of a screen together with the parameters; the best, by rising misfit.
+
+    The screen weighs an effect along a motion that was recovered with the parameters that suit any force there. Where
+    few sensors leave that motion open, or an effect moves resonances far, it finds a wrong size. Here resonances may
+    lie elsewhere at first, as when a model is tuned.
+
+    Parameters
+    ----------
+    model
+        Of the location's problem.
+    own
+        Effects of the user's by name.
+    """
+    enough = _PLAUSIBLE * min((one.profile.chi for one in location.ranked), default=0.0)
+    there = {
+        site.name: one for one in location.ranked if one.profile.chi < enough for site in one.places[0].sites
+    }
+    worth = [one for one in screened if one.trial.site.name in there]
+    effects = [(one, effect) for one in worth if (effect := effect_of(one, own)) is not None and effect.kind.linear]
+    found = [_best(model, location, effect, there[effect.site]) for _, effect in effects[:_FITTED]]
+    ranked = sorted((one for one in found if one is not None), key=lambda one: one.chi)
+    return [hypothesis_of((one.effect,), one.z, screened=one.chi) for one in ranked[:_ENTERED]]
+
+
+def _best(model: Model, location: Location, effect: AttachedEffect, located: Located) -> _Fitted | None:
+    """Fit from each start; None where none converges."""
+    found = []
+    for start in _starts(effect):
+        try:
+            found.append(_fitted(model, location, start, located.profile.z))
+        except (ModelError, np.linalg.LinAlgError):
+            continue
+    return min(found, key=lambda one: one.chi, default=None)
+
+
+def _starts(effect: AttachedEffect) -> list[AttachedEffect]:
+    if "frequency" not in effect.values:
+        return [effect]
+    return [
+        replace(effect, values={**effect.values, "frequency": factor * effect.values["frequency"]})
+        for factor in _OCTAVES
+    ]
+
+
+def _fitted(model: Model, location: Location, effect: AttachedEffect, z: Matrix) -> _Fitted:
+    numbers = effect_numbers((effect,))
+    problems = [_beside(one, model, effect, numbers) for one in (*location.segments, location.problem)]
+    start = np.concatenate([z, np.zeros(len(numbers))])
+    limit = np.repeat([OUTSIDE, _UNBOUNDED], [z.size, len(numbers)])
+    found = tuned_stepwise(problems, start, limit)
+    (ended,) = with_numbers((effect,), numbers, _inside(numbers, found.z[z.size :]))
+    return _Fitted(effect=ended, z=found.z[: z.size], chi=found.chi)
+
+
+def _beside(
+    problem: LinearProblem, model: Model, effect: AttachedEffect, numbers: Sequence[EffectNumber]
+) -> LinearProblem:
+    """Give the problem with the effect's numbers behind its parameters."""
+
+    def make(parameters: Mapping[str, float], further: Matrix) -> CompiledModel:
+        moved = with_numbers((effect,), numbers, _inside(numbers, further))
+        return model.with_values(parameters).with_effects((*model.effects, *moved)).compile()
+
+    return with_further(problem, len(numbers), make)
+
+
+def _inside(numbers: Sequence[EffectNumber], further: Matrix) -> Matrix:
+    """Steps of an effect's numbers, within its possible ranges but for what rounding adds."""
+    low, high = np.array([one.low for one in numbers]), np.array([one.high for one in numbers])
+    return np.clip(_STEP * further, low + 1e-9 * np.abs(low), high - 1e-9 * np.abs(high))
