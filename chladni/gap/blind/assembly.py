@@ -1,6 +1,6 @@
 """Puts equations together from named sums, and turns them into the arrays of the integrator."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -68,13 +68,13 @@ class Assembly:
         self.laws.append(PlacedLaw(name=name, word=word, d=d, s=s, numbers=numbers))
         return {name: 1.0}
 
-    def filtered(self, name: str, signal: Sum, num: tuple[float, float, float], den: tuple[float, float, float],
-                 ) -> dict[str, float]:  # fmt: skip
-        """Pass a signal through ``(n2 s^2 + n1 s + n0)/(s^2 + d1 s + d0)``; `den` begins with 1."""
-        # Observer form: the two states are z1' = n1 u - d1 y + z2, z2' = n0 u - d0 y, with y = z1 + n2 u.
+    def filtered(self, name: str, signal: Sum, num: Sequence[float], den: Sequence[float]) -> dict[str, float]:
+        """Pass a signal through a ratio of polynomials in s, highest power first; `den` begins with 1."""
+        # Observer form, as of second order: z1' = n1 u - d1 y + z2, z2' = n0 u - d0 y, with y = z1 + n2 u.
         out = added((1.0, {f"{name}.z1": 1.0}), (num[0], signal))
-        self.rates[f"{name}.z1"] = added((num[1], signal), (-den[1], out), (1.0, {f"{name}.z2": 1.0}))
-        self.rates[f"{name}.z2"] = added((num[2], signal), (-den[2], out))
+        for place in range(1, len(den)):
+            following = [(1.0, {f"{name}.z{place + 1}": 1.0})] if place + 1 < len(den) else []
+            self.rates[f"{name}.z{place}"] = added((num[place], signal), (-den[place], out), *following)
         return out
 
     def arrays(self, interval: float, steps: int) -> "Arrays":

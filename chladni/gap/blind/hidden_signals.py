@@ -69,10 +69,15 @@ def _factor(_machine: Machine, hidden: Hidden, signal: Sum) -> Expression:
 
 
 def _mount(machine: Machine, hidden: Hidden, signal: Sum) -> Expression:
-    """Sensor on a spring and damper that stand on what it measures: the damper carries motion too."""
+    """Sensor on a spring, and beside it a damper that hangs on a spring of its own, as wax and rubber do.
+
+    Zener's model: stiffness over mass ``w^2 + 2 zeta w s/(1 + tau s)``, and what it carries over that plus s^2.
+    """
     omega, ratio = 2 * pi * hidden.numbers["frequency"], hidden.numbers["damping_ratio"]
+    rate = omega / hidden.numbers["relaxation"]
+    stiff, still = omega**2 + 2 * ratio * omega * rate, omega**2 * rate
     return machine.assembly.filtered(
-        f"{hidden.site}.mount", signal, (0.0, 2 * ratio * omega, omega**2), (1.0, 2 * ratio * omega, omega**2)
+        f"{hidden.site}.mount", signal, (0.0, 0.0, stiff, still), (1.0, rate, stiff, still)
     )
 
 

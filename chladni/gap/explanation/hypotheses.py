@@ -26,6 +26,7 @@ _DETAILS: Mapping[str, tuple[str, ...]] = {
     "added_mass": ("damping_ratio",),
     "hysteresis": ("shape",),
     "lag": ("damping_ratio",),
+    "mounting_resonance": ("carried",),
     "one_sided_stop": ("dissipation",),
     "varying_stiffness": ("rise",),
     "rate_limit": ("tracking_time",),

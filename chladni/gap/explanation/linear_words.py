@@ -23,7 +23,7 @@ Matrix = NDArray[np.float64]
 #: Misfit over the best place's up to which a place is looked at.
 _PLAUSIBLE = 3.0
 #: Screened forms that are fitted, and of those the best that enter the contest.
-_FITTED, _ENTERED = 12, 3
+_FITTED, _ENTERED = 12, 4
 #: Factors on a frequency where its search begins too: what swings above half the rate shows folded down.
 _OCTAVES = (0.5, 1.0, 2.0)
 #: Of an effect's number in a fit's own units (e-folds of what is positive): so that its prior is none.
@@ -55,9 +55,7 @@ def linear_hypotheses(
         Effects of the user's by name.
     """
     enough = _PLAUSIBLE * min((one.profile.chi for one in location.ranked), default=0.0)
-    there = {
-        site.name: one for one in location.ranked if one.profile.chi < enough for site in one.places[0].sites
-    }
+    there = {site.name: one for one in location.ranked if one.profile.chi < enough for site in one.places[0].sites}
     worth = [one for one in screened if one.trial.site.name in there]
     effects = [(one, effect) for one in worth if (effect := effect_of(one, own)) is not None and effect.kind.linear]
     found = [_best(model, location, effect, there[effect.site]) for _, effect in effects[:_FITTED]]

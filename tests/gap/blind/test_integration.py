@@ -12,12 +12,14 @@ from chladni.gap.blind.assembly import Assembly, added
 from chladni.gap.blind.building import built
 from chladni.gap.blind.case_draw import Case, Order
 from chladni.gap.blind.drive_draw import draw_drive_bench
+from chladni.gap.blind.equations import Machine
 from chladni.gap.blind.excitation_draw import draw_drive
+from chladni.gap.blind.hidden_signals import through_sensor
 from chladni.gap.blind.integration import integrate, respond, steps_for
 from chladni.gap.blind.make import log_of
 from chladni.gap.blind.model_text import model_text
 from chladni.gap.blind.performance import measured, perform, rms
-from chladni.gap.blind.plan import Hidden
+from chladni.gap.blind.plan import Hidden, Plan
 from chladni.gap.blind.site_draw import draw_numbers
 from chladni.gap.blind.structure_draw import draw_structure
 from chladni.models.effects.attached_effect import attached
@@ -61,17 +63,49 @@ def test_the_exact_response_is_that_of_the_integrator():
     assert_allclose(exact, stepped, atol=1e-6 * np.abs(stepped).max())
 
 
-def test_a_filter_has_its_transfer_function():
-    omega, zeta, rate = 2 * pi * 20.0, 0.3, 2000.0
+OMEGA = 2 * pi * 20.0
+
+
+@pytest.mark.parametrize(
+    ("num", "den"),
+    [
+        ((1.0, 3.0), (1.0, OMEGA)),
+        ((1.0, 2.0, 3.0), (1.0, 0.6 * OMEGA, OMEGA**2)),
+        ((0.0, 1.0, OMEGA, 0.3 * OMEGA**2), (1.0, 2 * OMEGA, 1.8 * OMEGA**2, OMEGA**3)),
+    ],
+)
+def test_a_filter_has_its_transfer_function(num, den):
+    rate = 2000.0
     assembly = Assembly(inputs=["u"])
-    assembly.outputs["y"] = assembly.filtered("f", {"u": 1.0}, (1.0, 2.0, 3.0), (1.0, 2 * zeta * omega, omega**2))
+    assembly.outputs["y"] = assembly.filtered("f", {"u": 1.0}, num, den)
     t = np.arange(4000) / rate
     f = 35.0
     y = integrate(assembly, np.sin(2 * pi * f * t)[None], 1 / rate, steps=16)[0]
-    s = 2j * pi * f
-    h = (s**2 + 2 * s + 3) / (s**2 + 2 * zeta * omega * s + omega**2)
+    h = np.polyval(num, 2j * pi * f) / np.polyval(den, 2j * pi * f)
     steady = t > 1.0
     # Straight lines between samples weaken a sine by sinc^2(f/rate), 1e-3 here.
+    assert_allclose(y[steady], (np.abs(h) * np.sin(2 * pi * f * t + np.angle(h)))[steady], atol=2e-3 * abs(h))
+
+
+def test_a_sensor_rides_on_a_spring_and_a_damper_that_hangs_on_a_spring():
+    frequency, zeta, relaxation, rate, f = 20.0, 0.2, 0.3, 2000.0, 31.0
+    hidden = Hidden(
+        effect="mounting_resonance", site="sensor", law="mount",
+        numbers={"frequency": frequency, "damping_ratio": zeta, "relaxation": relaxation},
+    )  # fmt: skip
+    assembly = Assembly(inputs=["u"])
+    plan = Plan(name="bench", bodies=(), joints=(), inputs=(), outputs=())
+    machine = Machine(assembly=assembly, plan=plan, numbers={}, forces={}, masses={})
+    assembly.outputs["y"] = through_sensor(machine, hidden, {"u": 1.0})
+    t = np.arange(4000) / rate
+    y = integrate(assembly, np.sin(2 * pi * f * t)[None], 1 / rate, steps=16)[0]
+    # Of a sensor of 1 kg: a spring, and beside it a damper and a second spring in a row.
+    s, omega = 2j * pi * f, 2 * pi * frequency
+    damper = 2 * zeta * omega
+    second = damper * omega / relaxation
+    stiffness = omega**2 + 1 / (1 / (damper * s) + 1 / second)
+    h = stiffness / (s**2 + stiffness)
+    steady = t > 1.0
     assert_allclose(y[steady], (np.abs(h) * np.sin(2 * pi * f * t + np.angle(h)))[steady], atol=2e-3 * abs(h))
 
 

@@ -28,6 +28,16 @@ def test_at_its_frequency_it_raises_by_half_the_inverse_of_the_damping_ratio() -
     assert after / before == pytest.approx(-0.5j / ZETA, rel=1e-10)
 
 
+@pytest.mark.parametrize("carried", [0.4, 1.0])
+def test_a_damper_below_the_sensor_carries_motion(carried: float) -> None:
+    # A base that moves under a spring and a damper (Rao, Mechanical Vibrations, 5th ed., eq. 3.67).
+    way = (2 * carried * ZETA * OMEGA * S + OMEGA**2) / (S**2 + 2 * ZETA * OMEGA * S + OMEGA**2)
+    before = one_body().frequency_response(FREQUENCY_HZ)
+    mount = attached("mounting_resonance", "acc", {**VALUES, "carried": carried})
+    after = mount.attach(one_body()).frequency_response(FREQUENCY_HZ)
+    np.testing.assert_allclose(after[0], before[0] * way, rtol=1e-10)
+
+
 def test_in_a_loop_the_controller_sees_it() -> None:
     plant = 1 / (2.0 * S**2 + 4.0 * S + 800.0)
     for in_loop in (True, False):

@@ -1,0 +1,48 @@
+"""Linear effects that the screen loses are found beside the parameters."""
+
+import pytest
+
+import chladni
+from chladni.gap.comparison.noise_estimate import estimate_noise
+from chladni.gap.diagnosis.diagnose import diagnose
+from chladni.gap.explanation.candidates import screened
+from chladni.gap.explanation.linear_words import linear_hypotheses
+from chladni.gap.location.locate import locate
+from chladni.gap.plant.tunable import Tunables
+from chladni.gap.records.measurement import Measurement
+from tests.gap.arm import arm, measured, with_outputs
+
+#: As heavy as what they sit on, and more: resonances move far.
+LOADS = [
+    ("added_mass", "wrist", {"mass": 4.0}, ("acc_column", "acc_wrist")),
+    ("added_mass", "arm", {"mass": 6.0}, ("acc_column",)),
+    ("extra_mode", "arm", {"mass": 2.0, "frequency": 40.0, "damping_ratio": 0.02}, ("acc_column", "acc_arm")),
+]
+
+
+def loaded(word: str, site: str, values: dict[str, float], outputs: tuple[str, ...]) -> Measurement:
+    return with_outputs(measured((chladni.attached(word, site, values),), noise=0.003), outputs)
+
+
+@pytest.mark.parametrize(("word", "site", "values", "outputs"), LOADS)
+def test_a_heavy_load_is_found_where_the_screen_loses_it(
+    word: str, site: str, values: dict[str, float], outputs: tuple[str, ...]
+) -> None:
+    log = loaded(word, site, values, outputs)
+    location = locate(arm(), log, estimate_noise(log), Tunables.of(arm()))
+    candidates = screened(location, location.ranked, frozenset(), {})
+    own = [one for one in candidates if (one.trial.effect, one.trial.site.name) == (word, site)]
+    assert min(one.chi for one in own) > 100.0
+    found = linear_hypotheses(arm(), location, candidates, {})
+    best = next(one for one in found if one.effects[0].effect == word)
+    assert best.screened == pytest.approx(1.0, abs=0.1)
+    assert best.effects[0].site == site
+    # Parameters of the machine are off, by three per cent each: masses are known no better.
+    assert best.effects[0].values["mass"] == pytest.approx(values["mass"], rel=0.05)
+
+
+def test_and_named() -> None:
+    found = diagnose(arm(), [loaded(*LOADS[0])])
+    assert found.verdict == "effect"
+    assert (found.causes[0].effect, found.causes[0].site) == ("added_mass", "wrist")
+    assert found.gap.closed > 0.99
