@@ -92,10 +92,12 @@ def causes_of(study: Study, progress: Step) -> Causes:
         verdict = "unknown"
     probabilities = _probabilities(together, tuned, floor, added)
     ranked = [(one, share) for one, share in zip(together, probabilities, strict=True) if one is not tuned]
+    # Only of what will be told: it costs as much as a step of a fit.
+    told = study.contest.with_spread(best)
     return Causes(
         verdict=verdict,
-        tuned=tuned,
-        best=best,
+        tuned=told if best is tuned else study.contest.with_spread(tuned),
+        best=told,
         ranked=tuple(one for one, _ in ranked),
         probabilities=tuple(share for _, share in ranked),
         shaken=shaken,

@@ -4,14 +4,16 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from chladni.gap.diagnosis.search import sound
+from chladni.gap.diagnosis.search import ALONE, least_left, sound
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.candidates import Form, forms_at, promised, screened, searched
 from chladni.gap.explanation.hypotheses import effect_hypotheses, hypothesis_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.known_effect import KnownEffect
+from chladni.gap.explanation.linear_words import linear_hypotheses
 from chladni.gap.location.locate import Located, Location, locate, located_pairs
 from chladni.gap.tuning.law_error import with_law_error
+from chladni.models.core.model import Model
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.errors import ModelError
 
@@ -51,13 +53,22 @@ def second_causes(
     behind = _behind(study, found, kept)
     if behind is None:
         return []
-    location, known = behind
-    trials = screened(location, location.ranked[:_PLACES], study.leave_out, study.own, known)
+    model, location, known = behind
     # At the same place a second word would mend the details of the first one's law.
     taken = _same_places(study, {one.site for one in kept})
-    singles = effect_hypotheses([one for one in trials if one.trial.site.name not in taken], study.own, count=_SECOND)
+    trials = [
+        one
+        for one in screened(location, location.ranked[:_PLACES], study.leave_out, study.own, known)
+        if one.trial.site.name not in taken
+    ]
+    singles = effect_hypotheses(trials, study.own, count=_SECOND)
     both = [hypothesis_of((*kept, *one.effects), found.fit.z, screened=one.screened) for one in singles]
-    return sound(study, study.contest.enter_all(both))
+    entered = sound(study, study.contest.enter_all(both))
+    if least_left(entered) > ALONE:
+        linear = linear_hypotheses(model, location, trials, study.own)
+        both = [hypothesis_of((*kept, *one.effects), one.start_z, screened=one.screened) for one in linear]
+        entered += sound(study, study.contest.enter_all(both))
+    return entered
 
 
 def paired_causes(study: Study) -> list[Contestant]:
@@ -92,8 +103,11 @@ def without_one(study: Study, both: Contestant) -> list[Contestant]:
 
 def _behind(
     study: Study, found: Contestant, kept: tuple[AttachedEffect, ...]
-) -> tuple[Location, KnownEffect | None] | None:
-    """Where the rest of the gap lies when some effects of a fit are known; None when the model diverges without."""
+) -> tuple[Model, Location, KnownEffect | None] | None:
+    """Where the rest of the gap lies when some effects of a fit are known; None when the model diverges without.
+
+    Linear effects are in the model that comes with it, others are taken from the log.
+    """
     contest, model, known = study.contest, study.model, None
     # They leave details of their laws, which a quiet band of coloured noise would make more of than of any effect.
     floor = with_law_error(contest.noise.lowered(found.held), np.std(study.measurement.outputs, axis=1))
@@ -105,7 +119,7 @@ def _behind(
         except ModelError:
             return None
     rest = study.measurement if known is None else known.without(study.measurement)
-    return locate(model, rest, floor, contest.run.tunables, found.fit.z), known
+    return model, locate(model, rest, floor, contest.run.tunables, found.fit.z), known
 
 
 def _of_pair(study: Study, pair: Located, weighed: Sequence[Form]) -> list[Hypothesis]:

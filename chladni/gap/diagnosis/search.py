@@ -69,10 +69,10 @@ def single_causes(study: Study, progress: Step) -> list[Contestant]:
     wrong = wrong_parameters(location)
     entered = contest.enter_all([*hypotheses, *([wrong] if wrong else [])], lambda done: progress(0.3 + 0.5 * done))
     found = sound(study, entered)
-    if _lowest(found) > ALONE:
+    if least_left(found) > ALONE:
         linear = linear_hypotheses(study.model, location, candidates, study.own)
         found += sound(study, contest.enter_all(linear))
-    if _lowest(found) > ALONE:
+    if least_left(found) > ALONE:
         others = _others(effect_hypotheses(candidates, study.own, count=_AGAIN), hypotheses)
         found += sound(study, contest.enter_all(others))
     ranked = weighed([*found, *sibling_causes(study, weighed(found))])
@@ -83,7 +83,8 @@ def single_causes(study: Study, progress: Step) -> list[Contestant]:
     return weighed(ranked)
 
 
-def _lowest(found: Sequence[Contestant]) -> float:
+def least_left(found: Sequence[Contestant]) -> float:
+    """Give what the best of contestants leaves, over the noise's power; infinite without any."""
     return min((one.chi for one in found), default=np.inf)
 
 

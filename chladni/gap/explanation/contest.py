@@ -10,7 +10,7 @@ from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.records.noise_floor import NoiseFloor
-from chladni.gap.tuning.output_error import OutputErrorFit, fit_output_error
+from chladni.gap.tuning.output_error import OutputErrorFit, fit_output_error, with_coloured_spread
 from chladni.signals.errors import EstimateError, ModelError
 
 Matrix = NDArray[np.float64]
@@ -84,6 +84,18 @@ class Contest:
             prior=prior,
             starts=self._starts(fit),
         )
+
+    def with_spread(self, found: Contestant) -> Contestant:
+        """Give a contestant with the standard deviations that the colour of its residual allows."""
+        try:
+            fit = with_coloured_spread(
+                self.run, self.noise, found.fit,
+                fitted=found.hypothesis.fitted or None, training=self.training,
+                tune=bool(np.any(found.fit.parameter_std)), offsets=len(self.run.windows) == 1,
+            )  # fmt: skip
+        except (ModelError, EstimateError, np.linalg.LinAlgError):
+            return found
+        return replace(found, fit=fit)
 
     def _starts(self, fit: OutputErrorFit) -> int:
         """States that effects begin windows with, beyond those of the first one: free numbers, all of them."""

@@ -184,6 +184,32 @@ class FitProblem:
             )
         return found
 
+    def followed(self, here: Evaluation, slopes: Slopes) -> Matrix:
+        """``[unknown, output, training sample]``: change of the whitened outputs with each unknown.
+
+        What a fit finds beside the unknowns, initial states and constants, follows them as it does there.
+
+        Parameters
+        ----------
+        slopes
+            At the same point.
+        """
+        own, starts = self._columns(here)
+        moved = self.whitening.seen(own)
+        for (start, stop), (_, per) in zip(self.run.windows, slopes.back, strict=True):
+            seen, local = self._seen(start, stop), starts(start, stop)
+            local[self._spread(here.point) == 0] = 0.0
+            moved[..., seen] -= np.einsum("su,son->uon", per, local)
+        constants = self.whitening.constants()
+        for place, constant in enumerate(constants[place, place] for place in range(len(constants))):
+            share = moved[:, place] @ constant / (constant @ constant)
+            moved[:, place] -= share[:, None] * constant
+        return moved
+
+    def prior_information(self, unknowns: int) -> Matrix:
+        """``[unknown, unknown]``: what is known of the first so many unknowns beforehand."""
+        return np.diag(self._prior[:unknowns])
+
     def _equations(self, here: Evaluation, own: Matrix, starts: Callable[[int, int], Matrix]) -> Slopes:
         root = np.sqrt(weights(here.residual.power))[:, None]
         residual = here.residual.white * root

@@ -1,7 +1,8 @@
 """Output-error fit: parameters and effects with which a free run of the model comes nearest to the log."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.bounded_step import bounded_step
+from chladni.gap.tuning.coloured_spread import coloured_information
 from chladni.gap.tuning.effect_scale import effect_numbers
 from chladni.gap.tuning.fit_problem import Z_LIMIT, Evaluation, FitProblem, Point, Slopes
 from chladni.gap.tuning.law_error import with_law_error
@@ -163,9 +165,8 @@ def fit_output_error(
     require_shape("training", training, (samples,), "the log")
     z = np.zeros(count) if start_z is None else np.asarray(start_z, dtype=np.float64)
     require_shape("start_z", z, (count,), "the tunable parameters")
-    seen = with_law_error(noise, np.std(run.measurement.outputs, axis=1))
     problem = FitProblem(
-        run, Whitening(seen, training, offsets=offsets), training,
+        run, _whitening(run, noise, training, offsets), training,
         effects=effects, numbers=effect_numbers(effects, fitted), tune=tune, z_limit=z_limit, start_z=z,
     )  # fmt: skip
     start = problem.start_of_windows() if problem.has_laws and len(run.windows) > 1 else problem.start()
@@ -173,6 +174,52 @@ def fit_output_error(
         start = Point(start.x, np.array(start_initial, dtype=np.float64).reshape(start.initial.shape))
     here, slopes, converged, iterations = _fit(problem, start, max_iterations, precision)
     return _report(problem, here, slopes, converged=converged, iterations=iterations)
+
+
+def with_coloured_spread(
+    run: FreeRun,
+    noise: NoiseFloor,
+    fit: OutputErrorFit,
+    *,
+    fitted: Sequence[Sequence[str]] | None = None,
+    training: NDArray[np.bool_] | None = None,
+    tune: bool = True,
+    offsets: bool = True,
+) -> OutputErrorFit:
+    """Give a fit with spreads that allow for a residual that is correlated from sample to sample.
+
+    A fit states those of white noise, which cost it nothing. What a law leaves of another one is no such thing, and
+    tells numbers less well than as much noise would, see `coloured_information`.
+
+    Parameters
+    ----------
+    fit
+        What `fit_output_error` gave for the other arguments.
+    fitted, training, tune, offsets
+        As it was given them.
+
+    Raises
+    ------
+    EstimateError
+        When motions there part so fast that they have no slopes.
+    """
+    seen = np.ones(run.measurement.samples, dtype=bool) if training is None else training
+    problem = FitProblem(
+        run, _whitening(run, noise, seen, offsets), seen,
+        effects=fit.effects, numbers=effect_numbers(fit.effects, fitted), tune=tune, z_limit=np.inf, start_z=fit.z,
+    )  # fmt: skip
+    problem.coarse = False
+    x = np.concatenate([fit.z[: problem.tuned], np.zeros(len(problem.numbers))])
+    here = problem.evaluate(Point(x, fit.initial))
+    slopes = problem.slopes(here)
+    white = _inverse(slopes.curvature)
+    covariance = white @ coloured_information(problem, here, slopes) @ white
+    return replace(fit, covariance=covariance, **_spreads(problem, x, covariance))
+
+
+def _whitening(run: FreeRun, noise: NoiseFloor, training: NDArray[np.bool_], offsets: bool) -> Whitening:
+    seen = with_law_error(noise, np.std(run.measurement.outputs, axis=1))
+    return Whitening(seen, training, offsets=offsets)
 
 
 def _fit(problem: FitProblem, start: Point, most: int, precision: float) -> tuple[Evaluation, Slopes, bool, int]:
@@ -246,20 +293,15 @@ def _report(
     x, run = here.point.x, problem.run
     z = problem.z(x)
     covariance = _inverse(slopes.curvature)
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    values = run.tunables.values(z)
-    own = np.concatenate([std[: problem.tuned], np.zeros(z.size - problem.tuned)])
     offsets = here.residual.offsets
     outputs = here.outputs + offsets[:, None]
     held = ~problem.training
     white = problem.whitening.whitened(run.measurement.outputs - outputs)[:, held]
     by_output = np.mean(white**2, axis=1) if held.any() else np.zeros(0)
     return OutputErrorFit(
-        values=values,
+        values=run.tunables.values(z),
         z=z,
-        parameter_std=own * run.tunables.tolerance * np.abs(np.array([values[name] for name in run.tunables.names])),
         effects=problem.effects_at(x),
-        effect_std=_effect_std(problem, x, std),
         initial=here.point.initial,
         offsets=offsets,
         outputs=outputs,
@@ -272,10 +314,30 @@ def _report(
         converged=converged,
         iterations=iterations,
         evaluations=problem.evaluations,
-        undetermined=tuple(
-            name for name, one in zip(run.tunables.names[: problem.tuned], std, strict=False) if one > _UNDETERMINED
-        ),
         covariance=covariance,
+        **_spreads(problem, x, covariance),
+    )
+
+
+class _Spreads(TypedDict):
+    """What a covariance says of parameters and effects, see `OutputErrorFit`."""
+
+    parameter_std: Matrix
+    effect_std: tuple[Mapping[str, float], ...]
+    undetermined: tuple[str, ...]
+
+
+def _spreads(problem: FitProblem, x: Matrix, covariance: Matrix) -> _Spreads:
+    tunables, z = problem.run.tunables, problem.z(x)
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    own = np.concatenate([std[: problem.tuned], np.zeros(z.size - problem.tuned)])
+    values = tunables.values(z)
+    return _Spreads(
+        parameter_std=own * tunables.tolerance * np.abs(np.array([values[name] for name in tunables.names])),
+        effect_std=_effect_std(problem, x, std),
+        undetermined=tuple(
+            name for name, one in zip(tunables.names[: problem.tuned], std, strict=False) if one > _UNDETERMINED
+        ),
     )
 
 
