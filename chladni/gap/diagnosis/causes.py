@@ -166,7 +166,10 @@ def _verdict(tuned: Contestant, best: Contestant, floor: Matrix) -> Verdict:
         return "none" if tuned.chi < _CLEAN else "unknown"
     if completeness(tuned, best, floor) < 0.5:
         return "unknown"
-    return "effect" if best.hypothesis.effects else "parameters"
+    if best.hypothesis.effects:
+        return "effect"
+    # Parameters have no details that a machine's could differ in: what they leave, something else causes.
+    return "parameters" if best.chi < _CLEAN else "unknown"
 
 
 def _probabilities(contestants: Sequence[Contestant], tuned: Contestant, floor: Matrix, added: float) -> list[float]:

@@ -42,6 +42,8 @@ Matrix = NDArray[np.float64]
 StepProgress = Callable[[str, float], None]
 #: Nats within which a further measurement is worth a thought.
 _STILL_CLOSE = 8.0
+#: Of the tuned model's error: parameters outside their tolerance that leave less are wrong, whatever else is.
+_MOSTLY = 0.25
 
 
 @in_one_thread()
@@ -120,7 +122,7 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         next_measurement=_next(study, causes, seed),
         naive=naive_of(causes),
         remarks=(*_remarks(study, causes), *_distortion_remarks(study.measurement, distortion)),
-        advice=_advice(causes),
+        advice=_advice(study, causes),
         restoring_force=_restoring(study, causes, motion),
         signals=_signals(study, causes, before, after),
         distortion=() if distortion is None else distortion.shares,
@@ -291,11 +293,33 @@ def _next(study: Study, causes: Causes, seed: int) -> str | None:
     return None
 
 
-def _advice(causes: Causes) -> str | None:
+def _advice(study: Study, causes: Causes) -> str | None:
     if causes.instead is not None:
         return causes.instead.sentence()
+    if causes.verdict == "unknown" and causes.best.hypothesis.wide and causes.best.gap < _MOSTLY * causes.tuned.gap:
+        return _wrong_first(study, causes)
     if causes.verdict == "unknown":
         return "No effect of the catalogue explains the gap; the site and the recovered force say where to look."
     if causes.verdict == "none" and causes.tuned.chi > 1.2:
         return "What is left beside the noise is too little to be named."
     return None
+
+
+def _wrong_first(study: Study, causes: Causes) -> str:
+    """Say which parameters to put right, where something is missing beside them."""
+    tunables, values = study.contest.run.tunables, causes.best.fit.values
+    rows = zip(tunables.names, tunables.nominal, tunables.units, strict=True)
+    wrong = " and ".join(
+        f"{name} of {_short(values[name])} {unit} where the model has {_short(nominal)}"
+        for name, nominal, unit in rows
+        if name in causes.best.hypothesis.wide
+    )
+    return (
+        f"With {wrong} an error of {_short(100 * causes.best.gap)} % is left, {_short(100 * causes.tuned.gap)} % "
+        "without: put that right in the model and ask again; what is left has another cause."
+    )
+
+
+def _short(value: float) -> str:
+    """Three digits, without an exponent where there need be none."""
+    return f"{float(f'{value:.3g}'):g}"
