@@ -11,6 +11,7 @@ from chladni.gap.comparison.distortion import Distortion, distortion_of
 from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.comparison.outside_band import products_outside
 from chladni.gap.comparison.periodicity import with_period
+from chladni.gap.comparison.scale_doubt import scale_doubt
 from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, regime_shares
 from chladni.gap.design.next_measurement import next_measurement
 from chladni.gap.design.what_is_missing import what_is_missing
@@ -294,6 +295,17 @@ def _next(study: Study, causes: Causes, seed: int) -> str | None:
 
 
 def _advice(study: Study, causes: Causes) -> str | None:
+    """What to do next; a scale that can't be right comes before all else."""
+    measurement = study.measurement
+    try:
+        # From rest: the initial states that suit a log of another scale would hide it.
+        doubt = scale_doubt(measurement.outputs, study.contest.run.outputs(), measurement.output_names)
+    except ModelError:
+        doubt = None
+    return " ".join(filter(None, (doubt, _advice_on(study, causes)))) or None
+
+
+def _advice_on(study: Study, causes: Causes) -> str | None:
     if causes.instead is not None:
         return causes.instead.sentence()
     if causes.verdict == "unknown" and causes.best.hypothesis.wide and causes.best.gap < _MOSTLY * causes.tuned.gap:

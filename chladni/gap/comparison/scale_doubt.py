@@ -1,0 +1,44 @@
+"""Whether a model and a log are of one scale at all: what a wrong unit or channel does."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Matrix = NDArray[np.float64]
+#: Factor between model and log beyond which no effect explains it; least correlation that says it's one signal.
+_APART, _ALIKE = 30.0, 0.5
+
+
+def scale_doubt(measured: Matrix, simulated: Matrix, output_names: Sequence[str]) -> str | None:
+    """Give a sentence on the output whose scale differs most, None where all agree within a factor of 30.
+
+    A signal that the model gives in another shape tells nothing of its scale.
+
+    Parameters
+    ----------
+    measured, simulated
+        ``[output, sample]``, the latter of the nominal model.
+    output_names
+        Of the rows.
+
+    Examples
+    --------
+    >>> metres = np.sin(np.arange(100.0))[None]
+    >>> scale_doubt(metres, 1.5 * metres, ["rod"])
+    >>> print(scale_doubt(1e3 * metres, metres, ["rod"]))
+    At rod the model as it is gives 0.001 times what was measured: check its channel and unit, and the inputs'.
+    """
+    own, made = (one - one.mean(axis=1, keepdims=True) for one in (measured, simulated))
+    ratios = {
+        name: float(np.std(one) / np.std(other))
+        for name, one, other in zip(output_names, made, own, strict=True)
+        if abs(one @ other) > _ALIKE * float(np.linalg.norm(one) * np.linalg.norm(other))
+    }
+    worst = max(ratios, key=lambda name: abs(np.log(ratios[name])), default=None)
+    if worst is None or 1 / _APART < ratios[worst] < _APART:
+        return None
+    return (
+        f"At {worst} the model as it is gives {float(f'{ratios[worst]:.2g}'):g} times what was measured: "
+        "check its channel and unit, and the inputs'."
+    )
