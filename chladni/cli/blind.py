@@ -7,6 +7,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.output import Output
+from chladni.cli.places import require_places
 from chladni.cli.words import count as counted
 
 blind = typer.Typer(
@@ -34,6 +35,7 @@ def make(
     """Make cases: random machines with hidden effects, and their sealed truths; what is there stays."""
     from chladni.apps.blind import make_campaign
 
+    require_places(reads=(), writes={"--json": json})
     to = Output(json)
     with to.progress("making cases") as show:
         made = make_campaign(directory, count=count, seed=seed, jobs=jobs, progress=show)
@@ -54,6 +56,7 @@ def run(
     """Diagnose every case that has no result yet; the truths are never opened."""
     from chladni.apps.blind import run_campaign
 
+    require_places(reads=(), writes={"--json": json})
     to = Output(json)
     with to.progress("diagnosing") as show:
         report = run_campaign(directory, seed=seed, jobs=jobs, progress=show)
@@ -70,6 +73,7 @@ def score(directory: Folder, *, json: options.Json = None) -> None:
     from chladni.apps.blind import score_campaign
     from chladni.gap.blind.score_table import HEADER, confusion_rows, detection_rows, reliability_rows, score_rows
 
+    require_places(reads=(), writes={"--json": json})
     to = Output(json)
     found = score_campaign(directory)
     to.table(f"Score of {found['cases']} cases", HEADER, score_rows(found))

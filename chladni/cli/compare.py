@@ -7,6 +7,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.output import Output
+from chladni.cli.places import require_places
 from chladni.cli.words import NOTHING, number, unit, with_error
 from chladni.signals.wording import counted
 
@@ -47,6 +48,7 @@ def compare(
     from chladni.apps.documents import comparison_document
     from chladni.io.log import open_log
 
+    require_places(reads=[before, after, setup], writes={"--json": json}, folders={"--figures": figures})
     out = Output(json)
     with (
         open_log(before, setup=setup, stamp=stamp) as old,

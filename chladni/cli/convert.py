@@ -8,6 +8,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.output import Output
+from chladni.cli.places import require_places
 from chladni.cli.words import count, number
 
 OptionValue = str | float | bool | list[str] | dict[str, str]
@@ -48,6 +49,7 @@ def convert(
     from chladni.io.convert import convert as convert_file
     from chladni.signals.wording import counted
 
+    require_places(reads=[source], writes={"OUT": target, "--json": json})
     out = Output(json)
     written = convert_file(
         source,

@@ -9,6 +9,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.output import Output
+from chladni.cli.places import require_places
 from chladni.cli.words import number, unit, with_error
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ def demo(
     """Make a robot arm's log with known truth, analyse it, and show what was found beside the truth."""
     from chladni.apps.demo import run_tour
 
+    require_places(reads=(), writes={"--json": json}, folders={"--out": out})
     to = Output(json)
     with to.progress("tour") as progress:
         tour = run_tour(out, progress=progress)

@@ -6,6 +6,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.output import Output
+from chladni.cli.places import require_places
 from chladni.cli.words import number, unit, with_error
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def frf(
     from chladni.signals.study import Study
     from chladni.spectral.peaks import find_response_peaks
 
+    require_places(reads=[log, setup], writes={"--json": json, "--report": report}, folders={"--figures": figures})
     out = Output(json)
     with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name) as progress:
         found = transfer(

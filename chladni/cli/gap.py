@@ -10,6 +10,7 @@ import typer
 from chladni.cli import options
 from chladni.cli.gap_rows import print_comparison, print_diagnosis
 from chladni.cli.output import Output
+from chladni.cli.places import require_places
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,9 +19,6 @@ if TYPE_CHECKING:
     from chladni.io.log import Log
     from chladni.models.core.model import Model
     from chladni.viewers.gap_evidence import GapEvidence
-
-FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
-
 
 Files = Annotated[
     list[Path],
@@ -88,8 +86,10 @@ def gap(
     """Where a model and a log disagree, which effect was left out, and how far the gap closes with it."""
     from chladni.io.log import open_log
 
+    wanted = _Wanted(json=json, report=report, figure=figure, figures=figures, save=save, write_model=write_model)
+    # A diagnosis takes its time: it shouldn't be lost to a misspelt folder.
+    wanted.require_places([*files, simulated, setup])
     out = Output(json)
-    wanted = _Wanted(report=report, figure=figure, figures=figures, save=save, write_model=write_model)
     with ExitStack() as opened:
 
         def opening(path: Path) -> "Log":
@@ -100,8 +100,6 @@ def gap(
             _compare(out, opening(files[0]), opening(simulated), start_s=start, end_s=end)
             return
         model, logs = _model_and_logs(files)
-        # A diagnosis takes its time: it shouldn't be lost to a misspelt folder.
-        wanted.require_places()
         _diagnose(out, model, [opening(log) for log in logs], wanted, without=without or (), seed=seed,
                   start_s=start, end_s=end)  # fmt: skip
 
@@ -110,27 +108,31 @@ def gap(
 class _Wanted:
     """Files that were asked for."""
 
+    json: str | None
     report: Path | None
     figure: Path | None
     figures: Path | None
     save: Path | None
     write_model: Path | None
 
-    def require_places(self) -> None:
+    def require_places(self, reads: "Sequence[Path | None]") -> None:
         """Refuse files that can't be written, before anything is computed."""
-        from chladni.signals.errors import LogError, SetupError
-
-        if self.figure is not None and self.figure.suffix.lower() not in FIGURE_SUFFIXES:
-            raise SetupError(f"{self.figure}: a figure is one of {', '.join(FIGURE_SUFFIXES)}; give such a name")
-        for path in (self.figure, self.report, self.save, self.write_model):
-            if path is not None and not path.resolve().parent.is_dir():
-                raise LogError(f"{path}: there is no folder {path.parent}; make it, or name another")
+        require_places(
+            reads=reads, writes={"--json": self.json, **self._files()}, folders={"--figures": self.figures}
+        )
 
     def named(self) -> list[str]:
-        """Options that ask for a file."""
-        given = {"--html": self.report, "--figure": self.figure, "--figures": self.figures, "--save": self.save,
-                 "--write-model": self.write_model}  # fmt: skip
+        """Options that ask for a file with a picture or a model."""
+        given = {**self._files(), "--figures": self.figures}
         return [name for name, path in given.items() if path is not None]
+
+    def _files(self) -> dict[str, Path | None]:
+        return {
+            "--html": self.report,
+            "--figure": self.figure,
+            "--save": self.save,
+            "--write-model": self.write_model,
+        }
 
 
 def _model_and_logs(files: "Sequence[Path]") -> "tuple[Model, Sequence[Path]]":

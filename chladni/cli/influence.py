@@ -2,12 +2,14 @@
 
 from itertools import pairwise
 from math import isnan
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from chladni.cli import options
 from chladni.cli.output import Output
+from chladni.cli.places import require_places
 from chladni.cli.settings import with_settings
 
 if TYPE_CHECKING:
@@ -54,6 +56,7 @@ def influence(
     from chladni.models.analysis.influence import influence as coefficients
     from chladni.models.core.stability import growing_poles
 
+    require_places(reads=[Path(model)], writes={"--json": json}, folders={"--figures": figures})
     to = Output(json)
     instrument = named_instrument(model)
     chosen = with_settings(instrument.model(), settings or ())

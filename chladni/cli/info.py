@@ -5,6 +5,7 @@ from typing import Any
 from chladni.cli import options
 from chladni.cli.channel_rows import grouped_rows
 from chladni.cli.output import Output
+from chladni.cli.places import require_places
 from chladni.cli.words import NOTHING, count, number, unit
 
 
@@ -18,6 +19,7 @@ def info(
     """Channels, rates, duration, time base and damage of a log."""
     from chladni.io.log import open_log
 
+    require_places(reads=[log, setup], writes={"--json": json})
     out = Output(json)
     with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name):
         found = opened.info()

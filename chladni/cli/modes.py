@@ -9,6 +9,7 @@ import typer
 from chladni.cli import options
 from chladni.cli.mode_rows import print_modes, print_relative_motion
 from chladni.cli.output import Output
+from chladni.cli.places import require_places
 
 if TYPE_CHECKING:
     from chladni.apps.modal_study import ModalStudy
@@ -79,6 +80,11 @@ def modes(
     from chladni.apps.sources import Span
     from chladni.io.log import open_log
 
+    require_places(
+        reads=[log, setup],
+        writes={"--json": json, "--uff": uff, "--csv": csv, "--save": save, "--report": report},
+        folders={"--figures": figures},
+    )
     out = Output(json)
     damage: tuple[str, ...] = ()
     wanted = Wanted.of(bands_hz=None if band is None else [band], count=count, frequencies_hz=frequency)

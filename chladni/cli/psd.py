@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from chladni.cli import options
 from chladni.cli.output import Output
+from chladni.cli.places import require_places
 from chladni.cli.words import number, unit, with_error
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ def psd(
     from chladni.io.log import open_log
     from chladni.signals.study import Study
 
+    require_places(reads=[log, setup], writes={"--json": json, "--report": report}, folders={"--figures": figures})
     out = Output(json)
     with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name) as progress:
         found = densities(

@@ -7,6 +7,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.output import Output
+from chladni.cli.places import require_places
 from chladni.cli.settings import effect_of, with_settings
 from chladni.cli.words import count, number
 
@@ -88,6 +89,10 @@ def simulate(
     to = Output(json)
     # A simulation may take minutes: it shouldn't be lost to a misspelt folder.
     require_place(out)
+    require_places(
+        reads=[Path(model), log],
+        writes={"--out": out, "the truth of --out": out.with_suffix(".truth.json"), "--json": json},
+    )
     instrument = named_instrument(model)
     chosen = _changed(instrument.model(), settings or (), effect or ())
     recording = None

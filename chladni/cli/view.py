@@ -7,6 +7,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.output import Output
+from chladni.cli.places import require_places
 
 if TYPE_CHECKING:
     from chladni.signals.study import Study
@@ -44,6 +45,11 @@ def view(
 
     if save is not None and web:
         raise SetupError("--save writes a file and --web serves a page; give one of them")
+    require_places(
+        reads=[*logs, setup],
+        writes={"--json": json, "--save": save, "--report": report},
+        folders={"--figures": figures},
+    )
     out = Output(json)
     studies = []
     for log in logs:

@@ -78,7 +78,9 @@ def test_the_explained_model_is_written(run: Run, engine: StandIn, files: tuple[
     ("arguments", "words"),
     [
         (["--without", "coulomb_fricton"], "did you mean coulomb_friction"),
-        (["--figure", "gap.bmp"], "a figure is one of .png, .svg, .pdf"),
+        (["--figure", "gap.bmp"], "--figure writes .png, .svg or .pdf"),
+        (["--json", "none/gap.json"], "there is no folder none"),
+        (["--html", "gap.htmx"], "--html writes .html or .htm"),
         (["--save", "none/gap.rrd"], "there is no folder none"),
         (["--write-model", "none/gap.toml"], "there is no folder none"),
         (["--seed", "-1"], "--seed"),
@@ -93,6 +95,23 @@ def test_mistakes_are_told_in_one_line_before_anything_is_diagnosed(
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert words in outcome.err
     assert engine.model is None
+
+
+def test_no_option_replaces_the_model_or_the_log(
+    run: Run, engine: StandIn, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    model, log = files
+    held = model.read_bytes(), log.read_bytes()
+    (tmp_path / "link.json").symlink_to(log)
+    for option, path in (
+        ("--write-model", model),
+        ("--html", log),
+        ("--json", log),
+        ("--json", tmp_path / "link.json"),
+    ):
+        outcome = run("gap", *files, option, path)
+        assert (outcome.code, outcome.err.count("\n"), engine.model) == (2, 1, None)
+    assert (model.read_bytes(), log.read_bytes()) == held
 
 
 @pytest.mark.parametrize("missing", [0, 1])

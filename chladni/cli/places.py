@@ -1,0 +1,91 @@
+"""Where a command may write: asked before anything is computed, for all commands alike."""
+
+import os
+from collections.abc import Iterable, Mapping
+from itertools import combinations
+from pathlib import Path
+
+from chladni.signals.errors import LogError, SetupError
+
+# A file that is called otherwise than what it holds is looked for in vain, or is another file than was meant.
+SUFFIXES: Mapping[str, tuple[str, ...]] = {
+    "--csv": (".csv", ".txt"),
+    "--figure": (".png", ".svg", ".pdf"),
+    "--html": (".html", ".htm"),
+    "--json": (".json",),
+    "--report": (".html", ".htm"),
+    "--save": (".rrd",),
+    "--uff": (".uff", ".unv"),
+    "--write-model": (".toml",),
+}
+
+
+def require_places(
+    *,
+    reads: Iterable[Path | None],
+    writes: Mapping[str, Path | str | None],
+    folders: Mapping[str, Path | None] | None = None,
+) -> None:
+    """Refuse places at which a command can't write, or would destroy what it reads or wrote.
+
+    Parameters
+    ----------
+    reads
+        Files that the command reads; None for those that weren't given.
+    writes
+        File by the option that asks for it, such as ``--html``; None where it wasn't given, ``-`` is standard output.
+    folders
+        Folder by the option that asks for it; one that isn't there is made later.
+
+    Raises
+    ------
+    SetupError
+        When a name ends with another suffix than the option's, or is that of a file that is read or written already.
+    LogError
+        When a file's folder isn't there or can't be written to, or a file is a folder, or the reverse.
+
+    Examples
+    --------
+    >>> require_places(reads=[Path("arm.mcap")], writes={"--html": Path("arm.mcap")})
+    Traceback (most recent call last):
+    chladni.signals.errors.SetupError: arm.mcap: --html writes .html or .htm; give such a name
+    """
+    files = {option: Path(path) for option, path in writes.items() if path is not None and str(path) != "-"}
+    for option, path in files.items():
+        _require_suffix(option, path)
+        _require_folder_of(option, path)
+    for option, folder in (folders or {}).items():
+        if folder is not None and folder.exists() and not folder.is_dir():
+            raise LogError(f"{folder}: is a file; {option} takes a folder")
+    _require_apart(files, {path.resolve() for path in reads if path is not None})
+
+
+def _require_suffix(option: str, path: Path) -> None:
+    known = SUFFIXES.get(option, ())
+    if known and path.suffix.lower() not in known:
+        raise SetupError(f"{path}: {option} writes {_listed(known)}; give such a name")
+
+
+def _require_folder_of(option: str, path: Path) -> None:
+    # A link is followed when the file is written, too.
+    folder = path.resolve().parent
+    if not folder.is_dir():
+        raise LogError(f"{path}: there is no folder {path.parent}; make it, or name another")
+    if path.is_dir():
+        raise LogError(f"{path}: is a folder; {option} takes a file, name one in it")
+    if not os.access(folder, os.W_OK):
+        raise LogError(f"{path}: the folder {path.parent} can't be written to; name another")
+
+
+def _require_apart(files: Mapping[str, Path], reads: set[Path]) -> None:
+    for option, path in files.items():
+        if path.resolve() in reads:
+            raise SetupError(f"{path}: is read by this command, and {option} would replace it; name another file")
+    for (one, path), (other, second) in combinations(files.items(), 2):
+        if path.resolve() == second.resolve():
+            raise SetupError(f"{path}: {one} and {other} name the same file; give each its own")
+
+
+def _listed(suffixes: tuple[str, ...]) -> str:
+    *first, last = suffixes
+    return f"{', '.join(first)} or {last}" if first else last
