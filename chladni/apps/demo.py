@@ -20,9 +20,9 @@ from chladni.apps.modes import Wanted, modes_of_response
 from chladni.apps.show import gather
 from chladni.apps.sources import Progress, no_progress
 from chladni.io.atomic import atomic_write
+from chladni.io.folder import made_folder
 from chladni.io.log import open_log
 from chladni.io.mcap.writer import write_mcap
-from chladni.signals.errors import LogError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.study import Study
@@ -74,10 +74,7 @@ def run_tour(folder: Path, *, progress: Progress = no_progress) -> Tour:
     from chladni.viewers.report import write_report
     from chladni.viewers.rerun import write_rrd
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise LogError(f"{folder}: can't make this folder ({error.strerror}); name another with --out") from None
+    made_folder(folder)
     made = make_demo_log()
     progress(0.1)
     log_path, setup_path = folder / "arm.mcap", folder / "setup.toml"

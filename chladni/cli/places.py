@@ -55,8 +55,8 @@ def require_places(
         _require_suffix(option, path)
         _require_folder_of(option, path)
     for option, folder in (folders or {}).items():
-        if folder is not None and folder.exists() and not folder.is_dir():
-            raise LogError(f"{folder}: is a file; {option} takes a folder")
+        if folder is not None:
+            _require_folder(option, folder)
     _require_apart(files, {path.resolve() for path in reads if path is not None})
 
 
@@ -75,6 +75,12 @@ def _require_folder_of(option: str, path: Path) -> None:
         raise LogError(f"{path}: is a folder; {option} takes a file, name one in it")
     if not os.access(folder, os.W_OK):
         raise LogError(f"{path}: the folder {path.parent} can't be written to; name another")
+
+
+def _require_folder(option: str, folder: Path) -> None:
+    there = next(one for one in (folder, *folder.resolve().parents) if one.exists())
+    if not there.is_dir():
+        raise LogError(f"{folder}: {there} is a file; {option} takes a folder, name another")
 
 
 def _require_apart(files: Mapping[str, Path], reads: set[Path]) -> None:

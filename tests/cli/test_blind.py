@@ -69,6 +69,14 @@ def test_make_writes_cases_and_truths(run: Run, tmp_path: Path) -> None:
     assert run("blind", "make", tmp_path, "--count", 1, "--seed", 2, "--jobs", 1).code == 0
 
 
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_file_in_the_place_of_the_folder_is_one_line(run: Run, tmp_path: Path, jobs: int) -> None:
+    (tmp_path / "file").write_text("")
+    done = run("blind", "make", tmp_path / "file", "--count", 1, "--jobs", jobs)
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    assert "can't be made a folder (Not a directory)" in done.err
+
+
 def test_jobs_below_one_are_refused() -> None:
     with pytest.raises(SetupError, match="jobs 0"), blind.workers(0):
         pass

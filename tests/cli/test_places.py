@@ -42,8 +42,9 @@ def test_folders_and_files_are_not_confused(log: Path, tmp_path: Path) -> None:
         require_places(reads=(), writes={"--html": tmp_path / "page.html"})
     with pytest.raises(LogError, match="there is no folder"):
         require_places(reads=(), writes={"--json": str(tmp_path / "none" / "x.json")})
-    with pytest.raises(LogError, match=r"arm\.mcap: is a file; --figures takes a folder"):
-        require_places(reads=(), writes={}, folders={"--figures": log})
+    for folder in (log, log / "figures" / "all"):
+        with pytest.raises(LogError, match=r"arm\.mcap is a file; --figures takes a folder"):
+            require_places(reads=(), writes={}, folders={"--figures": folder})
 
 
 def test_a_folder_that_refuses_is_told_before_anything_is_computed(

@@ -16,6 +16,7 @@ from chladni.gap.blind.performance import measured
 from chladni.gap.blind.seal import seal_case, write_json
 from chladni.gap.linear_algebra import in_one_thread
 from chladni.io.atomic import atomic_write
+from chladni.io.folder import made_folder
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
 from chladni.signals.errors import SetupError
@@ -74,7 +75,7 @@ def make_cases(directory: Path, *, count: int, seed: int, composition: Mapping[K
         for place, (name, order) in enumerate(zip(names, planned, strict=True), start=1)
         if not (directory / "cases" / name / "case.json").is_file()
     ]
-    (directory / "truth").mkdir(parents=True, exist_ok=True)
+    made_folder(directory / "truth")
     _keep_to_one(
         directory / "truth" / "campaign.json", {"count": count, "seed": seed, "composition": {**composition}}
     )
@@ -102,8 +103,7 @@ def _keep_to_one(path: Path, told: dict[str, Any]) -> None:
 def make_case(task: CaseTask) -> str:
     """Draw, simulate, write and seal one case; give its name."""
     case = draw_case(task.order, np.random.default_rng(task.seed))
-    folder = task.directory / "cases" / task.name
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = made_folder(task.directory / "cases" / task.name)
     with atomic_write(folder / "model.toml") as file:
         file.write(model_text(case.bench.plan).encode())
     write_mcap(log_of(case), folder / "log.mcap", layout="batches")

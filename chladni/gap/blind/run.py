@@ -11,6 +11,7 @@ from typing import Protocol
 
 from chladni.gap.blind.case_folder import CaseFolder, case_folders
 from chladni.gap.blind.seal import write_json
+from chladni.io.folder import made_folder
 from chladni.signals.errors import ChladniError
 
 FAILURE_FORMAT = "chladni.blind-failure/1"
@@ -73,8 +74,7 @@ def run_cases(directory: Path, diagnose: Diagnose, *, seed: int = 0, executor: E
         When a result can't be written.
     """
     cases = case_folders(directory)
-    results = directory / "results"
-    results.mkdir(exist_ok=True)
+    results = made_folder(directory / "results")
     waiting = [case for case in cases if not (results / f"{case.name}.json").is_file()]
     work = partial(_diagnosed, results, diagnose, seed)
     failed: list[str] = []

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from chladni.io.atomic import atomic_write
+from chladni.io.folder import made_folder
 from chladni.signals.errors import SetupError
 
 CASE_FORMAT, TRUTH_FORMAT = "chladni.blind-case/1", "chladni.blind-truth/1"
@@ -66,6 +67,8 @@ def seal_case(directory: Path, name: str, truth: Mapping[str, Any], *, leave_out
     ------
     SetupError
         When the case has no model or log, or the truth no kind or effects.
+    LogError
+        When the truth or the seal can't be written.
     """
     case = directory / "cases" / name
     for file in ("model.toml", "log.mcap"):
@@ -76,8 +79,7 @@ def seal_case(directory: Path, name: str, truth: Mapping[str, Any], *, leave_out
             raise SetupError(f"{name}: the truth has no {key!r}; it needs kind and effects")
     sealed = {**truth, "format": TRUTH_FORMAT, "salt": new_salt()}
     seal = seal_of(sealed)
-    (directory / "truth").mkdir(exist_ok=True)
-    write_json(directory / "truth" / f"{name}.json", sealed)
+    write_json(made_folder(directory / "truth") / f"{name}.json", sealed)
     # Last, since its presence says that the case is whole.
     write_json(case / "case.json", {"format": CASE_FORMAT, "seal": seal, "leave_out": sorted(leave_out)})
     return seal

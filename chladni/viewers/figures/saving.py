@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from chladni.io.atomic import atomic_write
-from chladni.signals.errors import LogError, SetupError
+from chladni.io.folder import made_folder
+from chladni.signals.errors import SetupError
 from chladni.signals.study import Study
 from chladni.viewers.figures.album import Album
 
@@ -63,14 +64,7 @@ def _prepared(folder: str | os.PathLike[str], formats: Sequence[str]) -> Path:
     for kind in formats:
         if kind not in FORMATS:
             raise SetupError(f"figure format {kind!r} is none of {', '.join(FORMATS)}")
-    target = Path(folder)
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise LogError(
-            f"{target}: can't be made a folder ({error.strerror}); name another for the figures"
-        ) from error
-    return target
+    return made_folder(Path(folder))
 
 
 def file_name(name: str) -> str:
