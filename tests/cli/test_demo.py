@@ -61,6 +61,7 @@ def test_the_viewer_opens_where_there_is_a_display(run, monkeypatch, tmp_path):
     from types import SimpleNamespace
 
     import chladni.apps.demo
+    import chladni.viewers.rerun
 
     shown = []
     monkeypatch.setattr(chladni.viewers.rerun, "spawn", shown.append)
