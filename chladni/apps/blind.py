@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -62,7 +63,7 @@ def score_campaign(directory: Path) -> Mapping[str, Any]:
 
 @contextmanager
 def workers(jobs: int | None) -> Iterator[Executor | None]:
-    """Give processes to work with; None for one, which is this process.
+    """Give processes to work with; None for one, which is this process. Ctrl-C ends them in the midst of their work.
 
     Raises
     ------
@@ -75,10 +76,23 @@ def workers(jobs: int | None) -> Iterator[Executor | None]:
     if count == 1:
         yield None
         return
+    others = frozenset(multiprocessing.active_children())
     # A forked child of a process with threads may wait for a lock that nobody holds any more.
-    pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
+    pool = ProcessPoolExecutor(
+        count, mp_context=multiprocessing.get_context("spawn"), initializer=_leave_ctrl_c_to_the_parent
+    )
     try:
         yield pool
+    except KeyboardInterrupt:
+        # A case under way may take a minute, and is done again when the campaign goes on: its file isn't there.
+        for process in frozenset(multiprocessing.active_children()) - others:
+            process.terminate()
+        raise
     finally:
-        # After Ctrl-C nobody wants the cases that haven't begun.
+        # After a mistake nobody wants the cases that haven't begun.
         pool.shutdown(cancel_futures=True)
+
+
+def _leave_ctrl_c_to_the_parent() -> None:
+    # A terminal interrupts the whole group: each process would give its case up, begin the next, and say so.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -10,5 +10,6 @@ def run() -> None:
 
         code = main()
     except KeyboardInterrupt:
+        print("chladni: interrupted", file=sys.stderr)  # noqa: T201
         code = 130
     sys.exit(code)

@@ -58,8 +58,8 @@ def _options(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and give its exit code.
 
-    0 success; 2 unusable input; 130 interrupted; 1 a defect of chladni. Each failure is one line on standard error;
-    with ``CHLADNI_TRACEBACK=1`` in the environment the traceback follows.
+    0 success; 2 unusable input; 130 interrupted; 1 a defect of chladni. Each of the others is one line on standard
+    error; with ``CHLADNI_TRACEBACK=1`` in the environment the traceback follows.
     """
     try:
         code = app(args=arguments, prog_name="chladni", standalone_mode=False)
@@ -69,10 +69,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Typer's way of saying that the reader of our output has gone, as with `| head`: nothing is wrong.
         return SUCCESS
     except (KeyboardInterrupt, typer.Abort):
-        return INTERRUPTED
+        return _interrupted()
     except Exception as error:  # noqa: BLE001  # the last line of defence: a defect is told in one line
         return _fail(error, DEFECT)
-    return code if isinstance(code, int) else SUCCESS
+    # Typer makes an exit code of Ctrl-C in a command.
+    return _interrupted() if code == INTERRUPTED else code if isinstance(code, int) else SUCCESS
+
+
+def _interrupted() -> int:
+    # True because files are written atomically: each appears when it's whole.
+    print("chladni: interrupted; every file is whole, or as it was before", file=sys.stderr)  # noqa: T201
+    return INTERRUPTED
 
 
 def _fail(error: Exception, code: int) -> int:

@@ -80,7 +80,10 @@ def test_interrupting_gives_130_and_leaves_nothing_behind(run, arm_log, tmp_path
         raise KeyboardInterrupt
 
     monkeypatch.setattr(chladni.apps.documents, "psd_document", interrupted)
-    assert run("psd", arm_log, "--json", tmp_path / "psd.json").code == INTERRUPTED
+    outcome = run("psd", arm_log, "--json", tmp_path / "psd.json")
+    assert outcome.code == INTERRUPTED
+    # The levels were printed before: whoever sees them must know that the rest won't come.
+    assert outcome.err == "chladni: interrupted; every file is whole, or as it was before\n"
     assert list(tmp_path.iterdir()) == []
 
 
