@@ -184,6 +184,11 @@ def _whole_stretch(recording: TimeSeries, rows: Sequence[int], log: str) -> tupl
     longest = int(np.argmax(lasts - firsts)) if firsts.size else 0
     first, last = (int(firsts[longest]), int(lasts[longest])) if firsts.size else (0, 0)
     rate_hz, samples = recording.sample_rate_hz, good.size
+    if samples < FEWEST_SAMPLES:
+        raise LogError(
+            f"{log}: {samples / rate_hz:g} s at {rate_hz:g} Hz are {counted(samples, 'sample')}; at least "
+            f"{FEWEST_SAMPLES} samples are needed; take a longer part, or record longer"
+        )
     if last - first < LEAST_SHARE * samples or last - first < FEWEST_SAMPLES:
         missing = [int((~_good(recording, [row])).sum()) for row in rows]
         worst = recording.channels[rows[int(np.argmax(missing))]].name
