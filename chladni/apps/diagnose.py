@@ -8,8 +8,9 @@ from pathlib import Path
 from chladni.apps.findings import damage_sentences
 from chladni.apps.gap_document import Document, gap_document
 from chladni.apps.sources import Span
-from chladni.gap.comparison.measuring import measurement_of
+from chladni.gap.comparison.measuring import MatchedLog, matched_log
 from chladni.gap.records.diagnosis import Diagnosis
+from chladni.gap.records.log_use import LogUse
 from chladni.gap.records.measurement import Measurement
 from chladni.io.log import Log, open_log
 from chladni.io.log_info import some_of
@@ -96,7 +97,9 @@ def diagnose_gap(
     )
     # What limits the logs comes first, it limits everything after; several logs may say the same.
     remarks = [remark for one in read for remark in one.remarks]
-    return replace(found, remarks=tuple(dict.fromkeys([*remarks, *found.remarks])))
+    return replace(
+        found, remarks=tuple(dict.fromkeys([*remarks, *found.remarks])), used=tuple(one.use for one in read)
+    )
 
 
 def diagnosis_json(
@@ -117,9 +120,10 @@ def known_effects(words: Iterable[str], own_effects: Sequence[EffectKind] = ()) 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Read:
-    """A log as its model sees it, and what limits it."""
+    """A log as its model sees it, how much of it that is, and what limits it."""
 
     measurement: Measurement
+    use: LogUse
     remarks: tuple[str, ...]
 
 
@@ -156,13 +160,23 @@ def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
             f"{some_of(held, count=NAMES_TOLD)}, the model listens to {some_of(sorted(wanted), count=NAMES_TOLD)}"
         )
     series = log.read(chosen, start_s=span.start_s, end_s=span.end_s)
-    measurement, remarks = measurement_of(model, series, log=name, held=held)
-    return _Read(measurement=measurement, remarks=(*damage_sentences(log.damage), *remarks))
+    return _with_use(matched_log(model, series, log=name, held=held), series, damage_sentences(log.damage))
 
 
 def _of_series(model: Model, series: TimeSeries, name: str) -> _Read:
-    measurement, remarks = measurement_of(model, series, log=name)
-    return _Read(measurement=measurement, remarks=remarks)
+    return _with_use(matched_log(model, series, log=name), series)
+
+
+def _with_use(found: MatchedLog, series: TimeSeries, damage: tuple[str, ...] = ()) -> _Read:
+    seen, losses = found.measurement, (*damage, *found.losses)
+    use = LogUse(
+        log=seen.log,
+        used_s=seen.duration_s,
+        recorded_s=series.samples / series.sample_rate_hz,
+        sample_rate_hz=series.sample_rate_hz,
+        losses=losses,
+    )
+    return _Read(measurement=seen, use=use, remarks=(*losses, *found.remarks))
 
 
 def _listened_to(model: Model) -> set[str]:

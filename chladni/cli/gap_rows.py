@@ -3,20 +3,25 @@
 from typing import TYPE_CHECKING
 
 from chladni.cli.output import Output
+from chladni.cli.words import number
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from chladni.apps.gap_comparison import GapComparison
     from chladni.gap.records.diagnosis import Diagnosis, Where
+    from chladni.gap.records.log_use import LogUse
     from chladni.viewers.gap_tables import Table
 
 # Bands and regimes with less of the gap than this don't tell where it lies.
 LEAST_SHARE = 0.05
 # Rows of a table of sites or regimes, as many as one reads.
 MOST_ROWS = 6
+SECONDS_DIGITS = 5
 
 
 def print_diagnosis(out: Output, found: "Diagnosis") -> None:
-    """Print the answer, where the gap lies, what was weighed, what was tuned, and what to measure next."""
+    """Print the answer and what it rests on, where the gap lies, what was weighed and tuned, what to measure next."""
     from chladni.viewers import gap_tables as tables
     from chladni.viewers.gap_summary import naive_sentence, summary
 
@@ -24,6 +29,7 @@ def print_diagnosis(out: Output, found: "Diagnosis") -> None:
     out.line(first, style="bold")
     for sentence in rest:
         out.line(sentence)
+    _print_use(out, found.used)
     out.line()
     _print_where(out, found.where)
     _print(out, "Linear, even, odd and noise, as shares of each output", tables.distortion_table(found))
@@ -36,7 +42,8 @@ def print_diagnosis(out: Output, found: "Diagnosis") -> None:
     if found.next_measurement is not None:
         out.line("Measure next", style="bold")
         out.line(found.next_measurement)
-    out.lines((*found.levels, *found.remarks))
+    told = {loss for one in found.used for loss in one.losses}
+    out.lines((*found.levels, *(remark for remark in found.remarks if remark not in told)))
 
 
 def print_comparison(out: Output, found: "GapComparison") -> None:
@@ -52,6 +59,17 @@ def print_comparison(out: Output, found: "GapComparison") -> None:
     out.line()
     _print_where(out, found.where)
     out.lines(found.remarks)
+
+
+def _print_use(out: Output, used: "Sequence[LogUse]") -> None:
+    """Right below the answer, since an answer from half a log reads like one from a whole."""
+    for one in used:
+        seconds = number(one.used_s, digits=SECONDS_DIGITS)
+        # Less than a sample is rounding.
+        whole = (one.recorded_s - one.used_s) * one.sample_rate_hz < 1
+        of_all = "" if whole else f" of the {number(one.recorded_s, digits=SECONDS_DIGITS)} s"
+        out.line(f"Used: {seconds} s{of_all} of {one.log}, at {number(one.sample_rate_hz)} Hz.")
+        out.lines(one.losses)
 
 
 def _print_where(out: Output, where: "Where") -> None:

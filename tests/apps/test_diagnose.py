@@ -67,6 +67,27 @@ def test_a_part_of_the_log_is_a_part(engine: StandIn, files: tuple[Path, Path]) 
     assert engine.measurements[0].samples == 2 * made.RATE_HZ
 
 
+def test_how_much_of_each_log_was_used_is_told(engine: StandIn, files: tuple[Path, Path]) -> None:
+    series = made.log_series()
+    values = series.values.copy()
+    values[0, values.shape[1] // 4] = np.nan
+    found = chladni.diagnose_gap(files[0], [files[1], replace(series, values=values)])
+    whole, cut = found.used
+    assert (whole.log, whole.used_s, whole.losses) == ("arm.mcap", whole.recorded_s, ())
+    assert cut.recorded_s == whole.recorded_s
+    assert cut.used_s == pytest.approx(0.75 * whole.recorded_s, abs=2 / made.RATE_HZ)
+    assert "series 2 lacks 1 sample" in cut.losses[0]
+    # Readers of the document find it where limits always were.
+    assert cut.losses[0] in found.remarks
+
+
+def test_what_a_torn_log_lost_is_a_loss(engine: StandIn, files: tuple[Path, Path], tmp_path: Path) -> None:
+    torn = tmp_path / "torn.mcap"
+    torn.write_bytes(files[1].read_bytes()[:-2000])
+    (use,) = chladni.diagnose_gap(files[0], torn).used
+    assert use.losses[0].startswith("Damage")
+
+
 def test_effects_to_leave_out_and_of_ones_own_reach_the_diagnosis(engine: StandIn, files: tuple[Path, Path]) -> None:
     brake = replace(CATALOGUE["quadratic_damping"], name="magnetic_brake")
     chladni.diagnose_gap(*files, leave_out=["hysteresis", "magnetic_brake"], own_effects=[brake], seed=7)

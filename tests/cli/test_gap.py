@@ -97,6 +97,25 @@ def test_mistakes_are_told_in_one_line_before_anything_is_diagnosed(
     assert engine.model is None
 
 
+def test_what_was_lost_of_a_log_stands_right_below_the_answer(
+    run: Run, engine: StandIn, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    assert "\nUsed: 8 s of arm.mcap, at 500 Hz.\n\n" in run("gap", *files).out
+    torn = tmp_path / "torn.mcap"
+    series = made.log_series()
+    values = series.values.copy()
+    values[0, 500] = np.nan
+    write_mcap(replace(series, values=values), torn)
+    torn.write_bytes(torn.read_bytes()[:-10])
+    shown = run("gap", files[0], torn).out
+    answer = shown[: shown.index("\n\n")]
+    assert "Used: 6.998 s of the 8 s of torn.mcap, at 500 Hz.\n- Damage" in answer
+    assert "torn.mcap lacks 1 sample" in answer
+    # Once: what stands above isn't repeated among the remarks.
+    assert shown.count("Damage") == answer.count("Damage")
+    assert "was held." in shown[len(answer) :]
+
+
 def test_no_option_replaces_the_model_or_the_log(
     run: Run, engine: StandIn, files: tuple[Path, Path], tmp_path: Path
 ) -> None:

@@ -49,9 +49,35 @@ class _Match:
         return self.terminal.channel or self.terminal.name
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatchedLog:
+    """A log as a model sees it.
+
+    Attributes
+    ----------
+    measurement
+        SI, without a missing sample: the longest stretch in which all channels are there, if it is at least half of
+        the log.
+    losses
+        Sentences on what an answer can't be read without: gaps that cost a part of the log, inputs that never move.
+    remarks
+        Sentences on what else limits an answer: outputs that the log doesn't hold, a short log, a low rate.
+    """
+
+    measurement: Measurement
+    losses: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+
 def measurement_of(
     model: Model, recording: TimeSeries, *, log: str, held: Sequence[str] | None = None
 ) -> tuple[Measurement, tuple[str, ...]]:
+    """Give the measurement of `matched_log`, and all that is said of it: losses first, then remarks."""
+    found = matched_log(model, recording, log=log, held=held)
+    return found.measurement, (*found.losses, *found.remarks)
+
+
+def matched_log(model: Model, recording: TimeSeries, *, log: str, held: Sequence[str] | None = None) -> MatchedLog:
     """Match the channels of a log to the inputs and outputs of a model.
 
     A terminal of the model listens to the channel that it names, else to the channel that has its own name. The
@@ -71,12 +97,8 @@ def measurement_of(
 
     Returns
     -------
-    measurement
-        SI, without a missing sample: the longest stretch in which all channels are there, if it is at least half
-        of the log.
-    remarks
-        Sentences on what was left out and what limits an answer: outputs that the log doesn't hold, gaps, a short
-        log, a low rate.
+    MatchedLog
+        Measurement, and sentences on what limits it.
 
     Raises
     ------
@@ -105,7 +127,11 @@ def measurement_of(
         output_names=tuple(match.terminal.name for match in outputs),
         output_units=tuple(match.terminal.unit for match in outputs),
     )
-    return measurement, (*remarks, *gaps, *_undriven(inputs), *_limits(compiled, measurement))
+    return MatchedLog(
+        measurement=measurement,
+        losses=(*gaps, *_at_rest(inputs, measurement, recording)),
+        remarks=(*remarks, *_undriven(inputs), *_limits(compiled, measurement)),
+    )
 
 
 def _matched(terminal: Terminal, recording: TimeSeries) -> _Match:
@@ -238,6 +264,22 @@ def _undriven(inputs: Sequence[_Match]) -> tuple[str, ...]:
     return (f"not logged, taken as zero: input {', '.join(idle)}",) if idle else ()
 
 
+def _at_rest(inputs: Sequence[_Match], measurement: Measurement, recording: TimeSeries) -> tuple[str, ...]:
+    """Name the inputs when none of them ever moves, as after a wrong channel or a drive that was off."""
+    if np.any(np.ptp(measurement.inputs, axis=1) > 0):
+        return ()
+    told = ", ".join(
+        f"{match.terminal.name!r} ({recording.channels[match.row].name!r}) is {row[0]:g} throughout"
+        for match, row in zip(inputs, measurement.inputs, strict=True)
+        if match.row is not None
+    )
+    still = (
+        f"no input moves in {measurement.log}: input {told}; only what starts in motion or isn't logged shows; check "
+        "the channel, or whether the drive was on"
+    )
+    return (still,)
+
+
 def _limits(compiled: CompiledModel, measurement: Measurement) -> tuple[str, ...]:
     """Sentences on a log that is too short or too coarse for a good answer."""
     remarks = []
@@ -256,8 +298,6 @@ def _limits(compiled: CompiledModel, measurement: Measurement) -> tuple[str, ...
             f"a log at {rate_hz:g} Hz can't follow {counted(beyond, 'mode')} of the model above "
             f"{rate_hz / SAMPLES_A_CYCLE:.3g} Hz"
         )
-    if not np.any(np.ptp(measurement.inputs, axis=1) > 0):
-        remarks.append("no input moves in this log: only what starts in motion or isn't logged shows")
     return tuple(remarks)
 
 

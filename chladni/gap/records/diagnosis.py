@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.records.log_use import LogUse
 from chladni.signals.value import Value
 
 Matrix = NDArray[np.float64]
@@ -271,6 +272,8 @@ class Diagnosis:
         With several logs: sentences on what changes with level.
     elsewhere
         With several logs: how far what the first one told closes the gap on the others, which no fit saw.
+    used
+        How much of each log was used, and what was lost of it.
     """
 
     model: str
@@ -290,3 +293,4 @@ class Diagnosis:
     distortion: tuple[DistortionShare, ...] = ()
     levels: tuple[str, ...] = ()
     elsewhere: tuple[Closing, ...] = ()
+    used: tuple[LogUse, ...] = ()

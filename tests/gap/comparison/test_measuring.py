@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import chladni
-from chladni.gap.comparison.measuring import measurement_of
+from chladni.gap.comparison.measuring import matched_log, measurement_of
 from chladni.models.core.model import Model
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, ModelError
@@ -184,6 +184,7 @@ def test_gaps_leave_the_longest_stretch_and_are_told(tmp_path: Path, how: str) -
     found, remarks = measurement_of(model_of(tmp_path), gappy, log="log.mcap")
     np.testing.assert_array_equal(found.inputs[0], series.values[row, 320:])
     assert [remark for remark in remarks if "log.mcap lacks 20 samples" in remark and "0.32 s to 1 s" in remark]
+    assert matched_log(model_of(tmp_path), gappy, log="log.mcap").losses == remarks[:1]
 
 
 def test_one_missing_sample_is_one(tmp_path: Path) -> None:
@@ -247,7 +248,11 @@ def test_an_input_that_never_moves_is_told(tmp_path: Path) -> None:
     values[series.index("/hammer.force")] = 0.0
     still = TimeSeries(values=values, sample_rate_hz=RATE_HZ, channels=series.channels)
     _, remarks = measurement_of(model_of(tmp_path), still, log="log.mcap")
-    assert any("no input moves" in remark for remark in remarks)
+    (told,) = [remark for remark in remarks if "no input moves" in remark]
+    assert "input 'hammer' ('/hammer.force') is 0 throughout" in told
+    # An answer can't be read without it.
+    found = matched_log(model_of(tmp_path), still, log="log.mcap")
+    assert (found.losses, told in found.remarks) == ((told,), False)
 
 
 def test_measured_axis(shared_data: Path) -> None:
