@@ -19,9 +19,12 @@ def printed_patterns(view: LinearView, sites: Sequence[Site], outputs: Sequence[
     Parameters
     ----------
     outputs
-        Names of the view's outputs, which `noise` is of.
+        Names of the view's outputs, which `noise` is of. One without noise counts nothing.
     """
-    weight = 1.0 / np.sqrt(noise.density(view.lines.cycles))
+    density = noise.density(view.lines.cycles)
+    # Of an output without noise nothing is known, such as a sensor to be added where the log's input moves nothing.
+    known = density > 0
+    weight = np.where(known, 1.0 / np.sqrt(np.where(known, density, 1.0)), 0.0)
     return np.stack([view.pattern(way_to(view, site, outputs)) * weight for site in sites])
 
 

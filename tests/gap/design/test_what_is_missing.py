@@ -1,11 +1,13 @@
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from chladni.gap.design.site_angles import angles_deg
 from chladni.gap.design.what_is_missing import what_is_missing
-from tests.gap.made_log import RATE_HZ, band_noise, measured, three_bodies
+from chladni.models.structures.structure_output import StructureOutput
+from tests.gap.made_log import RATE_HZ, band_noise, measured, three_bodies, white_floor
 
 
 def missing(*, outputs=None, sites=(), samples=4096, noise=0.02):
@@ -43,6 +45,15 @@ def test_a_quiet_log_is_asked_to_be_louder():
     said = missing(noise=0.5)
     # 0.5 of the signal is 0.45 of signal and noise; 1.7 times the signal brings it to 0.3.
     assert re.fullmatch(r"Noise is 4[345]% of what .* raise the level 2 times, or average 4 records .*\.", said)
+
+
+def test_a_sensor_is_not_asked_for_when_nothing_moves():
+    # Its noise would follow from its signal, which is zero: it would be taken for infinitely good.
+    force = StructureOutput(name="f", measures="force", at="j0")
+    model = replace(three_bodies(), outputs=(force,))
+    log, _ = measured(model, np.zeros((1, 4096)))
+    noise = np.random.default_rng(1).standard_normal((1, 4096))
+    assert what_is_missing(model, replace(log, outputs=noise), white_floor([0.1])) is None
 
 
 def test_angles_are_those_between_patterns():
