@@ -23,6 +23,7 @@ from chladni.cli.psd import psd
 from chladni.cli.simulate import simulate
 from chladni.cli.view import view
 from chladni.signals.errors import ChladniError
+from chladni.signals.wording import counted
 
 SUCCESS, DEFECT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 MOST_MISTAKES = 3
@@ -104,5 +105,5 @@ def _mistakes(lines: Sequence[str]) -> str:
         # All have the same long path in front.
         told[1:] = [line.replace(place[0], "line ", 1) for line in told[1:]]
     if len(lines) > MOST_MISTAKES:
-        told.append(f"and {len(lines) - MOST_MISTAKES} more mistakes")
+        told.append(f"and {counted(len(lines) - MOST_MISTAKES, 'more mistake')}")
     return "; ".join(told)

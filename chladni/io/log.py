@@ -285,7 +285,9 @@ class Log:
             return Window()
         start_ns, end_ns = self._time_ns(start_s), self._time_ns(end_s)
         if start_ns is not None and end_ns is not None and start_ns >= end_ns:
-            raise LogError(f"{self.path.name}: the window from {start_s} s to {end_s} s is empty; start_s < end_s")
+            raise LogError(
+                f"{self.path.name}: the window from {start_s} s to {end_s} s is empty; let it end after its start"
+            )
         lags = [self._content.lags_ns[stream.topic.name] for stream in streams]
         known = [lag for lag in lags if lag is not None]
         bounded = len(known) == len(lags)

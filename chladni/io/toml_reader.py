@@ -7,6 +7,8 @@ import tomllib
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
+from chladni.signals.wording import counted
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
@@ -61,8 +63,9 @@ class TomlMistakes:
     def error(self, kind: type[ChladniError]) -> ChladniError:
         """Give one error with a line for each mistake, in the order of the file."""
         lines = list(dict.fromkeys(text for _, text in sorted(self._told)))
-        more = [f"... and {len(lines) - MAX_MISTAKES} more mistakes"] if len(lines) > MAX_MISTAKES else []
-        return kind("\n".join(lines[:MAX_MISTAKES] + more))
+        more = len(lines) - MAX_MISTAKES
+        told = [f"... and {counted(more, 'more mistake')}"] if more > 0 else []
+        return kind("\n".join(lines[:MAX_MISTAKES] + told))
 
 
 class TomlDocument:
@@ -89,7 +92,7 @@ class TomlDocument:
         try:
             self.content: dict[str, Any] = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
-            raise kind(_syntax_message(str(error), name, len(self._lines))) from None
+            raise kind(_syntax_message(str(error), name, self._lines)) from None
         except RecursionError:
             raise kind(f"{name}:1: tables or lists are nested too deeply for a file of this kind") from None
 
@@ -185,6 +188,9 @@ def read_toml(
     document = TomlDocument(_text(path, kind), name=str(path), kind=kind)
     mistakes = TomlMistakes(document)
     content = _validated(document.content, model, mistakes)
+    if content is None and not document.content:
+        # Rather than a list of all that it should hold.
+        raise kind(f"{path}: is empty, or holds comments alone; write the file, or name another")
     if check is not None:
         check(document.content, mistakes)
     if content is None or mistakes:
@@ -228,11 +234,13 @@ def _text(path: Path, kind: type[ChladniError]) -> str:
         raise kind(f"{path}:{line}: byte {raw[error.start]:#04x} isn't UTF-8; save the file as UTF-8") from None
 
 
-def _syntax_message(message: str, name: str, lines: int) -> str:
+def _syntax_message(message: str, name: str, lines: list[str]) -> str:
     found = _LINE_IN_MESSAGE.search(message)
-    line = int(found[1]) if found and found[1] else lines
+    line = int(found[1]) if found and found[1] else len(lines)
     what = _LINE_IN_MESSAGE.sub("", message)
-    return f"{name}:{line}: not TOML: {what[:1].lower()}{what[1:]}"
+    # Python says what it expected, not what it met: the line itself names the key.
+    met = lines[line - 1].strip()
+    return f"{name}:{line}: not TOML: {what[:1].lower()}{what[1:]}{f', in {_shown(met)}' if met else ''}"
 
 
 def _mistake(kind: str, message: str, found: object, loc: Loc, model: type[BaseModel]) -> str:

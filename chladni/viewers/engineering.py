@@ -11,6 +11,8 @@ from chladni.viewers.labels import printed_unit
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 3: "k", 6: "M", 9: "G", 12: "T"}
 # Between these a number is read as easily without a prefix.
 PLAIN_FROM, PLAIN_TO = 0.1, 1e4
+# From here on three digits round to an exponent.
+LAST_WITH_POINT = 999.5
 # Units that take prefixes, when they stand first and without an exponent. Not kg: mkg is no unit, and g is gravity.
 _FIRST = re.compile(r"(m|s|N|Hz|V|A|Pa|rad|W|J)(?![A-Za-z^])")
 SURE = 0.99
@@ -33,6 +35,8 @@ def engineering(value: float, std: float | None, unit: str) -> str:
     --------
     >>> engineering(8.1234, 0.21, "N"), engineering(2.004e-4, 3.1e-6, "m"), engineering(6.1e5, None, "N/m")
     ('8.12 ± 0.21 N', '200.4 ± 3.1 µm', '610 kN/m')
+    >>> engineering(8e3, None, "N s/m"), engineering(1000.0, None, "kg")
+    ('8000 N s/m', '1000 kg')
     >>> engineering(1.2e9, 4e8, "N/m^3"), engineering(0.925, 0.011, "1"), engineering(0.0312, None, "kg")
     ('1.20 ± 0.40 GN/m³', '0.925 ± 0.011', '0.0312 kg')
     """
@@ -101,7 +105,8 @@ def _prefix(value: float, unit: str) -> tuple[float, str]:
 
 def _number(value: float, std: float | None) -> str:
     if std is None or not isfinite(std) or std <= 0:
-        return f"{value:.3g}"
+        # Four digits in front of the point are read as they stand; three of them would be written as 8.12e+03.
+        return f"{value:.0f}" if LAST_WITH_POINT <= abs(value) < PLAIN_TO else f"{value:.3g}"
     # Two digits of sigma, and the value to the same place.
     places = 1 - floor(log10(std) + 1e-9)
     if places < -3 or places > 6:

@@ -78,6 +78,8 @@ def test_the_explained_model_is_written(run: Run, engine: StandIn, files: tuple[
     ("arguments", "words"),
     [
         (["--without", "coulomb_fricton"], "did you mean coulomb_friction"),
+        (["--without", "frictoin"], "did you mean coulomb_friction or stribeck_friction?"),
+        (["--start", "5", "--end", "2"], "the window from 5.0 s to 2.0 s is empty; let it end after its start"),
         (["--figure", "gap.bmp"], "--figure writes .png, .svg or .pdf"),
         (["--json", "none/gap.json"], "there is no folder none"),
         (["--html", "gap.htmx"], "--html writes .html or .htm"),

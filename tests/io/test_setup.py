@@ -193,7 +193,9 @@ def test_text_is_no_number(tmp_path: Path) -> None:
 
 
 def test_format_is_needed(tmp_path: Path) -> None:
-    assert mistakes(tmp_path, "") == ["1: format: is missing, and is needed"]
+    assert mistakes(tmp_path, "[[point]]\nname = 'a'\nposition = [1, 2, 3]") == [
+        "1: format: is missing, and is needed"
+    ]
     assert mistakes(tmp_path, 'format = "chladni.model/1"') == [
         "1: format: found 'chladni.model/1'; must be 'chladni.setup/1'"
     ]

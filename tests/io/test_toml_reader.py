@@ -156,6 +156,11 @@ def read(tmp_path: Path, content: str | bytes) -> str:
     ("content", "told"),
     [
         ("a = \n", "m.toml:1: not TOML: "),
+        (
+            "a = 1\nmass = 8.0e3x\n",
+            "m.toml:2: not TOML: expected newline or end of document after a statement, in 'mass = 8.0e3x'",
+        ),
+        (f"a = {'x' * 5000}", "xxx..."),
         ("\n\n[[part]\n", "m.toml:3: not TOML: "),
         ("a = '''\n\n", "m.toml:3: not TOML: "),
         (b"\n\xff", "m.toml:2: byte 0xff isn't UTF-8"),
@@ -186,7 +191,18 @@ def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
     assert known.place(("part", 0, "mass")) == f"{path}:2"
 
 
+@pytest.mark.parametrize("content", ["", "\n \n", "# later\n"])
+def test_an_empty_file_is_told_as_that(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text(content)
+    with pytest.raises(ModelError, match=r"m\.toml: is empty, or holds comments alone"):
+        read_toml(path, Part, kind=ModelError)
+    # A file in which nothing is needed may be empty.
+    assert read_toml(path, Model, kind=ModelError)[0] == Model()
+
+
 def test_mistakes_are_bounded(tmp_path: Path) -> None:
+    assert read(tmp_path, "".join(f"key{n} = 1\n" for n in range(MAX_MISTAKES + 1))).endswith("1 more mistake")
     told = read(tmp_path, "".join(f"key{n} = 1\n" for n in range(MAX_MISTAKES + 7))).split("\n")
     assert len(told) == MAX_MISTAKES + 1
     assert told[-1] == "... and 7 more mistakes"

@@ -9,7 +9,8 @@ from chladni.models.drives.catalogue import DRIVES
 from chladni.models.drives.drive_kind import DriveKind
 from chladni.models.drives.drive_model import DriveModel, drive_model
 from chladni.models.drives.selection import ChosenSignal
-from chladni.models.files.file_reading import Content, FileReading, nearest
+from chladni.models.effects.wording import nearest
+from chladni.models.files.file_reading import Content, FileReading
 from chladni.models.files.site_units import SiteUnits, compiled_site_units
 from chladni.models.files.tolerances import with_tolerances
 from chladni.models.structures.wiring import name_mistakes

@@ -1,7 +1,6 @@
 """What the readers of all kinds of model file share: numbers with units, names, effects, tolerances."""
 
-from collections.abc import Callable, Mapping, Sequence
-from difflib import get_close_matches
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 from chladni.io.toml_reader import TomlMistakes, tables
@@ -9,6 +8,7 @@ from chladni.models.core.model import Effect
 from chladni.models.core.parameter import Parameters
 from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.catalogue import CATALOGUE
+from chladni.models.effects.wording import nearest
 from chladni.models.files.quantity import is_finite, number
 from chladni.models.files.site_units import SiteUnits
 from chladni.signals.errors import ModelError
@@ -142,15 +142,6 @@ class FileReading:
             source = self.text(found, SOURCE)
             found = {key: one for key, one in found.items() if key != SOURCE}
         return self.numbers((*loc, "parameters"), found, units, what="parameter"), source
-
-
-def nearest(name: str, known: Sequence[str], what: str) -> str:
-    """Give ``did you mean ...?`` when one of the known names is near, else (the first of) all of them."""
-    near = get_close_matches(name, known, n=1)
-    if near:
-        return f"did you mean {near[0]}?"
-    listed = ", ".join(known[:20]) + (", ..." if len(known) > 20 else "")
-    return f"{what}: {listed or 'none'}"
 
 
 def _flat(loc: Loc, found: object, prefix: str = "") -> list[tuple[Loc, str, object]]:

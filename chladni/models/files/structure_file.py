@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from chladni.io.toml_reader import TomlMistakes, read_toml
+from chladni.models.effects.wording import nearest
 from chladni.models.files.controller_table import ControllerEnds, read_controller
-from chladni.models.files.file_reading import Content, FileReading, nearest
+from chladni.models.files.file_reading import Content, FileReading
 from chladni.models.files.site_units import SiteUnits
 from chladni.models.structures.controller import Controller
 from chladni.models.structures.structure import GROUND, Body, Joint, Motion, Structure
