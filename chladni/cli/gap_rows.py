@@ -18,6 +18,7 @@ LEAST_SHARE = 0.05
 # Rows of a table of sites or regimes, as many as one reads.
 MOST_ROWS = 6
 SECONDS_DIGITS = 5
+IN_REPORT = "the report and the JSON document"
 
 
 def print_diagnosis(out: Output, found: "Diagnosis") -> None:
@@ -31,7 +32,7 @@ def print_diagnosis(out: Output, found: "Diagnosis") -> None:
         out.line(sentence)
     _print_use(out, found.used)
     out.line()
-    _print_where(out, found.where)
+    _print_where(out, found.where, "Error before anything is tuned")
     _print(out, "Linear, even, odd and noise, as shares of each output", tables.distortion_table(found))
     _print(out, "Parameters of the causes", tables.cause_table(found))
     _print(out, "What was weighed", tables.ranking_table(found))
@@ -57,7 +58,8 @@ def print_comparison(out: Output, found: "GapComparison") -> None:
     if found.inputs:
         out.line(f"The same in both, taken for inputs: {', '.join(found.inputs)}.")
     out.line()
-    _print_where(out, found.where)
+    # Nothing is ever tuned here, and no report is written.
+    _print_where(out, found.where, "Error of the simulation", all_in="the JSON document (--json FILE)")
     out.lines(found.remarks)
 
 
@@ -72,21 +74,24 @@ def _print_use(out: Output, used: "Sequence[LogUse]") -> None:
         out.lines(one.losses)
 
 
-def _print_where(out: Output, where: "Where") -> None:
+def _print_where(out: Output, where: "Where", error: str, *, all_in: str = IN_REPORT) -> None:
     from chladni.viewers import gap_tables as tables
 
-    _print(out, "Error before anything is tuned, over the RMS of each output", tables.channel_table(where))
-    _print(out, "Where in frequency", tables.band_table(where, least=LEAST_SHARE))
-    _print(out, "What an unknown force, error or change at one site can explain", tables.site_table(where))
-    _print(out, "While", tables.regime_table(where, least=LEAST_SHARE))
+    for title, table in (
+        (f"{error}, over the RMS of each output", tables.channel_table(where)),
+        ("Where in frequency", tables.band_table(where, least=LEAST_SHARE)),
+        ("What an unknown force, error or change at one site can explain", tables.site_table(where)),
+        ("While", tables.regime_table(where, least=LEAST_SHARE)),
+    ):
+        _print(out, title, table, all_in=all_in)
 
 
-def _print(out: Output, title: str, table: "Table") -> None:
+def _print(out: Output, title: str, table: "Table", *, all_in: str = IN_REPORT) -> None:
     headings, rows = table
     # A heading over nothing asks what is missing.
     if not rows:
         return
     out.table(title, headings, rows[:MOST_ROWS])
     if len(rows) > MOST_ROWS:
-        out.line(f"and {len(rows) - MOST_ROWS} more; all are in the report and the JSON document")
+        out.line(f"and {len(rows) - MOST_ROWS} more; all are in {all_in}")
     out.line()

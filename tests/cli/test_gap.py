@@ -8,6 +8,7 @@ import pytest
 
 from chladni.io.mcap.writer import write_mcap
 from chladni.models.files.model_file import load_model
+from chladni.signals.channel import Channel
 from tests import made_diagnosis as made
 from tests.cli.conftest import Run
 from tests.gap_stand_in import StandIn, put_in_place
@@ -181,6 +182,22 @@ def test_a_simulated_log_takes_the_place_of_a_model(run: Run, files: tuple[Path,
     assert outcome.document["format"] == "chladni.gap-comparison/1"
     assert "theirs.mcap is 28 % from arm.mcap" in outcome.err
     assert "taken for inputs: /shaker.wrench.force.x" in outcome.err
+    assert "Error of the simulation, over the RMS of each output" in outcome.err
+    assert "tuned" not in outcome.err
+
+
+def test_what_a_comparison_leaves_out_is_looked_for_where_it_is(
+    run: Run, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(0)
+    channels = tuple(Channel(name=f"/rig/accel_{n}", unit="m/s^2") for n in range(9))
+    series = replace(made.log_series(), channels=channels, values=rng.standard_normal((9, 4000)))
+    write_mcap(series, tmp_path / "ours.mcap", layout="batches")
+    write_mcap(replace(series, values=1.1 * series.values), tmp_path / "theirs.mcap", layout="batches")
+    outcome = run("gap", "--simulated", tmp_path / "theirs.mcap", tmp_path / "ours.mcap")
+    assert outcome.code == 0, outcome.err
+    # --html is refused here, so no report can hold it.
+    assert "and 3 more; all are in the JSON document (--json FILE)" in outcome.out
 
 
 @pytest.mark.parametrize(
