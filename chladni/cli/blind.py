@@ -10,6 +10,9 @@ from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.words import count as counted
 
+# As many as one reads.
+MOST_MISSED = 30
+
 blind = typer.Typer(
     name="blind",
     help="Check the diagnosis on machines whose hidden effects are sealed: make them, run it, score it.",
@@ -71,7 +74,14 @@ def run(
 def score(directory: Folder, *, json: options.Json = None) -> None:
     """Verify the seals and hold the answers against the truths."""
     from chladni.apps.blind import score_campaign
-    from chladni.gap.blind.score_table import HEADER, confusion_rows, detection_rows, reliability_rows, score_rows
+    from chladni.gap.blind.score_table import (
+        HEADER,
+        confusion_rows,
+        detection_rows,
+        missed_rows,
+        reliability_rows,
+        score_rows,
+    )
 
     require_places(reads=(), writes={"--json": json})
     to = Output(json)
@@ -83,6 +93,10 @@ def score(directory: Folder, *, json: options.Json = None) -> None:
         ("Detection of faint effects", detection_rows(found)),
     ):
         to.table(title, header, rows)
+    header, missed = missed_rows(found)
+    if missed:
+        more = f", the first {MOST_MISSED}; all are in score.json" if len(missed) > MOST_MISSED else ""
+        to.table(f"Answered wrongly: {len(missed)}{more}", header, missed[:MOST_MISSED])
     if found["missing"]:
         to.lines([f"Warning: {len(found['missing'])} cases have no result yet; chladni blind run {directory}"])
     to.line(f"wrote {directory / 'score.json'}")

@@ -41,6 +41,9 @@ def test_run_and_score(run: Run, campaign: Path, monkeypatch: pytest.MonkeyPatch
     assert score.document["group_sizes"] == {"2": 1}
     assert "right effect, first place" in score.err
     assert "no" in score.err
+    # Which one was missed, and what it hid.
+    (row,) = [line for line in score.err.splitlines() if line.startswith("case-0002")]
+    assert row.split() == ["case-0002", "effect", "delay", "at", "motor", "failed", "-"]
 
 
 def test_a_broken_seal_is_one_line(run: Run, campaign: Path) -> None:

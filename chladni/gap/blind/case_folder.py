@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from chladni.gap.blind.seal import CASE_FORMAT, TRUTH_FORMAT, seal_of
+from chladni.gap.blind.seal import CASE_FORMAT, SEALED_FILES, TRUTH_FORMAT, checksum, seal_of
 from chladni.gap.blind.vocabulary import WORDS
 from chladni.signals.errors import SetupError
 
@@ -53,7 +53,7 @@ def case_folders(directory: Path) -> list[CaseFolder]:
 
 def _folder(path: Path) -> CaseFolder:
     content = read_json(path, CASE_FORMAT)
-    model, log = path.with_name("model.toml"), path.with_name("log.mcap")
+    model, log = (path.with_name(file) for file in SEALED_FILES)
     for file in (model, log):
         if not file.is_file():
             raise SetupError(f"{file}: isn't there; a case is a model and a log")
@@ -71,9 +71,11 @@ def truth_of_case(directory: Path, case: CaseFolder) -> Mapping[str, Any]:
     Raises
     ------
     SetupError
-        When it isn't there, or isn't what was sealed.
+        When it isn't there, or it, the model or the log isn't what was sealed.
     """
     path = directory / "truth" / f"{case.name}.json"
+    if not path.is_file():
+        raise SetupError(f"{path}: isn't there; move the truths back to {path.parent} for the score")
     truth = read_json(path, TRUTH_FORMAT)
     if seal_of(truth) != case.seal:
         raise SetupError(
@@ -83,7 +85,20 @@ def truth_of_case(directory: Path, case: CaseFolder) -> Mapping[str, Any]:
     for key, kind in (("kind", str), ("effects", list)):
         if not isinstance(truth.get(key), kind):
             raise SetupError(f"{path}: {key} is missing or no {kind.__name__}")
+    _require_sealed(case, truth.get("files"))
     return truth
+
+
+def _require_sealed(case: CaseFolder, checksums: object) -> None:
+    """Refuse a model or a log that was changed; a truth sealed by an earlier version doesn't know them."""
+    if not isinstance(checksums, dict):
+        return
+    for file in (case.model, case.log):
+        if checksums.get(file.name) != checksum(file):
+            raise SetupError(
+                f"{file}: was changed after the case was sealed: an answer to it can't be scored; put the sealed one "
+                "back, and run the case again"
+            )
 
 
 def read_json(path: Path, word: str) -> dict[str, Any]:

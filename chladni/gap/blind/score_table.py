@@ -4,11 +4,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 Row = list[str]
+_ROUNDING = 1e-9
 HEADER = ("what", "measured", "95 % interval", "cases", "must be", "met")
 
 
 def score_rows(score: Mapping[str, Any]) -> list[Row]:
-    """Give one row for each figure: ``what, measured, interval, cases, must be, met``."""
+    """Give one row for each figure: ``what, measured, interval, cases, must be, met``.
+
+    A share that meets what must be, of so few cases that a single wrong one would miss it, is ``too few``.
+    """
     faint, two, closed = score["faint"], score["two"], score["closed"]
     return [
         _share("right effect, first place", score["effect"], at_least=0.92),
@@ -38,7 +42,10 @@ def _share(what: str, told: Mapping[str, Any], *, at_least: float | None = None,
     interval = f"{100 * low:.1f} to {100 * high:.1f} %" if told["count"] else "-"
     shown = "-" if told["share"] is None else f"{100 * told['share']:.1f} % ({told['right']})"
     demand, met = _demand(told["share"], at_least, at_most, "{:.0%}")
-    return [what, shown, interval, str(told["count"]), demand, met]
+    wrong_may_be = 1.0 - at_least if at_least is not None else at_most
+    # Where not even one may be wrong, what is met by all of so few is met by chance.
+    few = wrong_may_be is not None and told["count"] * wrong_may_be < 1.0 - _ROUNDING
+    return [what, shown, interval, str(told["count"]), demand, "too few" if met == "yes" and few else met]
 
 
 def _number(what: str, value: float | None, count: int, *, at_least: float | None = None,
@@ -81,6 +88,20 @@ def detection_rows(score: Mapping[str, Any]) -> tuple[list[str], list[Row]]:
         rows.append([f"{one['low']:g} to {one['high']:g}", str(noticed["count"]), str(noticed["right"]),
                      str(named["right"])])  # fmt: skip
     return ["effect over noise", "cases", "noticed", "named rightly"], rows
+
+
+def missed_rows(score: Mapping[str, Any]) -> tuple[list[str], list[Row]]:
+    """Give header and rows of the cases that were answered wrongly."""
+    rows = [
+        [one["case"], one["kind"], _pairs(one["hidden"]) or one["off"] or "nothing",
+         _pairs(one["named"]) or one["verdict"], "-" if one["probability"] is None else f"{one['probability']:.2f}"]
+        for one in score["marks"] if not one["right"]
+    ]  # fmt: skip
+    return ["case", "kind", "hidden", "named", "probability"], rows
+
+
+def _pairs(named: Sequence[Sequence[str]]) -> str:
+    return ", ".join(f"{effect} at {site}" for effect, site in named)
 
 
 def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -12,6 +12,7 @@ from chladni.io.folder import made_folder
 from chladni.signals.errors import SetupError
 
 CASE_FORMAT, TRUTH_FORMAT = "chladni.blind-case/1", "chladni.blind-truth/1"
+SEALED_FILES = ("model.toml", "log.mcap")
 _SALT_BYTES = 32
 
 
@@ -54,7 +55,8 @@ def seal_case(directory: Path, name: str, truth: Mapping[str, Any], *, leave_out
     Parameters
     ----------
     truth
-        At least ``kind`` and ``effects``, see docs/methods/withheld-check.md; format and salt are added.
+        At least ``kind`` and ``effects``, see docs/methods/withheld-check.md; format, salt and the checksums of model
+        and log are added.
     leave_out
         Words that the catalogue must not hold in this run.
 
@@ -71,18 +73,35 @@ def seal_case(directory: Path, name: str, truth: Mapping[str, Any], *, leave_out
         When the truth or the seal can't be written.
     """
     case = directory / "cases" / name
-    for file in ("model.toml", "log.mcap"):
+    for file in SEALED_FILES:
         if not (case / file).is_file():
             raise SetupError(f"{case / file}: isn't there; a case is a model and a log")
     for key in ("kind", "effects"):
         if key not in truth:
             raise SetupError(f"{name}: the truth has no {key!r}; it needs kind and effects")
-    sealed = {**truth, "format": TRUTH_FORMAT, "salt": new_salt()}
+    # With the files: an answer to another model than the sealed one says nothing of the truth.
+    files = {file: checksum(case / file) for file in SEALED_FILES}
+    sealed = {**truth, "files": files, "format": TRUTH_FORMAT, "salt": new_salt()}
     seal = seal_of(sealed)
     write_json(made_folder(directory / "truth") / f"{name}.json", sealed)
     # Last, since its presence says that the case is whole.
     write_json(case / "case.json", {"format": CASE_FORMAT, "seal": seal, "leave_out": sorted(leave_out)})
     return seal
+
+
+def checksum(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal.
+
+    Raises
+    ------
+    SetupError
+        When it can't be read.
+    """
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise SetupError(f"{path}: can't be read: {error.strerror or error}") from error
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

@@ -5,7 +5,7 @@ import pytest
 from chladni.gap.blind.intervals import Share, calibration_error, reliability
 from chladni.gap.blind.marking import mark
 from chladni.gap.blind.score import scored
-from chladni.gap.blind.score_table import HEADER, confusion_rows, detection_rows, markdown, score_rows
+from chladni.gap.blind.score_table import HEADER, confusion_rows, detection_rows, markdown, missed_rows, score_rows
 from chladni.signals.errors import SetupError
 
 
@@ -129,6 +129,29 @@ def test_the_share_closed_is_that_of_the_true_law():
     assert (closed["count"], closed["without"]) == (3, 1)
 
 
+@pytest.mark.parametrize(("count", "met"), [(9, "too few"), (10, "yes")])
+def test_a_share_that_may_miss_one_is_of_enough(count, met):
+    marks = [answered("leave_out", "delay@m", "lag@m") for _ in range(count)]
+    rows = {row[0]: row for row in score_rows(scored(marks))}
+    assert rows["left out or outside: unknown, or a sibling"][5] == met
+
+
+def test_cases_that_were_missed_are_listed():
+    marks = [
+        answered("effect", "delay@m", "delay@m"),
+        answered("effect", "delay@m", "clipping@y lag@m", p=0.734),
+        answered("none", "", "", verdict="unknown"),
+        answered("parameters", "", "", verdict="none", off="k"),
+    ]
+    header, rows = missed_rows(scored(marks))
+    assert header == ["case", "kind", "hidden", "named", "probability"]
+    assert rows == [
+        ["x", "effect", "delay at m", "clipping at y, lag at m", "0.73"],
+        ["x", "none", "nothing", "unknown", "-"],
+        ["x", "parameters", "k", "none", "-"],
+    ]
+
+
 def test_wilsons_interval_has_its_published_values():
     # Newcombe, Statistics in Medicine 17 (1998), table I: 81 of 263 and 15 of 148.
     for right, count, low, high in ((81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605)):
@@ -162,7 +185,10 @@ def test_tables_say_what_must_be_met():
     rows = {row[0]: row for row in score_rows(score)}
     assert all(len(row) == len(HEADER) for row in rows.values())
     assert rows["right effect, first place"][1:] == ["90.0 % (9)", "59.6 to 98.2 %", "10", "at least 92%", "no"]
-    assert rows["right family"][5] == "yes"
+    # One wrong family of ten would be one too many: all ten tell little.
+    assert rows["right family"][5] == "too few"
+    enough = {row[0]: row for row in score_rows(scored(3 * marks))}
+    assert (enough["right family"][5], enough["right effect, first place"][5]) == ("yes", "no")
     assert rows["two effects: both named"][1] == "-"
     header, confusion = confusion_rows(score["confusion"])
     assert markdown(header, confusion).splitlines()[2] == "| delay | 9 | 1 |"

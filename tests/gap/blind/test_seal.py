@@ -27,7 +27,9 @@ def test_the_seal_is_sha256_of_salt_and_canonical_truth(own_case):
     text = json.dumps(sealed, sort_keys=True, separators=(",", ":"))
     assert seal == hashlib.sha256(f"{salt}{text}".encode()).hexdigest()
     assert json.loads((own_case / "cases" / "mine" / "case.json").read_text())["seal"] == seal
-    assert sealed == {**TRUTH, "format": "chladni.blind-truth/1"}
+    nothing = hashlib.sha256(b"").hexdigest()
+    files = {"model.toml": nothing, "log.mcap": nothing}
+    assert sealed == {**TRUTH, "files": files, "format": "chladni.blind-truth/1"}
 
 
 def test_the_order_of_keys_is_no_part_of_a_truth():
@@ -45,6 +47,33 @@ def test_a_truth_that_was_changed_is_refused(own_case, change):
     path.write_text(json.dumps(json.loads(path.read_text()) | change))
     (case,) = case_folders(own_case)
     with pytest.raises(SetupError, match="doesn't fit the seal of mine"):
+        truth_of_case(own_case, case)
+
+
+@pytest.mark.parametrize("file", ["model.toml", "log.mcap"])
+def test_a_case_whose_model_or_log_was_changed_is_refused(own_case, file):
+    seal_case(own_case, "mine", TRUTH)
+    (own_case / "cases" / "mine" / file).write_text("# another")
+    (case,) = case_folders(own_case)
+    with pytest.raises(SetupError, match=rf"{file}: was changed after the case was sealed"):
+        truth_of_case(own_case, case)
+
+
+def test_a_truth_of_an_earlier_version_knows_no_files(own_case):
+    seal_case(own_case, "mine", TRUTH)
+    truth, told = own_case / "truth" / "mine.json", own_case / "cases" / "mine" / "case.json"
+    former = {key: value for key, value in json.loads(truth.read_text()).items() if key != "files"}
+    truth.write_text(json.dumps(former))
+    told.write_text(json.dumps(json.loads(told.read_text()) | {"seal": seal_of(former)}))
+    (case,) = case_folders(own_case)
+    assert truth_of_case(own_case, case)["kind"] == "effect"
+
+
+def test_a_truth_that_was_moved_away_is_asked_for(own_case):
+    seal_case(own_case, "mine", TRUTH)
+    (own_case / "truth").rename(own_case / "elsewhere")
+    (case,) = case_folders(own_case)
+    with pytest.raises(SetupError, match=r"mine\.json: isn't there; move the truths back to .*truth"):
         truth_of_case(own_case, case)
 
 
