@@ -7,15 +7,12 @@ from pathlib import Path
 
 from chladni.signals.errors import LogError, SetupError
 
-# A file that is called otherwise than what it holds is looked for in vain, or is another file than was meant.
+# Viewers, browsers and drawing go by the suffix; text for programs may have any name, a pipe's too.
 SUFFIXES: Mapping[str, tuple[str, ...]] = {
-    "--csv": (".csv", ".txt"),
     "--figure": (".png", ".svg", ".pdf"),
     "--html": (".html", ".htm"),
-    "--json": (".json",),
     "--report": (".html", ".htm"),
     "--save": (".rrd",),
-    "--uff": (".uff", ".unv"),
     "--write-model": (".toml",),
 }
 
