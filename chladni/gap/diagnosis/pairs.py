@@ -19,6 +19,8 @@ from chladni.signals.errors import ModelError
 
 #: Fits of a second effect beside a first, and of each of two at once; places at which a second is looked for.
 _SECOND, _EACH, _PLACES = 4, 2, 4
+#: Linear words that are fitted beside the parameters behind a first effect.
+_LINEAR = 4
 #: Two forces must leave less than this of what one leaves; pairs that are as good as the best are screened too, so
 #: many, and those searched whose laws promise most.
 _PAIR_GAIN, _PAIR_TIE, _SCREENED, _PAIRS = 0.6, 1.3, 8, 3
@@ -65,7 +67,7 @@ def second_causes(
     both = [hypothesis_of((*kept, *one.effects), found.fit.z, screened=one.screened) for one in singles]
     entered = sound(study, study.contest.enter_all(both))
     if least_left(entered) > ALONE:
-        linear = linear_hypotheses(model, location, trials, study.own)
+        linear = linear_hypotheses(model, location, trials, study.own, count=_LINEAR)
         both = [hypothesis_of((*kept, *one.effects), one.start_z, screened=one.screened) for one in linear]
         entered += sound(study, study.contest.enter_all(both))
     return entered

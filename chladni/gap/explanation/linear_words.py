@@ -1,6 +1,7 @@
 """Linear effects beside the parameters of a model, fitted where both are linear: over segments first."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,10 +10,11 @@ from numpy.typing import NDArray
 from chladni.gap.explanation.hypotheses import OUTSIDE, effect_of, hypothesis_of
 from chladni.gap.explanation.hypothesis import Hypothesis
 from chladni.gap.explanation.screen import Screened
-from chladni.gap.location.locate import Located, Location, tuned_stepwise
+from chladni.gap.location.locate import Location, tuned_stepwise
+from chladni.gap.location.profile import Profile, profiled
 from chladni.gap.plant.further_numbers import with_further
 from chladni.gap.plant.linear_problem import LinearProblem
-from chladni.gap.tuning.effect_scale import EffectNumber, effect_numbers, with_numbers
+from chladni.gap.tuning.effect_scale import effect_numbers, with_numbers
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
 from chladni.models.effects.attached_effect import AttachedEffect
@@ -22,8 +24,8 @@ from chladni.signals.errors import ModelError
 Matrix = NDArray[np.float64]
 #: Misfit over the best place's up to which a place is looked at.
 _PLAUSIBLE = 3.0
-#: Screened forms that are fitted, and of those the best that enter the contest.
-_FITTED, _ENTERED = 12, 4
+#: Of the fitted ones the best that enter the contest.
+_ENTERED = 4
 #: Factors on a frequency where its search begins too: what swings above half the rate shows folded down.
 _OCTAVES = (0.5, 1.0, 2.0)
 #: Of an effect's number in a fit's own units (e-folds of what is positive): so that its prior is none.
@@ -39,7 +41,7 @@ class _Fitted:
 
 
 def linear_hypotheses(
-    model: Model, location: Location, screened: Sequence[Screened], own: Mapping[str, EffectKind]
+    model: Model, location: Location, screened: Sequence[Screened], own: Mapping[str, EffectKind], *, count: int = 10
 ) -> list[Hypothesis]:
     """Fit the linear effects of a screen together with the parameters; the best, by rising misfit.
 
@@ -53,25 +55,16 @@ def linear_hypotheses(
         Of the location's problem.
     own
         Effects of the user's by name.
+    count
+        Of screened forms that are fitted, at half a second each.
     """
     enough = _PLAUSIBLE * min((one.profile.chi for one in location.ranked), default=0.0)
     there = {site.name: one for one in location.ranked if one.profile.chi < enough for site in one.places[0].sites}
     worth = [one for one in screened if one.trial.site.name in there]
-    effects = [(one, effect) for one in worth if (effect := effect_of(one, own)) is not None and effect.kind.linear]
-    found = [_best(model, location, effect, there[effect.site]) for _, effect in effects[:_FITTED]]
+    effects = [effect for one in worth if (effect := effect_of(one, own)) is not None and effect.kind.linear]
+    found = [_fitted(model, location, effect, there[effect.site].profile.z) for effect in effects[:count]]
     ranked = sorted((one for one in found if one is not None), key=lambda one: one.chi)
     return [hypothesis_of((one.effect,), one.z, screened=one.chi) for one in ranked[:_ENTERED]]
-
-
-def _best(model: Model, location: Location, effect: AttachedEffect, located: Located) -> _Fitted | None:
-    """Fit from each start; None where none converges."""
-    found = []
-    for start in _starts(effect):
-        try:
-            found.append(_fitted(model, location, start, located.profile.z))
-        except (ModelError, np.linalg.LinAlgError):
-            continue
-    return min(found, key=lambda one: one.chi, default=None)
 
 
 def _starts(effect: AttachedEffect) -> list[AttachedEffect]:
@@ -83,29 +76,39 @@ def _starts(effect: AttachedEffect) -> list[AttachedEffect]:
     ]
 
 
-def _fitted(model: Model, location: Location, effect: AttachedEffect, z: Matrix) -> _Fitted:
+def _fitted(model: Model, location: Location, effect: AttachedEffect, z: Matrix) -> _Fitted | None:
+    """Fit from the start that is best over short segments; None where none converges."""
     numbers = effect_numbers((effect,))
-    problems = [_beside(one, model, effect, numbers) for one in (*location.segments, location.problem)]
-    start = np.concatenate([z, np.zeros(len(numbers))])
     limit = np.repeat([OUTSIDE, _UNBOUNDED], [z.size, len(numbers)])
-    found = tuned_stepwise(problems, start, limit)
-    (ended,) = with_numbers((effect,), numbers, _inside(numbers, found.z[z.size :]))
-    return _Fitted(effect=ended, z=found.z[: z.size], chi=found.chi)
+    begun: list[tuple[Profile, AttachedEffect]] = []
+    for start in _starts(effect):
+        first = _beside(location.segments[0], model, start)
+        at = np.concatenate([z, np.zeros(len(numbers))])
+        with suppress(ModelError, np.linalg.LinAlgError):
+            begun.append((profiled(first, (), at, iterations=8, limit=limit), start))
+    if not begun:
+        return None
+    best, start = min(begun, key=lambda one: one[0].chi)
+    problems = [_beside(one, model, start) for one in (*location.segments[1:], location.problem)]
+    try:
+        found = tuned_stepwise(problems, best.z, limit)
+    except (ModelError, np.linalg.LinAlgError):
+        return None
+    return _Fitted(effect=_moved(start, found.z[z.size :]), z=found.z[: z.size], chi=found.chi)
 
 
-def _beside(
-    problem: LinearProblem, model: Model, effect: AttachedEffect, numbers: Sequence[EffectNumber]
-) -> LinearProblem:
+def _beside(problem: LinearProblem, model: Model, effect: AttachedEffect) -> LinearProblem:
     """Give the problem with the effect's numbers behind its parameters."""
 
     def make(parameters: Mapping[str, float], further: Matrix) -> CompiledModel:
-        moved = with_numbers((effect,), numbers, _inside(numbers, further))
-        return model.with_values(parameters).with_effects((*model.effects, *moved)).compile()
+        return model.with_values(parameters).with_effects((*model.effects, _moved(effect, further))).compile()
 
-    return with_further(problem, len(numbers), make)
+    return with_further(problem, len(effect_numbers((effect,))), make)
 
 
-def _inside(numbers: Sequence[EffectNumber], further: Matrix) -> Matrix:
-    """Steps of an effect's numbers, within its possible ranges but for what rounding adds."""
+def _moved(effect: AttachedEffect, further: Matrix) -> AttachedEffect:
+    """Give the effect with its numbers moved, within their possible ranges but for what rounding adds."""
+    numbers = effect_numbers((effect,))
     low, high = np.array([one.low for one in numbers]), np.array([one.high for one in numbers])
-    return np.clip(_STEP * further, low + 1e-9 * np.abs(low), high - 1e-9 * np.abs(high))
+    steps = np.clip(_STEP * further, low + 1e-9 * np.abs(low), high - 1e-9 * np.abs(high))
+    return with_numbers((effect,), numbers, steps)[0]
