@@ -216,7 +216,7 @@ def diagnosis() -> Diagnosis:
             ),
             sites=(SiteShare(name="elbow", share=0.93), SiteShare(name="shoulder", share=0.31),
                    SiteShare(name="shaker", share=0.28), SiteShare(name="acc_wrist", share=0.12)),
-            regimes=(RegimeShare(variable="elbow.velocity", low=-0.01, high=0.01, share=0.6),),
+            regimes=(RegimeShare(variable="elbow.velocity", low=-0.01, high=0.01, share=0.6, unit="m/s"),),
         ),
         gap=Closing(
             before=pooled(measured() - nominal),
@@ -257,9 +257,11 @@ def ranking() -> tuple[Ranked, ...]:
 
 def unknown() -> Diagnosis:
     found = diagnosis()
-    gap = replace(found.gap, after=0.21, closed=0.2, interval=(0.1, 0.3))
+    gap = replace(found.gap, tuned=0.21, after=0.21, closed=0.2, interval=(0.1, 0.3))
+    bands = tuple(replace(one, share=share) for one, share in zip(found.where.bands, (0.05, 0.1, 0.85), strict=True))
     return replace(
         found, verdict="unknown", causes=(), gap=gap, advice="Measure the wrist's rotation, too.",
+        left=replace(found.where, channels=(), bands=bands),
         restoring_force=replace(restoring_force(), law_force=None),
     )  # fmt: skip
 

@@ -26,8 +26,8 @@ def gap_document(found: Diagnosis) -> Document:
     -------
     Document
         ``format``, ``model``, ``logs``, ``verdict``, ``causes``, ``ranking``, ``where``, ``gap``,
-        ``tuned_parameters`` and ``next_measurement`` always; ``naive``, ``advice``, ``remarks``, ``distortion`` and
-        ``levels`` when there is something in them. docs/gap.md says what each means.
+        ``tuned_parameters`` and ``next_measurement`` always; ``naive``, ``advice``, ``remarks``, ``distortion``,
+        ``levels``, ``elsewhere`` and ``left`` when there is something in them. docs/gap.md says what each means.
     """
     return {
         "format": GAP_FORMAT,
@@ -51,6 +51,7 @@ def gap_document(found: Diagnosis) -> Document:
                 "distortion": [_distortion(one) for one in found.distortion],
                 "levels": list(found.levels),
                 "elsewhere": [closing_document(one) for one in found.elsewhere],
+                "left": None if found.left is None else where_document(found.left),
             }
         ),
     }

@@ -32,7 +32,12 @@ def print_diagnosis(out: Output, found: "Diagnosis") -> None:
         out.line(sentence)
     _print_use(out, found.used)
     out.line()
-    _print_where(out, found.where, "Error before anything is tuned")
+    _print_where(
+        out,
+        tables.where_told(found),
+        "Error before anything is tuned, whole log",
+        of="" if found.left is None else ", of what the best parameters leave",
+    )
     _print(out, "Linear, even, odd and noise, as shares of each output", tables.distortion_table(found))
     _print(out, "Parameters of the causes", tables.cause_table(found))
     _print(out, "What was weighed", tables.ranking_table(found))
@@ -74,14 +79,14 @@ def _print_use(out: Output, used: "Sequence[LogUse]") -> None:
         out.lines(one.losses)
 
 
-def _print_where(out: Output, where: "Where", error: str, *, all_in: str = IN_REPORT) -> None:
+def _print_where(out: Output, where: "Where", error: str, *, of: str = "", all_in: str = IN_REPORT) -> None:
     from chladni.viewers import gap_tables as tables
 
     for title, table in (
         (f"{error}, over the RMS of each output", tables.channel_table(where)),
-        ("Where in frequency", tables.band_table(where, least=LEAST_SHARE)),
+        (f"Where in frequency{of}", tables.band_table(where, least=LEAST_SHARE)),
         ("What an unknown force, error or change at one site can explain", tables.site_table(where)),
-        ("While", tables.regime_table(where, least=LEAST_SHARE)),
+        (f"While{of}", tables.regime_table(where, least=LEAST_SHARE)),
     ):
         _print(out, title, table, all_in=all_in)
 

@@ -7,6 +7,10 @@ from chladni.models.effects.catalogue import CATALOGUE
 from chladni.viewers.engineering import engineering
 
 PARAMETER = "parameter"
+# A sigma so many times the value tells nothing of it. What can't be negative is fitted by its logarithm: a sigma of
+# its own size is a factor of e. What has a sign may well be known to be near zero, beside other numbers of its law.
+WIDE_POSITIVE, WIDE_SIGNED = 1.0, 100.0
+NOT_DETERMINED = "not determined"
 
 # With an article where the field uses one.
 _SPOKEN: Mapping[str, str] = {
@@ -85,8 +89,9 @@ def cause_phrase(cause: Cause) -> str:
         # A bare number says nothing without its name: "a gain error of 0.92" could be a loss of 8 or of 92 %.
         if number.unit != "1":
             head = effect_name(cause.effect)
-            return f"{head} of {_printed(number)}{said.removeprefix(head)}"
-    numbers = ", ".join(f"{name.replace('_', ' ')} {_printed(number)}" for name, number in telling.items())
+            size = printed_number(cause, *telling) if is_determined(cause, *telling) else "undetermined size"
+            return f"{head} of {size}{said.removeprefix(head)}"
+    numbers = ", ".join(f"{name.replace('_', ' ')} {printed_number(cause, name)}" for name in telling)
     return f"{said} ({numbers})"
 
 
@@ -112,5 +117,19 @@ def _telling(cause: Cause) -> Mapping[str, FittedNumber]:
     return {name: cause.parameters[name] for name in needed if name in cause.parameters}
 
 
-def _printed(number: FittedNumber) -> str:
-    return engineering(number.value, number.std, number.unit)
+def is_determined(cause: Cause, name: str) -> bool:
+    """Whether the log tells a parameter of a cause; what was held is what it is."""
+    number, kind = cause.parameters[name], CATALOGUE.get(cause.effect)
+    if number.std is None:
+        return True
+    # Effects of somebody's own aren't in the catalogue: their signs aren't known.
+    known = kind.parameters_of(cause.variant).get(name) if kind is not None else None
+    positive = known is not None and known.minimum >= 0
+    return number.std <= (WIDE_POSITIVE if positive else WIDE_SIGNED) * abs(number.value)
+
+
+def printed_number(cause: Cause, name: str) -> str:
+    """Print a parameter of a cause with one sigma, or that it isn't determined."""
+    number = cause.parameters[name]
+    # Such as a constant force that only accelerometers saw: its value would be read, its sigma not.
+    return engineering(number.value, number.std, number.unit) if is_determined(cause, name) else NOT_DETERMINED

@@ -35,16 +35,28 @@ def engineering(value: float, std: float | None, unit: str) -> str:
     --------
     >>> engineering(8.1234, 0.21, "N"), engineering(2.004e-4, 3.1e-6, "m"), engineering(6.1e5, None, "N/m")
     ('8.12 ± 0.21 N', '200.4 ± 3.1 µm', '610 kN/m')
-    >>> engineering(8e3, None, "N s/m"), engineering(1000.0, None, "kg")
-    ('8000 N s/m', '1000 kg')
     >>> engineering(1.2e9, 4e8, "N/m^3"), engineering(0.925, 0.011, "1"), engineering(0.0312, None, "kg")
     ('1.20 ± 0.40 GN/m³', '0.925 ± 0.011', '0.0312 kg')
+    >>> engineering(8000.0, None, "N s/m"), engineering(5.3e-6, None, "kg")
+    ('8000 N s/m', '5.3e-06 kg')
     """
     scale, prefix = _prefix(value, unit)
     shown = f"{prefix}{printed_unit(unit)}" if unit != "1" else ""
     number = _number(value / scale, None if std is None else std / scale)
     # An exponent would read as that of the uncertainty alone, and a bare sum as divided by the unit's last part.
     return f"({number}) {shown}" if "e" in number and "±" in number and shown else f"{number} {shown}".rstrip()
+
+
+def span(low: float, high: float, unit: str) -> str:
+    """Print a range with one prefix and one unit, which is left out where it isn't known.
+
+    Examples
+    --------
+    >>> span(-0.0147, 1.2e-4, "m"), span(-0.01, 0.01, "")
+    ('-14.7 to 0.12 mm', '-0.01 to 0.01')
+    """
+    scale, prefix = _prefix(max(abs(low), abs(high)), unit)
+    return f"{_digits(low / scale)} to {_digits(high / scale)} {prefix}{printed_unit(unit)}".rstrip()
 
 
 def axis_scale(values: NDArray[np.float64], unit: str) -> tuple[float, str]:
@@ -79,6 +91,17 @@ def percent(share: float) -> str:
     return f"{value:.{min(max(0, 1 - floor(log10(abs(rounded)))), 6)}f} %"
 
 
+def signed_percent(share: float) -> str:
+    """Print a change as a share, with its sign.
+
+    Examples
+    --------
+    >>> signed_percent(-0.995), signed_percent(3.5), signed_percent(0.02)
+    ('-99.5 %', '+350 %', '+2.0 %')
+    """
+    return f"{'+' if share > 0 else ''}{percent(share)}"
+
+
 def chance(probability: float) -> str:
     """Print a probability; beyond what a campaign can calibrate only that it lies there.
 
@@ -105,10 +128,14 @@ def _prefix(value: float, unit: str) -> tuple[float, str]:
 
 def _number(value: float, std: float | None) -> str:
     if std is None or not isfinite(std) or std <= 0:
-        # Four digits in front of the point are read as they stand; three of them would be written as 8.12e+03.
-        return f"{value:.0f}" if LAST_WITH_POINT <= abs(value) < PLAIN_TO else f"{value:.3g}"
+        return _digits(value)
     # Two digits of sigma, and the value to the same place.
     places = 1 - floor(log10(std) + 1e-9)
     if places < -3 or places > 6:
         return f"{value:.3e} ± {std:.1e}"
     return f"{value:.{max(places, 0)}f} ± {std:.{max(places, 0)}f}"
+
+
+def _digits(value: float) -> str:
+    """Three digits; four in front of the point are read as they stand, as three they would need an exponent."""
+    return f"{value:.0f}" if LAST_WITH_POINT <= abs(value) <= PLAIN_TO else f"{value:.3g}"

@@ -91,7 +91,8 @@ def _closing(found: Diagnosis) -> str:
     # Shares of causes that explain some of the gap twice may add up to more than all of it.
     explained = f"{subject} {percent(min(sum(shares), 1.0))} of the gap; " if shares else ""
     adding = "adding it brings" if len(found.causes) == 1 else "adding them brings"
-    brings = f"{adding} the error from {percent(gap.before)} to {percent(gap.after)}"
+    # Tables of the whole log show other numbers.
+    brings = f"{adding} the error from {percent(gap.before)} to {percent(gap.after)} on stretches that no fit saw"
     text = f"{explained}{brings}, noise {percent(gap.noise)}."
     return text if explained else text[0].upper() + text[1:]
 
@@ -101,7 +102,8 @@ def _elsewhere(found: Diagnosis) -> Iterator[str]:
     for gap in found.elsewhere:
         log = gap.held_out[0].log if gap.held_out else "another log"
         brings = f"from {percent(gap.before)} to {percent(gap.after)}, noise {percent(gap.noise)}"
-        yield f"On {log}, which nothing was fitted to, the error goes {brings}."
+        verdict = "" if gap.after < gap.before else ": what was found doesn't carry over"
+        yield f"On {log}, which nothing was fitted to, the error goes {brings}{verdict}."
 
 
 def _reservations(cause: Cause) -> Iterator[str]:
@@ -160,21 +162,21 @@ def _agreement(gap: Closing) -> str:
 def _unknown(found: Diagnosis) -> Iterator[str]:
     gap = found.gap
     yield (
-        f"There is a gap that no known effect explains: the error is {percent(gap.before)}, "
-        f"{percent(gap.tuned)} with the best parameters, and the noise {percent(gap.noise)}."
+        f"There is a gap that no known effect explains: the best parameters leave an error of {percent(gap.tuned)} "
+        f"({percent(gap.before)} before), noise {percent(gap.noise)}."
     )
-    where = []
-    if found.where.sites:
-        site = max(found.where.sites, key=lambda one: one.share)
-        where.append(f"{percent(site.share)} of it can come from {site.name}")
-    if found.where.bands:
-        band = max(found.where.bands, key=lambda one: one.share)
+    where = found.left or found.where
+    told = []
+    if where.sites:
+        site = max(where.sites, key=lambda one: one.share)
+        told.append(f"{percent(site.share)} of what they leave can come from {site.name}")
+    if where.bands:
+        band = max(where.bands, key=lambda one: one.share)
         # With one sensor there is no site to begin with.
-        of_it = "" if where else " of it"
-        where.append(f"{percent(band.share)}{of_it} lies between {band.low_hz:.4g} and {band.high_hz:.4g} Hz")
-    if where:
-        text = ", and ".join(where)
-        yield f"{text[0].upper()}{text[1:]}."
+        of_it = " of it" if told else " of what they leave"
+        told.append(f"{percent(band.share)}{of_it} lies between {band.low_hz:.4g} and {band.high_hz:.4g} Hz")
+    if told:
+        yield f"{', and '.join(told)}."
     nearest = [effect_at(one.effect, one.site) for one in found.ranking[:NEAREST]]
     if nearest:
         yield f"Nearest, but not good enough: {', '.join(nearest)}."

@@ -1,10 +1,12 @@
 """Rows of the tables that tell where a gap lies, what was weighed and what was tuned."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from math import inf
 
-from chladni.gap.records.diagnosis import Diagnosis, FittedNumber, Where
-from chladni.viewers.effect_words import effect_heading
-from chladni.viewers.engineering import chance, engineering, percent
+from chladni.gap.records.diagnosis import Cause, Diagnosis, FittedNumber, Ranked, Where
+from chladni.viewers.effect_words import NOT_DETERMINED, effect_heading, printed_number
+from chladni.viewers.engineering import SURE, chance, engineering, percent, signed_percent, span
 
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 
@@ -12,14 +14,19 @@ Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 RANKED = 5
 # A parameter that moved by less than its own sigma, and by less than this, didn't move.
 MOVED = 1e-3
-# A sigma so many times the value tells nothing of it.
-WIDE = 100.0
+# What has a chance of less than this is printed as one that has none.
+UNLIKELY = 1.0 - SURE
 
 
 def channel_table(where: Where) -> Table:
     """Gap and noise of each output, over its own RMS; the largest first."""
     rows = sorted(where.channels, key=lambda one: -one.gap)
     return ("Output", "Gap", "Noise"), [(one.name, percent(one.gap), percent(one.noise)) for one in rows]
+
+
+def where_told(found: Diagnosis) -> Where:
+    """Give where the gap lies; of one that nothing explains, bands and regimes of what the best parameters leave."""
+    return found.where if found.left is None else replace(found.left, channels=found.where.channels)
 
 
 def band_table(where: Where, *, least: float = 0.0) -> Table:
@@ -42,13 +49,13 @@ def regime_table(where: Where, *, least: float = 0.0) -> Table:
     """Share of the gap's power in each regime, those with `least` and more; the largest first."""
     rows = sorted(where.regimes, key=lambda one: -one.share)
     return ("While", "is between", "Share"), [
-        (one.variable, f"{one.low:.3g} to {one.high:.3g}", percent(one.share)) for one in rows if one.share >= least
+        (one.variable, span(one.low, one.high, one.unit), percent(one.share)) for one in rows if one.share >= least
     ]
 
 
 def ranking_table(found: Diagnosis, *, count: int = RANKED) -> Table:
-    """Candidates by falling probability."""
-    return ("Effect", "Site", "Probability", "Error left", "ln evidence"), [
+    """Candidates by falling probability, those with hardly any by evidence; last what is left to others."""
+    rows = [
         (
             effect_heading(one.effect),
             one.site,
@@ -56,12 +63,23 @@ def ranking_table(found: Diagnosis, *, count: int = RANKED) -> Table:
             "–" if one.gap is None else percent(one.gap),
             "–" if one.log_evidence is None else f"{one.log_evidence:.1f}",
         )
-        for one in found.ranking[:count]
+        for one in sorted(found.ranking, key=_standing)[:count]
     ]
+    # Causes that act together share their probability: their sum tells nothing of the others.
+    others = 1.0 - sum(one.probability for one in found.ranking)
+    if rows and len(found.causes) < 2 and others >= UNLIKELY:
+        rows.append(("none of these", "–", chance(others), "–", "–"))
+    return ("Effect", "Site", "Probability", "Error left", "ln evidence"), rows
+
+
+def _standing(one: Ranked) -> tuple[float, float]:
+    """Sort key by what is printed: a column of "under 1 %" would look unordered by its hidden digits."""
+    evidence = -inf if one.log_evidence is None else one.log_evidence
+    return -one.probability if one.probability >= UNLIKELY else 0.0, -evidence
 
 
 def parameter_table(found: Diagnosis) -> Table:
-    """Parameters that moved, and those that the log doesn't determine, which were held."""
+    """Parameters that moved, and those that the log doesn't determine."""
     rows = [
         (name, _nominal(number), engineering(number.value, number.std, number.unit), _change(number))
         for name, number in found.tuned_parameters.items()
@@ -73,7 +91,7 @@ def parameter_table(found: Diagnosis) -> Table:
 def cause_table(found: Diagnosis) -> Table:
     """Every parameter of every cause."""
     rows = [
-        (effect_heading(cause.effect), cause.site, name.replace("_", " "), _value(number))
+        (effect_heading(cause.effect), cause.site, name.replace("_", " "), _value(cause, name, number))
         for cause in found.causes
         for name, number in cause.parameters.items()
     ]
@@ -88,12 +106,8 @@ def distortion_table(found: Diagnosis) -> Table:
     ]
 
 
-def _value(number: FittedNumber) -> str:
-    if number.std is None:
-        return f"{engineering(number.value, None, number.unit)} (held)"
-    # Such as a constant force that only accelerometers saw: its value would be read, its sigma not.
-    wide = number.std > WIDE * abs(number.value)
-    return "not determined" if wide else engineering(number.value, number.std, number.unit)
+def _value(cause: Cause, name: str, number: FittedNumber) -> str:
+    return printed_number(cause, name) + (" (held)" if number.std is None else "")
 
 
 def _nominal(number: FittedNumber) -> str:
@@ -103,14 +117,14 @@ def _nominal(number: FittedNumber) -> str:
 def _has_moved(number: FittedNumber) -> bool:
     if number.nominal is None:
         return True
-    change = abs(number.value - number.nominal)
+    change, least = abs(number.value - number.nominal), MOVED * abs(number.nominal)
     # A sigma of nearly zero, or one as wide as the value, must not decide alone.
-    return change > min(MOVED * abs(number.nominal), number.std or 0.0)
+    return change > (least if number.std is None else min(least, number.std))
 
 
 def _change(number: FittedNumber) -> str:
-    if number.std is None:
-        return "held: not determined"
-    if not number.nominal:
-        return "–"
-    return f"{100 * (number.value / number.nominal - 1):+.2g} %"
+    moved = signed_percent(number.value / number.nominal - 1) if number.nominal and _has_moved(number) else ""
+    if number.std is not None:
+        return moved or "–"
+    # What the log doesn't tell may move all the same, within its tolerance, where others that it depends on do.
+    return f"{moved}, {NOT_DETERMINED}" if moved else NOT_DETERMINED

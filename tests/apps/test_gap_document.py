@@ -50,7 +50,7 @@ SCHEMA: Mapping[str, Any] = {
 }
 # What may stand beside the agreed keys, by the place it stands in.
 MORE = {
-    "": {"naive", "advice", "remarks", "distortion", "levels", "elsewhere"},
+    "": {"naive", "advice", "remarks", "distortion", "levels", "elsewhere", "left"},
     ".causes": {"variant", "from", "share"},
     ".gap": {"by", "horizon_s"},
 }
@@ -138,7 +138,8 @@ def test_whole_numbers_are_written_as_floats() -> None:
 def test_keys_beside_the_agreed_ones_are_there_only_with_content() -> None:
     bare = replace(made.diagnosis(), naive=None, remarks=(), advice=None)
     assert set(written(bare)) == set(SCHEMA)
-    full = written(replace(made.periodic(), advice="Measure longer.", naive=Candidate(effect="lag", site="shaker")))
+    naive = Candidate(effect="lag", site="shaker")
+    full = written(replace(made.periodic(), advice="Measure longer.", naive=naive, left=made.unknown().left))
     assert set(full) == set(SCHEMA) | MORE[""]
     assert full["distortion"][0] == {
         "output": "acc_column", "linear": 0.93, "even": 0.001, "odd": 0.068, "noise": 0.001

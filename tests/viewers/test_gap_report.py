@@ -35,7 +35,7 @@ def test_the_report_begins_with_the_answer(arm: str) -> None:
 def test_the_report_holds_every_table_and_the_law(arm: str) -> None:
     shown = Page(arm).texts
     for text in (
-        "Output", "acc_wrist", "8 to 16", "elbow.velocity", "20 ± 50 mN", "-130.2", "held: not determined", "6.8 %",
+        "Output", "acc_wrist", "8 to 16", "elbow.velocity", "20 ± 50 mN", "-130.2", "not determined", "6.8 %",
         "The largest drop of the error alone would have named hysteresis at elbow.",
         "The closing was measured on 4 s that no fit saw, in 2 of its stretches.",
         "shoulder.damping is not determined by this log and was held.",

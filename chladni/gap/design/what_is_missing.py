@@ -107,8 +107,8 @@ def _sensor(model: Model, measurement: Measurement, noise: NoiseFloor, names: Se
     )
     by = "" if len(sites) == 2 else "at least "
     return (
-        f"{reason}: add {sensors[best].words}, and patterns of what acts at {places} are {by}{then:.2g} degrees "
-        f"apart (now {round(now, 1):g})."
+        f"{reason}: add {sensors[best].words}. Between what forces at {places} print over the sensors the angle is "
+        f"then {by}{then:.2g} degrees, now {round(now, 1):g}; 90 can't be confused, under {NEAR_DEG:g} noise does it."
     )
 
 

@@ -20,6 +20,7 @@ from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
 from chladni.gap.diagnosis.other_logs import closing_elsewhere
 from chladni.gap.diagnosis.study import Study, study_of
+from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.explanation.shaken_ground import predicted_by_others
 from chladni.gap.linear_algebra import in_one_thread
 from chladni.gap.location.profile import profile_at
@@ -29,6 +30,7 @@ from chladni.gap.records.diagnosis import (
     Cause,
     Diagnosis,
     GapSignals,
+    RegimeShare,
     RestoringForce,
     SiteShare,
     Where,
@@ -118,11 +120,13 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         causes=said,
         ranking=ranking_of(causes, said),
         where=_where(study, causes, before, motion),
+        # What the parameters close isn't what nothing explains, and may lie elsewhere.
+        left=_where(study, causes, causes.tuned.fit.outputs, motion) if causes.verdict == "unknown" else None,
         gap=closing_of(_yardstick(study, causes), before, causes.tuned.fit.outputs, after, seed=seed),
         tuned_parameters=tuned_numbers(study, shown.fit),
         next_measurement=_next(study, causes, seed),
         naive=naive_of(causes),
-        remarks=(*_remarks(study, causes), *_distortion_remarks(study.measurement, distortion)),
+        remarks=(*_remarks(study, causes, shown), *_distortion_remarks(study.measurement, distortion)),
         advice=_advice(study, causes),
         restoring_force=_restoring(study, causes, motion),
         signals=_signals(study, causes, before, after),
@@ -152,22 +156,28 @@ def _nominal(study: Study) -> Matrix:
         return run.outputs()
 
 
-def _where(study: Study, causes: Causes, before: Matrix, motion: Recovered | None) -> Where:
+def _where(study: Study, causes: Causes, simulated: Matrix, motion: Recovered | None) -> Where:
     measurement = study.measurement
-    residual = measurement.outputs - before
+    residual = measurement.outputs - simulated
     shares = sorted(study.location.shares.items(), key=lambda one: -one[1])
-    variables = {}
-    if motion is not None and motion.site.kind == "joint":
-        variables = {
-            f"{motion.site.name}.displacement": motion.displacement,
-            f"{motion.site.name}.velocity": motion.velocity,
-        }
     return Where(
         channels=channel_gaps(residual, measurement.outputs, causes.noise, output_names=measurement.output_names),
         bands=band_shares(residual, measurement.outputs, sample_rate_hz=measurement.sample_rate_hz),
         sites=tuple(SiteShare(name=name, share=share) for name, share in shares),
-        regimes=tuple(regime_shares(residual, measurement.outputs, variables)) if variables else (),
+        regimes=_regimes(study, residual, motion),
     )
+
+
+def _regimes(study: Study, residual: Matrix, motion: Recovered | None) -> tuple[RegimeShare, ...]:
+    """Regimes of a joint's motion; of what acts elsewhere there are none."""
+    if motion is None or motion.site.kind != "joint":
+        return ()
+    unit = _port(study, motion.site)[1]
+    name = motion.site.name
+    variables = {f"{name}.displacement": motion.displacement, f"{name}.velocity": motion.velocity}
+    units = {f"{name}.displacement": unit, f"{name}.velocity": f"{unit}/s"}
+    found = regime_shares(residual, study.measurement.outputs, variables)
+    return tuple(replace(one, unit=units[one.variable]) for one in found)
 
 
 def _evidence(study: Study, causes: Causes, said: Sequence[Cause]) -> Recovered | None:
@@ -238,6 +248,8 @@ def _signals(study: Study, causes: Causes, before: Matrix, after: Matrix) -> Gap
         map_frequency_hz=frequency_hz,
         gap_map=density,
         gap_map_after=gap_map(measurement.outputs - after, measurement.outputs, measurement.sample_rate_hz)[2],
+        # Each sensor predicted from the others knows of no windows.
+        window_starts=() if causes.shaken is not None else tuple(start for start, _ in study.windows or ()),
     )
 
 
@@ -256,7 +268,7 @@ def _distortion_remarks(measurement: Measurement, distortion: Distortion | None)
     return (*distortion.remarks, *(() if outside is None else (outside.sentence(),)))
 
 
-def _remarks(study: Study, causes: Causes) -> list[str]:
+def _remarks(study: Study, causes: Causes, shown: Contestant) -> list[str]:
     found = []
     if len(study.measurement.output_names) < 2:
         found.append(
@@ -270,9 +282,9 @@ def _remarks(study: Study, causes: Causes) -> list[str]:
         )
     if causes.distorted:
         found.append(f"{', '.join(causes.distorted)}: what is left follows its own signal in a curve or in steps")
-    if causes.tuned.fit.undetermined:
-        names = ", ".join(causes.tuned.fit.undetermined[:6])
-        found.append(f"this log doesn't determine {names}: held near nominal")
+    if shown.fit.undetermined:
+        names = ", ".join(shown.fit.undetermined[:6])
+        found.append(f"this log doesn't determine {names}: only the stated tolerance holds what it can't tell")
     if np.any(causes.noise.upper_bound):
         found.append("the noise floor of some outputs is an upper bound: distortion may be in it")
     return found

@@ -83,7 +83,8 @@ class SimulatorFindings:
             verdict=verdict,
             causes=self.causes(),
             ranking=self.ranking(),
-            where=self.where(),
+            where=self.where(self.search.nominal),
+            left=self.where(self.search.tuned.outputs) if verdict == "unknown" else None,
             gap=self.closing(),
             tuned_parameters=self.parameters(chosen),
             naive=self.naive(),
@@ -223,10 +224,10 @@ class SimulatorFindings:
             rows.setdefault((effect, site), unfitted)
         return tuple(sorted(rows.values(), key=lambda each: -each.probability)[:_LISTED])
 
-    def where(self) -> Where:
-        """Say where the nominal gap lies."""
+    def where(self, simulated: Matrix) -> Where:
+        """Say where the gap to a simulation lies."""
         runs, log = self.search.runs, self.search.runs.measurement
-        residual = log.outputs - self.search.nominal
+        residual = log.outputs - simulated
         motions = runs.motions(np.zeros(len(runs.tunables.names)), ()) if runs.wrapped.simulator.joints else ()
         variables = {
             f"{motion.name}.{word}": signal

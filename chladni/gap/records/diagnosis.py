@@ -108,12 +108,16 @@ class SiteShare:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RegimeShare:
-    """Share of the gap's power while a variable, such as ``elbow.velocity``, lies between two values (SI)."""
+    """Share of the gap's power while a variable, such as ``elbow.velocity``, lies between two values.
+
+    Values are SI; `unit` is empty where it isn't known.
+    """
 
     variable: str
     low: float
     high: float
     share: float
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,6 +214,8 @@ class GapSignals(Value):
         ``[time]``, ``[frequency]``, ``[time, frequency]``: density of the nominal gap, outputs scaled by RMS, 1/Hz.
     gap_map_after
         The same after.
+    window_starts
+        Samples at which windows begin, each from an estimated state: simulations jump there. Empty in free run.
     """
 
     log: str
@@ -224,6 +230,7 @@ class GapSignals(Value):
     map_frequency_hz: Matrix
     gap_map: Matrix
     gap_map_after: Matrix
+    window_starts: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -274,6 +281,8 @@ class Diagnosis:
         With several logs: how far what the first one told closes the gap on the others, which no fit saw.
     used
         How much of each log was used, and what was lost of it.
+    left
+        With the verdict ``unknown``: where what the best parameters leave lies, which is what isn't explained.
     """
 
     model: str
@@ -294,3 +303,4 @@ class Diagnosis:
     levels: tuple[str, ...] = ()
     elsewhere: tuple[Closing, ...] = ()
     used: tuple[LogUse, ...] = ()
+    left: Where | None = None

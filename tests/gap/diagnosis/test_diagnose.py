@@ -157,6 +157,8 @@ def test_a_sensor_s_square_passes_for_no_noise() -> None:
     outputs[1] += 0.03 / np.sqrt(2.0) * ((outputs[1] / scale) ** 2 - 1.0) * scale
     found = diagnose(arm(), [replace(log, outputs=outputs)])
     assert found.verdict == "unknown"
+    assert found.left is not None
+    assert found.left.bands != found.where.bands
     assert any(remark.startswith("acc_arm: what is left follows its own signal") for remark in found.remarks)
 
 
