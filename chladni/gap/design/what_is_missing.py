@@ -107,8 +107,9 @@ def _sensor(model: Model, measurement: Measurement, noise: NoiseFloor, names: Se
     )
     by = "" if len(sites) == 2 else "at least "
     return (
-        f"{reason}: add {sensors[best].words}. Between what forces at {places} print over the sensors the angle is "
-        f"then {by}{then:.2g} degrees, now {round(now, 1):g}; 90 can't be confused, under {NEAR_DEG:g} noise does it."
+        f"{reason}: add {sensors[best].words}. What forces at {places} print over the sensors then differs by "
+        f"{by}{then:.2g} degrees, now by {round(now, 1):g}; 90 can't be confused, less than {NEAR_DEG:g} drowns in "
+        "noise."
     )
 
 

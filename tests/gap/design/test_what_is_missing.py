@@ -23,7 +23,7 @@ def test_one_sensor_cannot_locate_and_the_one_that_can_is_named():
     said = missing(outputs=[2], sites=("j0", "j1"))
     assert said.startswith("One sensor can't tell where a force acts: add ")
     assert "j0 and j1" in said
-    assert "degrees, now 0; 90 can't be confused" in said
+    assert "degrees, now by 0; 90 can't be confused" in said
 
 
 def test_the_sensor_that_is_named_tells_the_sites_apart():
