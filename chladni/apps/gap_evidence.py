@@ -1,5 +1,7 @@
 """What the pictures of a diagnosis need: spectra of the errors, and where the nominal model errs most."""
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,8 @@ Matrix = NDArray[np.float64]
 
 # Cycles of the gap's typical frequency that can be told apart in a picture, and the fewest samples that make one.
 CYCLES, FEWEST_SAMPLES = 12.0, 60
+# Of windows: the error begins anew in each, and several of them show how it grows.
+WINDOWS = 6
 # Finer than spectra for the eye: a gap often sits in the flank of one resonance.
 SEGMENTS, SHORTEST_SEGMENT, MOST_LINES = 8, 16, 4096
 NAMES = ("measured", "before", "after")
@@ -37,15 +41,17 @@ def _spectra(signals: GapSignals) -> GapSpectra | None:
     channels = tuple(
         Channel(name=f"{what} {row}", unit=unit) for what in NAMES for row, unit in enumerate(signals.output_units)
     )
-    # A model that diverges leaves samples that are no numbers; segments that hold some are left out.
+    # A model that diverges leaves samples that are no numbers; segments that hold some are left out. Those that held
+    # the jump from one window to the next would show its leakage in place of the error.
     finite = np.isfinite(stacked)
+    finite[:, list(signals.window_starts[1:])] = False
     series = TimeSeries(
         values=stacked,
         sample_rate_hz=signals.sample_rate_hz,
         channels=channels,
         valid=None if finite.all() else finite,
     )
-    resolution_hz = max(SEGMENTS / series.duration_s, signals.sample_rate_hz / (2 * MOST_LINES))
+    resolution_hz = max(SEGMENTS / series.duration_s, signals.sample_rate_hz / (2 * MOST_LINES), _window_hz(signals))
     try:
         density = psd(series, window="hann", resolution_hz=resolution_hz)
     except EstimateError:
@@ -61,12 +67,22 @@ def _spectra(signals: GapSignals) -> GapSpectra | None:
     )
 
 
+def _window_hz(signals: GapSignals) -> float:
+    """Resolution at which a segment fits between two jumps, 0 where there are none."""
+    edges = (*signals.window_starts, signals.measured.shape[1])
+    shortest = min((stop - start for start, stop in pairwise(edges)), default=0)
+    # One sample of each window is the jump.
+    return signals.sample_rate_hz / max(shortest - 1, SHORTEST_SEGMENT) if shortest else 0.0
+
+
 def _telling_stretch(signals: GapSignals, spectra: GapSpectra | None) -> tuple[float, float]:
     """Where the error that was found to have a cause is largest, all outputs by their own RMS."""
     rms = np.sqrt(np.mean(signals.measured**2, axis=1, keepdims=True))
     errors = np.nan_to_num((signals.measured - signals.before) / np.where(rms > 0, rms, 1.0), posinf=0.0, neginf=0.0)
     samples = errors.shape[1]
     wanted = samples if spectra is None else round(CYCLES / _typical_hz(spectra) * signals.sample_rate_hz)
+    if signals.window_starts:
+        wanted = min(wanted, WINDOWS * samples // len(signals.window_starts))
     length = min(max(wanted, FEWEST_SAMPLES), samples)
     # Sums over every stretch of that length at once, as differences of the running sum.
     total = np.concatenate([[0.0], np.cumsum(np.sum(errors**2, axis=0))])

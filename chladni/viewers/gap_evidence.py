@@ -27,7 +27,8 @@ class GapSpectra(Value):
     frequency_hz
         ``[line]``.
     measured, before, after
-        ``[output, line]``: the signal, the error of the nominal model, the error with what was found.
+        ``[output, line]``: the signal, the error of the nominal model, the error with what was found. Of simulations
+        over windows all three are averages over those, since jumps between them are no errors of the model.
     noise
         ``[output]``: what the noise's RMS would be as a density if it were white.
     """
@@ -64,3 +65,8 @@ class GapEvidence:
     found: Diagnosis
     spectra: GapSpectra | None = None
     telling_s: tuple[float, float] | None = None
+
+    @property
+    def after(self) -> str:
+        """Word for the last simulation: where nothing is named, only its parameters were tuned."""
+        return "after" if self.found.verdict in ("effect", "parameters") else "when tuned"

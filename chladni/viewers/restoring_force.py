@@ -14,6 +14,9 @@ Over = Literal["displacement", "velocity"]
 POINTS = 3000
 # A few wild samples of a recovered force must not flatten all others.
 SHOWN, ROOM = 99.5, 1.15
+LAW_ROOM = 1.05
+# A mean that is such a share of the motion is none.
+CENTRED = 1e-6
 # Blue against orange, grey in the middle: seen on paper and on black, told apart with any colour vision.
 SIGNED = np.array([(0, 114, 178), (158, 158, 158), (213, 94, 0)], dtype=np.float64)
 
@@ -28,6 +31,15 @@ def motion(surface: RestoringForce, over: Over) -> Floats:
     return surface.displacement if over == "displacement" else surface.velocity
 
 
+def motion_name(surface: RestoringForce, over: Over) -> str:
+    """Name of the displacement or the velocity, on an axis."""
+    if over == "velocity":
+        return "Velocity"
+    # Recovered line by line, a motion has no mean: its zero isn't the sensor's.
+    centred = abs(float(np.mean(surface.displacement))) < CENTRED * _reach(surface.displacement)
+    return "Displacement from its mean" if centred else "Displacement"
+
+
 def motion_unit(surface: RestoringForce, over: Over) -> str:
     """Unit of the displacement or the velocity."""
     return surface.displacement_unit if over == "displacement" else f"{surface.displacement_unit}/s"
@@ -39,8 +51,11 @@ def other(over: Over) -> Over:
 
 
 def force_range(surface: RestoringForce) -> tuple[float, float]:
-    """Forces that a picture shows, as much below zero as above."""
+    """Forces that a picture shows, as much below zero as above; of the law all that is drawn."""
     reach = ROOM * _reach(surface.force)
+    if surface.law_force is not None:
+        # Of a spring that hardens the rare ends of the range are what tells it.
+        reach = max(reach, LAW_ROOM * float(np.abs(surface.law_force[spread_out(surface)]).max(initial=0.0)))
     return -reach, reach
 
 

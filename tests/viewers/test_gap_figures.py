@@ -1,5 +1,6 @@
 """Figures of a diagnosis: what they draw is what was found."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from chladni.apps.gap_evidence import gap_evidence
+from chladni.gap.records.diagnosis import FittedNumber
 from chladni.signals.errors import EstimateError
 from chladni.viewers.figures.campaign import ReliabilityBin, calibration_figure, confusion_figure
 from chladni.viewers.figures.gap import gap_album
@@ -14,7 +16,7 @@ from chladni.viewers.figures.gap_sheet import LETTERS, SENTENCES, gap_sheet
 from chladni.viewers.figures.rendering import rendered
 from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.gap_summary import summary
-from chladni.viewers.restoring_force import POINTS, SIGNED, force_range, signed_colours, spread_out
+from chladni.viewers.restoring_force import POINTS, SIGNED, force_range, motion_name, signed_colours, spread_out
 from tests import made_diagnosis as made
 
 
@@ -53,7 +55,11 @@ def test_errors_keep_their_extremes(figures: dict[str, Figure]) -> None:
 def test_spectra_are_roots_of_densities(figures: dict[str, Figure], evidence: GapEvidence) -> None:
     assert evidence.spectra is not None
     axes = figures["spectra"].axes[1]
-    np.testing.assert_allclose(axes.lines[1].get_ydata(), np.sqrt(evidence.spectra.before[1]))
+    low, high = (int(np.searchsorted(evidence.spectra.frequency_hz, end)) for end in axes.get_xlim())
+    np.testing.assert_allclose(axes.lines[1].get_ydata(), np.sqrt(evidence.spectra.before[1, low : high + 1]))
+    # Nearly all of each curve's power is there; from standing still no logarithmic axis of frequency begins.
+    assert low == 1
+    assert evidence.spectra.before[1, low : high + 1].sum() > 0.99 * evidence.spectra.before[1, 1:].sum()
     noise = np.sqrt(evidence.spectra.noise[1])
     np.testing.assert_allclose(axes.lines[3].get_ydata(), noise)
     assert axes.get_ylim()[0] < noise
@@ -70,6 +76,10 @@ def test_the_force_is_drawn_over_both_motions_with_the_law(figures: dict[str, Fi
     rows = spread_out(surface)
     named = {axes.get_xlabel().split(" [")[0]: axes for axes in figures["restoring force"].axes}
     over_displacement, over_velocity, over_time = (named[name] for name in ("Displacement", "Velocity", "Time"))
+    # In the telling stretch nothing is cut.
+    low, high = over_time.get_ylim()
+    assert low < min(line.get_ydata().min() for line in over_time.lines)
+    assert high > max(line.get_ydata().max() for line in over_time.lines)
     dots = np.asarray(over_velocity.collections[0].get_offsets())
     np.testing.assert_allclose(dots[:, 0], surface.velocity[rows])
     np.testing.assert_allclose(dots[:, 1], surface.force[rows])
@@ -89,6 +99,81 @@ def test_bars_are_the_shares_and_the_named_site_is_in_colour(figures: dict[str, 
     assert [bar.get_width() for bar in bars] == pytest.approx([93, 31, 28, 12])
     colours = [bar.get_facecolor() for bar in bars]
     assert colours[0] != colours[1] == colours[2]
+
+
+def test_one_output_has_room_for_its_curves() -> None:
+    signals = made.signals()
+    alone = replace(
+        signals,
+        output_names=signals.output_names[:1],
+        output_units=signals.output_units[:1],
+        **{name: getattr(signals, name)[:1] for name in ("measured", "before", "after", "noise_rms")},
+    )
+    drawn = gap_album(gap_evidence(replace(made.diagnosis(), signals=alone))).figures
+    for name in ("signals", "errors", "spectra"):
+        figure = drawn[name]
+        figure.draw_without_rendering()
+        height_in = figure.axes[0].get_position().height * figure.get_size_inches()[1]
+        assert height_in > 1.2
+        # Numbers of the axis have twice the room of their letters.
+        axis = figure.axes[0].yaxis
+        shown = [one for one in axis.get_majorticklabels() if one.get_text()]
+        assert len(shown) * 2 * axis.get_majorticklabels()[0].get_fontsize() < 72 * height_in
+
+
+def test_windows_are_told_and_not_joined() -> None:
+    signals = made.signals()
+    starts = tuple(range(0, signals.measured.shape[1], 250))
+    evidence = gap_evidence(replace(made.drifting(), signals=replace(signals, window_starts=starts)))
+    drawn = gap_album(evidence).figures
+    for name in ("signals", "errors", "spectra"):
+        assert drawn[name].axes[0].get_title(loc="right") == "windows of 0.5 s"
+    errors = np.asarray(drawn["errors"].axes[0].lines[0].get_ydata())
+    assert np.isnan(errors).sum() == len(starts) - 1
+    assert not np.isnan(np.asarray(drawn["signals"].axes[0].lines[0].get_ydata())).any()
+
+
+def test_where_nothing_is_named_the_last_simulation_is_the_tuned_one() -> None:
+    drawn = gap_album(gap_evidence(made.unknown())).figures
+    labels = [line.get_label() for line in drawn["signals"].axes[0].lines]
+    assert labels == ["measured", "simulated before", "when tuned"]
+    shares = drawn["where"].axes
+    assert shares[-1].get_xlabel() == "Share of what the best parameters leave [%]"
+    assert [bar.get_width() for bar in shares[1].patches] == pytest.approx([5, 10, 85])
+
+
+def test_a_motion_without_a_mean_says_so() -> None:
+    surface = made.restoring_force()
+    assert motion_name(surface, "velocity") == "Velocity"
+    assert motion_name(surface, "displacement") == "Displacement"
+    centred = replace(surface, displacement=surface.displacement - surface.displacement.mean())
+    assert motion_name(centred, "displacement") == "Displacement from its mean"
+
+
+def test_the_rare_ends_of_a_law_are_shown() -> None:
+    surface = made.restoring_force()
+    assert surface.law_force is not None
+    law = surface.law_force.copy()
+    drawn = spread_out(surface)[100]
+    law[drawn] = 50 * np.abs(law).max()
+    assert force_range(replace(surface, law_force=law))[1] > law[drawn]
+
+
+def test_no_line_of_the_title_breaks_inside_a_quantity() -> None:
+    stribeck = made.friction(
+        effect="stribeck_friction",
+        variant=None,
+        parameters={
+            name: FittedNumber(value=value, std=std, unit=unit)
+            for name, value, std, unit in (
+                ("coulomb", 13.2, 1.1, "N"), ("static", 123.8, 1.4, "N"), ("speed", 0.0779, 0.0065, "m/s"),
+            )
+        },
+    )  # fmt: skip
+    for probability in (0.71, 0.97):
+        found = replace(made.diagnosis(), causes=(replace(stribeck, probability=probability),))
+        lines = gap_sheet(gap_evidence(found)).get_suptitle().splitlines()
+        assert not any(re.match(r"±|%|m?N\b|mm/s", line) or line.endswith("±") for line in lines)
 
 
 def test_many_outputs_are_divided_over_figures() -> None:

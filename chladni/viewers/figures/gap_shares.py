@@ -6,9 +6,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chladni.gap.records.diagnosis import BandShare, Diagnosis
-from chladni.viewers.engineering import percent
+from chladni.viewers.engineering import percent, span
 from chladni.viewers.figures.sheet import WIDTH_IN, look, paint, plain
 from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, GapEvidence
+from chladni.viewers.gap_tables import where_told
 
 Bar = tuple[str, float]
 
@@ -31,8 +32,13 @@ def share_figures(evidence: GapEvidence) -> dict[str, Figure]:
         for axes, (title, bars) in zip(stack, parts, strict=True):
             draw_shares(axes, bars, named=named)
             axes.set_title(title, loc="left", pad=2)
-        stack[-1].set_xlabel("Share of the gap [%]")
+        stack[-1].set_xlabel(share_label(evidence.found))
         return {"where": figure}
+
+
+def share_label(found: Diagnosis) -> str:
+    """What the bars are shares of."""
+    return "Share of the gap [%]" if found.left is None else "Share of what the best parameters leave [%]"
 
 
 def site_bars(found: Diagnosis) -> Sequence[Bar]:
@@ -56,16 +62,17 @@ def draw_shares(axes: Axes, bars: Sequence[Bar], *, named: set[str]) -> None:
 
 
 def _parts(found: Diagnosis) -> list[tuple[str, Sequence[Bar]]]:
-    shown = sorted(found.where.bands, key=lambda one: -one.share)[:BARS]
+    where = where_told(found)
+    shown = sorted(where.bands, key=lambda one: -one.share)[:BARS]
     # In the order of frequency, as in a spectrum.
     bands = [(f"{one.low_hz:.4g} to {one.high_hz:.4g} Hz", one.share) for one in sorted(shown, key=_low_hz)]
-    regimes = sorted(found.where.regimes, key=lambda one: -one.share)[:BARS]
+    regimes = sorted(where.regimes, key=lambda one: -one.share)[:BARS]
     return [
         ("What one site alone can explain", site_bars(found)),
         ("In which band it lies", bands),
         (
             "While which variable is where",
-            [(f"{one.variable} {one.low:.3g} to {one.high:.3g}", one.share) for one in regimes],
+            [(f"{one.variable} {span(one.low, one.high, one.unit)}", one.share) for one in regimes],
         ),
     ]
 

@@ -1,5 +1,6 @@
 """One sheet with the answer of a diagnosis and its evidence."""
 
+import re
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
@@ -10,8 +11,8 @@ from matplotlib.gridspec import SubplotSpec
 
 from chladni.gap.records.diagnosis import Diagnosis, RestoringForce
 from chladni.io.atomic import atomic_write
-from chladni.viewers.figures.gap_shares import BAR_HEIGHT_IN, draw_shares, site_bars
-from chladni.viewers.figures.gap_signals import LEGEND, draw_zoom
+from chladni.viewers.figures.gap_shares import BAR_HEIGHT_IN, draw_shares, share_label, site_bars
+from chladni.viewers.figures.gap_signals import LEGEND, draw_zoom, windows_told
 from chladni.viewers.figures.gap_spectra import draw_spectrum
 from chladni.viewers.figures.rendering import rendered
 from chladni.viewers.figures.restoring_force import draw_surfaces
@@ -20,7 +21,7 @@ from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.gap_summary import summary
 
 # Of the summary; the rest is in the report.
-SENTENCES, LETTERS = 2, 94
+SENTENCES, LETTERS = 2, 90
 LINE_IN = 0.16
 Part = tuple[float, Callable[[Figure, SubplotSpec], None]]
 
@@ -29,7 +30,7 @@ def gap_sheet(evidence: GapEvidence) -> Figure:
     """Draw the answer as a title over the output that errs most, in time and frequency, the force and the sites."""
     with look():
         parts = _parts(evidence)
-        lines = [line for one in summary(evidence.found)[:SENTENCES] for line in textwrap.wrap(one, LETTERS)]
+        lines = [line for one in summary(evidence.found)[:SENTENCES] for line in _wrapped(one)]
         heights = [height for height, _ in parts]
         above = 0.2 + LINE_IN * len(lines)
         figure = Figure(figsize=(WIDTH_IN * 1.25, sum(heights) + above), layout="constrained")
@@ -52,6 +53,13 @@ def save_gap_sheet(evidence: GapEvidence, path: Path) -> Path:
     with atomic_write(path) as file:
         file.write(content)
     return path
+
+
+def _wrapped(sentence: str) -> list[str]:
+    """Lines that break at no space inside a quantity: before its sigma, its unit, or a percent sign."""
+    tied = re.sub(r" ± ", "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}", sentence)
+    tied = re.sub(r"(?<=\d) (?=[^\s\d(]{1,4}(?:[\s,.)]|$))", "\N{NO-BREAK SPACE}", tied)
+    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in textwrap.wrap(tied, LETTERS)]
 
 
 def _parts(evidence: GapEvidence) -> list[Part]:
@@ -84,9 +92,10 @@ def _zoom(figure: Figure, place: SubplotSpec, evidence: GapEvidence) -> None:
     if signals is None or telling_s is None:
         return
     axes, row = figure.add_subplot(place), _worst(evidence.found)
-    draw_zoom(axes, signals, row, telling_s)
+    draw_zoom(axes, signals, row, telling_s, after=evidence.after)
     # On the other side of the legend.
-    axes.set_title(plain(signals.output_names[row]), loc="right", pad=2)
+    told = ", ".join(one for one in (signals.output_names[row], windows_told(evidence.found)) if one)
+    axes.set_title(plain(told), loc="right", pad=2)
     axes.set_xlabel("Time [s]")
     _legend(axes)
 
@@ -96,7 +105,7 @@ def _spectrum(figure: Figure, place: SubplotSpec, evidence: GapEvidence) -> None
     if signals is None or spectra is None:
         return
     axes = figure.add_subplot(place)
-    draw_spectrum(axes, signals, spectra, _worst(evidence.found))
+    draw_spectrum(axes, signals, spectra, _worst(evidence.found), after=evidence.after)
     axes.set_xlabel("Frequency [Hz]")
     _legend(axes)
 
@@ -115,4 +124,4 @@ def _sites(figure: Figure, place: SubplotSpec, found: Diagnosis) -> None:
     axes = figure.add_subplot(place)
     draw_shares(axes, site_bars(found), named={cause.site for cause in found.causes})
     axes.set_title("What one site alone can explain", loc="left", pad=2)
-    axes.set_xlabel("Share of the gap [%]")
+    axes.set_xlabel(share_label(found))

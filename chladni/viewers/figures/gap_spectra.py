@@ -9,14 +9,20 @@ from matplotlib.figure import Figure
 from chladni.gap.records.diagnosis import GapSignals
 from chladni.viewers.drawing import Floats
 from chladni.viewers.figures.gap_signals import AFTER, BEFORE, MEASURED, OUTPUTS_A_FIGURE, stacked
-from chladni.viewers.figures.log_axis import logarithmic
+from chladni.viewers.figures.log_axis import logarithmic, logarithmic_frequency
 from chladni.viewers.figures.panes import pages
 from chladni.viewers.figures.sheet import look, plain
 from chladni.viewers.gap_evidence import GapEvidence, GapSpectra
 from chladni.viewers.labels import amplitude_density_unit
 
-# Down to what is left and a little below the noise; never more decades than these.
-BELOW_NOISE, ROOM, DECADES = 0.5, 0.7, 6.0
+Paint = tuple[float, float, float]
+
+# Down to what is left, and a little below the noise where it isn't far; never more decades than these.
+BELOW_NOISE, FAR, ROOM, DECADES = 0.5, 0.03, 0.7, 6.0
+# The band that is shown holds this share of each curve's power, and some room above it.
+HELD, ABOVE = 0.999, 4.0
+# Powers of ten at most: more would stand on top of each other where several outputs share a figure.
+NUMBERS = 5
 
 
 def spectrum_figures(evidence: GapEvidence) -> dict[str, Figure]:
@@ -27,30 +33,49 @@ def spectrum_figures(evidence: GapEvidence) -> dict[str, Figure]:
     with look():
         return {
             f"spectra{part}": stacked(
-                signals, rows, lambda axes, row: draw_spectrum(axes, signals, spectra, row), x_label="Frequency [Hz]"
+                evidence,
+                signals,
+                rows,
+                lambda axes, row: draw_spectrum(axes, signals, spectra, row, after=evidence.after),
+                x_label="Frequency [Hz]",
             )
             for part, rows in pages(len(signals.output_names), OUTPUTS_A_FIGURE)
         }
 
 
-def draw_spectrum(axes: Axes, signals: GapSignals, spectra: GapSpectra, row: int) -> None:
+def draw_spectrum(axes: Axes, signals: GapSignals, spectra: GapSpectra, row: int, *, after: str) -> None:
     """Draw one output's amplitude densities: measured, error before and after, noise."""
-    lines = list(_lines(spectra, row))
+    # What stands still has no place on a logarithmic axis of frequency.
+    shown = slice(1, _last_line(spectra) + 1)
+    frequency_hz = spectra.frequency_hz[shown]
+    lines = [(values[shown], colour, width, label) for values, colour, width, label in _lines(spectra, row, after)]
     for values, colour, width, label in lines:
-        axes.plot(spectra.frequency_hz, values, color=colour, linewidth=width, label=label)
-    noise = float(np.sqrt(spectra.noise[row]))
-    axes.axhline(noise, color="black", linewidth=0.8, linestyle=(0, (4, 2)), label="noise, if white")
+        axes.plot(frequency_hz, values, color=colour, linewidth=width, label=label)
     high = max(float(values.max()) for values, *_ in lines)
-    # A channel that is zero has no place on a logarithmic axis.
+    # A channel that is zero has no place on a logarithmic axis, either.
     if high > 0:
-        left = lines[-1][0]
-        lowest = min(BELOW_NOISE * noise, ROOM * float(left[left > 0].min(initial=high)))
-        logarithmic(axes, max(lowest, high / 10**DECADES), 2 * high)
-    axes.set_xlim(0, float(spectra.frequency_hz[-1]))
+        noise, left = float(np.sqrt(spectra.noise[row])), lines[-1][0]
+        least = float(left[left > 0].min(initial=high))
+        lowest = min(BELOW_NOISE * noise, ROOM * least) if noise > FAR * least else ROOM * least
+        low = max(lowest, high / 10**DECADES)
+        logarithmic(axes, low, 2 * high, numbers=NUMBERS)
+        # What lies below the axis isn't promised in the legend.
+        if noise > low:
+            axes.axhline(noise, color="black", linewidth=0.8, linestyle=(0, (4, 2)), label="noise, if white")
+    logarithmic_frequency(axes, float(frequency_hz[0]), float(frequency_hz[-1]))
     axes.set_ylabel(f"[{plain(amplitude_density_unit(signals.output_units[row]))}]")
 
 
-def _lines(spectra: GapSpectra, row: int) -> Iterator[tuple[Floats, tuple[float, float, float], float, str]]:
-    yield np.sqrt(spectra.measured[row]), MEASURED, 1.6, "measured"
-    yield np.sqrt(spectra.before[row]), BEFORE, 0.9, "error before"
-    yield np.sqrt(spectra.after[row]), AFTER, 0.9, "error after"
+def _last_line(spectra: GapSpectra) -> int:
+    """Line above which no curve of any output has power that is worth showing."""
+    curves = np.vstack([spectra.measured, spectra.before, spectra.after])[:, 1:]
+    rising = np.cumsum(curves, axis=1)
+    held = [int(np.searchsorted(one, HELD * one[-1])) for one in rising if one[-1] > 0]
+    most = spectra.frequency_hz.size - 1
+    return min(round(ABOVE * (max(held, default=most) + 1)), most)
+
+
+def _lines(spectra: GapSpectra, row: int, after: str) -> Iterator[tuple[Floats, Paint, float, str]]:
+    yield np.sqrt(spectra.measured[row]), MEASURED, 2.2, "measured"
+    yield np.sqrt(spectra.before[row]), BEFORE, 1.4, "error before"
+    yield np.sqrt(spectra.after[row]), AFTER, 0.8, f"error {after}"

@@ -3,7 +3,7 @@
 from math import log10
 
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, LogLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 # Over fewer decades than this, powers of ten alone are too few numbers.
@@ -24,13 +24,25 @@ def power_of_ten(value: float) -> str:
     return "10" + str(exponent).translate(_SUPERSCRIPTS)
 
 
-def logarithmic(axes: Axes, low: float, high: float) -> None:
-    """Give the y axis a logarithmic scale from `low` to `high`."""
+def logarithmic_frequency(axes: Axes, low_hz: float, high_hz: float) -> None:
+    """Give the x axis a logarithmic scale from `low_hz` to `high_hz`; numbers at 1, 2 and 5 where there is room."""
+    axes.set_xscale("log")
+    axes.set_xlim(low_hz, high_hz)
+    few = log10(high_hz / low_hz) < 2 * FEW_DECADES
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=12))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_locator(NullLocator())
+
+
+def logarithmic(axes: Axes, low: float, high: float, *, numbers: int = 7) -> None:
+    """Give the y axis a logarithmic scale from `low` to `high`, with at most so many powers of ten."""
     axes.set_yscale("log")
     axes.set_ylim(low, high)
     axis = axes.yaxis
-    axis.set_major_locator(LogLocator(numticks=7))
+    axis.set_major_locator(LogLocator(numticks=numbers))
     axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
     few = log10(high / low) < FEW_DECADES
-    axis.set_minor_locator(LogLocator(subs=(2.0, 5.0) if few else tuple(range(2, 10)), numticks=12))
+    minor = LogLocator(subs=(2.0, 5.0) if few else tuple(range(2, 10)), numticks=12)
+    # Marks of so many decades that not each of them has its number would run into one bar.
+    axis.set_minor_locator(minor if log10(high / low) < numbers else NullLocator())
     axis.set_minor_formatter(FuncFormatter(lambda value, _: f"{value:g}" if few else ""))

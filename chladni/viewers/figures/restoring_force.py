@@ -15,6 +15,7 @@ from chladni.viewers.restoring_force import (
     Over,
     force_range,
     motion,
+    motion_name,
     motion_reach,
     motion_unit,
     other,
@@ -72,7 +73,7 @@ def _draw(figure: Figure, axes: Axes, surface: RestoringForce, over: Over) -> No
         law = surface.law_force[rows] / up
         axes.plot(x, law, ".", color="black", markersize=1.6, markeredgewidth=0, label="law", rasterized=True)
     axes.set_ylim(*(end / up for end in force_range(surface)))
-    axes.set_xlabel(f"{over.capitalize()} [{x_unit}]")
+    axes.set_xlabel(f"{motion_name(surface, over)} [{x_unit}]")
     axes.set_ylabel(f"Force [{force_unit}]")
     _colour_bar(figure, axes, surface, other(over))
 
@@ -86,7 +87,7 @@ def _draw_over_time(axes: Axes, surface: RestoringForce, telling_s: tuple[float,
               label="recovered")  # fmt: skip
     if surface.law_force is not None:
         axes.plot(surface.time_s[rows], surface.law_force[rows] / up, color="black", linewidth=0.8, label="law")
-    axes.set_ylim(*(end / up for end in force_range(surface)))
+    # All of it: in so short a stretch a force is followed sample by sample, and none may be cut.
     axes.set_xlim(start_s, end_s)
     axes.set_xlabel("Time [s]")
     axes.set_ylabel(f"Force [{force_unit}]")

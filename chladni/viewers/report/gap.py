@@ -1,7 +1,7 @@
 """The report of a diagnosis: one HTML file that needs nothing else."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from chladni.gap.records.diagnosis import Diagnosis
@@ -10,19 +10,12 @@ from chladni.viewers import gap_tables as tables
 from chladni.viewers.effect_words import cause_law
 from chladni.viewers.figures.album import Album
 from chladni.viewers.figures.gap import gap_album
+from chladni.viewers.figures.gap_signals import windows_told
 from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.gap_summary import naive_sentence, summary
 from chladni.viewers.report.markup import PAGE, element, escaped, table
 from chladni.viewers.report.pictures import picture
 
-_CAPTIONS = {
-    "signals": "Where the model errs most: measured, simulated before, and after with what was found.",
-    "errors": "What is left of the whole log, before and after.",
-    "spectra": "Spectra of the errors between what was measured and the noise.",
-    "map": "Density of the gap over band and time, outputs over their RMS.",
-    "force": "Force that the model lacks, recovered without assuming a law; black: the law that was named.",
-    "shares": "In colour: the site that was named.",
-}
 # More than in a terminal: the page can be scrolled.
 RANKED = 12
 
@@ -64,12 +57,16 @@ def gap_report_html(evidence: GapEvidence, *, album: Album | None = None) -> str
 
 def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
     yield element("h1", escaped(title))
+    yield _log(found)
     yield _section("Answer", _answer(found))
     yield _section("Causes", _causes(found))
-    yield _section("Evidence", _pictures(album, "signals", "errors", "spectra", "force"))
-    # With one sensor no site can be told from another, and the picture of shares is empty.
-    places = ("shares", "map") if found.where.sites else ("map",)
-    yield _section("Where it lies", _where(found) + _pictures(album, *places))
+    yield _section("Evidence", _flow(_pictures(found, album, "signals", "errors", "spectra", "force")))
+    # With one sensor no site can be told from another, and bands and regimes are read as easily in tables.
+    drawn = bool(found.where.sites and album.sections.get("shares"))
+    places = ("shares", "map") if drawn else ("map",)
+    yield _section(
+        "Where it lies", _flow(_where(found, drawn=drawn), _pictures(found, album, *places)) + _left(found)
+    )
     yield _section(
         "What was weighed", _tables((tables.ranking_table(found, count=RANKED), (2, 3, 4))) + _naive(found)
     )
@@ -81,15 +78,38 @@ def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
     yield _section("Limits", _list((*found.levels, *found.remarks, *_held_out(found))))
 
 
-def _where(found: Diagnosis) -> str:
-    shown = _tables(
-        (tables.channel_table(found.where), (1, 2)),
-        (tables.site_table(found.where), (1,)),
-        (tables.band_table(found.where), (1,)),
-        (tables.regime_table(found.where), (2,)),
+def _log(found: Diagnosis) -> str:
+    """What the pictures are of."""
+    signals = found.signals
+    if signals is None:
+        return ""
+    length_s = signals.measured.shape[1] / signals.sample_rate_hz
+    return element("p", escaped(f"{signals.log}: {length_s:.4g} s at {signals.sample_rate_hz:.6g} Hz"), class_="note")
+
+
+def _where(found: Diagnosis, *, drawn: bool) -> str:
+    where = tables.where_told(found)
+    channels = (tables.channel_table(where), (1, 2))
+    shares = (
+        (tables.site_table(where), (1,)),
+        (tables.band_table(where), (1,)),
+        (tables.regime_table(where), (2,)),
     )
-    # Side by side where there is room for it.
-    return element("div", shown, class_="figures") if shown else ""
+    # The picture of shares has their numbers.
+    return _tables(channels) if drawn else _tables(channels, *shares)
+
+
+def _left(found: Diagnosis) -> str:
+    if found.left is None:
+        return ""
+    told = "The gap of each output is that before anything is tuned; shares are of what the best parameters leave."
+    return element("p", told, class_="note")
+
+
+def _flow(*shown: str) -> str:
+    """Side by side where there is room for it."""
+    content = "".join(shown)
+    return element("div", content, class_="flow") if content else ""
 
 
 def _section(heading: str, content: str) -> str:
@@ -128,11 +148,32 @@ def _tables(*several: tuple[tables.Table, Sequence[int]]) -> str:
     return "".join(table(headings, rows, numbers=numbers) for (headings, rows), numbers in several)
 
 
-def _pictures(album: Album, *sections: str) -> str:
-    shown = [
-        picture(album, name, _CAPTIONS[section]) for section in sections for name in album.sections.get(section, {})
-    ]
-    return element("div", "".join(shown), class_="figures") if shown else ""
+def _captions(found: Diagnosis) -> Mapping[str, str]:
+    """What each figure shows; where nothing is named, no law is drawn and no site coloured."""
+    windows = windows_told(found)
+    each = f" Simulated over {windows}, each from an estimated state." if windows else ""
+    named = found.verdict in ("effect", "parameters")
+    after = "after with what was found" if named else "with the best parameters"
+    sites = {cause.site for cause in found.causes}
+    drawn = found.restoring_force is not None and found.restoring_force.law_force is not None
+    coloured = any(one.name in sites for one in found.where.sites)
+    return {
+        "signals": f"Where the model errs most: measured, simulated before, and {after}.{each}",
+        "errors": f"What is left of the whole log, before and {after}.",
+        "spectra": "Spectra of the errors and of what was measured." + (" Mean over the windows." if windows else ""),
+        "map": f"Density of the gap over band and time, before and {after}; outputs over their RMS.",
+        "force": "Force that the model lacks, recovered without assuming a law"
+        + ("; black: the law that was named." if drawn else "."),
+        "shares": ("In colour: the site that was named." if coloured else "")
+        or ("Of what the best parameters leave." if found.left is not None else "Shares of the gap."),
+    }
+
+
+def _pictures(found: Diagnosis, album: Album, *sections: str) -> str:
+    captions = _captions(found)
+    return "".join(
+        picture(album, name, captions[section]) for section in sections for name in album.sections.get(section, {})
+    )
 
 
 def _list(sentences: Sequence[str]) -> str:

@@ -4,6 +4,8 @@ import html
 from collections.abc import Iterable, Sequence
 from string import Template
 
+from chladni import __version__
+
 # No request leaves the page: pictures are data, styles are inline, and scripts aren't allowed at all.
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; form-action 'none'; base-uri 'none'"
 
@@ -21,6 +23,7 @@ h2 { font-size: 1.15rem; margin: 2.2rem 0 .7rem; padding-bottom: .3rem; border-b
 ul { margin: 0; padding-left: 1.2rem; }
 li { margin: .2rem 0; overflow-wrap: anywhere; }
 .scroll { overflow-x: auto; }
+.scroll + ul { margin-top: .6rem; }
 table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .3rem .9rem .3rem .5rem; text-align: left; vertical-align: top;
   border-bottom: 1px solid var(--line); }
@@ -29,9 +32,11 @@ tbody tr:nth-child(even) { background: var(--band); }
 td.number { text-align: right; white-space: nowrap; }
 th.number { text-align: right; }
 .note { margin: .5rem 0 .8rem; color: var(--soft); font-size: .85rem; }
-td { overflow-wrap: anywhere; }
+td { overflow-wrap: break-word; }
 .figures { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(26rem, 100%), 1fr)); gap: 1rem;
   align-items: start; }
+.flow { columns: 26rem; column-gap: 1rem; }
+.flow > * { break-inside: avoid; margin: 0 0 1rem; }
 figure { margin: 0; padding: .6rem; background: #ffffff; border: 1px solid var(--line); border-radius: 6px; }
 figure img { display: block; width: 100%; height: auto; }
 figcaption { color: #5b6570; font-size: .8rem; padding-top: .3rem; }
@@ -58,7 +63,7 @@ PAGE = Template(
 </head>
 <body>
 $body
-<footer>Made by chladni.</footer>
+<footer>Made by chladni {__version__}.</footer>
 </body>
 </html>
 """
