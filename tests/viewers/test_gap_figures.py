@@ -176,6 +176,14 @@ def test_no_line_of_the_title_breaks_inside_a_quantity() -> None:
         assert not any(re.match(r"±|%|m?N\b|mm/s", line) or line.endswith("±") for line in lines)
 
 
+def test_the_figure_of_shares_leaves_no_site_out() -> None:
+    found = made.diagnosis()
+    sites = tuple(replace(found.where.sites[0], name=f"joint{row}", share=0.9 - 0.03 * row) for row in range(23))
+    many = gap_evidence(replace(found, where=replace(found.where, sites=sites)))
+    assert len(gap_album(many).figures["where"].axes[0].patches) == 23
+    assert len(gap_sheet(many).axes[-1].patches) == 10
+
+
 def test_many_outputs_are_divided_over_figures() -> None:
     signals, several = made.signals(), 6
     wide = replace(

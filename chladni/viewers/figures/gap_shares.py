@@ -14,7 +14,7 @@ from chladni.viewers.gap_tables import where_told
 Bar = tuple[str, float]
 
 BAR_HEIGHT_IN = 0.19
-# More bars than this don't tell where to look first.
+# On the sheet, where more bars don't tell where to look first; the figure, which stands for a table, has all.
 BARS = 10
 NAMED, OTHERS = paint(AFTER_ON_LIGHT), "#b9c4cf"
 
@@ -41,9 +41,9 @@ def share_label(found: Diagnosis) -> str:
     return "Share of the gap [%]" if found.left is None else "Share of what the best parameters leave [%]"
 
 
-def site_bars(found: Diagnosis) -> Sequence[Bar]:
+def site_bars(found: Diagnosis, *, count: int | None = BARS) -> Sequence[Bar]:
     """Shares that an unknown force at each site explains, the largest first."""
-    rows = sorted(found.where.sites, key=lambda one: -one.share)[:BARS]
+    rows = sorted(found.where.sites, key=lambda one: -one.share)[:count]
     return [(one.name, one.share) for one in rows]
 
 
@@ -63,12 +63,11 @@ def draw_shares(axes: Axes, bars: Sequence[Bar], *, named: set[str]) -> None:
 
 def _parts(found: Diagnosis) -> list[tuple[str, Sequence[Bar]]]:
     where = where_told(found)
-    shown = sorted(where.bands, key=lambda one: -one.share)[:BARS]
     # In the order of frequency, as in a spectrum.
-    bands = [(f"{one.low_hz:.4g} to {one.high_hz:.4g} Hz", one.share) for one in sorted(shown, key=_low_hz)]
-    regimes = sorted(where.regimes, key=lambda one: -one.share)[:BARS]
+    bands = [(f"{one.low_hz:.4g} to {one.high_hz:.4g} Hz", one.share) for one in sorted(where.bands, key=_low_hz)]
+    regimes = sorted(where.regimes, key=lambda one: -one.share)
     return [
-        ("What one site alone can explain", site_bars(found)),
+        ("What one site alone can explain", site_bars(found, count=None)),
         ("In which band it lies", bands),
         (
             "While which variable is where",
