@@ -80,8 +80,8 @@ def _overview(recording: rr.RecordingStream, evidence: GapEvidence, answer: rrb.
     if signals is None:
         return rrb.Vertical(answer, name="Answer")
     # The stretch that tells most is shown first; all of the log is in it.
-    plots = draw_signals(recording, signals, evidence.telling_s)
-    errors = draw_errors(recording, signals)
+    plots = draw_signals(recording, signals, evidence.telling_s, after=evidence.after)
+    errors = draw_errors(recording, signals, after=evidence.after)
     beside = rrb.Vertical(_stack(plots), _stack(errors))
     return rrb.Horizontal(answer, beside, column_shares=[1, 1.9], name="Answer")
 

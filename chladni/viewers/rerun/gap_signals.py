@@ -19,14 +19,14 @@ LINES_OF_AN_OUTPUT = 5
 
 
 def draw_signals(
-    recording: rr.RecordingStream, signals: GapSignals, telling_s: tuple[float, float] | None
+    recording: rr.RecordingStream, signals: GapSignals, telling_s: tuple[float, float] | None, *, after: str
 ) -> list[rrb.View]:
     """Write every output as measured, before and after; each view opens where the model errs most."""
     start_s, end_s = telling_s or (0.0, signals.measured.shape[1] / signals.sample_rate_hz)
     lines = (
         ("measured", signals.measured, MEASURED_ON_DARK, 3.0),
         ("simulated before", signals.before, BEFORE_ON_DARK, 1.2),
-        ("simulated after", signals.after, AFTER_ON_DARK, 1.2),
+        (f"simulated {after}", signals.after, AFTER_ON_DARK, 1.2),
     )
     views = []
     for row, name in enumerate(signals.output_names):
@@ -39,10 +39,10 @@ def draw_signals(
     return views
 
 
-def draw_errors(recording: rr.RecordingStream, signals: GapSignals) -> list[rrb.View]:
+def draw_errors(recording: rr.RecordingStream, signals: GapSignals, *, after: str) -> list[rrb.View]:
     """Write what is left of every output, before and after; each view opens on the whole log."""
     end_ns = round(signals.measured.shape[1] / signals.sample_rate_hz * NS_PER_S)
-    lines = (("error before", signals.before, BEFORE_ON_DARK), ("error after", signals.after, AFTER_ON_DARK))
+    lines = (("error before", signals.before, BEFORE_ON_DARK), (f"error {after}", signals.after, AFTER_ON_DARK))
     views = []
     for row, name in enumerate(signals.output_names):
         parent, stretch = _parent("errors", row), 1
