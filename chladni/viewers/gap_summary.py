@@ -121,7 +121,8 @@ def _parameters(found: Diagnosis) -> Iterator[str]:
     yield f"Nothing is missing, but {told}: more than the stated tolerance allows."
     gap = found.gap
     yield (
-        f"With that the error falls from {percent(gap.before)} to {percent(gap.after)}, noise {percent(gap.noise)}."
+        f"With that the error falls from {percent(gap.before)} to {percent(gap.after)} on stretches that no fit saw, "
+        f"noise {percent(gap.noise)}."
     )
     for cause in wrong:
         yield from _reservations(cause)

@@ -98,6 +98,7 @@ def test_nothing_missing_is_told_with_what_was_tuned() -> None:
 def test_wrong_values_are_told_against_the_nominal_ones() -> None:
     said = summary(made.wrong_values())
     assert "elbow.stiffness is 31.000 ± 0.090 kN/m where the model has 20 kN/m (96 %)" in said[0]
+    assert "on stretches that no fit saw" in said[1]
     alone = summary(replace(made.wrong_values(), tuned_parameters={}))
     assert "elbow.stiffness is 31.000 ± 0.090 kN/m (96 %)" in alone[0]
 
