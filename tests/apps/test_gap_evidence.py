@@ -77,3 +77,21 @@ def test_a_model_that_diverges_is_drawn_as_far_as_it_goes() -> None:
     assert np.isfinite(evidence.spectra.before).all()
     assert evidence.telling_s is not None
     assert evidence.telling_s[0] < 15
+
+
+def test_jumps_between_windows_dont_leak_into_the_spectra_of_errors() -> None:
+    signals, length = made.signals(), 500
+    samples = signals.measured.shape[1]
+    # An error that grows by the square of the time in each window, from nothing.
+    growing = (np.arange(samples) % length / length) ** 2
+    drifted = replace(signals, before=signals.measured - growing)
+    starts = tuple(range(0, samples, length))
+    joined, apart = (
+        gap_evidence(replace(made.drifting(), signals=replace(drifted, window_starts=one))).spectra
+        for one in ((), starts)
+    )
+    assert joined is not None
+    assert apart is not None
+    # Far above the error's own frequencies only the jumps have power.
+    high = [one.before[:, one.frequency_hz > 50].max() for one in (joined, apart)]
+    assert high[1] < 1e-3 * high[0]
