@@ -9,18 +9,15 @@ from numpy.typing import NDArray
 
 from chladni.gap.comparison.distortion import Distortion, distortion_of
 from chladni.gap.comparison.levels import compare_levels
-from chladni.gap.comparison.outside_band import products_outside
 from chladni.gap.comparison.periodicity import with_period
-from chladni.gap.comparison.scale_doubt import scale_doubt
 from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, regime_shares
-from chladni.gap.design.next_measurement import next_measurement
-from chladni.gap.design.what_is_missing import what_is_missing
+from chladni.gap.diagnosis.advice import advice_on, measure_next
 from chladni.gap.diagnosis.causes import Causes, causes_of
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
 from chladni.gap.diagnosis.other_logs import closing_elsewhere
+from chladni.gap.diagnosis.remarks import remarks_on
 from chladni.gap.diagnosis.study import Study, study_of
-from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.explanation.shaken_ground import predicted_by_others
 from chladni.gap.linear_algebra import in_one_thread
 from chladni.gap.location.profile import profile_at
@@ -43,10 +40,6 @@ from chladni.signals.errors import EstimateError, ModelError
 
 Matrix = NDArray[np.float64]
 StepProgress = Callable[[str, float], None]
-#: Nats within which a further measurement is worth a thought.
-_STILL_CLOSE = 8.0
-#: Of the tuned model's error: parameters outside their tolerance that leave less are wrong, whatever else is.
-_MOSTLY = 0.25
 
 
 @in_one_thread()
@@ -124,10 +117,10 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         left=_where(study, causes, causes.tuned.fit.outputs, motion) if causes.verdict == "unknown" else None,
         gap=closing_of(_yardstick(study, causes), before, causes.tuned.fit.outputs, after, seed=seed),
         tuned_parameters=tuned_numbers(study, shown.fit),
-        next_measurement=_next(study, causes, seed),
+        next_measurement=measure_next(study, causes, seed),
         naive=naive_of(causes),
-        remarks=(*_remarks(study, causes, shown), *_distortion_remarks(study.measurement, distortion)),
-        advice=_advice(study, causes),
+        remarks=remarks_on(study, causes, shown, distortion),
+        advice=advice_on(study, causes),
         restoring_force=_restoring(study, causes, motion),
         signals=_signals(study, causes, before, after),
         distortion=() if distortion is None else distortion.shares,
@@ -258,92 +251,3 @@ def _distortion(measurement: Measurement) -> Distortion | None:
         return distortion_of(measurement)
     except EstimateError:
         return None
-
-
-def _distortion_remarks(measurement: Measurement, distortion: Distortion | None) -> tuple[str, ...]:
-    """What the excitation doesn't allow to be told of distortion, and what the lines above its band tell."""
-    if distortion is None:
-        return ()
-    outside = products_outside(measurement)
-    return (*distortion.remarks, *(() if outside is None else (outside.sentence(),)))
-
-
-def _remarks(study: Study, causes: Causes, shown: Contestant) -> list[str]:
-    found = []
-    if len(study.measurement.output_names) < 2:
-        found.append(
-            "one output only: which site the missing force acts at can't be told from patterns, only from its law; "
-            "a second sensor would tell"
-        )
-    if study.repeating:
-        found.append(
-            f"{', '.join(study.repeating)}: samples repeat the one before; the sensor is slower than the log, or "
-            "messages were lost"
-        )
-    if causes.distorted:
-        found.append(f"{', '.join(causes.distorted)}: what is left follows its own signal in a curve or in steps")
-    if shown.fit.undetermined:
-        names = ", ".join(shown.fit.undetermined[:6])
-        found.append(f"this log doesn't determine {names}: only the stated tolerance holds what it can't tell")
-    if np.any(causes.noise.upper_bound):
-        found.append("the noise floor of some outputs is an upper bound: distortion may be in it")
-    return found
-
-
-def _next(study: Study, causes: Causes, seed: int) -> str | None:
-    """What to measure so that the answer gets clearer, None when it's clear or nothing would help."""
-    run = study.contest.run
-    if causes.shaken is not None:
-        return None
-    close = [one for one in (*causes.ranked, causes.tuned) if len(one.hypothesis.named) <= 1]
-    close = sorted(close, key=lambda one: -one.log_evidence)
-    near = [one for one in close if one.log_evidence > close[0].log_evidence - _STILL_CLOSE]
-    if causes.verdict != "unknown" and len(near) > 1 and close[0] is not causes.tuned:
-        return next_measurement(study.model, study.measurement, run.tunables, near[:4], causes.noise, seed=seed)
-    if causes.verdict == "unknown":
-        sites = [located.places[0].sites[0].name for located in study.location.ranked[:3]]
-        return what_is_missing(study.model, study.measurement, causes.noise, sites=sites)
-    return None
-
-
-def _advice(study: Study, causes: Causes) -> str | None:
-    """What to do next; a scale that can't be right comes before all else."""
-    measurement = study.measurement
-    try:
-        # From rest: the initial states that suit a log of another scale would hide it.
-        doubt = scale_doubt(measurement.outputs, study.contest.run.outputs(), measurement.output_names)
-    except ModelError:
-        doubt = None
-    return " ".join(filter(None, (doubt, _advice_on(study, causes)))) or None
-
-
-def _advice_on(study: Study, causes: Causes) -> str | None:
-    if causes.instead is not None:
-        return causes.instead.sentence()
-    if causes.verdict == "unknown" and causes.best.hypothesis.wide and causes.best.gap < _MOSTLY * causes.tuned.gap:
-        return _wrong_first(study, causes)
-    if causes.verdict == "unknown":
-        return "No effect of the catalogue explains the gap; the site and the recovered force say where to look."
-    if causes.verdict == "none" and causes.tuned.chi > 1.2:
-        return "What is left beside the noise is too little to be named."
-    return None
-
-
-def _wrong_first(study: Study, causes: Causes) -> str:
-    """Say which parameters to put right, where something is missing beside them."""
-    tunables, values = study.contest.run.tunables, causes.best.fit.values
-    rows = zip(tunables.names, tunables.nominal, tunables.units, strict=True)
-    wrong = " and ".join(
-        f"{name} of {_short(values[name])} {unit} where the model has {_short(nominal)}"
-        for name, nominal, unit in rows
-        if name in causes.best.hypothesis.wide
-    )
-    return (
-        f"With {wrong} an error of {_short(100 * causes.best.gap)} % is left, {_short(100 * causes.tuned.gap)} % "
-        "without: put that right in the model and ask again; what is left has another cause."
-    )
-
-
-def _short(value: float) -> str:
-    """Three digits, without an exponent where there need be none."""
-    return f"{float(f'{value:.3g}'):g}"

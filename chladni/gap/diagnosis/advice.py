@@ -1,0 +1,72 @@
+"""What to do after a diagnosis: what to check, to put right, to measure."""
+
+from chladni.gap.comparison.scale_doubt import scale_doubt
+from chladni.gap.design.next_measurement import next_measurement
+from chladni.gap.design.what_is_missing import what_is_missing
+from chladni.gap.diagnosis.causes import Causes
+from chladni.gap.diagnosis.study import Study
+from chladni.signals.errors import ModelError
+
+#: Nats within which a further measurement is worth a thought.
+_STILL_CLOSE = 8.0
+#: Of the tuned model's error: parameters outside their tolerance that leave less are wrong, whatever else is.
+_MOSTLY = 0.25
+
+
+def advice_on(study: Study, causes: Causes) -> str | None:
+    """What to do next; a scale that can't be right comes before all else."""
+    measurement = study.measurement
+    try:
+        # From rest: the initial states that suit a log of another scale would hide it.
+        doubt = scale_doubt(measurement.outputs, study.contest.run.outputs(), measurement.output_names)
+    except ModelError:
+        doubt = None
+    return " ".join(filter(None, (doubt, _on_causes(study, causes)))) or None
+
+
+def measure_next(study: Study, causes: Causes, seed: int) -> str | None:
+    """What to measure so that the answer gets clearer, None when it's clear or nothing would help."""
+    run = study.contest.run
+    if causes.shaken is not None:
+        return None
+    close = [one for one in (*causes.ranked, causes.tuned) if len(one.hypothesis.named) <= 1]
+    close = sorted(close, key=lambda one: -one.log_evidence)
+    near = [one for one in close if one.log_evidence > close[0].log_evidence - _STILL_CLOSE]
+    if causes.verdict != "unknown" and len(near) > 1 and close[0] is not causes.tuned:
+        return next_measurement(study.model, study.measurement, run.tunables, near[:4], causes.noise, seed=seed)
+    if causes.verdict == "unknown":
+        sites = [located.places[0].sites[0].name for located in study.location.ranked[:3]]
+        return what_is_missing(study.model, study.measurement, causes.noise, sites=sites)
+    return None
+
+
+def _on_causes(study: Study, causes: Causes) -> str | None:
+    if causes.instead is not None:
+        return causes.instead.sentence()
+    if causes.verdict == "unknown" and causes.best.hypothesis.wide and causes.best.gap < _MOSTLY * causes.tuned.gap:
+        return _wrong_first(study, causes)
+    if causes.verdict == "unknown":
+        return "No effect of the catalogue explains the gap; the site and the recovered force say where to look."
+    if causes.verdict == "none" and causes.tuned.chi > 1.2:
+        return "What is left beside the noise is too little to be named."
+    return None
+
+
+def _wrong_first(study: Study, causes: Causes) -> str:
+    """Say which parameters to put right, where something is missing beside them."""
+    tunables, values = study.contest.run.tunables, causes.best.fit.values
+    rows = zip(tunables.names, tunables.nominal, tunables.units, strict=True)
+    wrong = " and ".join(
+        f"{name} of {_short(values[name])} {unit} where the model has {_short(nominal)}"
+        for name, nominal, unit in rows
+        if name in causes.best.hypothesis.wide
+    )
+    return (
+        f"With {wrong} an error of {_short(100 * causes.best.gap)} % is left, {_short(100 * causes.tuned.gap)} % "
+        "without: put that right in the model and ask again; what is left has another cause."
+    )
+
+
+def _short(value: float) -> str:
+    """Three digits, without an exponent where there need be none."""
+    return f"{float(f'{value:.3g}'):g}"

@@ -1,0 +1,49 @@
+"""What limits a diagnosis: sensors, parameters, noise, excitation."""
+
+import numpy as np
+
+from chladni.gap.comparison.distortion import Distortion
+from chladni.gap.comparison.outside_band import products_outside
+from chladni.gap.diagnosis.causes import Causes
+from chladni.gap.diagnosis.study import Study
+from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.records.measurement import Measurement
+
+
+def remarks_on(study: Study, causes: Causes, shown: Contestant, distortion: Distortion | None) -> tuple[str, ...]:
+    """What limits an answer.
+
+    Parameters
+    ----------
+    shown
+        The contestant whose numbers are told.
+    distortion
+        Of the log, None where its excitation doesn't tell any.
+    """
+    found = []
+    if len(study.measurement.output_names) < 2:
+        found.append(
+            "one output only: which site the missing force acts at can't be told from patterns, only from its law; "
+            "a second sensor would tell"
+        )
+    if study.repeating:
+        found.append(
+            f"{', '.join(study.repeating)}: samples repeat the one before; the sensor is slower than the log, or "
+            "messages were lost"
+        )
+    if causes.distorted:
+        found.append(f"{', '.join(causes.distorted)}: what is left follows its own signal in a curve or in steps")
+    if shown.fit.undetermined:
+        names = ", ".join(shown.fit.undetermined[:6])
+        found.append(f"this log doesn't determine {names}: only the stated tolerance holds what it can't tell")
+    if np.any(causes.noise.upper_bound):
+        found.append("the noise floor of some outputs is an upper bound: distortion may be in it")
+    return (*found, *_of_distortion(study.measurement, distortion))
+
+
+def _of_distortion(measurement: Measurement, distortion: Distortion | None) -> tuple[str, ...]:
+    """What the excitation doesn't allow to be told of distortion, and what the lines above its band tell."""
+    if distortion is None:
+        return ()
+    outside = products_outside(measurement)
+    return (*distortion.remarks, *(() if outside is None else (outside.sentence(),)))
