@@ -54,6 +54,7 @@ def main() -> None:
     model, log = model_of_the_arm(), log_of_the_machine()
     if len(sys.argv) > 1:
         folder = Path(sys.argv[1])
+        folder.mkdir(parents=True, exist_ok=True)
         chladni.write_model(model, folder / "arm.toml")
         chladni.write_mcap(log, folder / "arm.mcap")
     found = chladni.diagnose_gap(model, log)
