@@ -1,6 +1,7 @@
 """Where a command's words go: a table for people, JSON for programs, progress while one waits."""
 
 import json
+import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -26,12 +27,21 @@ class Progress(Protocol):
         """Show the share done, 0 to 1, and what is being done where there are several steps."""
 
 
+class _Console(Console):
+    """A console that falls silent when its reader goes away, as with ``| head``: files are written all the same."""
+
+    def on_broken_pipe(self) -> None:
+        self.quiet = True
+        # What Python flushes at its end must go somewhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), self.file.fileno())
+
+
 class Output:
     """Tables go to standard output, unless JSON was asked for there: then to standard error."""
 
     def __init__(self, json_target: str | None = None) -> None:
         self.json_target = json_target
-        self.console = Console(stderr=json_target == "-", highlight=False, soft_wrap=False)
+        self.console = _Console(stderr=json_target == "-", highlight=False, soft_wrap=False)
         if not self.console.is_terminal:
             # A pipe has no width of its own; rich's 80 would cut channel names in two.
             self.console.width = max(self.console.width, 160)

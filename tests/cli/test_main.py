@@ -1,3 +1,4 @@
+import json
 import subprocess
 import sys
 
@@ -94,6 +95,16 @@ def test_a_reader_that_goes_away_is_no_error(arm_log):
     assert finished.returncode == SUCCESS
     assert "Traceback" not in finished.stderr
     assert "defect" not in finished.stderr
+
+
+def test_files_are_written_for_a_reader_that_goes_away(arm_log, tmp_path):
+    # The summary ends what `head` wants; the document comes last.
+    document = tmp_path / "psd.json"
+    command = f"{sys.executable} -m chladni psd {arm_log} --json {document} | head -c 0"
+    finished = subprocess.run(["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True, check=False)
+    assert finished.returncode == SUCCESS
+    assert finished.stderr == ""
+    assert json.loads(document.read_text())["format"].startswith("chladni.psd/")
 
 
 def test_help_is_completed_by_the_shell(monkeypatch):
