@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from chladni.gap.comparison.scale_doubt import scale_doubt
 from chladni.gap.diagnosis.diagnose import diagnose
@@ -31,6 +32,7 @@ def test_what_stands_still_is_told_elsewhere() -> None:
     assert scale_doubt(SIGNALS, SIGNALS * 0.0, ["a", "b"]) is None
 
 
+@pytest.mark.slow
 def test_a_log_in_millimetres_is_told_in_the_advice() -> None:
     log = measured()
     found = diagnose(arm(), [replace(log, outputs=1e3 * log.outputs)])
