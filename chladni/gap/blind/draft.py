@@ -68,6 +68,14 @@ class Scene:
         """Draw a word."""
         return str(self.rng.choice(words))
 
+    def ripple_shape(self) -> dict[str, float]:
+        """Draw a phase, and shares and phases of a second and third harmonic: teeth are no sines."""
+        return {
+            "phase": self.between(-3, 3),
+            "second": self.between(0.05, 0.3), "second_phase": self.between(-3, 3),
+            "third": self.between(0.02, 0.12), "third_phase": self.between(-3, 3),
+        }  # fmt: skip
+
     def force_at(self, joint: str) -> float:
         """RMS force that a joint holds: its spring's, or where it has none what the inputs push."""
         held = self.stiffness(joint) * self.moving[f"{joint}.d"]

@@ -7,6 +7,8 @@ from chladni.gap.blind.assembly import added
 from chladni.gap.blind.equations import Machine
 from chladni.gap.blind.plan import GROUND, Hidden
 
+#: Of a force over position, at a joint or where an input acts.
+RIPPLE_NUMBERS = ("amplitude", "period", "phase", "second", "second_phase", "third", "third_phase")
 #: Numbers that each law at a joint takes, in its order.
 JOINT_LAWS: Mapping[str, tuple[str, ...]] = {
     "lugre": ("sliding", "static", "speed", "exponent", "stiffness", "damping"),
@@ -23,7 +25,7 @@ JOINT_LAWS: Mapping[str, tuple[str, ...]] = {
     "smooth_change": ("change", "middle", "width"),
     "ramp_change": ("change", "start", "end"),
     "periodic_change": ("change", "angular_frequency", "phase"),
-    "ripple": ("amplitude", "period", "phase", "second", "second_phase"),
+    "ripple": RIPPLE_NUMBERS,
 }
 #: Natural frequencies of a clamped beam's second and third mode over its first, and their modal masses likewise
 #: (Thomson & Dahleh, Theory of Vibration with Applications, section 9.5).

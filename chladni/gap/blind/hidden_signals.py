@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from chladni.gap.blind.assembly import Sum, added
 from chladni.gap.blind.equations import Machine
-from chladni.gap.blind.hidden_forces import tone_name
+from chladni.gap.blind.hidden_forces import RIPPLE_NUMBERS, tone_name
 from chladni.gap.blind.plan import GROUND, Hidden
 
 Matrix = NDArray[np.float64]
@@ -21,7 +21,7 @@ SIGNAL_LAWS: Mapping[str, tuple[str, ...]] = {
     "overlap": ("width", "rounding"),
     "slew": ("rate", "tracking_time"),
     "position_gain": ("share", "length"),
-    "ripple": ("amplitude", "period", "phase", "second", "second_phase"),
+    "ripple": RIPPLE_NUMBERS,
 }
 #: Laws that act on the samples of a sensor, behind its noise.
 ON_SAMPLES = ("clip", "round_clip", "floor_steps", "round_steps", "square", "held")

@@ -115,10 +115,9 @@ def varying(scene: Scene, site: str) -> Draft:
 
 
 def joint_ripple(scene: Scene, site: str) -> Draft:
-    """Cogging with a second harmonic."""
+    """Cogging with a second and a third harmonic."""
     period, force = scene.moving[f"{site}.d"] * scene.about(0.7, 2.5), scene.force_at(site)
-    shape = {"period": period, "phase": scene.between(-3, 3), "second": scene.between(0.05, 0.3),
-             "second_phase": scene.between(-3, 3)}  # fmt: skip
+    shape = {"period": period, **scene.ripple_shape()}
     return _draft("ripple", site, "ripple", lambda size: {"amplitude": 0.1 * size * force, **shape})
 
 

@@ -146,9 +146,10 @@ def periodic_change(d: float, _s: float, t: float, p: Any, _z: Any, _dz: Any) ->
 
 @compiled
 def ripple(d: float, _s: float, _t: float, p: Any, _z: Any, _dz: Any) -> float:
-    """Force over position with a second harmonic; `p`: amplitude, period, phase, share and phase of the second."""
+    """Force over position; `p`: amplitude, period, phase, share and phase of the second harmonic, of the third."""
     angle = 2.0 * math.pi * d / p[1]
-    return float(p[0] * (math.sin(angle + p[2]) + p[3] * math.sin(2.0 * angle + p[4])))
+    more = p[3] * math.sin(2.0 * angle + p[4]) + p[5] * math.sin(3.0 * angle + p[6])
+    return float(p[0] * (math.sin(angle + p[2]) + more))
 
 
 @compiled

@@ -58,8 +58,7 @@ def rate_limit(scene: Scene, site: str) -> Draft:
 def input_ripple(scene: Scene, site: str) -> Draft:
     """A motor's cogging over the position at which it pushes."""
     period, level = scene.moving[f"{site}.x"] * scene.about(0.7, 2.5), scene.moving[f"{site}.u"]
-    shape = {"period": period, "phase": scene.between(-3, 3), "second": scene.between(0.05, 0.3),
-             "second_phase": scene.between(-3, 3)}  # fmt: skip
+    shape = {"period": period, **scene.ripple_shape()}
     return _draft("ripple", site, "ripple", lambda size: {"amplitude": 0.1 * size * level, **shape})
 
 

@@ -1,6 +1,7 @@
 """Trials at joints: friction, stiffness, damping, ripple, along the recovered displacement and velocity."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ def joint_trials(motion: Recovered, port: Port) -> Iterator[Trial]:
         yield _backlash(motion, port)
         yield from _varying(motion, port)
     yield from _stops(motion)
-    yield ripple_trial(motion, motion.displacement)
+    yield from ripples(motion, motion.displacement)
 
 
 def _friction(motion: Recovered) -> Iterator[Trial]:
@@ -229,23 +230,36 @@ def _stop(motion: Recovered, side: float, variant: str, power: float) -> Trial:
     )  # fmt: skip
 
 
-def ripple_trial(motion: Recovered, position: Matrix) -> Trial:
-    """Give the trial of a force periodic in a position ``[sample]``."""
+def ripples(motion: Recovered, position: Matrix) -> Iterator[Trial]:
+    """Give the trials of a force periodic in a position ``[sample]``, with one harmonic and with two."""
     span = float(np.quantile(position, 0.98) - np.quantile(position, 0.02)) or 1.0
 
-    def build(shape: Shape) -> Force:
+    def build(shape: Shape, *, orders: tuple[float, ...]) -> Force:
         angle = 2 * np.pi * position / numbers(shape)[0]
-        return Force.of(motion.spectrum(np.sin(angle)), motion.spectrum(np.cos(angle)))
+        return Force.of(*(motion.spectrum(wave(order * angle)) for order in orders for wave in (np.sin, np.cos)))
 
-    def values(shape: Shape, a: Matrix) -> Numbers:
-        return {
-            "amplitude": float(np.hypot(a[0], a[1])),
-            "period": numbers(shape)[0],
-            "phase": float(np.arctan2(a[1], a[0])),
-        }
+    def first(shape: Shape, a: Matrix) -> Numbers:
+        phase = float(np.arctan2(a[1], a[0]))
+        return {"amplitude": float(np.hypot(a[0], a[1])), "period": numbers(shape)[0], "phase": phase}
+
+    def both(shape: Shape, a: Matrix) -> Numbers | None:
+        found = first(shape, a)
+        # Turned by twice the phase, since the law counts its second harmonic from where the first begins.
+        second = complex(a[2], a[3]) * np.exp(-2j * found["phase"])
+        if abs(second) >= found["amplitude"]:
+            return None
+        share = second / found["amplitude"]
+        return {**found, "second_sine": float(share.real), "second_cosine": float(share.imag)}
 
     grid = logarithms(np.geomspace(0.03 * span, span, 32).tolist())
-    return Trial(effect="ripple", site=motion.site, build=build, grid=grid, values=values, parameters=3)
+    yield Trial(
+        effect="ripple", site=motion.site, variant="sine", build=partial(build, orders=(1.0,)), grid=grid,
+        values=first, parameters=3,
+    )  # fmt: skip
+    yield Trial(
+        effect="ripple", site=motion.site, variant="harmonics", build=partial(build, orders=(1.0, 2.0)), grid=grid,
+        values=both, parameters=5,
+    )  # fmt: skip
 
 
 def _positive(amplitudes: Matrix, **values: float) -> Numbers | None:

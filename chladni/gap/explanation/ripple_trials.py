@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from chladni.gap.explanation.joint_trials import ripple_trial
+from chladni.gap.explanation.joint_trials import ripples
 from chladni.gap.explanation.trial import Trial
 from chladni.gap.location.recovered import Recovered
 from chladni.gap.plant.linear_problem import LinearProblem
@@ -12,8 +12,8 @@ from chladni.gap.plant.places import Site
 
 
 def ripple_at_input(problem: LinearProblem, motion: Recovered, site: Site) -> Iterator[Trial]:
-    """Give the trial when the input acts at a place that moves."""
+    """Give the trials when the input acts at a place that moves."""
     compiled = problem.view(np.zeros(len(problem.tunables.names))).compiled
     if any((port.name, port.kind) == (site.name, "actuation") for port in compiled.ports):
         position = motion.position_at(problem, compiled.port_index(site.name, "actuation"))
-        yield ripple_trial(motion, position)
+        yield from ripples(motion, position)

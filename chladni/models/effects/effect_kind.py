@@ -64,8 +64,8 @@ class Variant:
     odd
         Whether the law claims ``F(-d, -s) = -F(d, s)``; tested with ``offset`` and ``phase`` at zero.
     fitted
-        Names among `parameters` that make this form what it is: a fit moves them beside those that the effect
-        requires.
+        Names, also among those that all variants share, that make this form what it is: a fit moves them beside
+        those that the effect requires.
     """
 
     name: str
@@ -134,9 +134,9 @@ class EffectKind:
             raise ModelError(f"effect {self.name!r}: it needs at least one kind of site and one variant")
         # A name used twice shows when the parameters are put together: now, not when someone picks the variant.
         for variant in self.variants:
-            self.parameters_of(variant.name)
+            known = self.parameters_of(variant.name)
             for name in variant.fitted:
-                variant.parameters.require(name)
+                known.require(name)
         for name in (*self.optional, *self.neutral):
             self.parameters.require(name)
 

@@ -1,7 +1,7 @@
 """Ripple: a force periodic in position: cogging of a motor, mesh of a gear."""
 
 from dataclasses import dataclass, replace
-from math import pi, sin
+from math import cos, pi, sin
 from typing import Any
 
 from chladni.models.core.compiled_model import CompiledModel
@@ -19,8 +19,30 @@ def ripple(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates:
     return float(parameters[0] * sin(parameters[1] * d + parameters[2]))
 
 
+def harmonics(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    """Give the first harmonic and shares of the second, both over ``a = 2 pi d/period + phase``.
+
+    Parameters amplitude, 2 pi/period, phase, second_sine, second_cosine.
+    """
+    angle = parameters[1] * d + parameters[2]
+    second = parameters[3] * sin(2.0 * angle) + parameters[4] * cos(2.0 * angle)
+    return float(parameters[0] * (sin(angle) + second))
+
+
 def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
     return values["amplitude"], 2 * pi / values["period"], values["phase"]
+
+
+def _harmonics_numbers(values: Values, port: Port) -> tuple[float, ...]:
+    return (*_numbers(values, port), values["second_sine"], values["second_cosine"])
+
+
+def _share(name: str) -> Parameter:
+    # Beyond 1 the second harmonic would be the first of a ripple of half the period.
+    return Parameter(
+        name=name, value=0.0, low=-0.3, high=0.3, minimum=-1.0, maximum=1.0,
+        meaning="of the second harmonic over the first",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +85,14 @@ RIPPLE = EffectKind(
             attach=_AtJointOrActuator(law=LawAtPort(law=ripple, numbers=_numbers)),
             formula="F = amplitude sin(2 pi d/period + phase)",
             odd=True,
+            fitted=("phase",),
+        ),
+        Variant(
+            name="harmonics",
+            attach=_AtJointOrActuator(law=LawAtPort(law=harmonics, numbers=_harmonics_numbers)),
+            formula="F = amplitude (sin a + second_sine sin 2a + second_cosine cos 2a), a = 2 pi d/period + phase",
+            parameters=Parameters((_share("second_sine"), _share("second_cosine"))),
+            fitted=("phase", "second_sine", "second_cosine"),
         ),
     ),
 )

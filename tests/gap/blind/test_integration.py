@@ -64,6 +64,8 @@ def test_the_exact_response_is_that_of_the_integrator():
 
 
 OMEGA = 2 * pi * 20.0
+#: A made ripple that is a sine.
+ONE_HARMONIC = {"second": 0.0, "second_phase": 0.0, "third": 0.0, "third_phase": 0.0}
 
 
 @pytest.mark.parametrize(
@@ -194,7 +196,7 @@ SAME = [
      {"coefficient": 1.0}, {}),
     ("bouc_wen", "joint1", {"force": 1.0, "yield": 1.0, "beta": 0.5, "gamma": 0.5, "exponent": 1.0}, "hysteresis",
      {"force": 1.0, "yield": 1.0, "shape": 1.0}, {}),
-    ("ripple", "joint1", {"amplitude": 1.0, "period": 1.0, "phase": 0.3, "second": 0.0, "second_phase": 0.0},
+    ("ripple", "joint1", {"amplitude": 1.0, "period": 1.0, "phase": 0.3, **ONE_HARMONIC},
      "ripple", {"amplitude": 1.0, "period": 1.0, "phase": 0.3}, {}),
     ("contact", "joint1", {"stiffness": 1.0, "clearance": 1.0, "side": -1.0, "dissipation": 0.0, "exponent": 1.0},
      "one_sided_stop", {"stiffness": 1.0, "clearance": 1.0, "side": -1.0}, {}),
@@ -298,7 +300,7 @@ IN_LOOP = [
     ("hard_limit", "motor", {"limit": 1.0}, "saturation", {"limit": 1.0}, {}),
     ("hyperbolic_limit", "motor", {"limit": 1.0}, "saturation", {"limit": 1.0}, {"variant": "smooth"}),
     ("overlap", "motor", {"width": 0.3, "rounding": 1e-6}, "dead_zone", {"width": 0.3}, {}),
-    ("ripple", "motor", {"amplitude": 0.3, "period": 0.01, "phase": 0.4, "second": 0.0, "second_phase": 0.0},
+    ("ripple", "motor", {"amplitude": 0.3, "period": 0.01, "phase": 0.4, **ONE_HARMONIC},
      "ripple", {"amplitude": 0.3, "period": 0.01, "phase": 0.4}, {}),
 ]  # fmt: skip
 

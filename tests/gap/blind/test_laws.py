@@ -89,8 +89,9 @@ def test_quadratic_damping_takes_its_closed_form():
         ("rubber", (1e3, 0.004), lambda d: 1e3 * (0.004 * np.sinh(d / 0.004) - d)),
         ("arctangent", (1e3, 0.004), lambda d: 1e3 * (0.004 * np.arctan(d / 0.004) - d)),
         ("sine_spring", (1e3, 0.02), lambda d: 1e3 * (0.02 * np.sin(d / 0.02) - d)),
-        ("ripple", (2.0, 0.003, 0.4, 0.2, 1.0),
-         lambda d: 2 * (np.sin(2 * pi * d / 0.003 + 0.4) + 0.2 * np.sin(4 * pi * d / 0.003 + 1.0))),
+        ("ripple", (2.0, 0.003, 0.4, 0.2, 1.0, 0.1, 0.5),
+         lambda d: 2 * (np.sin(2 * pi * d / 0.003 + 0.4) + 0.2 * np.sin(4 * pi * d / 0.003 + 1.0)
+                        + 0.1 * np.sin(6 * pi * d / 0.003 + 0.5))),
         ("hard_limit", (0.004,), lambda d: np.clip(d, -0.004, 0.004)),
         ("hyperbolic_limit", (0.004,), lambda d: 0.004 * np.tanh(d / 0.004)),
         ("soft_limit", (0.004, 2.0), lambda d: d / np.sqrt(1 + (d / 0.004) ** 2)),

@@ -1,5 +1,5 @@
 from dataclasses import replace
-from math import pi, sin
+from math import cos, pi, sin
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ from tests.models.effects.small_models import one_body, with_loop
 from tests.models.structures.made_models import tree
 
 VALUES = {"amplitude": 2.0, "period": 0.02, "phase": 0.4}
+TEETH = {**VALUES, "second_sine": 0.3, "second_cosine": -0.1}
 
 
 @pytest.mark.parametrize(("site", "kind", "sign"), [("spring", "joint", -1.0), ("motor", "actuation", 1.0)])
@@ -25,8 +26,17 @@ def test_the_force_repeats_with_the_position_of_the_place(site: str, kind: str, 
     assert np.sign(compiled.g[1, law.port]) == sign
 
 
-def test_it_takes_no_energy() -> None:
-    law = law_of(attached("ripple", "spring", VALUES), one_body())
+def test_teeth_have_a_second_harmonic() -> None:
+    (law,) = attached("ripple", "spring", TEETH, variant="harmonics").attach(one_body()).laws
+    for d in (-0.013, 0.0, 0.004):
+        angle = 2 * pi * d / 0.02 + 0.4
+        expected = 2.0 * (sin(angle) + 0.3 * sin(2 * angle) - 0.1 * cos(2 * angle))
+        assert force(law, d=d) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(("values", "variant"), [(VALUES, "sine"), (TEETH, "harmonics")])
+def test_it_takes_no_energy(values: dict[str, float], variant: str) -> None:
+    law = law_of(attached("ripple", "spring", values, variant=variant), one_body())
     assert energy(*loop(law, 0.05, 3.0)) == pytest.approx(0.0, abs=1e-9)
 
 
