@@ -12,10 +12,11 @@ from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, regime_shares
 from chladni.gap.diagnosis.advice import advice_on, measure_next
-from chladni.gap.diagnosis.causes import Causes, causes_of
+from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
 from chladni.gap.diagnosis.other_logs import closing_elsewhere
+from chladni.gap.diagnosis.parting_runs import causes_found
 from chladni.gap.diagnosis.remarks import remarks_on
 from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.explanation.shaken_ground import predicted_by_others
@@ -80,7 +81,7 @@ def diagnose(
     tell("locating", 0.0)
     study = study_of(model, measurements[0], leave_out=leave_out, own={one.name: one for one in own_effects})
     tell("explaining", 0.3)
-    causes = causes_of(study, lambda done: tell("explaining", 0.3 + 0.6 * done))
+    study, causes = causes_found(study, lambda done: tell("explaining", 0.3 + 0.6 * done))
     tell("measuring the closing", 0.9)
     found = _assembled(study, causes, [one.log for one in measurements], seed)
     # Periods tell noise from distortion at every level, as they did for the first log.

@@ -10,7 +10,7 @@ from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.study import Study, training_of
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
-from chladni.gap.plant.windows import windows_for
+from chladni.gap.plant.windows import short_windows
 from chladni.gap.records.diagnosis import Closing
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
@@ -34,7 +34,7 @@ def closing_elsewhere(study: Study, causes: Causes, measurement: Measurement, *,
     if causes.shaken is not None:
         return None
     measurement = with_period(measurement)
-    windows = None if study.windows is None else windows_for(study.model, measurement)
+    windows = None if study.windows is None else short_windows(study.model, measurement)
     run, noise = FreeRun(study.model, measurement, windows=windows), estimate_noise(measurement)
     training = training_of(measurement, windows)
     believed = causes.best if causes.verdict in ("effect", "parameters") else causes.tuned

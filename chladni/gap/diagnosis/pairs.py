@@ -3,6 +3,7 @@
 from collections.abc import Collection, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.search import ALONE, least_left, sound
 from chladni.gap.diagnosis.study import Study
@@ -17,6 +18,7 @@ from chladni.models.core.model import Model
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.errors import ModelError
 
+Matrix = NDArray[np.float64]
 #: Fits of a second effect beside a first, and of each of two at once; places at which a second is looked for.
 _SECOND, _EACH, _PLACES = 4, 2, 4
 #: Linear words that are fitted beside the parameters behind a first effect.
@@ -64,13 +66,18 @@ def second_causes(
         if one.trial.site.name not in taken
     ]
     singles = effect_hypotheses(trials, study.own, count=_SECOND)
-    both = [hypothesis_of((*kept, *one.effects), found.fit.z, screened=one.screened) for one in singles]
+    both = [_beside(found, kept, one, found.fit.z) for one in singles]
     entered = sound(study, study.contest.enter_all(both))
     if least_left(entered) > ALONE:
         linear = linear_hypotheses(model, location, trials, study.own, count=_LINEAR)
-        both = [hypothesis_of((*kept, *one.effects), one.start_z, screened=one.screened) for one in linear]
+        both = [_beside(found, kept, one, one.start_z) for one in linear]
         entered += sound(study, study.contest.enter_all(both))
     return entered
+
+
+def _beside(found: Contestant, kept: tuple[AttachedEffect, ...], one: Hypothesis, z: Matrix) -> Hypothesis:
+    """Another effect beside those of a fit that are kept."""
+    return hypothesis_of((*kept, *one.effects), z, screened=one.screened, initial=found.fit.initial)
 
 
 def paired_causes(study: Study) -> list[Contestant]:
@@ -96,7 +103,12 @@ def without_one(study: Study, both: Contestant) -> list[Contestant]:
     """Enter each effect of several without one of the others, started from their common fit."""
     effects = both.fit.effects
     fewer = [
-        hypothesis_of((*effects[:place], *effects[place + 1 :]), both.fit.z, screened=both.hypothesis.screened)
+        hypothesis_of(
+            (*effects[:place], *effects[place + 1 :]),
+            both.fit.z,
+            screened=both.hypothesis.screened,
+            initial=both.fit.initial,
+        )
         for place in range(len(effects))
         if len(effects) > 1
     ]

@@ -4,13 +4,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from chladni.gap.diagnosis.study import Study
+from chladni.gap.diagnosis.study import Study, recovered_states
 from chladni.gap.explanation.candidates import screened
 from chladni.gap.explanation.contest import weighed
 from chladni.gap.explanation.degenerate import is_degenerate
 from chladni.gap.explanation.hypotheses import effect_hypotheses, polished, siblings, wrong_parameters
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.linear_words import linear_hypotheses
+from chladni.gap.explanation.shooting import Shooting, Shot
 from chladni.gap.location.locate import Located, Location
 from chladni.signals.errors import EstimateError
 
@@ -25,6 +26,9 @@ ALONE = 1.3
 #: An unknown force that leaves less than this explains all; with more than so many sensors that says something. A
 #: place at which it leaves so many times more is another one.
 _ONE_FORCE, _PATTERN_SENSORS, _SAME_PLACE = 1.15, 2, 1.25
+#: Named effects that leave so many times what an unknown force does may have lost the run; over short windows a law
+#: follows the log that leaves at most so many times that; most that go on from there, and hypotheses that are tried.
+_LOST, _FOLLOWING, _GROWN, TRIED = 3.0, 3.0, 3, 6
 
 
 def is_one_force(location: Location) -> bool:
@@ -75,12 +79,45 @@ def single_causes(study: Study, progress: Step) -> list[Contestant]:
     if least_left(found) > ALONE:
         others = _others(effect_hypotheses(candidates, study.own, count=_AGAIN), hypotheses)
         found += sound(study, contest.enter_all(others))
+    if is_lost(location, least_left(found)):
+        found += shot_causes(study, hypotheses)
     ranked = weighed([*found, *sibling_causes(study, weighed(found))])
     if ranked and ranked[0].chi > _DETAILED:
         # A detail of its law that was set by the screen's grid must not cost a word its place.
         forms = _best_forms(ranked)
         ranked = [*(_polished(study, one) for one in forms), *(one for one in ranked if one not in forms)]
     return weighed(ranked)
+
+
+def shot_causes(study: Study, hypotheses: Sequence[Hypothesis]) -> list[Contestant]:
+    """Enter the hypotheses that follow the log over short windows, from there.
+
+    Where an unknown force explains far more than any named one, its run may have gone another way than the log's.
+    """
+    states = recovered_states(study.location)
+    if states is None:
+        return []
+    shooting = Shooting(study.contest, states)
+    entered = [shooting.entered(shot) for shot in following(study, shooting, hypotheses)]
+    return sound(study, [one for one in entered if one is not None])
+
+
+def following(study: Study, shooting: Shooting, hypotheses: Sequence[Hypothesis]) -> list[Shot]:
+    """Shoot the most promising hypotheses; those that explain nearly what an unknown force does, best first."""
+    shots = [shot for shot in map(shooting.shot, hypotheses[:TRIED]) if shot is not None]
+    enough = _FOLLOWING * least_force(study.location)
+    return sorted((one for one in shots if one.misfit < enough), key=lambda one: one.misfit)[:_GROWN]
+
+
+def least_force(location: Location) -> float:
+    """Give what an unknown force at the best place leaves, over the noise's power, at least 1; infinite without."""
+    best = location.best
+    return np.inf if best is None or not best.profile.forces else max(best.profile.chi, 1.0)
+
+
+def is_lost(location: Location, left: float) -> bool:
+    """Whether what the best runs leave, over the noise's power, is far more than an unknown force does."""
+    return left > _LOST * least_force(location)
 
 
 def least_left(found: Sequence[Contestant]) -> float:
@@ -112,7 +149,7 @@ def _best_forms(ranked: Sequence[Contestant]) -> list[Contestant]:
 
 def _polished(study: Study, found: Contestant) -> Contestant:
     """Let the details of the laws move too: creep, presliding, shape; kept when that pays."""
-    finer = polished(found.hypothesis, found.fit.effects, found.fit.z)
+    finer = polished(found.hypothesis, found.fit)
     entered = study.contest.enter(finer) if finer is not None else None
     if entered is None or is_degenerate(study.contest.run, entered):
         return found

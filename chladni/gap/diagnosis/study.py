@@ -1,7 +1,7 @@
 """One log beside one model, made ready: noise, training stretches, free runs, location."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,13 @@ from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.quiet_floor import quiet_floor
 from chladni.gap.explanation.contest import Contest, training_mask
+from chladni.gap.explanation.known_states import KnownStates
 from chladni.gap.explanation.lattice import Lattice, lattice_of
 from chladni.gap.location.locate import Location, locate
+from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.tunable import Tunables
-from chladni.gap.plant.windows import training_in_windows, windows_for
+from chladni.gap.plant.windows import short_windows, training_in_windows, windows_for
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
@@ -100,6 +102,25 @@ def study_of(
         leave_out=leave_out,
         own=own,
     )
+
+
+def over_windows(study: Study) -> Study | None:
+    """Give the study of the same log over windows that begin at recovered states; None where no force tells these."""
+    states = recovered_states(study.location)
+    if states is None:
+        return None
+    windows = short_windows(study.model, study.measurement)
+    run, training = FreeRun(study.model, study.measurement, windows=windows), training_in_windows(windows)
+    return replace(study, windows=windows, contest=Contest(run, study.contest.noise, training, states))
+
+
+def recovered_states(location: Location) -> KnownStates | None:
+    """Give the states under the unknown force at the best place; None without any."""
+    best, problem = location.best, location.problem
+    if best is None or not best.profile.forces:
+        return None
+    motion = recovered(problem, best.profile, best.places[0].sites[0])
+    return KnownStates(names=problem.model.compile().states, values=motion.states(problem))
 
 
 def training_of(measurement: Measurement, windows: Sequence[tuple[int, int]] | None) -> NDArray[np.bool_]:

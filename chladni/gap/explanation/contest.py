@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.gap.explanation.known_states import KnownStates
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.output_error import OutputErrorFit, fit_output_error, with_coloured_spread
@@ -49,20 +50,26 @@ class Contest:
         Of the outputs.
     training
         ``[sample]`` what fits may see.
+    states
+        Those that windows begin their search at; without them each begins at what its linear part alone would.
     """
 
-    def __init__(self, run: FreeRun, noise: NoiseFloor, training: Mask) -> None:
-        self.run, self.noise, self.training = run, noise, training
+    def __init__(self, run: FreeRun, noise: NoiseFloor, training: Mask, states: KnownStates | None = None) -> None:
+        self.run, self.noise, self.training, self.states = run, noise, training, states
 
-    def enter(self, hypothesis: Hypothesis, *, max_iterations: int = 12, tune: bool = True) -> Contestant | None:
-        """Fit a hypothesis; None when its start already diverges."""
+    def enter(
+        self, hypothesis: Hypothesis, *, max_iterations: int = 12, tune: bool = True, initial: Matrix | None = None
+    ) -> Contestant | None:
+        """Fit a hypothesis, from some initial states ``[window, state]``; None when its start already diverges."""
         try:
+            if initial is None:
+                initial = self._initial(hypothesis)
             fit = fit_output_error(
                 self.run, self.noise,
                 effects=hypothesis.effects, fitted=hypothesis.fitted or None, training=self.training,
                 start_z=np.clip(hypothesis.start_z, -3.0, 3.0) if not hypothesis.wide else hypothesis.start_z,
                 z_limit={name: hypothesis.wide.get(name, 3.0) for name in self.run.tunables.names},
-                max_iterations=max_iterations, tune=tune,
+                start_initial=initial, max_iterations=max_iterations, tune=tune,
                 # Over windows each start is free: of a free axis a constant is the same thing again.
                 offsets=len(self.run.windows) == 1,
             )  # fmt: skip
@@ -96,6 +103,17 @@ class Contest:
         except (ModelError, EstimateError, np.linalg.LinAlgError):
             return found
         return replace(found, fit=fit)
+
+    def _initial(self, hypothesis: Hypothesis) -> Matrix | None:
+        """``[window, state]`` to begin a fit at; what effects add begins at rest."""
+        if hypothesis.initial is None and self.states is None:
+            return None
+        names, windows = self.run.compiled(None, hypothesis.effects).states, self.run.windows
+        if hypothesis.initial is None:
+            return None if self.states is None else self.states.at_starts(windows, names)
+        found, own = np.zeros((len(windows), len(names))), len(self.run.compiled().states)
+        found[:, :own] = hypothesis.initial[:, :own]
+        return found
 
     def _starts(self, fit: OutputErrorFit) -> int:
         """States that effects begin windows with, beyond those of the first one: free numbers, all of them."""

@@ -11,6 +11,7 @@ from chladni.gap.explanation.screen import Screened
 from chladni.gap.location.locate import Location, tuned_stepwise
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.tuning.effect_scale import usually_fitted
+from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.core.parameter import Parameter
 from chladni.models.effects.attached_effect import AttachedEffect, attached
 from chladni.models.effects.effect_kind import EffectKind
@@ -30,7 +31,6 @@ _DETAILS: Mapping[str, tuple[str, ...]] = {
     "one_sided_stop": ("dissipation",),
     "varying_stiffness": ("rise",),
     "rate_limit": ("tracking_time",),
-    "ripple": ("phase",),
     "tonal_disturbance": ("phase",),
 }
 #: Speeds over the joint's RMS speed at which a Stribeck curve begins its search: from one it may end as Coulomb's.
@@ -75,10 +75,13 @@ def effect_hypotheses(
     return found
 
 
-def hypothesis_of(effects: tuple[AttachedEffect, ...], z: Matrix, *, screened: float | None = None) -> Hypothesis:
+def hypothesis_of(
+    effects: tuple[AttachedEffect, ...], z: Matrix, *, screened: float | None = None, initial: Matrix | None = None
+) -> Hypothesis:
     """Give the hypothesis that these effects act."""
     fitted = tuple(usually_fitted(effect) for effect in effects)
-    return Hypothesis(effects=effects, fitted=fitted, start_z=np.clip(z, -OUTSIDE, OUTSIDE), screened=screened)
+    start = np.clip(z, -OUTSIDE, OUTSIDE)
+    return Hypothesis(effects=effects, fitted=fitted, start_z=start, screened=screened, initial=initial)
 
 
 def effect_of(one: Screened, own: Mapping[str, EffectKind]) -> AttachedEffect | None:
@@ -106,7 +109,7 @@ def siblings(found: Contestant, run: FreeRun) -> list[Hypothesis]:
         for share in _STRIBECK_SPEEDS:
             richer = _stribeck_beside(plain, share * float(np.sqrt(np.mean(velocity**2))))
             effects = (*fit.effects[:place], richer, *fit.effects[place + 1 :])
-            hypotheses.append(hypothesis_of(effects, fit.z, screened=found.hypothesis.screened))
+            hypotheses.append(hypothesis_of(effects, fit.z, screened=found.hypothesis.screened, initial=fit.initial))
     return hypotheses
 
 
@@ -122,15 +125,17 @@ def _stribeck_beside(plain: AttachedEffect, speed: float) -> AttachedEffect:
     )
 
 
-def polished(coarse: Hypothesis, effects: tuple[AttachedEffect, ...], z: Matrix) -> Hypothesis | None:
+def polished(coarse: Hypothesis, fit: OutputErrorFit) -> Hypothesis | None:
     """Give the hypothesis with the details of the laws free too, starting from a fit; None when there are none."""
+    effects = fit.effects
     fitted = tuple(
         (*usually_fitted(effect), *(name for name in _DETAILS.get(effect.effect, ()) if name in effect.values))
         for effect in effects
     )
     if fitted == coarse.fitted or not effects:
         return None
-    return replace(coarse, effects=effects, fitted=fitted, start_z=np.clip(z, -OUTSIDE, OUTSIDE))
+    start = np.clip(fit.z, -OUTSIDE, OUTSIDE)
+    return replace(coarse, effects=effects, fitted=fitted, start_z=start, initial=fit.initial)
 
 
 def wrong_parameters(location: Location, *, most: int = 2) -> Hypothesis | None:

@@ -29,6 +29,8 @@ class Hypothesis:
         Where the parameters start.
     screened
         Misfit over noise of the screen, None when it wasn't screened.
+    initial
+        ``[window, state]`` where the states of the model without these effects start, None when nothing tells.
     """
 
     effects: tuple[AttachedEffect, ...] = ()
@@ -36,6 +38,7 @@ class Hypothesis:
     wide: Mapping[str, float] = field(default_factory=dict)
     start_z: Matrix
     screened: float | None = None
+    initial: Matrix | None = None
 
     @property
     def named(self) -> tuple[Candidate, ...]:

@@ -1,7 +1,7 @@
 """What an effect that is known already did beyond the linear model, while another one is looked for."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from chladni.gap.location.recovered import Recovered
 from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.linear_view import LinearView
+from chladni.gap.plant.record_lines import all_lines
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.core.port import PortKind
@@ -41,6 +43,9 @@ class KnownEffect(Value):
     def of(cls, run: FreeRun, fit: OutputErrorFit, effects: tuple[AttachedEffect, ...]) -> Self:
         """Give what effects of a fit did; where they aren't all of it, their own states begin at rest.
 
+        Over windows a linear model would begin each at the machine's state, and what laws did before would be lost:
+        there it's the linear response of the whole record to the laws' forces.
+
         Raises
         ------
         ModelError
@@ -52,12 +57,34 @@ class KnownEffect(Value):
             own = len(run.compiled(fit.z, effects).states) - start.shape[1]
             bent_start = np.hstack([start, np.zeros((len(start), own))])
         plain, bent = run.motions(fit.z, (), start), run.motions(fit.z, effects, bent_start)
+        if len(run.windows) > 1 and _only_laws(run, effects):
+            return cls._of_forces(run, fit, {key: one.force - plain[key].force for key, one in bent.items()})
         return cls(
             outputs=run.outputs(fit.z, effects, bent_start) - run.outputs(fit.z, (), start),
             displacement={
                 key: bent[key].displacement - one.displacement for key, one in plain.items() if key in bent
             },
             velocity={key: bent[key].velocity - one.velocity for key, one in plain.items() if key in bent},
+        )
+
+    @classmethod
+    def _of_forces(cls, run: FreeRun, fit: OutputErrorFit, forces: Mapping[tuple[str, PortKind], Matrix]) -> Self:
+        measurement, compiled = run.measurement, run.compiled(fit.z)
+        lines = all_lines(measurement.samples, measurement.sample_rate_hz)
+        view = LinearView(compiled, lines, np.zeros_like(measurement.inputs), tuple(run.rows.tolist()))
+        acting = [
+            (view.way_of_port(place), lines.spectrum(forces[port.name, port.kind]))
+            for place, port in enumerate(compiled.ports)
+            if np.any(forces[port.name, port.kind])
+        ]
+        moved = {
+            (port.name, port.kind): [lines.signal(one)[0] for one in view.motion(place, None, acting)]
+            for place, port in enumerate(compiled.ports)
+        }
+        return cls(
+            outputs=lines.signal(view.response(None, acting))[:, 0],
+            displacement={key: one[0] for key, one in moved.items()},
+            velocity={key: one[1] for key, one in moved.items()},
         )
 
     def without(self, measurement: Measurement) -> Measurement:
@@ -82,3 +109,10 @@ class KnownEffect(Value):
             displacement=motion.displacement + self.displacement[key],
             velocity=motion.velocity + self.velocity[key],
         )
+
+
+def _only_laws(run: FreeRun, effects: tuple[AttachedEffect, ...]) -> bool:
+    """Whether effects add forces at ports and nothing else."""
+    plain, bent = run.compiled(), run.compiled(None, effects)
+    others = [field.name for field in fields(plain) if field.name != "laws"]
+    return all(np.array_equal(getattr(plain, name), getattr(bent, name)) for name in others)

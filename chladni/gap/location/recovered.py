@@ -76,6 +76,14 @@ class Recovered(Value):
         motion = view.motion(port, self.transient, [(whole.way(view, self.site), lines.spectrum(self.force))])
         return np.asarray(lines.signal(motion[0])[0], dtype=np.float64)
 
+    def states(self, problem: LinearProblem) -> Matrix:
+        """``[state, sample]`` of the linear part under the same force, in the order of the compiled model's."""
+        lines = all_lines(problem.measurement.samples, problem.measurement.sample_rate_hz)
+        whole = problem.on(lines)
+        view = whole.view(self.z)
+        found = view.states(self.transient, [(whole.way(view, self.site), lines.spectrum(self.force))])
+        return np.asarray(lines.signal(found)[:, 0], dtype=np.float64)
+
     def spectrum(self, signal: Matrix) -> Spectrum:
         """``[line]`` of a signal ``[sample]``."""
         return np.asarray(self.lines.spectrum(signal)[0], dtype=np.complex128)

@@ -15,6 +15,8 @@ _TIMES = 3.0
 _USUAL_S = 1.0
 #: Shortest window, in samples; most of a record that one may take.
 _SHORTEST, _LARGEST_SHARE = 20, 0.25
+#: Windows that become one when nested ones grow.
+_GROWTH = 3
 
 
 def windows_for(model: Model, measurement: Measurement) -> tuple[tuple[int, int], ...] | None:
@@ -52,9 +54,13 @@ def windows_for(model: Model, measurement: Measurement) -> tuple[tuple[int, int]
     0.91
     """
     poles = np.asarray(np.linalg.eigvals(model.compile().a), dtype=np.complex128)
+    return short_windows(model, measurement) if _lasting(poles, measurement.duration_s).any() else None
+
+
+def short_windows(model: Model, measurement: Measurement) -> tuple[tuple[int, int], ...]:
+    """Give windows as `windows_for` does, for any model."""
+    poles = np.asarray(np.linalg.eigvals(model.compile().a), dtype=np.complex128)
     lasting = _lasting(poles, measurement.duration_s)
-    if not lasting.any():
-        return None
     rate, samples = measurement.sample_rate_hz, measurement.samples
     length = _horizon_s(poles, lasting) * rate
     length = np.clip(length, _SHORTEST, max(_SHORTEST, _LARGEST_SHARE * samples))
@@ -66,6 +72,27 @@ def windows_for(model: Model, measurement: Measurement) -> tuple[tuple[int, int]
 def horizon_s(windows: tuple[tuple[int, int], ...], sample_rate_hz: float) -> float:
     """Mean length of the windows in seconds: how far ahead the model is asked to predict."""
     return float(np.mean([stop - start for start, stop in windows]) / sample_rate_hz)
+
+
+def nested_windows(
+    model: Model, measurement: Measurement, windows: Sequence[tuple[int, int]]
+) -> list[tuple[tuple[int, int], ...]]:
+    """Give parts of windows, as long as the slowest of the model's own times, and what they grow to by threes.
+
+    The last before the windows themselves is the last that's given; there's none when they are as short already.
+
+    """
+    poles = np.asarray(np.linalg.eigvals(model.compile().a), dtype=np.complex128)
+    rate = measurement.sample_rate_hz
+    length = max(_horizon_s(poles, _lasting(poles, measurement.duration_s)) / _TIMES * rate, _SHORTEST)
+    parts = max(max(1, round((stop - start) / length)) for start, stop in windows)
+    finest = [np.round(np.linspace(start, stop, parts + 1)).astype(int).tolist() for start, stop in windows]
+    found = []
+    while parts > 1:
+        found.append(tuple(pair for edges in finest for pair in pairwise(edges)))
+        finest = [[*edges[:-1:_GROWTH], edges[-1]] for edges in finest]
+        parts = len(finest[0]) - 1
+    return found
 
 
 def training_in_windows(windows: Sequence[tuple[int, int]]) -> NDArray[np.bool_]:

@@ -1,0 +1,119 @@
+"""Multiple shooting: a hypothesis fitted over short windows from recovered states, which then grow to the whole run.
+
+A run of a strongly nonlinear machine has several ends for one set of parameters, and between them its misfit has
+minima that no slope leads out of. Over a window no longer than an oscillation there's one, when the window begins at
+the state that the machine had there (Bock, in: Modelling of Chemical Reaction Systems, Springer 1981).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.gap.explanation.contest import Contest
+from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.gap.explanation.known_states import KnownStates
+from chladni.gap.plant.free_run import FreeRun, Windows
+from chladni.gap.plant.windows import nested_windows, training_in_windows
+from chladni.gap.tuning.law_error import with_law_error
+from chladni.gap.tuning.output_error import OutputErrorFit, fit_output_error
+from chladni.gap.tuning.residual import Whitening
+from chladni.signals.errors import EstimateError, ModelError
+
+Matrix = NDArray[np.float64]
+#: A misfit that grows by more than this when windows grow says that the run parted from the log's.
+_PARTED = 10.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Shot:
+    """A hypothesis fitted over windows.
+
+    Attributes
+    ----------
+    hypothesis
+        As it was before.
+    fit
+        Over the windows.
+    misfit
+        Mean square of the whitened residual in the median window, 1 is noise: a few that began at a state from which
+        the search didn't find to the machine's say nothing of the law.
+    level
+        How often the windows have grown.
+    """
+
+    hypothesis: Hypothesis
+    fit: OutputErrorFit
+    misfit: float
+    level: int = 0
+
+
+class Shooting:
+    """Fits over windows that grow, on one log.
+
+    Parameters
+    ----------
+    contest
+        Whose windows, or whole run, are grown to.
+    states
+        That the machine went through.
+    """
+
+    def __init__(self, contest: Contest, states: KnownStates) -> None:
+        self.contest, self.states = contest, states
+        run = contest.run
+        self.levels = nested_windows(run.model, run.measurement, run.windows)
+        floor = with_law_error(contest.noise, np.std(run.measurement.outputs, axis=1))
+        self._whitening = Whitening(floor, contest.training, offsets=False)
+
+    def shot(self, hypothesis: Hypothesis) -> Shot | None:
+        """Fit over the shortest windows; None when that fails, or when there are no shorter ones."""
+        if not self.levels:
+            return None
+        names = self.contest.run.compiled(None, hypothesis.effects).states
+        return self._shot(hypothesis, hypothesis, 0, self.states.at_starts(self.levels[0], names))
+
+    def grown(self, shot: Shot) -> Shot:
+        """Let the windows grow as long as the run follows the log."""
+        while shot.level + 1 < len(self.levels):
+            level = shot.level + 1
+            starts = _firsts(shot.fit, self.levels[shot.level], self.levels[level])
+            longer = self._shot(shot.hypothesis, reached(shot), level, starts)
+            if longer is None or longer.misfit > _PARTED * max(shot.misfit, 1.0):
+                break
+            shot = longer
+        return shot
+
+    def entered(self, shot: Shot) -> Contestant | None:
+        """Enter the contest from where the windows led."""
+        found = self.grown(shot)
+        run = self.contest.run
+        return self.contest.enter(reached(found), initial=_firsts(found.fit, self.levels[found.level], run.windows))
+
+    def _shot(self, hypothesis: Hypothesis, now: Hypothesis, level: int, starts: Matrix) -> Shot | None:
+        """Fit `now`, which is the hypothesis with the values reached so far."""
+        run, windows = self.contest.run, self.levels[level]
+        try:
+            fit = fit_output_error(
+                FreeRun(run.model, run.measurement, tolerance=run.tolerance, windows=windows), self.contest.noise,
+                effects=now.effects, fitted=now.fitted or None, training=training_in_windows(windows),
+                start_z=np.clip(now.start_z, -3.0, 3.0), start_initial=starts, offsets=False,
+            )  # fmt: skip
+        except (ModelError, EstimateError, np.linalg.LinAlgError):
+            return None
+        return Shot(hypothesis=hypothesis, fit=fit, misfit=self._misfit(fit, windows), level=level)
+
+    def _misfit(self, fit: OutputErrorFit, windows: Windows) -> float:
+        power = np.mean(self._whitening.whitened(self.contest.run.measurement.outputs - fit.outputs) ** 2, axis=0)
+        return float(np.median([np.mean(power[slice(*window)]) for window in windows]))
+
+
+def reached(shot: Shot) -> Hypothesis:
+    """Give the hypothesis with the values that a shot led to."""
+    return replace(shot.hypothesis, effects=shot.fit.effects, start_z=shot.fit.z)
+
+
+def _firsts(fit: OutputErrorFit, windows: Windows, longer: Windows) -> Matrix:
+    """``[window, state]`` at the starts of longer windows, which some of the shorter ones begin with too."""
+    starts = [start for start, _ in windows]
+    return fit.initial[[starts.index(start) for start, _ in longer]]
