@@ -94,6 +94,24 @@ def test_a_cube_whose_middle_lies_beside_rest_is_told_with_its_square():
     assert best.values["quadratic"] == pytest.approx(values["quadratic"], rel=0.15)
 
 
+def test_teeth_are_told_with_their_second_harmonic():
+    seen = (StructureOutput(name="d", measures="displacement", at="b0"),)
+    model = replace(chain([1.0], [4e4], [20.0]), outputs=seen)
+    values = {"amplitude": 6.0, "period": 1.3e-3, "phase": 0.8, "second_sine": -0.25, "second_cosine": 0.2}
+    machine = model.with_effects([attached("ripple", "j0", values, variant="harmonics")])
+    log, floor = measured(machine, band_noise(3000, rms=60.0), noise=1e-3)
+    location = locate(model, log, floor, Tunables.of(model))
+    (best, *others) = screened(location, location.ranked, frozenset(), {})
+    assert (best.trial.effect, best.trial.variant) == ("ripple", "harmonics")
+    # But for the phase: where the middle of the way lies no spectrum without its mean tells.
+    assert best.values["amplitude"] == pytest.approx(values["amplitude"], rel=0.1)
+    assert best.values["period"] == pytest.approx(values["period"], rel=0.05)
+    assert best.values["second_sine"] == pytest.approx(values["second_sine"], abs=0.1)
+    assert best.values["second_cosine"] == pytest.approx(values["second_cosine"], abs=0.1)
+    sine = next(one for one in others if (one.trial.effect, one.trial.variant) == ("ripple", "sine"))
+    assert sine.misfit > 3 * best.misfit
+
+
 def test_bristles_that_bend_within_a_sample_are_found():
     model = chain([1.0], [4e4], [20.0])
     dahl = attached("coulomb_friction", "j0", {"force": 20.0, "presliding": 2e-6}, variant="bristle")

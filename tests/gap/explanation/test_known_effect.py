@@ -9,8 +9,10 @@ from chladni.gap.explanation.hypotheses import hypothesis_of
 from chladni.gap.explanation.known_effect import KnownEffect
 from chladni.gap.location.locate import locate
 from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.windows import training_in_windows
 from chladni.models.effects.attached_effect import attached
-from tests.gap.made_log import band_noise, measured, three_bodies
+from chladni.models.integrator.integrator import Integrator
+from tests.gap.made_log import RATE_HZ, band_noise, measured, three_bodies
 
 SAMPLES = 6000
 STOP = attached("hardening_stiffness", "j1", {"cubic": 4e12})
@@ -42,6 +44,24 @@ def test_ports_move_as_with_the_effect(made) -> None:
     plain = contest.run.motion(fit.z, (), start, site="j1").displacement
     bent = contest.run.motion(fit.z, fit.effects, fit.initial, site="j1").displacement
     np.testing.assert_allclose(plain + known.displacement["j1", "joint"], bent, atol=1e-12)
+
+
+def test_over_windows_it_is_what_the_linear_model_answers_to_the_law_s_force(made) -> None:
+    log, floor, contest, first = made
+    windows = tuple((start, start + 500) for start in range(0, SAMPLES, 500))
+    run = FreeRun(three_bodies(), log, windows=windows)
+    states = Integrator(run.compiled(None, (STOP,)), RATE_HZ, tolerance=1e-9).run(log.inputs).states
+    there = Contest(run, floor, training_in_windows(windows))
+    start = np.ascontiguousarray(states[:, ::500].T)
+    fit = there.enter(hypothesis_of((STOP,), first.fit.z), tune=False, initial=start).fit
+    whole, parts = (KnownEffect.of(one, at, (STOP,)) for one, at in ((contest.run, first.fit), (run, fit)))
+    # Transients of the record's ends apart, which a linear model answers to anything with.
+    middle = slice(1000, 5000)
+    apart = np.std((whole.outputs - parts.outputs)[:, middle], axis=1) / np.std(whole.outputs, axis=1)
+    assert np.all(apart < 0.1)
+    key = ("j1", "joint")
+    way = whole.displacement[key]
+    assert np.std((way - parts.displacement[key])[middle]) < 0.1 * np.std(way)
 
 
 def test_a_sensor_s_mount_is_found_behind_a_spring(made) -> None:

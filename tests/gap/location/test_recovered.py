@@ -12,6 +12,7 @@ from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import all_lines
 from chladni.models.effects.attached_effect import attached
+from chladni.models.integrator.integrator import Integrator
 from tests.gap.made_log import RATE_HZ, band_noise, measured, three_bodies
 
 SAMPLES = 6000
@@ -40,6 +41,19 @@ def test_motion_is_not_made_of_noise_where_accelerometers_hardly_see_a_force(dri
     found = recovered(problem, profile, JOINT).displacement
     truth = true_motion(problem, (SPRING,))
     assert np.std(found - truth) < 0.2 * np.std(truth)
+
+
+def test_states_are_those_that_the_machine_went_through() -> None:
+    machine = three_bodies().with_effects((SPRING,))
+    problem, profile = located(machine)
+    found = recovered(problem, profile, JOINT).states(problem)
+    compiled = machine.compile()
+    truth = Integrator(compiled, RATE_HZ, tolerance=1e-9).run(problem.measurement.inputs).states
+    assert compiled.states == three_bodies().compile().states
+    apart = np.std(found - truth, axis=1) / np.std(truth, axis=1)
+    assert np.all(apart < 0.2)
+    # Accelerometers hardly see how a slow force displaces; speeds they do.
+    assert np.all(apart[3:] < 0.05)
 
 
 def test_another_force_is_neither_taken_for_this_one_nor_left_out_of_the_motion() -> None:

@@ -5,7 +5,15 @@ import numpy as np
 import pytest
 
 from chladni.gap.plant.free_run import FreeRun
-from chladni.gap.plant.windows import _horizon_s, _lasting, horizon_s, training_in_windows, windows_for
+from chladni.gap.plant.windows import (
+    _horizon_s,
+    _lasting,
+    horizon_s,
+    nested_windows,
+    short_windows,
+    training_in_windows,
+    windows_for,
+)
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.tuning.output_error import fit_output_error
 from chladni.models.effects.attached_effect import attached
@@ -28,6 +36,28 @@ def log_of(model, samples=10_000, rate_hz=1000.0):
 
 def test_a_damped_structure_needs_none():
     assert windows_for(three_bodies(), log_of(three_bodies())) is None
+
+
+def test_short_ones_last_three_of_its_slowest_periods_all_the_same():
+    model = chain([1.0], [(2 * np.pi * 10.0) ** 2], [0.1])
+    assert horizon_s(short_windows(model, log_of(model)), 1000.0) == pytest.approx(0.3, rel=0.05)
+
+
+def test_nested_ones_grow_by_threes_from_one_period_and_begin_where_shorter_ones_do():
+    model = chain([1.0], [(2 * np.pi * 10.0) ** 2], [0.1])
+    log = log_of(model)
+    levels = nested_windows(model, log, ((0, 5000), (5000, 10_000)))
+    assert [len(level) for level in levels] == [100, 34, 12, 4]
+    for shorter, longer in pairwise([*levels, ((0, 5000), (5000, 10_000))]):
+        assert {start for start, _ in longer} <= {start for start, _ in shorter}
+    for level in levels:
+        assert (level[0][0], level[-1][1]) == (0, 10_000)
+        assert all(one[1] == other[0] for one, other in pairwise(level))
+
+
+def test_windows_as_short_as_a_period_have_none_within():
+    model = chain([1.0], [(2 * np.pi * 10.0) ** 2], [0.1])
+    assert nested_windows(model, log_of(model), ((0, 100), (100, 200))) == []
 
 
 def test_a_lightly_damped_mode_is_still_a_mode():
