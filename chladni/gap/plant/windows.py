@@ -126,5 +126,5 @@ def _horizon_s(poles: NDArray[np.complex128], lasting: NDArray[np.bool_]) -> flo
     # Of what oscillates a few cycles show all there is, however long it rings.
     times = np.where(np.abs(own.imag) > 0, np.minimum(times, 2 * np.pi / np.maximum(np.abs(own.imag), 1e-300)), times)
     horizon = _TIMES * float(times.max()) if own.size else _USUAL_S
-    growth = float(poles.real.max())
+    growth = float(poles.real.max(initial=-np.inf))
     return min(horizon, _TIMES / growth) if growth > 0 and lasting.any() else horizon
