@@ -55,6 +55,8 @@ class Causes:
         Outputs whose residual, when nothing is named, follows their own signal in a curve.
     instead
         What explains the gap better without being a word; nothing is named then.
+    followed
+        Whether all runs of single causes were lost, and one of them follows the log over short windows.
     """
 
     verdict: Verdict
@@ -65,14 +67,16 @@ class Causes:
     shaken: ShakenGround | None
     noise: NoiseFloor
     distorted: tuple[str, ...]
-    instead: Instead | None = None
+    instead: Instead | None
+    followed: bool
 
 
 def causes_of(study: Study, progress: Step) -> Causes:
     """Enter hypotheses and judge."""
     nothing = without_cause(study)
     progress(0.1)
-    entered, instead = _searched(study, nothing, progress)
+    singles = single_causes(study, progress)
+    entered, instead = _searched(study, nothing, singles.ranked)
     progress(1.0)
     together = weighed([nothing, *entered])
     tuned = next(one for one in together if one.fit is nothing.fit)
@@ -104,13 +108,16 @@ def causes_of(study: Study, progress: Step) -> Causes:
         noise=noise,
         distorted=distorted,
         instead=instead,
+        followed=singles.followed,
     )
 
 
-def _searched(study: Study, nothing: Contestant, progress: Step) -> tuple[list[Contestant], Instead | None]:
+def _searched(
+    study: Study, nothing: Contestant, singles: Sequence[Contestant]
+) -> tuple[list[Contestant], Instead | None]:
     """Every contestant with a cause: single ones, and two where one leaves something that nothing else explains."""
     added = added_nats(study.location)
-    found = single_causes(study, progress)
+    found = list(singles)
 
     def best() -> Contestant:
         return _best(weighed([nothing, *found]), nothing, added)

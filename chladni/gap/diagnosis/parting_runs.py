@@ -3,38 +3,32 @@
 from collections.abc import Callable
 
 from chladni.gap.diagnosis.causes import Causes, causes_of
-from chladni.gap.diagnosis.search import TRIED, following, is_lost, plausible_places
+from chladni.gap.diagnosis.search import is_lost
 from chladni.gap.diagnosis.study import Study, over_windows
-from chladni.gap.explanation.candidates import screened
-from chladni.gap.explanation.hypotheses import effect_hypotheses
-from chladni.gap.explanation.shooting import Shooting
 
 Step = Callable[[float], None]
+#: Share of the progress that a contest takes which another one over windows may follow.
+_FIRST = 0.7
 
 
 def causes_found(study: Study, progress: Step) -> tuple[Study, Causes]:
     """Judge a study; where no named effect's run follows the log, over windows, when one is named there.
 
     A machine that may come to rest at several places, or take several ways on, goes one that a model of almost the
-    same numbers doesn't. An unknown force goes with it: where that explains far more than any run does, the states
-    that it led through are where windows begin.
+    same numbers doesn't. An unknown force goes with it: where that explains far more than any run does, and a law
+    follows as far over short windows, the states that it led through are where longer windows begin.
     """
-    causes = causes_of(study, progress)
+    causes = causes_of(study, lambda done: progress(_FIRST * done))
+    windowed = over_windows(study) if _parted(study, causes) else None
+    if windowed is not None:
+        again = causes_of(windowed, lambda done: progress(_FIRST + (1.0 - _FIRST) * done))
+        if again.verdict == "effect" and again.shaken is None:
+            study, causes = windowed, again
+    progress(1.0)
+    return study, causes
+
+
+def _parted(study: Study, causes: Causes) -> bool:
+    """Whether nothing is named since runs part from the log's; where something else explains it, they don't."""
     unexplained = causes.verdict == "unknown" and causes.instead is None
-    if not unexplained or study.windows is not None or not is_lost(study.location, causes.best.chi):
-        return study, causes
-    windowed = over_windows(study)
-    if windowed is None or not _is_followed(windowed):
-        return study, causes
-    again = causes_of(windowed, progress)
-    return (windowed, again) if again.verdict == "effect" and again.shaken is None else (study, causes)
-
-
-def _is_followed(study: Study) -> bool:
-    """Whether a law of the catalogue follows the log over short windows as far as an unknown force does."""
-    states = study.contest.states
-    if states is None:
-        return False
-    candidates = screened(study.location, plausible_places(study.location), study.leave_out, study.own)
-    hypotheses = effect_hypotheses(candidates, study.own, count=TRIED)
-    return bool(following(study, Shooting(study.contest, states), hypotheses))
+    return unexplained and study.windows is None and causes.followed and is_lost(study.location, causes.best.chi)

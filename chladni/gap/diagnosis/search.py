@@ -1,6 +1,7 @@
 """The search for one cause: every plausible effect entered, more while all leave something."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,7 +29,23 @@ ALONE = 1.3
 _ONE_FORCE, _PATTERN_SENSORS, _SAME_PLACE = 1.15, 2, 1.25
 #: Named effects that leave so many times what an unknown force does may have lost the run; over short windows a law
 #: follows the log that leaves at most so many times that; most that go on from there, and hypotheses that are tried.
-_LOST, _FOLLOWING, _GROWN, TRIED = 3.0, 3.0, 3, 6
+_LOST, _FOLLOWING, _GROWN, _TRIED = 3.0, 3.0, 3, 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Singles:
+    """Single causes that were entered.
+
+    Attributes
+    ----------
+    ranked
+        By falling evidence.
+    followed
+        Whether all runs were lost, and a law follows the log over short windows nearly as far as an unknown force.
+    """
+
+    ranked: list[Contestant]
+    followed: bool
 
 
 def is_one_force(location: Location) -> bool:
@@ -63,8 +80,8 @@ def without_cause(study: Study) -> Contestant:
     return found
 
 
-def single_causes(study: Study, progress: Step) -> list[Contestant]:
-    """Enter every effect that the screen holds plausible, and parameters beyond their tolerance; by evidence."""
+def single_causes(study: Study, progress: Step) -> Singles:
+    """Enter every effect that the screen holds plausible, and parameters beyond their tolerance."""
     location, contest = study.location, study.contest
     places = plausible_places(location)
     candidates = screened(location, places, study.leave_out, study.own)
@@ -79,37 +96,38 @@ def single_causes(study: Study, progress: Step) -> list[Contestant]:
     if least_left(found) > ALONE:
         others = _others(effect_hypotheses(candidates, study.own, count=_AGAIN), hypotheses)
         found += sound(study, contest.enter_all(others))
-    if is_lost(location, least_left(found)):
-        found += shot_causes(study, hypotheses)
+    shots = _followed(study, hypotheses) if is_lost(location, least_left(found)) else None
+    found += shots or []
     ranked = weighed([*found, *sibling_causes(study, weighed(found))])
     if ranked and ranked[0].chi > _DETAILED:
         # A detail of its law that was set by the screen's grid must not cost a word its place.
         forms = _best_forms(ranked)
         ranked = [*(_polished(study, one) for one in forms), *(one for one in ranked if one not in forms)]
-    return weighed(ranked)
+    return Singles(ranked=weighed(ranked), followed=shots is not None)
 
 
-def shot_causes(study: Study, hypotheses: Sequence[Hypothesis]) -> list[Contestant]:
-    """Enter the hypotheses that follow the log over short windows, from there.
+def _followed(study: Study, hypotheses: Sequence[Hypothesis]) -> list[Contestant] | None:
+    """Enter the hypotheses that follow the log over short windows, from there; None when none does.
 
     Where an unknown force explains far more than any named one, its run may have gone another way than the log's.
     """
     states = recovered_states(study.location)
     if states is None:
-        return []
+        return None
     shooting = Shooting(study.contest, states)
-    entered = [shooting.entered(shot) for shot in following(study, shooting, hypotheses)]
-    return sound(study, [one for one in entered if one is not None])
+    following = _following(study, shooting, hypotheses)
+    entered = [shooting.entered(shot) for shot in following]
+    return sound(study, [one for one in entered if one is not None]) if following else None
 
 
-def following(study: Study, shooting: Shooting, hypotheses: Sequence[Hypothesis]) -> list[Shot]:
+def _following(study: Study, shooting: Shooting, hypotheses: Sequence[Hypothesis]) -> list[Shot]:
     """Shoot the most promising hypotheses; those that explain nearly what an unknown force does, best first."""
-    shots = [shot for shot in map(shooting.shot, hypotheses[:TRIED]) if shot is not None]
-    enough = _FOLLOWING * least_force(study.location)
+    shots = [shot for shot in map(shooting.shot, hypotheses[:_TRIED]) if shot is not None]
+    enough = _FOLLOWING * _least_force(study.location)
     return sorted((one for one in shots if one.misfit < enough), key=lambda one: one.misfit)[:_GROWN]
 
 
-def least_force(location: Location) -> float:
+def _least_force(location: Location) -> float:
     """Give what an unknown force at the best place leaves, over the noise's power, at least 1; infinite without."""
     best = location.best
     return np.inf if best is None or not best.profile.forces else max(best.profile.chi, 1.0)
@@ -117,7 +135,7 @@ def least_force(location: Location) -> float:
 
 def is_lost(location: Location, left: float) -> bool:
     """Whether what the best runs leave, over the noise's power, is far more than an unknown force does."""
-    return left > _LOST * least_force(location)
+    return left > _LOST * _least_force(location)
 
 
 def least_left(found: Sequence[Contestant]) -> float:

@@ -106,14 +106,13 @@ class Contest:
 
     def _initial(self, hypothesis: Hypothesis) -> Matrix | None:
         """``[window, state]`` to begin a fit at; what effects add begins at rest."""
-        if hypothesis.initial is None and self.states is None:
+        if hypothesis.initial is not None:
+            own = hypothesis.initial[:, : len(self.run.compiled().states)]
+            added = len(self.run.compiled(None, hypothesis.effects).states) - own.shape[1]
+            return np.pad(own, ((0, 0), (0, added)))
+        if self.states is None:
             return None
-        names, windows = self.run.compiled(None, hypothesis.effects).states, self.run.windows
-        if hypothesis.initial is None:
-            return None if self.states is None else self.states.at_starts(windows, names)
-        found, own = np.zeros((len(windows), len(names))), len(self.run.compiled().states)
-        found[:, :own] = hypothesis.initial[:, :own]
-        return found
+        return self.states.at_starts(self.run.windows, self.run.compiled(None, hypothesis.effects).states)
 
     def _starts(self, fit: OutputErrorFit) -> int:
         """States that effects begin windows with, beyond those of the first one: free numbers, all of them."""

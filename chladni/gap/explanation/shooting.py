@@ -32,7 +32,7 @@ class Shot:
     Attributes
     ----------
     hypothesis
-        As it was before.
+        With the values that the windows led to.
     fit
         Over the windows.
     misfit
@@ -71,14 +71,14 @@ class Shooting:
         if not self.levels:
             return None
         names = self.contest.run.compiled(None, hypothesis.effects).states
-        return self._shot(hypothesis, hypothesis, 0, self.states.at_starts(self.levels[0], names))
+        return self._shot(hypothesis, 0, self.states.at_starts(self.levels[0], names))
 
     def grown(self, shot: Shot) -> Shot:
         """Let the windows grow as long as the run follows the log."""
         while shot.level + 1 < len(self.levels):
             level = shot.level + 1
             starts = _firsts(shot.fit, self.levels[shot.level], self.levels[level])
-            longer = self._shot(shot.hypothesis, reached(shot), level, starts)
+            longer = self._shot(shot.hypothesis, level, starts)
             if longer is None or longer.misfit > _PARTED * max(shot.misfit, 1.0):
                 break
             shot = longer
@@ -88,29 +88,24 @@ class Shooting:
         """Enter the contest from where the windows led."""
         found = self.grown(shot)
         run = self.contest.run
-        return self.contest.enter(reached(found), initial=_firsts(found.fit, self.levels[found.level], run.windows))
+        return self.contest.enter(found.hypothesis, initial=_firsts(found.fit, self.levels[found.level], run.windows))
 
-    def _shot(self, hypothesis: Hypothesis, now: Hypothesis, level: int, starts: Matrix) -> Shot | None:
-        """Fit `now`, which is the hypothesis with the values reached so far."""
+    def _shot(self, hypothesis: Hypothesis, level: int, starts: Matrix) -> Shot | None:
         run, windows = self.contest.run, self.levels[level]
         try:
             fit = fit_output_error(
                 FreeRun(run.model, run.measurement, tolerance=run.tolerance, windows=windows), self.contest.noise,
-                effects=now.effects, fitted=now.fitted or None, training=training_in_windows(windows),
-                start_z=np.clip(now.start_z, -3.0, 3.0), start_initial=starts, offsets=False,
+                effects=hypothesis.effects, fitted=hypothesis.fitted or None, training=training_in_windows(windows),
+                start_z=hypothesis.start_z, start_initial=starts, offsets=False,
             )  # fmt: skip
         except (ModelError, EstimateError, np.linalg.LinAlgError):
             return None
-        return Shot(hypothesis=hypothesis, fit=fit, misfit=self._misfit(fit, windows), level=level)
+        reached = replace(hypothesis, effects=fit.effects, start_z=fit.z)
+        return Shot(hypothesis=reached, fit=fit, misfit=self._misfit(fit, windows), level=level)
 
     def _misfit(self, fit: OutputErrorFit, windows: Windows) -> float:
         power = np.mean(self._whitening.whitened(self.contest.run.measurement.outputs - fit.outputs) ** 2, axis=0)
         return float(np.median([np.mean(power[slice(*window)]) for window in windows]))
-
-
-def reached(shot: Shot) -> Hypothesis:
-    """Give the hypothesis with the values that a shot led to."""
-    return replace(shot.hypothesis, effects=shot.fit.effects, start_z=shot.fit.z)
 
 
 def _firsts(fit: OutputErrorFit, windows: Windows, longer: Windows) -> Matrix:

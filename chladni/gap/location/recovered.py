@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from chladni.gap.location.profile import Profile, Projection
 from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.linear_view import LinearView, Way
 from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import RecordLines, all_lines
 from chladni.signals.value import Value
@@ -70,19 +71,21 @@ class Recovered(Value):
 
     def position_at(self, problem: LinearProblem, port: int) -> Matrix:
         """``[sample]`` displacement at another port, under the same force."""
-        lines = all_lines(problem.measurement.samples, problem.measurement.sample_rate_hz)
-        whole = problem.on(lines)
-        view = whole.view(self.z)
-        motion = view.motion(port, self.transient, [(whole.way(view, self.site), lines.spectrum(self.force))])
-        return np.asarray(lines.signal(motion[0])[0], dtype=np.float64)
+        view, acting = self._acting(problem)
+        motion = view.motion(port, self.transient, [acting])
+        return np.asarray(view.lines.signal(motion[0])[0], dtype=np.float64)
 
     def states(self, problem: LinearProblem) -> Matrix:
         """``[state, sample]`` of the linear part under the same force, in the order of the compiled model's."""
-        lines = all_lines(problem.measurement.samples, problem.measurement.sample_rate_hz)
-        whole = problem.on(lines)
+        view, acting = self._acting(problem)
+        found = view.states(self.transient, [acting])
+        return np.asarray(view.lines.signal(found)[:, 0], dtype=np.float64)
+
+    def _acting(self, problem: LinearProblem) -> tuple[LinearView, tuple[Way, Spectrum]]:
+        """Give the model on all lines, and the force on it with the way that it takes in."""
+        whole = problem.on(all_lines(problem.measurement.samples, problem.measurement.sample_rate_hz))
         view = whole.view(self.z)
-        found = view.states(self.transient, [(whole.way(view, self.site), lines.spectrum(self.force))])
-        return np.asarray(lines.signal(found)[:, 0], dtype=np.float64)
+        return view, (whole.way(view, self.site), whole.lines.spectrum(self.force))
 
     def spectrum(self, signal: Matrix) -> Spectrum:
         """``[line]`` of a signal ``[sample]``."""

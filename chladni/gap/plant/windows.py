@@ -53,17 +53,13 @@ def windows_for(model: Model, measurement: Measurement) -> tuple[tuple[int, int]
     >>> round(horizon_s(windows, log.sample_rate_hz), 2)
     0.91
     """
-    poles = np.asarray(np.linalg.eigvals(model.compile().a), dtype=np.complex128)
-    return short_windows(model, measurement) if _lasting(poles, measurement.duration_s).any() else None
+    return short_windows(model, measurement) if _lasting(_poles(model), measurement.duration_s).any() else None
 
 
 def short_windows(model: Model, measurement: Measurement) -> tuple[tuple[int, int], ...]:
     """Give windows as `windows_for` does, for any model."""
-    poles = np.asarray(np.linalg.eigvals(model.compile().a), dtype=np.complex128)
-    lasting = _lasting(poles, measurement.duration_s)
     rate, samples = measurement.sample_rate_hz, measurement.samples
-    length = _horizon_s(poles, lasting) * rate
-    length = np.clip(length, _SHORTEST, max(_SHORTEST, _LARGEST_SHARE * samples))
+    length = np.clip(_longest_s(model, measurement) * rate, _SHORTEST, max(_SHORTEST, _LARGEST_SHARE * samples))
     count = max(1, round(samples / float(length)))
     edges = np.round(np.linspace(0, samples, count + 1)).astype(int).tolist()
     return tuple(pairwise(edges))
@@ -80,11 +76,8 @@ def nested_windows(
     """Give parts of windows, as long as the slowest of the model's own times, and what they grow to by threes.
 
     The last before the windows themselves is the last that's given; there's none when they are as short already.
-
     """
-    poles = np.asarray(np.linalg.eigvals(model.compile().a), dtype=np.complex128)
-    rate = measurement.sample_rate_hz
-    length = max(_horizon_s(poles, _lasting(poles, measurement.duration_s)) / _TIMES * rate, _SHORTEST)
+    length = max(_longest_s(model, measurement) / _TIMES * measurement.sample_rate_hz, _SHORTEST)
     parts = max(max(1, round((stop - start) / length)) for start, stop in windows)
     finest = [np.round(np.linspace(start, stop, parts + 1)).astype(int).tolist() for start, stop in windows]
     found = []
@@ -113,11 +106,21 @@ def training_in_windows(windows: Sequence[tuple[int, int]]) -> NDArray[np.bool_]
     return training
 
 
+def _poles(model: Model) -> NDArray[np.complex128]:
+    return np.asarray(np.linalg.eigvals(model.compile().a), dtype=np.complex128)
+
+
 def _lasting(poles: NDArray[np.complex128], duration_s: float) -> NDArray[np.bool_]:
     """Poles that stay still within the record, or grow; a mode that rings as long is damped all the same."""
     slow = np.abs(poles) * duration_s < 1.0
     grows = poles.real > 1e-9 * np.maximum(np.abs(poles), 1.0 / duration_s)
     return np.asarray(slow | grows)
+
+
+def _longest_s(model: Model, measurement: Measurement) -> float:
+    """Seconds of a window that shows all that the model does of itself."""
+    poles = _poles(model)
+    return _horizon_s(poles, _lasting(poles, measurement.duration_s))
 
 
 def _horizon_s(poles: NDArray[np.complex128], lasting: NDArray[np.bool_]) -> float:

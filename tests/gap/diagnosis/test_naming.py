@@ -33,6 +33,8 @@ def test_the_cause_that_alone_leaves_least_comes_first(lag: float, mount: float,
         shaken=None,
         noise=None,
         distorted=(),
+        instead=None,
+        followed=False,
     )
     named = causes_named(SimpleNamespace(lattices={}), causes)
     assert named[0].effect == first

@@ -35,7 +35,7 @@ def test_details_of_one_law_mustn_t_name_a_second(effects: tuple[AttachedEffect,
 @pytest.mark.slow
 def test_the_second_is_found_behind_the_first() -> None:
     study = study_of(arm(), measured((SPRING, LATE), seconds=6.0, seed=4), leave_out=frozenset(), own={})
-    first = single_causes(study, lambda _: None)[0]
+    first = single_causes(study, lambda _: None).ranked[0]
     found = weighed(second_causes(study, first))[0]
     assert {one.effect for one in found.hypothesis.effects} == {"hardening_stiffness", "time_offset"}
     assert np.all(found.held < 1.3)
