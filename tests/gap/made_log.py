@@ -40,6 +40,19 @@ def three_bodies():
     return chain([2.0, 2.5, 3.0], [5e5, 6e5, 4e5], [40.0, 60.0, 50.0], at=2)
 
 
+def damper():
+    """On a rig that prescribes its stroke, its force seen: nothing in it moves by itself."""
+    return StructureModel(
+        name="damper",
+        structure=Structure(
+            bodies=(Body(name="rod", mass=1.0),),
+            joints=(Joint(name="seal", between=("ground", "rod"), stiffness=1000.0, damping=3200.0),),
+        ),
+        inputs=(StructureInput(name="stroke", at="rod", kind="displacement"),),
+        outputs=(StructureOutput(name="force", measures="force", at="seal"),),
+    )
+
+
 def band_noise(samples: int, seed: int = 0, rms: float = 100.0):
     rng = np.random.default_rng(seed)
     return rms * sosfilt(butter(4, 150.0, fs=RATE_HZ, output="sos"), rng.standard_normal((1, samples)))

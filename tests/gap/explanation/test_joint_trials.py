@@ -12,26 +12,11 @@ from chladni.gap.location.locate import locate
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
 from chladni.models.effects.attached_effect import attached
-from chladni.models.structures.structure import Body, Joint, Structure
-from chladni.models.structures.structure_input import StructureInput
-from chladni.models.structures.structure_model import StructureModel
 from chladni.models.structures.structure_output import StructureOutput
-from tests.gap.made_log import band_noise, chain, measured, white_floor
+from tests.gap.made_log import band_noise, chain, damper, measured, white_floor
 
 RATE_HZ, SAMPLES = 200.0, 1600
 STIFFNESS, DAMPING = 900.0, 3000.0
-
-
-def damper():
-    return StructureModel(
-        name="damper",
-        structure=Structure(
-            bodies=(Body(name="rod", mass=1.0),),
-            joints=(Joint(name="seal", between=("ground", "rod"), stiffness=1000.0, damping=3200.0),),
-        ),
-        inputs=(StructureInput(name="stroke", at="rod", kind="displacement"),),
-        outputs=(StructureOutput(name="force", measures="force", at="seal"),),
-    )
 
 
 def spencer(time_s, alpha, delta, c0, c1):

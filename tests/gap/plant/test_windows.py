@@ -19,11 +19,8 @@ from chladni.gap.tuning.output_error import fit_output_error
 from chladni.models.effects.attached_effect import attached
 from chladni.models.files.model_file import load_model
 from chladni.models.integrator.integrator import Integrator
-from chladni.models.structures.structure import Body, Joint, Structure
-from chladni.models.structures.structure_input import StructureInput
-from chladni.models.structures.structure_model import StructureModel
 from chladni.models.structures.structure_output import StructureOutput
-from tests.gap.made_log import chain, three_bodies, white_floor
+from tests.gap.made_log import chain, damper, three_bodies, white_floor
 
 
 def log_of(model, samples=10_000, rate_hz=1000.0):
@@ -35,18 +32,6 @@ def log_of(model, samples=10_000, rate_hz=1000.0):
         output_names=tuple(one.name for one in compiled.outputs),
         output_units=tuple(one.unit for one in compiled.outputs),
     )  # fmt: skip
-
-
-def prescribed():
-    return StructureModel(
-        name="damper",
-        structure=Structure(
-            bodies=(Body(name="rod", mass=1.0),),
-            joints=(Joint(name="seal", between=("ground", "rod"), stiffness=1000.0, damping=3200.0),),
-        ),
-        inputs=(StructureInput(name="stroke", at="rod", kind="displacement"),),
-        outputs=(StructureOutput(name="force", measures="force", at="seal"),),
-    )
 
 
 def test_a_damped_structure_needs_none():
@@ -71,8 +56,7 @@ def test_nested_ones_grow_by_threes_from_one_period_and_begin_where_shorter_ones
 
 
 def test_a_model_without_states_has_a_second_s_time():
-    # A damper whose stroke is prescribed: nothing in it moves by itself.
-    model = prescribed()
+    model = damper()
     assert horizon_s(short_windows(model, log_of(model)), 1000.0) == pytest.approx(1.0)
     assert nested_windows(model, log_of(model), ((0, 10_000),))
 
