@@ -32,6 +32,15 @@ def spencer(time_s, alpha, delta, c0, c1):
     return c1 * np.array([rates(t, state)[0] for t, state in zip(time_s, found.y.T, strict=True)])
 
 
+def screened_at_an_oscillator(effect, *, damping=20.0, measures="displacement", samples=3000, rms=60.0, noise=2e-3):
+    """Forms by rising cost, screened at 1 kg on a spring, 32 Hz, whose log has an effect that its model lacks."""
+    seen = (StructureOutput(name="motion", measures=measures, at="b0"),)
+    model = replace(chain([1.0], [4e4], [damping]), outputs=seen)
+    log, floor = measured(model.with_effects((effect,)), band_noise(samples, rms=rms), noise=noise)
+    location = locate(model, log, floor, Tunables.of(model))
+    return screened(location, location.ranked, frozenset(), {})
+
+
 @pytest.fixture(scope="module")
 def found():
     time_s = np.arange(SAMPLES) / RATE_HZ
@@ -67,26 +76,18 @@ def test_its_numbers_are_those_of_the_law_with_both_dashpots_in_one(found):
 
 
 def test_a_cube_whose_middle_lies_beside_rest_is_told_with_its_square():
-    seen = (StructureOutput(name="d", measures="displacement", at="b0"),)
-    model = replace(chain([1.0], [4e4], [8.0]), outputs=seen)
     values = {"cubic": 3e8, "quadratic": -6e5}
-    machine = model.with_effects([attached("hardening_stiffness", "j0", values, variant="asymmetric")])
-    log, floor = measured(machine, band_noise(2000, rms=60.0), noise=2e-3)
-    location = locate(model, log, floor, Tunables.of(model))
-    (best, *_) = screened(location, location.ranked, frozenset(), {})
+    cube = attached("hardening_stiffness", "j0", values, variant="asymmetric")
+    best = screened_at_an_oscillator(cube, damping=8.0, samples=2000)[0]
     assert (best.trial.effect, best.trial.variant) == ("hardening_stiffness", "asymmetric")
     assert best.values["cubic"] == pytest.approx(values["cubic"], rel=0.1)
     assert best.values["quadratic"] == pytest.approx(values["quadratic"], rel=0.15)
 
 
 def test_teeth_are_told_with_their_second_harmonic():
-    seen = (StructureOutput(name="d", measures="displacement", at="b0"),)
-    model = replace(chain([1.0], [4e4], [20.0]), outputs=seen)
     values = {"amplitude": 6.0, "period": 1.3e-3, "phase": 0.8, "second_sine": -0.25, "second_cosine": 0.2}
-    machine = model.with_effects([attached("ripple", "j0", values, variant="harmonics")])
-    log, floor = measured(machine, band_noise(3000, rms=60.0), noise=1e-3)
-    location = locate(model, log, floor, Tunables.of(model))
-    (best, *others) = screened(location, location.ranked, frozenset(), {})
+    teeth = attached("ripple", "j0", values, variant="harmonics")
+    best, *others = screened_at_an_oscillator(teeth, noise=1e-3)
     assert (best.trial.effect, best.trial.variant) == ("ripple", "harmonics")
     # But for the phase: where the middle of the way lies no spectrum without its mean tells.
     assert best.values["amplitude"] == pytest.approx(values["amplitude"], rel=0.1)
@@ -98,13 +99,9 @@ def test_teeth_are_told_with_their_second_harmonic():
 
 
 def test_bristles_that_bend_within_a_sample_are_found():
-    model = chain([1.0], [4e4], [20.0])
     dahl = attached("coulomb_friction", "j0", {"force": 20.0, "presliding": 2e-6}, variant="bristle")
-    log, floor = measured(model.with_effects((dahl,)), band_noise(6000, rms=100.0), noise=0.002)
-    location = locate(model, log, floor, Tunables.of(model))
-    forms = {
-        (one.trial.effect, one.trial.variant): one for one in screened(location, location.ranked, frozenset(), {})
-    }
+    screen = screened_at_an_oscillator(dahl, measures="acceleration", samples=6000, rms=100.0)
+    forms = {(one.trial.effect, one.trial.variant): one for one in screen}
     found = forms["coulomb_friction", "bristle"].values
     # Between two samples it moves ten times as far as the bristles bend.
     assert found["presliding"] == pytest.approx(2e-6, rel=0.3)
@@ -112,13 +109,9 @@ def test_bristles_that_bend_within_a_sample_are_found():
 
 
 def test_a_round_contact_is_a_stop_and_no_spring_that_hardens_to_one_side():
-    seen = (StructureOutput(name="d", measures="displacement", at="b0"),)
-    model = replace(chain([1.0], [4e4], [20.0]), outputs=seen)
-    contact = {"stiffness": 6e4, "clearance": 1.5e-3, "depth": 1e-3, "dissipation": 0.3}
-    machine = model.with_effects([attached("one_sided_stop", "j0", contact, variant="hertz_damper")])
-    log, floor = measured(machine, band_noise(3000, rms=60.0), noise=2e-3)
-    location = locate(model, log, floor, Tunables.of(model))
-    best = screened(location, location.ranked, frozenset(), {})[0]
+    values = {"stiffness": 6e4, "clearance": 1.5e-3, "depth": 1e-3, "dissipation": 0.3}
+    contact = attached("one_sided_stop", "j0", values, variant="hertz_damper")
+    best = screened_at_an_oscillator(contact)[0]
     assert (best.trial.effect, best.trial.variant, best.values["side"]) == ("one_sided_stop", "hertz_damper", 1.0)
     assert best.values["clearance"] == pytest.approx(1.5e-3, rel=0.2)
     # Stiffness at another depth is the same law: compared as N/m^1.5.
