@@ -6,11 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.diagnosis.completeness import completeness, known_share
+from chladni.gap.diagnosis.completeness import completeness, completeness_among, known_share
 from chladni.gap.diagnosis.instead import Instead, explained_instead
 from chladni.gap.diagnosis.own_signal import share_of_own_signal
 from chladni.gap.diagnosis.pairs import added_nats, exchanged, paired_causes, second_causes, without_one
-from chladni.gap.diagnosis.search import ALONE, detailed, is_one_force, sibling_causes, single_causes, without_cause
+from chladni.gap.diagnosis.search import (
+    ALONE,
+    detailed,
+    is_lost,
+    is_one_force,
+    sibling_causes,
+    single_causes,
+    without_cause,
+)
 from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.contest import lowest, weighed
@@ -27,6 +35,8 @@ WRONG, NAMED = 3.0, 6.0
 _LEADS = 2
 #: A fit that leaves less than this, over the noise's power, leaves nothing to be explained.
 _CLEAN = 1.6
+#: Probability that a cause is all of it, with which it's named.
+_COMPLETE = 0.5
 #: Share of what a sensor leaves that follows its own signal in a curve: more is no noise.
 _DISTORTED = 0.2
 
@@ -84,7 +94,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
     best = _best(together, tuned, added)
     noise = study.contest.noise.lowered(best.held)
     floor = lowest(together)
-    verdict = _verdict(tuned, best, floor)
+    verdict = _verdict(together, tuned, best, floor)
     if instead is not None:
         verdict = "unknown"
     shaken = shaken_by(study) if verdict == "unknown" and instead is None else None
@@ -122,19 +132,35 @@ def _searched(
     def best() -> Contestant:
         return _best(weighed([nothing, *found]), nothing, added)
 
+    def leaves_another() -> bool:
+        return _leaves_another(study, best(), nothing, lowest([nothing, *found]))
+
     instead = explained_instead(study, best())
-    if best().chi < ALONE or is_one_force(study.location) or instead is not None:
+    if instead is not None or not leaves_another():
         return found, instead
     for lead in _leads(weighed(found)):
-        if best().chi > ALONE:
+        if leaves_another():
             found += second_causes(study, lead)
-    if best().chi > ALONE:
-        found += paired_causes(study)
+    if leaves_another():
+        found += paired_causes(study, best().chi)
     if len(best().hypothesis.effects) > 1:
         found += exchanged(study, best())
         found += sibling_causes(study, [best()])
         found += [detailed(study, best()), *without_one(study, best())]
-    return found, None
+    return [one for one in found if _is_plausible(study, one)], None
+
+
+def _leaves_another(study: Study, best: Contestant, nothing: Contestant, floor: Matrix) -> bool:
+    """Whether what the best cause leaves may be another one."""
+    if best.chi < ALONE:
+        return best is not nothing and completeness(nothing, best, floor) < _COMPLETE
+    # One force may do what two do, elsewhere; but then no law follows it.
+    return not is_one_force(study.location) or is_lost(study.location, best.chi)
+
+
+def _is_plausible(study: Study, found: Contestant) -> bool:
+    """Whether one cause, or two; where one force explains all, two must do so as well, or they only come near it."""
+    return len(found.hypothesis.effects) < 2 or not is_one_force(study.location) or found.chi < ALONE
 
 
 def _leads(ranked: Sequence[Contestant]) -> list[Contestant]:
@@ -167,11 +193,11 @@ def _distorted(study: Study, tuned: Contestant) -> tuple[str, ...]:
     )
 
 
-def _verdict(tuned: Contestant, best: Contestant, floor: Matrix) -> Verdict:
+def _verdict(together: Sequence[Contestant], tuned: Contestant, best: Contestant, floor: Matrix) -> Verdict:
     if best is tuned:
         # With no candidate that pays: is there anything to explain?
         return "none" if tuned.chi < _CLEAN else "unknown"
-    if completeness(tuned, best, floor) < 0.5:
+    if completeness_among(tuned, best, together, floor) < _COMPLETE:
         return "unknown"
     if best.hypothesis.effects:
         return "effect"
@@ -183,5 +209,7 @@ def _probabilities(contestants: Sequence[Contestant], tuned: Contestant, floor: 
     evidence = np.array([_paid(one, added) for one in contestants])
     weight = np.exp(evidence - evidence.max())
     known = known_share(tuned, floor)
-    complete = np.array([1.0 if one is tuned else known * completeness(tuned, one, floor) for one in contestants])
-    return [float(one) for one in weight / weight.sum() * complete]
+    complete = [
+        1.0 if one is tuned else known * completeness_among(tuned, one, contestants, floor) for one in contestants
+    ]
+    return [float(one) for one in weight / weight.sum() * np.array(complete)]

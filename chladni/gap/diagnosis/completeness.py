@@ -1,5 +1,7 @@
 """Whether a hypothesis leaves details of its laws, or another cause."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
@@ -40,6 +42,23 @@ def completeness(tuned: Contestant, found: Contestant, floor: Matrix) -> float:
     left = _beyond(found.held / floor - _UNCOUNTED)
     share = left / gap if gap > 0 else float(left > 0)
     return float(expit((1.0 - share / _LEFT[exact]) / _SHARPNESS))
+
+
+def completeness_among(tuned: Contestant, found: Contestant, others: Sequence[Contestant], floor: Matrix) -> float:
+    """Give the completeness of a hypothesis, or of one among others that adds oscillators to its own.
+
+    A cable or a bracket has more modes than the catalogue's oscillator: what its second mode does is a detail.
+    """
+    whole = [found, *(one for one in others if _has_more_modes(one, found))]
+    return max(completeness(tuned, one, floor) for one in whole)
+
+
+def _has_more_modes(other: Contestant, found: Contestant) -> bool:
+    """Whether both are oscillators alone, one of them where the only one of the other is."""
+    effects, more = found.hypothesis.effects, other.hypothesis.effects
+    sites = {one.site for one in more}
+    alone = len(effects) == 1 and len(more) > 1 and {one.effect for one in (*effects, *more)} == {"extra_mode"}
+    return alone and effects[0].site in sites
 
 
 def known_share(tuned: Contestant, floor: Matrix) -> float:

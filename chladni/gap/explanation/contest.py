@@ -21,6 +21,8 @@ Mask = NDArray[np.bool_]
 EFFECTIVE_SAMPLES = 200.0
 #: Share of the noise's power that details of a law may leave without counting against it.
 SLACK = 0.3
+#: Least of them that tell a state at the start of a window.
+_LEAST_SAMPLES = 2.0
 _BLOCK_S = 0.75
 #: Every so manieth block is held out.
 _EVERY = 3
@@ -114,10 +116,14 @@ class Contest:
             return None
         return self.states.at_starts(self.run.windows, self.run.compiled(None, hypothesis.effects).states)
 
-    def _starts(self, fit: OutputErrorFit) -> int:
-        """States that effects begin windows with, beyond those of the first one: free numbers, all of them."""
-        added = fit.initial.shape[-1] - len(self.run.compiled().states)
-        return int(max(added, 0) * (len(self.run.windows) - 1))
+    def _starts(self, fit: OutputErrorFit) -> float:
+        """Nats for the states that effects begin windows with, beyond those of the first: all are free numbers.
+
+        Each is told by its own window's samples alone, and pays by these.
+        """
+        windows = len(self.run.windows)
+        added = max(fit.initial.shape[-1] - len(self.run.compiled().states), 0) * (windows - 1)
+        return float(0.5 * added * np.log(max(EFFECTIVE_SAMPLES / windows, _LEAST_SAMPLES)))
 
     def enter_all(
         self, hypotheses: Sequence[Hypothesis], progress: Callable[[float], None] | None = None
@@ -143,7 +149,7 @@ def weighed(contestants: Sequence[Contestant]) -> list[Contestant]:
         return []
     floor = lowest(contestants)
     found = [
-        replace(one, log_evidence=log_evidence(one.held / floor, one.prior, one.hypothesis.freedom + one.starts))
+        replace(one, log_evidence=log_evidence(one.held / floor, one.prior, one.hypothesis.freedom) - one.starts)
         for one in contestants
     ]
     return sorted(found, key=lambda one: -one.log_evidence)

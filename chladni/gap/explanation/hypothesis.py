@@ -70,7 +70,7 @@ class Contestant:
     log_evidence
         Nats, but for a constant that all hypotheses that were weighed together share.
     starts
-        States that its effects begin windows with, beyond those of the first: they are fitted too.
+        Nats that it pays for the states that its effects begin windows with, beyond those of the first.
     """
 
     hypothesis: Hypothesis
@@ -79,7 +79,7 @@ class Contestant:
     gap: float
     prior: float
     log_evidence: float = 0.0
-    starts: int = 0
+    starts: float = 0.0
 
     @property
     def chi(self) -> float:

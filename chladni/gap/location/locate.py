@@ -26,6 +26,8 @@ _RECORD_LINES = 1500
 _FOLLOWED, _FOLLOWED_AGAIN, _TIED, _MOST = 5, 4, 1.5, 10
 #: Patterns tell places apart only when there are more sensors than forces.
 _PAIR_SENSORS = 3
+#: Places that are paired with every other one, at least; over the best one's misfit up to which another is its equal.
+_LEADING, _LEVEL = 2, 1.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,21 +119,22 @@ def locate(
     )
 
 
-def located_pairs(location: Location, rough: int = 5, leading: int = 2) -> list[Located]:
+def located_pairs(location: Location, rough: int = 5) -> list[Located]:
     """Profile forces at two places at a time; by rising misfit, none with too few sensors.
 
     Parameters
     ----------
     rough
         Followed places that are paired with each other.
-    leading
-        Followed places that are paired with every other one: beside the strongest force the place of a second one
-        may explain nothing alone.
+
+    The first few, and those that explain as much, are paired with every other place too: beside the strongest force
+    that of a second one may explain nothing alone.
     """
     problem = location.problem
     if len(problem.measured) < _PAIR_SENSORS:
         return []
     followed = list(location.ranked[:rough])
+    leading = max(_LEADING, sum(one.profile.chi < _LEVEL * followed[0].profile.chi for one in followed))
     known = {one.places[0] for one in followed}
     pairs = [(one, other.places[0]) for place, one in enumerate(followed) for other in followed[place + 1 :]]
     pairs += [(one, other) for one in followed[:leading] for other in location.places if other not in known]

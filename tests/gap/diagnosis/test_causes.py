@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chladni.gap.diagnosis.causes import _is_plausible, _leaves_another
 from chladni.gap.diagnosis.completeness import completeness as completeness_over
-from chladni.gap.diagnosis.completeness import known_share
+from chladni.gap.diagnosis.completeness import completeness_among, known_share
 from chladni.gap.diagnosis.search import plausible_places
 from chladni.gap.diagnosis.study import study_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
@@ -51,6 +52,20 @@ def test_a_factor_has_no_details_that_could_be_left() -> None:
     law = replace(left(400.0), hypothesis=Hypothesis(effects=(drag,), fitted=((),), start_z=np.zeros(0)))
     # A fifth of the gap's RMS.
     assert completeness(left(1e4), factor) < 0.5 < completeness(left(1e4), law)
+
+
+def test_a_second_mode_of_what_is_attached_is_a_detail_of_it() -> None:
+    def hanging(chi: float, *sites: str, effect: str = "extra_mode") -> Contestant:
+        numbers = {"mass": 1.0} if effect == "added_mass" else {"mass": 1.0, "frequency": 9.0, "damping_ratio": 0.01}
+        added = tuple(attached(effect, site, numbers) for site in sites)
+        hypothesis = Hypothesis(effects=added, fitted=((),) * len(added), start_z=np.zeros(0))
+        return replace(left(chi), hypothesis=hypothesis)
+
+    tuned, found, floor = left(1e4), hanging(400.0, "b1"), np.ones(2)
+    assert completeness_among(tuned, found, [hanging(1.0, "b2", "b1")], floor) > 0.9
+    # Not elsewhere, nor another effect, nor fewer of them.
+    for other in (hanging(1.0, "b2", "b3"), hanging(1.0, "b1", "b2", effect="added_mass"), hanging(1.0, "b1")):
+        assert completeness_among(tuned, found, [other], floor) < 0.5
 
 
 def test_one_sensor_that_is_not_explained_is_not_hidden_by_many_that_are() -> None:
@@ -103,3 +118,57 @@ def test_the_leading_place_is_paired_with_those_that_were_not_followed() -> None
     first = study.location.ranked[0]
     pairs = located_pairs(replace(study.location, ranked=(first,)))
     assert {pair.places[1] for pair in pairs} == set(study.location.places) - {first.places[0]}
+
+
+def test_a_place_that_explains_as_much_as_the_leading_ones_is_paired_with_all_too() -> None:
+    study = study_of(arm(), measured(seconds=2.0), leave_out=frozenset(), own={})
+    first, second, third = study.location.ranked[:3]
+    followed = {one.places[0] for one in (first, second, third)}
+    far = next(place for place in study.location.places if place not in followed)
+
+    def paired(misfit: float) -> bool:
+        """Whether the third place is, when it leaves so many times what the first does."""
+        again = replace(third, profile=replace(third.profile, misfit=misfit * first.profile.misfit))
+        pairs = located_pairs(replace(study.location, ranked=(first, second, again)))
+        return any(set(pair.places) == {far, third.places[0]} for pair in pairs)
+
+    assert paired(1.05)
+    assert not paired(2.0)
+
+
+@pytest.fixture(scope="module")
+def explained_by_one_force():
+    """A study whose best place is said to leave nothing to an unknown force, and one where it leaves a third."""
+    study = study_of(arm(), measured(seconds=2.0), leave_out=frozenset(), own={})
+    first = study.location.ranked[0]
+
+    def leaving(chi: float):
+        profile = replace(first.profile, misfit=chi * first.profile.expected)
+        return replace(study, location=replace(study.location, ranked=(replace(first, profile=profile),)))
+
+    return leaving(1.0), leaving(1.3)
+
+
+def test_where_one_force_explains_all_another_cause_is_looked_for_only_when_no_law_follows_it(
+    explained_by_one_force,
+) -> None:
+    one, several = explained_by_one_force
+    nothing, floor = left(100.0), np.ones(2)
+    assert [_leaves_another(one, left(chi), nothing, floor) for chi in (1.2, 2.0, 5.0)] == [False, False, True]
+    assert [_leaves_another(several, left(chi), nothing, floor) for chi in (1.2, 2.0, 5.0)] == [False, True, True]
+
+
+def test_another_cause_is_looked_for_where_a_small_gap_is_half_explained(explained_by_one_force) -> None:
+    for study in explained_by_one_force:
+        assert _leaves_another(study, left(1.25), left(1.6), np.ones(2))
+        nothing = left(1.25)
+        assert not _leaves_another(study, nothing, nothing, np.ones(2))
+
+
+def test_two_causes_instead_of_one_force_must_explain_all(explained_by_one_force) -> None:
+    one, several = explained_by_one_force
+    two = tuple(attached("gain_error", site, {"gain": 2.0}) for site in ("a", "b"))
+    both = Hypothesis(effects=two, fitted=((), ()), start_z=np.zeros(0))
+    near, all_of_it = (replace(left(chi), hypothesis=both) for chi in (1.6, 1.1))
+    assert [_is_plausible(one, found) for found in (near, all_of_it, left(9.0))] == [False, True, True]
+    assert _is_plausible(several, near)

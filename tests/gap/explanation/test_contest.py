@@ -117,11 +117,17 @@ def test_a_floor_is_never_raised() -> None:
 
 
 def test_states_that_windows_begin_with_are_paid_for() -> None:
-    free = replace(left(1.0, 1.0), starts=24)
-    assert (
-        log_evidence(np.ones(2), 0.0, 24)
-        == next(one for one in weighed([left(1.0, 1.0), free]) if one.starts).log_evidence
-    )
+    free = replace(left(1.0, 1.0), starts=24.0)
+    fixed, moved = weighed([free, left(1.0, 1.0)])
+    assert (fixed.starts, moved.starts) == (0.0, 24.0)
+    assert fixed.log_evidence - moved.log_evidence == 24.0
+
+
+def test_a_state_pays_by_the_samples_that_tell_it(runs) -> None:
+    found = runs.enter(hypothesis_of(LACKING, np.zeros(2)), max_iterations=1, tune=False)
+    states, windows = 2, len(STARTS)
+    assert found.starts == pytest.approx(0.5 * states * (windows - 1) * np.log(EFFECTIVE_SAMPLES / windows))
+    assert runs.enter(hypothesis_of(LACKING[1:], np.zeros(2)), max_iterations=1, tune=False).starts == 0.0
 
 
 @pytest.mark.parametrize("others", [0, 3])
