@@ -1,7 +1,7 @@
 """The search for one cause: every plausible effect entered, more while all leave something."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -168,10 +168,11 @@ def _best_forms(ranked: Sequence[Contestant]) -> list[Contestant]:
 def _polished(study: Study, found: Contestant) -> Contestant:
     """Let the details of the laws move too: creep, presliding, shape; kept when that pays."""
     finer = polished(found.hypothesis, found.fit)
-    entered = study.contest.enter(finer) if finer is not None else None
-    if entered is None or is_degenerate(study.contest.run, entered):
+    if finer is None:
         return found
-    return weighed([found, entered])[0]
+    # Windows of a lost fit begin where no details lead out: then it's the linear part that tells their states.
+    starts = [finer, replace(finer, initial=None)] if study.windows is not None else [finer]
+    return weighed([found, *sound(study, study.contest.enter_all(starts))])[0]
 
 
 def detailed(study: Study, found: Contestant) -> Contestant:
