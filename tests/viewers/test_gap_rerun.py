@@ -12,8 +12,10 @@ import rerun as rr
 from chladni.apps.gap_evidence import gap_evidence
 from chladni.apps.gap_structure import structure_sketch
 from chladni.gap.records.diagnosis import Diagnosis
-from chladni.viewers.rerun import gap_signals
+from chladni.viewers.engineering import engineering
+from chladni.viewers.rerun import gap_signals, restoring_force
 from chladni.viewers.rerun.gap import write_gap_rrd
+from chladni.viewers.restoring_force import force_range
 from tests import made_diagnosis as made
 from tests.viewers.headless import EXECUTABLE, headless_viewer
 from tests.viewers.rrd import Contents
@@ -84,6 +86,45 @@ def test_the_surface_has_a_dot_for_each_sample_and_the_law_over_it(arm: Contents
     np.testing.assert_allclose(
         arm.scalars("/restoring_force/time/law")[:, 0], made.restoring_force().law_force, rtol=1e-12
     )
+
+
+@pytest.fixture(scope="module")
+def wild(tmp_path_factory: pytest.TempPathFactory) -> Contents:
+    """Of a force that swings to a hundred times its size at the ends of the record."""
+    surface = made.restoring_force()
+    force = surface.force.copy()
+    force[[0, 1, -1]] = 100 * np.abs(force).max() * np.array([1.0, -0.5, -1.0])
+    found = replace(made.diagnosis(), restoring_force=replace(surface, force=force))
+    return Contents(written(found, tmp_path_factory.mktemp("wild")))
+
+
+def test_wild_ends_of_a_record_do_not_flatten_the_force_over_time(wild: Contents) -> None:
+    (name,) = (name for name in wild.view_names() if name.startswith("Force lacking at elbow [N]"))
+    (low, high), *_ = (row["ScalarAxis:range"][0] for row in wild.blueprint if row.get("ScalarAxis:range"))
+    assert (low, high) == pytest.approx(force_range(made.restoring_force()), rel=0.1)
+    most = np.abs(wild.scalars("/restoring_force/time/recovered")).max()
+    assert name.endswith(f" · reaches {engineering(most, None, 'N')}, beyond the axis")
+
+
+@pytest.mark.parametrize("over", ["displacement", "velocity"])
+def test_dots_beyond_the_axis_are_counted_not_drawn_among_the_numbers(wild: Contents, over: str) -> None:
+    dots = np.array(wild.static(f"/restoring_force/{over}/force")["Points2D:positions"])
+    assert ((dots[:, 1] >= 0) & (dots[:, 1] <= restoring_force.HEIGHT)).all()
+    (name,) = (name for name in wild.view_names() if name.startswith(f"Force lacking at elbow over {over}"))
+    assert name.endswith(f" · {3000 - len(dots)} of 3000 dots lie beyond the axis")
+    assert len(dots) < len(wild.static(f"/restoring_force/{over}/law")["Points2D:positions"]) == 3000
+
+
+def test_names_of_both_axes_stand_within_the_view(arm: Contents) -> None:
+    labels = arm.static("/restoring_force/velocity/axes/numbers")
+    bounds = [row["VisualBounds2D:range"][0] for row in arm.blueprint if row.get("VisualBounds2D:range")]
+    for name in ("velocity [m/s]", "force [N]"):
+        x, y = labels["Points2D:positions"][labels["Points2D:labels"].index(name)]
+        for one in bounds:
+            (left, right), (top, bottom) = one["x_range"], one["y_range"]
+            assert left < x < right
+            # A name hangs below its place.
+            assert top < y < bottom
 
 
 def test_parts_of_the_structure_are_named_with_their_shares_and_coloured(arm: Contents) -> None:

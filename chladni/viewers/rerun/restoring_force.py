@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from chladni.gap.records.diagnosis import RestoringForce
 from chladni.signals.time_series import NS_PER_S
 from chladni.viewers.drawing import Floats, thin
-from chladni.viewers.engineering import axis_scale
+from chladni.viewers.engineering import axis_scale, engineering
 from chladni.viewers.gap_evidence import AFTER_ON_DARK, MEASURED_ON_DARK
+from chladni.viewers.labels import printed_unit
 from chladni.viewers.rerun.canvas import Canvas
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.rerun.timelines import send_scalars, time_axis, time_index
@@ -43,18 +44,25 @@ def _draw(recording: rr.RecordingStream, surface: RestoringForce, over: Over) ->
     rows, path = spread_out(surface), f"{PATH}/{over}"
     across, x_unit = axis_scale(motion(surface, over), motion_unit(surface, over))
     up, force_unit = axis_scale(surface.force, surface.force_unit)
-    x = motion(surface, over)[rows] / across
     low, high = force_range(surface)
+    # The canvas cuts nothing off: a dot beyond its range would stand among numbers and names.
+    inside = rows[np.abs(surface.force[rows]) <= high]
+    x = motion(surface, over)[rows] / across
     canvas = Canvas(width=WIDTH, height=HEIGHT, x_range=_padded(x), y_range=(low / up, high / up))
     canvas.draw_axes(recording, f"{path}/axes", x_name=f"{over} [{x_unit}]", y_name=f"force [{force_unit}]")
-    shade = motion(surface, other(over))[rows] / motion_reach(surface, other(over))
-    _dots(recording, f"{path}/force", canvas.places(x, surface.force[rows] / up), signed_colours(shade), points=1.6)
+    shade = motion(surface, other(over))[inside] / motion_reach(surface, other(over))
+    force = canvas.places(motion(surface, over)[inside] / across, surface.force[inside] / up)
+    _dots(recording, f"{path}/force", force, signed_colours(shade), points=1.6)
     if surface.law_force is not None:
         law = canvas.places(x, surface.law_force[rows] / up)
         _dots(recording, f"{path}/law", law, np.array([LAW_COLOUR], dtype=np.uint8), points=0.8)
-    return canvas.view(
-        path, f"Force lacking at {surface.site} over {over}; blue to orange: {other(over)}; white: law"
-    )
+    law_told = "" if surface.law_force is None else "; white: law"
+    name = f"Force lacking at {surface.site} over {over}; blue to orange: {other(over)}{law_told}"
+    return canvas.view(path, f"{name}{_beyond(rows.size - inside.size, rows.size)}", above=ABOVE)
+
+
+def _beyond(missing: int, dots: int) -> str:
+    return f" · {missing} of {dots} dots lie beyond the axis" if missing else ""
 
 
 def _dots(
@@ -75,11 +83,17 @@ def draw_force_over_time(recording: rr.RecordingStream, surface: RestoringForce)
     _line(recording, surface.time_s, surface.force, "recovered", MEASURED_ON_DARK)
     if surface.law_force is not None:
         _line(recording, surface.time_s, surface.law_force, "law", AFTER_ON_DARK)
+    reach, furthest = force_range(surface)[1], float(np.abs(surface.force).max())
+    # A recovered force swings wildly at the ends of a record, which would make a flat line of all between them.
+    beyond = (
+        f" · reaches {engineering(furthest, None, surface.force_unit)}, beyond the axis" if furthest > reach else ""
+    )
     start_ns, end_ns = (round(float(end) * NS_PER_S) for end in surface.time_s[[0, -1]])
     return rrb.TimeSeriesView(
         origin=f"{PATH}/time",
-        name=f"Force lacking at {surface.site} [{surface.force_unit}]",
+        name=f"Force lacking at {surface.site} [{printed_unit(surface.force_unit)}]{beyond}",
         axis_x=time_axis(end_ns, start_ns=start_ns),
+        axis_y=rrb.ScalarAxis(range=force_range(surface)),
         plot_legend=rrb.PlotLegend(visible=True, corner=rrb.Corner2D.LeftTop),
     )
 
