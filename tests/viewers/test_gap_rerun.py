@@ -13,6 +13,7 @@ from chladni.apps.gap_evidence import gap_evidence
 from chladni.apps.gap_structure import structure_sketch
 from chladni.gap.records.diagnosis import Diagnosis
 from chladni.viewers.engineering import engineering
+from chladni.viewers.gap_band import band_told, shown_hz
 from chladni.viewers.rerun import gap_signals, restoring_force
 from chladni.viewers.rerun.gap import write_gap_rrd
 from chladni.viewers.restoring_force import force_range
@@ -74,7 +75,8 @@ def test_both_maps_have_one_range_of_colours(arm: Contents) -> None:
     before, after = (arm.static(f"/gap_map/{what}") for what in ("before", "after"))
     assert before["Tensor:value_range"] == after["Tensor:value_range"]
     picture = before["Tensor:data"][0]
-    assert list(picture["shape"]) == list(made.signals().gap_map.shape)
+    times, lines = made.signals().gap_map.shape
+    assert (picture["shape"][0], picture["shape"][1] <= lines) == (times, True)
 
 
 def test_the_surface_has_a_dot_for_each_sample_and_the_law_over_it(arm: Contents) -> None:
@@ -86,6 +88,21 @@ def test_the_surface_has_a_dot_for_each_sample_and_the_law_over_it(arm: Contents
     np.testing.assert_allclose(
         arm.scalars("/restoring_force/time/law")[:, 0], made.restoring_force().law_force, rtol=1e-12
     )
+
+
+def test_maps_show_the_band_that_holds_the_gap_and_say_what_lies_above(tmp_path: Path) -> None:
+    signals = made.signals()
+    lines = signals.map_frequency_hz
+    low = np.where(lines < 20, 1.0, 1e-5) * np.ones_like(signals.gap_map)
+    narrow = replace(signals, gap_map=low, gap_map_after=1e-3 * low)
+    contents = Contents(written(replace(made.diagnosis(), signals=narrow), tmp_path))
+    shown = lines <= shown_hz(narrow)
+    assert 20 < lines[shown][-1] < 30
+    for what, density in (("before", low), ("after", 1e-3 * low)):
+        picture = contents.static(f"/gap_map/{what}")["Tensor:data"][0]
+        assert list(picture["shape"]) == [len(density), int(shown.sum())]
+        (name,) = (name for name in contents.view_names() if name.startswith(f"Gap {what} [dB re 1/Hz]"))
+        assert name.endswith(f" · {band_told(narrow)}")
 
 
 @pytest.fixture(scope="module")

@@ -9,14 +9,13 @@ from matplotlib.image import AxesImage
 from chladni.gap.records.diagnosis import GapSignals
 from chladni.viewers.drawing import Floats, block_maximum, decibels_of_power
 from chladni.viewers.figures.sheet import look, sheet
+from chladni.viewers.gap_band import band_told, shown_hz
 from chladni.viewers.gap_evidence import GapEvidence
 
 PIXELS = 1500
 # Less than a spectrum's usual 80 dB: what lies further below the worst of the gap doesn't matter to anyone.
 DYNAMIC_RANGE_DB = 50.0
 HEIGHT_IN = 1.6
-# The band that is shown holds this share of the gap; above it there is some room to see that nothing comes.
-HELD, ROOM = 0.99, 1.2
 
 
 def gap_map_figures(evidence: GapEvidence) -> dict[str, Figure]:
@@ -39,23 +38,14 @@ def _figure(signals: GapSignals) -> Figure:
         image = _draw(axes, signals, level, high)
         axes.set_title(title, loc="left", pad=2)
         axes.set_ylabel("Frequency [Hz]")
-    stack[-1].set_ylim(0, _shown_hz(signals))
+    stack[0].set_title(band_told(signals), loc="right", pad=2)
+    stack[-1].set_ylim(0, shown_hz(signals))
     stack[-1].set_xlabel("Time [s]")
     if image is not None:
         bar = figure.colorbar(image, ax=stack, aspect=36, pad=0.02)
         bar.set_label("Density [dB re 1/Hz]")
         bar.outline.set_linewidth(0.0)
     return figure
-
-
-def _shown_hz(signals: GapSignals) -> float:
-    """Frequency under which nearly all of the gap lies, and some room above it."""
-    power = np.nan_to_num(signals.gap_map).sum(axis=0)
-    lines = signals.map_frequency_hz
-    if not power.sum() > 0:
-        return float(lines[-1])
-    last = int(np.searchsorted(np.cumsum(power), HELD * power.sum()))
-    return float(min(ROOM * lines[last] + lines[1], lines[-1]))
 
 
 def _shortened(density: Floats) -> Floats:
