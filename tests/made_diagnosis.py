@@ -154,6 +154,8 @@ def signals() -> GapSignals:
         before=before,
         after=after,
         noise_rms=NOISE * after.std(axis=1),
+        # White.
+        noise_density=np.tile((NOISE * after.std(axis=1, keepdims=True)) ** 2 / (RATE_HZ / 2), 65),
         map_time_s=time,
         map_frequency_hz=frequency,
         gap_map=first,

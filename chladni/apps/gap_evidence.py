@@ -63,8 +63,14 @@ def _spectra(signals: GapSignals) -> GapSpectra | None:
         measured=measured,
         before=before,
         after=after,
-        noise=signals.noise_rms**2 / (signals.sample_rate_hz / 2),
+        noise=_noise(signals, density.frequency_hz),
     )
+
+
+def _noise(signals: GapSignals, frequency_hz: Matrix) -> Matrix:
+    """``[output, line]``: the estimated noise at the lines of the other spectra."""
+    lines_hz = np.linspace(0.0, signals.sample_rate_hz / 2, signals.noise_density.shape[1])
+    return np.array([np.interp(frequency_hz, lines_hz, row) for row in signals.noise_density])
 
 
 def _window_hz(signals: GapSignals) -> float:

@@ -30,7 +30,7 @@ class GapSpectra(Value):
         ``[output, line]``: the signal, the error of the nominal model, the error with what was found. Of simulations
         over windows all three are averages over those, since jumps between them are no errors of the model.
     noise
-        ``[output]``: what the noise's RMS would be as a density if it were white.
+        ``[output, line]``: the estimated noise.
     """
 
     frequency_hz: Matrix
@@ -41,8 +41,8 @@ class GapSpectra(Value):
 
     def __post_init__(self) -> None:
         # Outputs in another order would be drawn against the wrong noise.
-        shape = (self.noise.size, self.frequency_hz.size)
-        for name in ("measured", "before", "after"):
+        shape = (len(self.noise), self.frequency_hz.size)
+        for name in ("measured", "before", "after", "noise"):
             require_shape(name, getattr(self, name), shape, "outputs and lines")
         self._freeze()
 

@@ -60,9 +60,26 @@ def test_spectra_are_roots_of_densities(figures: dict[str, Figure], evidence: Ga
     # Nearly all of each curve's power is there; from standing still no logarithmic axis of frequency begins.
     assert low == 1
     assert evidence.spectra.before[1, low : high + 1].sum() > 0.99 * evidence.spectra.before[1, 1:].sum()
-    noise = np.sqrt(evidence.spectra.noise[1])
+    noise = np.sqrt(evidence.spectra.noise[1, low : high + 1])
     np.testing.assert_allclose(axes.lines[3].get_ydata(), noise)
-    assert axes.get_ylim()[0] < noise
+    assert axes.get_ylim()[0] < noise.min()
+
+
+def test_noise_has_its_own_spectrum() -> None:
+    signals, rate_hz = made.signals(), made.RATE_HZ
+    # Of noise that fades with frequency a level line of the same RMS lay above all that was measured there.
+    hz = np.linspace(0, rate_hz / 2, signals.noise_density.shape[1])
+    fading = signals.noise_density * 10 ** (-4 * hz / hz[-1])
+    evidence = gap_evidence(replace(made.diagnosis(), signals=replace(signals, noise_density=fading)))
+    assert evidence.spectra is not None
+    np.testing.assert_allclose(
+        evidence.spectra.noise,
+        signals.noise_density[:, :1] * 10 ** (-4 * evidence.spectra.frequency_hz / hz[-1]),
+        # Straight lines between logarithms that fall by a sixteenth of a decade.
+        rtol=0.01,
+    )
+    (line,) = (line for line in gap_album(evidence).figures["spectra"].axes[0].lines if line.get_label() == "noise")
+    assert line.get_ydata()[-1] < line.get_ydata()[0]
 
 
 def test_both_maps_have_one_scale_of_colours(figures: dict[str, Figure]) -> None:
@@ -107,7 +124,9 @@ def test_one_output_has_room_for_its_curves() -> None:
         signals,
         output_names=signals.output_names[:1],
         output_units=signals.output_units[:1],
-        **{name: getattr(signals, name)[:1] for name in ("measured", "before", "after", "noise_rms")},
+        **{
+            name: getattr(signals, name)[:1] for name in ("measured", "before", "after", "noise_rms", "noise_density")
+        },
     )
     drawn = gap_album(gap_evidence(replace(made.diagnosis(), signals=alone))).figures
     for name in ("signals", "errors", "spectra"):
@@ -192,6 +211,7 @@ def test_many_outputs_are_divided_over_figures() -> None:
         output_units=("m/s^2",) * several,
         **{name: np.repeat(getattr(signals, name)[:1], several, axis=0) for name in ("measured", "before", "after")},
         noise_rms=np.repeat(signals.noise_rms[:1], several),
+        noise_density=np.repeat(signals.noise_density[:1], several, axis=0),
     )
     drawn = gap_album(gap_evidence(replace(made.diagnosis(), signals=wide))).figures
     assert {"signals 1–3", "signals 4–6", "spectra 1–3"} <= set(drawn)

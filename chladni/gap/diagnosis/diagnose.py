@@ -238,6 +238,7 @@ def _signals(study: Study, causes: Causes, before: Matrix, after: Matrix) -> Gap
         before=before,
         after=after,
         noise_rms=causes.noise.rms,
+        noise_density=causes.noise.one_sided(measurement.sample_rate_hz),
         map_time_s=time_s,
         map_frequency_hz=frequency_hz,
         gap_map=density,

@@ -373,6 +373,7 @@ class SimulatorFindings:
             before=self.search.nominal,
             after=after,
             noise_rms=self.noise.rms,
+            noise_density=self.noise.one_sided(log.sample_rate_hz),
             map_time_s=times_s,
             map_frequency_hz=frequency_hz,
             gap_map=before_map,

@@ -208,8 +208,9 @@ class GapSignals(Value):
         Which log, and what its rows are.
     measured, before, after
         ``[output, sample]``: measured; nominal model; parameters and effects (or tuned, where none is named).
-    noise_rms
-        ``[output]``.
+    noise_rms, noise_density
+        ``[output]``, and its spread ``[output, line]`` over evenly spaced lines from 0 to half the sample rate, both
+        included, in the output's unit^2/Hz.
     map_time_s, map_frequency_hz, gap_map
         ``[time]``, ``[frequency]``, ``[time, frequency]``: density of the nominal gap, outputs scaled by RMS, 1/Hz.
     gap_map_after
@@ -226,6 +227,7 @@ class GapSignals(Value):
     before: Matrix
     after: Matrix
     noise_rms: Matrix
+    noise_density: Matrix
     map_time_s: Matrix
     map_frequency_hz: Matrix
     gap_map: Matrix

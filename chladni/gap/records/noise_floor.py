@@ -9,6 +9,9 @@ from chladni.signals.value import Value
 
 Matrix = NDArray[np.float64]
 
+# Of a spectrum for pictures: finer than any that is drawn beside it.
+LINES = 4097
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NoiseFloor(Value):
@@ -65,6 +68,10 @@ class NoiseFloor(Value):
         lags = np.arange(self.whitening.shape[1])
         response = self.whitening @ np.exp(-2j * np.pi * np.multiply.outer(lags, cycles))
         return np.asarray(self.innovation_rms[:, None] ** 2 / np.abs(response) ** 2, dtype=np.float64)
+
+    def one_sided(self, sample_rate_hz: float) -> Matrix:
+        """Give ``[output, line]`` power density from 0 to half the sample rate, unit^2/Hz; it adds up to rms^2."""
+        return 2 / sample_rate_hz * self.density(np.linspace(0.0, 0.5, LINES))
 
     def whitened(self, residual: Matrix) -> Matrix:
         """Give ``[..., output, sample]`` residuals as white noise of unit variance, were they noise alone."""

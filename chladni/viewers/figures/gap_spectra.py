@@ -54,14 +54,14 @@ def draw_spectrum(axes: Axes, signals: GapSignals, spectra: GapSpectra, row: int
     high = max(float(values.max()) for values, *_ in lines)
     # A channel that is zero has no place on a logarithmic axis, either.
     if high > 0:
-        noise, left = float(np.sqrt(spectra.noise[row])), lines[-1][0]
-        least = float(left[left > 0].min(initial=high))
-        lowest = min(BELOW_NOISE * noise, ROOM * least) if noise > FAR * least else ROOM * least
+        noise, left = np.sqrt(spectra.noise[row, shown]), lines[-1][0]
+        least, quiet = (float(one[one > 0].min(initial=high)) for one in (left, noise))
+        lowest = min(BELOW_NOISE * quiet, ROOM * least) if quiet > FAR * least else ROOM * least
         low = max(lowest, high / 10**DECADES)
         logarithmic(axes, low, 2 * high, numbers=NUMBERS)
         # What lies below the axis isn't promised in the legend.
-        if noise > low:
-            axes.axhline(noise, color="black", linewidth=0.8, linestyle=(0, (4, 2)), label="noise, if white")
+        if noise.max() > low:
+            axes.plot(frequency_hz, noise, color="black", linewidth=0.8, linestyle=(0, (4, 2)), label="noise")
     logarithmic_frequency(axes, float(frequency_hz[0]), float(frequency_hz[-1]))
     axes.set_ylabel(f"[{plain(amplitude_density_unit(signals.output_units[row]))}]")
 
