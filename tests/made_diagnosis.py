@@ -25,6 +25,7 @@ from chladni.gap.records.diagnosis import (
     SiteShare,
     Where,
 )
+from chladni.gap.records.log_use import LogUse
 from chladni.models.core.simulation import Simulation
 from chladni.models.effects.attached_effect import attached
 from chladni.models.files.model_file import load_model
@@ -239,6 +240,7 @@ def diagnosis() -> Diagnosis:
         remarks=("shoulder.damping is not determined by this log and was held.",),
         restoring_force=restoring_force(),
         signals=signals(),
+        used=(LogUse(log=LOG, used_s=SECONDS, recorded_s=SECONDS, sample_rate_hz=RATE_HZ),),
     )  # fmt: skip
 
 

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 LEAST_SHARE = 0.05
 # Rows of a table of sites or regimes, as many as one reads.
 MOST_ROWS = 6
-SECONDS_DIGITS = 5
 IN_REPORT = "the report and the JSON document"
 
 
@@ -70,12 +69,10 @@ def print_comparison(out: Output, found: "GapComparison") -> None:
 
 def _print_use(out: Output, used: "Sequence[LogUse]") -> None:
     """Right below the answer, since an answer from half a log reads like one from a whole."""
+    from chladni.viewers.gap_summary import used_length
+
     for one in used:
-        seconds = number(one.used_s, digits=SECONDS_DIGITS)
-        # Less than a sample is rounding.
-        whole = (one.recorded_s - one.used_s) * one.sample_rate_hz < 1
-        of_all = "" if whole else f" of the {number(one.recorded_s, digits=SECONDS_DIGITS)} s"
-        out.line(f"Used: {seconds} s{of_all} of {one.log}, at {number(one.sample_rate_hz)} Hz.")
+        out.line(f"Used: {used_length(one)} of {one.log}, at {number(one.sample_rate_hz)} Hz.")
         out.lines(one.losses)
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from chladni.gap.records.diagnosis import Cause, Closing, Diagnosis, FittedNumber
+from chladni.gap.records.log_use import LogUse
 from chladni.viewers.effect_words import PARAMETER, cause_phrase, effect_at, effect_heading
 from chladni.viewers.engineering import chance, engineering, percent
 
@@ -37,6 +38,13 @@ def naive_sentence(found: Diagnosis) -> str | None:
     if naive is None or (naive.effect, naive.site) in {(cause.effect, cause.site) for cause in found.causes}:
         return None
     return f"The largest drop of the error alone would have named {effect_at(naive.effect, naive.site)}."
+
+
+def used_length(one: LogUse) -> str:
+    """Give the seconds of a log that were used, and of how many, where that isn't all."""
+    # Less than a sample is rounding.
+    whole = (one.recorded_s - one.used_s) * one.sample_rate_hz < 1
+    return f"{one.used_s:.5g} s" if whole else f"{one.used_s:.5g} s of the {one.recorded_s:.5g} s"
 
 
 def _sentences(found: Diagnosis) -> Iterator[str]:

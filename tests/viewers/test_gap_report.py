@@ -64,6 +64,17 @@ def test_the_page_tells_its_log_and_its_maker(arm: str) -> None:
     assert f"Made by chladni {chladni.__version__}." in shown
 
 
+def test_the_page_tells_how_much_of_each_log_was_used_and_which_is_shown() -> None:
+    found = made.diagnosis()
+    cut = replace(found.used[0], log="louder.mcap", used_s=12.5, recorded_s=20.0)
+    several = replace(found, logs=("arm.mcap", "louder.mcap"), used=(*found.used, cut))
+    shown = Page(gap_report_html(gap_evidence(several), album=NO_FIGURES)).texts
+    told = "2 logs; arm.mcap: 8 s at 500 Hz; louder.mcap: 12.5 s of the 20 s at 500 Hz; pictures are of arm.mcap"
+    assert told in shown
+    unfiled = Page(gap_report_html(gap_evidence(replace(found, used=())), album=NO_FIGURES)).texts
+    assert "arm.mcap: 8 s at 500 Hz" in unfiled
+
+
 def test_captions_promise_nothing_where_nothing_is_named() -> None:
     told = " ".join(Page(gap_report_html(gap_evidence(made.unknown()))).texts)
     assert "with the best parameters" in told

@@ -12,7 +12,7 @@ from chladni.viewers.figures.album import Album
 from chladni.viewers.figures.gap import gap_album
 from chladni.viewers.figures.gap_signals import windows_told
 from chladni.viewers.gap_evidence import GapEvidence
-from chladni.viewers.gap_summary import naive_sentence, summary
+from chladni.viewers.gap_summary import naive_sentence, summary, used_length
 from chladni.viewers.report.markup import PAGE, element, escaped, table
 from chladni.viewers.report.pictures import picture
 
@@ -57,7 +57,7 @@ def gap_report_html(evidence: GapEvidence, *, album: Album | None = None) -> str
 
 def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
     yield element("h1", escaped(title))
-    yield _log(found)
+    yield _logs(found)
     yield _section("Answer", _answer(found))
     yield _section("Causes", _causes(found))
     yield _section("Evidence", _flow(_pictures(found, album, "signals", "errors", "spectra", "force")))
@@ -78,13 +78,18 @@ def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
     yield _section("Limits", _list((*found.levels, *found.remarks, *_held_out(found))))
 
 
-def _log(found: Diagnosis) -> str:
-    """What the pictures are of."""
+def _logs(found: Diagnosis) -> str:
+    """How much of each log was used, and which of several the pictures are of."""
     signals = found.signals
-    if signals is None:
-        return ""
-    length_s = signals.measured.shape[1] / signals.sample_rate_hz
-    return element("p", escaped(f"{signals.log}: {length_s:.4g} s at {signals.sample_rate_hz:.6g} Hz"), class_="note")
+    told = [f"{one.log}: {used_length(one)} at {one.sample_rate_hz:.6g} Hz" for one in found.used]
+    if len(told) > 1:
+        shown = [] if signals is None else [f"pictures are of {signals.log}"]
+        told = [f"{len(told)} logs", *told, *shown]
+    # Diagnoses that weren't made from files don't tell how much of them was used.
+    if not told and signals is not None:
+        length_s = signals.measured.shape[1] / signals.sample_rate_hz
+        told = [f"{signals.log}: {length_s:.4g} s at {signals.sample_rate_hz:.6g} Hz"]
+    return element("p", escaped("; ".join(told)), class_="note") if told else ""
 
 
 def _where(found: Diagnosis, *, drawn: bool) -> str:
