@@ -31,6 +31,20 @@ def headline(diagnosis: Diagnosis) -> str:
     return summary(diagnosis)[0]
 
 
+def caveats(found: Diagnosis) -> tuple[str, ...]:
+    """Those sentences of the summary, in its order, without which its first two say more than was found."""
+    causes = found.causes if found.verdict in ("effect", "parameters") else ()
+    told = {
+        *_faint(found),
+        *(one for cause in causes for one in _reservations(cause)),
+        *(_too_near(found.gap) if causes else ()),
+        *_elsewhere(found),
+        *_how(found.gap),
+        *filter(None, (found.advice,)),
+    }
+    return tuple(sentence for sentence in summary(found) if sentence in told)
+
+
 def naive_sentence(found: Diagnosis) -> str | None:
     """Say what the largest drop of the error alone would have named, where that is something else."""
     naive = found.naive
@@ -78,10 +92,14 @@ def _effects(found: Diagnosis) -> Iterator[str]:
         told = _listed([f"{cause_phrase(cause)} ({chance(cause.probability)})" for cause in causes])
         yield f"{_certainty(least)} {_COUNT.get(len(causes), 'several')} causes at once: {told}."
     yield _closing(found)
-    if found.gap.before < FAINT * found.gap.noise:
-        yield f"The gap is faint: the error is {found.gap.before / found.gap.noise:.2g} times the noise."
+    yield from _faint(found)
     for cause in causes:
         yield from _reservations(cause)
+
+
+def _faint(found: Diagnosis) -> Iterator[str]:
+    if found.gap.before < FAINT * found.gap.noise:
+        yield f"The gap is faint: the error is {found.gap.before / found.gap.noise:.2g} times the noise."
 
 
 _COUNT = {2: "two", 3: "three", 4: "four"}
@@ -193,11 +211,15 @@ def _unknown(found: Diagnosis) -> Iterator[str]:
 
 def _closed(gap: Closing) -> Iterator[str]:
     """How sure the share that closes is, or that nothing can be said of it."""
-    if gap.closed is None:
-        yield "The gap is too near to the noise to say which share of it closes."
-    elif gap.interval is not None:
+    yield from _too_near(gap)
+    if gap.closed is not None and gap.interval is not None:
         low, high = (percent(end).removesuffix(" %") for end in gap.interval)
         yield f"Closed: {percent(gap.closed)} of what noise leaves to close, 95 % interval {low} to {high} %."
+
+
+def _too_near(gap: Closing) -> Iterator[str]:
+    if gap.closed is None:
+        yield "The gap is too near to the noise to say which share of it closes."
 
 
 def _how(gap: Closing) -> Iterator[str]:

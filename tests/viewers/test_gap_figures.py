@@ -12,10 +12,10 @@ from chladni.gap.records.diagnosis import FittedNumber
 from chladni.signals.errors import EstimateError
 from chladni.viewers.figures.campaign import ReliabilityBin, calibration_figure, confusion_figure
 from chladni.viewers.figures.gap import gap_album
-from chladni.viewers.figures.gap_sheet import LETTERS, SENTENCES, gap_sheet
+from chladni.viewers.figures.gap_sheet import LETTERS, LIMIT_LETTERS, SENTENCES, gap_sheet
 from chladni.viewers.figures.rendering import rendered
 from chladni.viewers.gap_evidence import GapEvidence
-from chladni.viewers.gap_summary import summary
+from chladni.viewers.gap_summary import caveats, summary
 from chladni.viewers.restoring_force import POINTS, SIGNED, force_range, motion_name, signed_colours, spread_out
 from tests import made_diagnosis as made
 
@@ -220,9 +220,33 @@ def test_many_outputs_are_divided_over_figures() -> None:
 @pytest.mark.parametrize("kind", made.every_kind())
 def test_a_sheet_can_be_drawn_of_every_answer(kind: str) -> None:
     found = made.every_kind()[kind]
-    title = gap_sheet(gap_evidence(found)).get_suptitle()
-    assert title.replace("\n", " ") == " ".join(summary(found)[:SENTENCES])
+    sheet = gap_sheet(gap_evidence(found))
+    title, limits = sheet.get_suptitle(), sheet.get_supxlabel()
+    first = summary(found)[:SENTENCES]
+    assert title.replace("\n", " ") == " ".join([*first, *(one for one in caveats(found) if one not in first)])
     assert max(map(len, title.splitlines())) <= LETTERS
+    assert limits.replace("\n", " ") == " ".join(f"– {one}" for one in (*found.levels, *found.remarks))
+    assert max(map(len, limits.splitlines())) <= LIMIT_LETTERS
+
+
+def test_the_sheet_alone_does_not_look_like_success() -> None:
+    found = made.periodic()
+    short = "the log is short: 300 samples, 1000 or more tell more"
+    worse = replace(found.elsewhere[0], before=0.52, after=0.71)
+    sheet = gap_sheet(gap_evidence(replace(found, elsewhere=(worse,), remarks=(short, *found.remarks))))
+    title = sheet.get_suptitle().replace("\n", " ")
+    assert "the error goes from 52 % to 71 %, noise 1.0 %: what was found doesn't carry over." in title
+    limits = sheet.get_supxlabel()
+    for one in (short, *found.levels, *found.remarks):
+        assert one in limits.replace("\n", " ")
+    sheet.draw_without_rendering()
+    # Neither text runs over the edge or into a picture.
+    size, shown = sheet.bbox, {one.get_text(): one for one in sheet.texts}
+    above, below = (shown[text].get_window_extent() for text in (sheet.get_suptitle(), limits))
+    axes = [one.get_tightbbox() for one in sheet.axes]
+    assert size.y1 >= above.y1 > above.y0 >= max(one.y1 for one in axes)
+    assert min(one.y0 for one in axes) >= below.y1 > below.y0 >= size.y0
+    assert max(above.x1, below.x1) <= size.x1
 
 
 def test_a_diagnosis_without_signals_still_has_its_bars() -> None:

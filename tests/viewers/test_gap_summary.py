@@ -10,7 +10,7 @@ from chladni.viewers import effect_words
 from chladni.viewers import gap_tables as tables
 from chladni.viewers.effect_words import cause_law, cause_phrase, effect_at, effect_heading, effect_name
 from chladni.viewers.engineering import engineering, percent
-from chladni.viewers.gap_summary import headline, naive_sentence, summary
+from chladni.viewers.gap_summary import caveats, headline, naive_sentence, summary
 from tests import made_diagnosis as made
 
 
@@ -198,6 +198,33 @@ def test_another_log_is_told_with_its_own_numbers() -> None:
     told = summary(made.periodic())
     assert not any("carry over" in one for one in told)
     assert "On louder.mcap, which nothing was fitted to, the error goes from 28 % to 3.1 %, noise 1.0 %." in told
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        ("effect", ()),
+        ("group", ("These sensors can't tell elbow from shoulder.", "This log can't tell")),
+        ("periodic", ("On louder.mcap",)),
+        ("windows", ("Errors are those of windows",)),
+        ("unknown", ("Measure the wrist's rotation",)),
+        ("none", ()),
+    ],
+)
+def test_caveats_are_those_sentences_that_limit_the_answer(kind: str, told: tuple[str, ...]) -> None:
+    found = made.every_kind()[kind]
+    limiting = caveats(found)
+    assert len(limiting) == len(told)
+    assert all(one.startswith(begun) for one, begun in zip(limiting, told, strict=True))
+    assert set(limiting) <= set(summary(found)[1:])
+
+
+def test_a_gap_near_the_noise_is_a_caveat() -> None:
+    found = made.diagnosis()
+    near = replace(found, gap=replace(found.gap, noise=found.gap.before / 1.5, closed=None))
+    faint, unclear = caveats(near)
+    assert faint.startswith("The gap is faint")
+    assert unclear.startswith("The gap is too near to the noise")
 
 
 def test_a_cause_that_makes_another_log_worse_is_said_not_to_carry_over() -> None:

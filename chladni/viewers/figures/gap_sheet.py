@@ -18,11 +18,13 @@ from chladni.viewers.figures.rendering import rendered
 from chladni.viewers.figures.restoring_force import draw_surfaces
 from chladni.viewers.figures.sheet import WIDTH_IN, look, plain
 from chladni.viewers.gap_evidence import GapEvidence
-from chladni.viewers.gap_summary import summary
+from chladni.viewers.gap_summary import caveats, summary
 
-# Of the summary; the rest is in the report.
+# Of the summary, beside its caveats; the rest is in the report.
 SENTENCES, LETTERS = 2, 90
-LINE_IN = 0.16
+LINE_IN, SIZE = 0.16, 8.5
+# What limits the answer, below the pictures.
+LIMIT_LETTERS, LIMIT_LINE_IN, LIMIT_SIZE = 110, 0.13, 7.0
 Part = tuple[float, Callable[[Figure, SubplotSpec], None]]
 
 
@@ -30,11 +32,14 @@ def gap_sheet(evidence: GapEvidence) -> Figure:
     """Draw the answer as a title over the output that errs most, in time and frequency, the force and the sites."""
     with look():
         parts = _parts(evidence)
-        lines = [line for one in summary(evidence.found)[:SENTENCES] for line in _wrapped(one)]
+        lines = [line for one in _told(evidence.found) for line in _wrapped(one, LETTERS)]
+        limits = [line for one in _limits(evidence.found) for line in _wrapped(one, LIMIT_LETTERS)]
         heights = [height for height, _ in parts]
-        above = 0.2 + LINE_IN * len(lines)
-        figure = Figure(figsize=(WIDTH_IN * 1.25, sum(heights) + above), layout="constrained")
-        figure.suptitle("\n".join(map(plain, lines)), fontsize=8.5, x=0.02, ha="left")
+        texts = 0.2 + LINE_IN * len(lines) + LIMIT_LINE_IN * len(limits)
+        figure = Figure(figsize=(WIDTH_IN * 1.25, sum(heights) + texts), layout="constrained")
+        figure.suptitle("\n".join(map(plain, lines)), fontsize=SIZE, x=0.02, ha="left")
+        if limits:
+            figure.supxlabel("\n".join(map(plain, limits)), fontsize=LIMIT_SIZE, x=0.02, ha="left")
         grid = figure.add_gridspec(len(parts), 1, height_ratios=heights)
         for place, (_, draw) in enumerate(parts):
             draw(figure, grid[place])
@@ -55,11 +60,21 @@ def save_gap_sheet(evidence: GapEvidence, path: Path) -> Path:
     return path
 
 
-def _wrapped(sentence: str) -> list[str]:
+def _told(found: Diagnosis) -> list[str]:
+    """The answer, and all without which the sheet would look like more than was found."""
+    first = summary(found)[:SENTENCES]
+    return [*first, *(one for one in caveats(found) if one not in first)]
+
+
+def _limits(found: Diagnosis) -> list[str]:
+    return [f"– {one}" for one in (*found.levels, *found.remarks)]
+
+
+def _wrapped(sentence: str, letters: int) -> list[str]:
     """Lines that break at no space inside a quantity: before its sigma, its unit, or a percent sign."""
     tied = re.sub(r" ± ", "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}", sentence)
     tied = re.sub(r"(?<=\d) (?=[^\s\d(]{1,4}(?:[\s,.)]|$))", "\N{NO-BREAK SPACE}", tied)
-    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in textwrap.wrap(tied, LETTERS)]
+    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in textwrap.wrap(tied, letters)]
 
 
 def _parts(evidence: GapEvidence) -> list[Part]:
