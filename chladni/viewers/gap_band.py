@@ -28,7 +28,7 @@ def band_told(signals: GapSignals) -> str:
         return ""
     maps = _power(signals.gap_map), _power(signals.gap_map_after)
     most = max(float(power[above].sum()) for power in maps) / float(maps[0].sum())
-    return f"{lines[0]:.3g} to {high_hz:.3g} of {lines[-1]:.4g} Hz, above at most {percent(most)} of the gap before"
+    return f"{lines[0]:.3g} to {high_hz:.3g} of {lines[-1]:.4g} Hz, {percent(most)} of the gap above"
 
 
 def _power(density: Floats) -> Floats:

@@ -38,7 +38,7 @@ def test_noise_far_below_the_gap_does_not_widen_the_band_and_its_share_is_said()
     noisy = maps(at(10, power=1e4) + 1.0, np.ones_like(LINES_HZ))
     assert shown_hz(noisy) < 20
     # Above 13 Hz 87 lines of 1, of 10101 in all.
-    assert band_told(noisy) == "0 to 13 of 100 Hz, above at most 0.86 % of the gap before"
+    assert band_told(noisy) == "0 to 13 of 100 Hz, 0.86 % of the gap above"
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from chladni.viewers.figures.campaign import ReliabilityBin, calibration_figure,
 from chladni.viewers.figures.gap import gap_album
 from chladni.viewers.figures.gap_sheet import LETTERS, LIMIT_LETTERS, SENTENCES, gap_sheet
 from chladni.viewers.figures.rendering import rendered
+from chladni.viewers.gap_band import band_told, shown_hz
 from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.gap_summary import caveats, summary
 from chladni.viewers.restoring_force import POINTS, SIGNED, force_range, motion_name, signed_colours, spread_out
@@ -85,6 +86,9 @@ def test_noise_has_its_own_spectrum() -> None:
 def test_both_maps_have_one_scale_of_colours(figures: dict[str, Figure]) -> None:
     before, after = (axes.images[0] for axes in figures["gap map"].axes[:2])
     assert before.get_clim() == after.get_clim()
+    top = figures["gap map"].axes[0]
+    assert top.get_ylim() == (0, shown_hz(made.signals()))
+    assert top.get_title(loc="left") == f"Gap before · {band_told(made.signals())}"
     assert before.get_array().max() == pytest.approx(10 * np.log10(made.signals().gap_map.max()))
 
 

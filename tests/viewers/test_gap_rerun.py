@@ -65,7 +65,7 @@ def test_errors_are_what_is_left(arm: Contents) -> None:
         np.testing.assert_array_equal(arm.scalars(f"/errors/2/{place}")[:, 0], signals.measured[1] - simulated[1])
 
 
-@pytest.mark.parametrize("entity", ["/signals/1/0", "/errors/1/1", "/restoring_force/time/recovered"])
+@pytest.mark.parametrize("entity", ["/signals/1/0", "/errors/1/1", "/restoring_force/time/0"])
 def test_vibration_does_not_look_like_silence_when_zoomed_out(arm: Contents, entity: str) -> None:
     policy = arm.static(entity)["SeriesLines:aggregation_policy"]
     assert policy == [rr.components.AggregationPolicy.MinMax.value]
@@ -86,7 +86,7 @@ def test_the_surface_has_a_dot_for_each_sample_and_the_law_over_it(arm: Contents
     # Both stand at the same velocities, up and down by the noise.
     np.testing.assert_array_equal(np.array(force)[:, 0], np.array(law)[:, 0])
     np.testing.assert_allclose(
-        arm.scalars("/restoring_force/time/law")[:, 0], made.restoring_force().law_force, rtol=1e-12
+        arm.scalars("/restoring_force/time/1")[:, 0], made.restoring_force().law_force, rtol=1e-12
     )
 
 
@@ -119,7 +119,8 @@ def test_wild_ends_of_a_record_do_not_flatten_the_force_over_time(wild: Contents
     (name,) = (name for name in wild.view_names() if name.startswith("Force lacking at elbow [N]"))
     (low, high), *_ = (row["ScalarAxis:range"][0] for row in wild.blueprint if row.get("ScalarAxis:range"))
     assert (low, high) == pytest.approx(force_range(made.restoring_force()), rel=0.1)
-    most = np.abs(wild.scalars("/restoring_force/time/recovered")).max()
+    assert name.startswith(f"Force lacking at elbow [N], ±{engineering(high, None, 'N')} ")
+    most = np.abs(wild.scalars("/restoring_force/time/0")).max()
     assert name.endswith(f" · reaches {engineering(most, None, 'N')}, beyond the axis")
 
 
@@ -144,6 +145,12 @@ def test_names_of_both_axes_stand_within_the_view(arm: Contents) -> None:
             assert top < y < bottom
 
 
+def test_the_law_over_time_is_drawn_in_front_of_the_force(arm: Contents) -> None:
+    # The viewer draws lines in the order of their paths.
+    paths = sorted(entity for entity in arm.entities() if entity.startswith("/restoring_force/time/"))
+    assert [arm.static(path)["SeriesLines:names"] for path in paths] == [["recovered"], ["law"]]
+
+
 def test_parts_of_the_structure_are_named_with_their_shares_and_coloured(arm: Contents) -> None:
     joints = arm.static("/structure/joints")
     assert joints["LineStrips3D:labels"] == ["shoulder 31 %", "elbow 93 %"]
@@ -163,8 +170,9 @@ def test_the_answer_is_inert_markdown(tmp_path: Path) -> None:
 
 def test_the_arrangement_has_a_page_of_each_kind(arm: Contents) -> None:
     names = arm.view_names()
-    for name in ("Answer", "acc_wrist [m/s²]", "Force lacking at elbow [N]"):
+    for name in ("Answer", "acc_wrist [m/s²]", "acc_column [m/s²]"):
         assert name in names
+    assert any(name.startswith("Force lacking at elbow [N], ±") for name in names)
     assert any(name.startswith("Gap before [dB re 1/Hz]") for name in names)
     assert any(name.startswith("What each part alone can explain") for name in names)
 

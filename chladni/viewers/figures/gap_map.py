@@ -34,11 +34,12 @@ def _figure(signals: GapSignals) -> Figure:
     known = np.concatenate([level[np.isfinite(level)] for level in levels])
     high = float(known.max()) if known.size else 0.0
     image = None
-    for axes, level, title in zip(stack, levels, ("Gap before", "Gap after"), strict=True):
+    # In one title: two on the same line would run into each other.
+    before = " · ".join(filter(None, ("Gap before", band_told(signals))))
+    for axes, level, title in zip(stack, levels, (before, "Gap after"), strict=True):
         image = _draw(axes, signals, level, high)
         axes.set_title(title, loc="left", pad=2)
         axes.set_ylabel("Frequency [Hz]")
-    stack[0].set_title(band_told(signals), loc="right", pad=2)
     stack[-1].set_ylim(0, shown_hz(signals))
     stack[-1].set_xlabel("Time [s]")
     if image is not None:

@@ -66,7 +66,7 @@ def draw_gap(recording: rr.RecordingStream, evidence: GapEvidence, sketch: Struc
     if surface is not None and surface.force.size:
         shown = rrb.Horizontal(*draw_surfaces(recording, surface))
         over_time = draw_force_over_time(recording, surface)
-        pages.append(rrb.Vertical(shown, over_time, row_shares=[2, 1], name="Restoring force"))
+        pages.append(rrb.Vertical(shown, over_time, row_shares=[3, 2], name="Restoring force"))
     if sketch is not None:
         pages.append(rrb.Horizontal(draw_structure(recording, sketch), name="Structure"))
     # The blueprint goes last: rerun 0.41 has lost rows that followed one in a file (rerun issue 12769).

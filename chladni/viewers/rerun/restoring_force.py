@@ -80,26 +80,27 @@ def _padded(x: Floats) -> tuple[float, float]:
 
 def draw_force_over_time(recording: rr.RecordingStream, surface: RestoringForce) -> rrb.View:
     """Write the recovered force and the law's over time and give their view."""
-    _line(recording, surface.time_s, surface.force, "recovered", MEASURED_ON_DARK)
+    # Numbered: the viewer draws lines in the order of their paths, and the law belongs in front.
+    _line(recording, f"{PATH}/time/0", surface.time_s, surface.force, "recovered", MEASURED_ON_DARK)
     if surface.law_force is not None:
-        _line(recording, surface.time_s, surface.law_force, "law", AFTER_ON_DARK)
-    reach, furthest = force_range(surface)[1], float(np.abs(surface.force).max())
+        _line(recording, f"{PATH}/time/1", surface.time_s, surface.law_force, "law", AFTER_ON_DARK)
+    unit, furthest, reach = surface.force_unit, float(np.abs(surface.force).max()), force_range(surface)[1]
     # A recovered force swings wildly at the ends of a record, which would make a flat line of all between them.
-    beyond = (
-        f" · reaches {engineering(furthest, None, surface.force_unit)}, beyond the axis" if furthest > reach else ""
-    )
+    beyond = f" · reaches {engineering(furthest, None, unit)}, beyond the axis" if furthest > reach else ""
     start_ns, end_ns = (round(float(end) * NS_PER_S) for end in surface.time_s[[0, -1]])
     return rrb.TimeSeriesView(
         origin=f"{PATH}/time",
-        name=f"Force lacking at {surface.site} [{printed_unit(surface.force_unit)}]{beyond}",
+        # The viewer labels powers of ten alone where there is little room.
+        name=f"Force lacking at {surface.site} [{printed_unit(unit)}], ±{engineering(reach, None, unit)}{beyond}",
         axis_x=time_axis(end_ns, start_ns=start_ns),
         axis_y=rrb.ScalarAxis(range=force_range(surface)),
         plot_legend=rrb.PlotLegend(visible=True, corner=rrb.Corner2D.LeftTop),
     )
 
 
-def _line(recording: rr.RecordingStream, time_s: Floats, values: Floats, name: str, colour: Colour) -> None:
-    path = f"{PATH}/time/{name}"
+def _line(
+    recording: rr.RecordingStream, path: str, time_s: Floats, values: Floats, name: str, colour: Colour
+) -> None:
     # The default averages neighbours when zoomed out, which makes a vibration look like silence.
     look = rr.SeriesLines(names=name, colors=[colour], widths=1.2, aggregation_policy="MinMax")
     recording.log(path, look, static=True)
