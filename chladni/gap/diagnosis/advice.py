@@ -1,10 +1,13 @@
 """What to do after a diagnosis: what to check, to put right, to measure."""
 
-from chladni.gap.comparison.scale_doubt import scale_doubt
+from collections.abc import Iterator
+
+from chladni.gap.comparison.scale_doubt import gain_doubt, mass_doubt, scale_doubt
 from chladni.gap.design.next_measurement import next_measurement
 from chladni.gap.design.what_is_missing import what_is_missing
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.study import Study
+from chladni.gap.plant.driven_part import driven_parts
 from chladni.signals.errors import ModelError
 
 #: Nats within which a further measurement is worth a thought.
@@ -15,13 +18,35 @@ _MOSTLY = 0.25
 
 def advice_on(study: Study, causes: Causes) -> str | None:
     """What to do next; a scale that can't be right comes before all else."""
-    measurement = study.measurement
+    scale = _doubted_scale(study)
+    doubts = _doubted_values(study, causes) if scale is None else [scale]
+    return " ".join(filter(None, (*doubts, _on_causes(study, causes)))) or None
+
+
+def _doubted_scale(study: Study) -> str | None:
+    """Doubt of what the inputs do in the model: the starts that suit a log of another scale would hide it."""
+    run, measurement = study.contest.run, study.measurement
     try:
-        # From rest: the initial states that suit a log of another scale would hide it.
-        doubt = scale_doubt(measurement.outputs, study.contest.run.outputs(), measurement.output_names)
+        if study.windows is None:
+            measured, simulated = measurement.outputs, run.outputs()
+        else:
+            measured, simulated = driven_parts(run)
     except ModelError:
-        doubt = None
-    return " ".join(filter(None, (doubt, _on_causes(study, causes)))) or None
+        return None
+    return scale_doubt(measured, simulated, measurement.output_names)
+
+
+def _doubted_values(study: Study, causes: Causes) -> Iterator[str | None]:
+    """Doubts of what was fitted: effects that are too large for their name."""
+    if causes.verdict != "effect":
+        return
+    for effect in causes.best.fit.effects:
+        if effect.effect == "gain_error":
+            yield gain_doubt(effect.site, effect.values["gain"])
+        if effect.effect == "added_mass":
+            numbers = [study.model.parameters.get(f"{effect.site}.{word}") for word in ("mass", "inertia")]
+            for modelled in filter(None, numbers):
+                yield mass_doubt(effect.site, effect.values["mass"], modelled.value, modelled.unit)
 
 
 def measure_next(study: Study, causes: Causes, seed: int) -> str | None:

@@ -1,12 +1,17 @@
 """Wrong units are doubted before anything else is believed."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from chladni.gap.comparison.scale_doubt import scale_doubt
+import chladni
+from chladni.apps.diagnose import diagnose_gap
+from chladni.gap.comparison.scale_doubt import gain_doubt, mass_doubt, scale_doubt
 from chladni.gap.diagnosis.diagnose import diagnose
+from chladni.models.effects.catalogue import CATALOGUE
 from tests.gap.arm import arm, measured
 
 RNG = np.random.default_rng(0)
@@ -32,6 +37,35 @@ def test_what_stands_still_is_told_elsewhere() -> None:
     assert scale_doubt(SIGNALS, SIGNALS * 0.0, ["a", "b"]) is None
 
 
+@pytest.mark.parametrize(("factor", "words"), [(700.0, "mm for m"), (1 / 1500, "mm for m"), (1e6, "um for m")])
+def test_what_is_about_a_prefix_is_told_as_one(factor: float, words: str) -> None:
+    found = scale_doubt(SIGNALS, factor * SIGNALS, ["a", "b"])
+    assert found is not None
+    assert f"; about the factor of a prefix such as {words}" in found
+
+
+@pytest.mark.parametrize("gain", [1.0, 0.5, -1.0, 9.0, 11.0, 0.0, 29.0])
+def test_a_sensitivity_may_be_off(gain: float) -> None:
+    assert gain_doubt("tip", gain) is None
+
+
+@pytest.mark.parametrize(
+    ("gain", "words"),
+    [(9.80665, "between g and m/s^2"), (np.pi / 180, "between degrees and rad"), (-1e-3, "mm for m"),
+     (7.1e-4, "rather that of a wrong unit"), (40.0, "rather that of a wrong unit")],
+)  # fmt: skip
+def test_a_gain_that_only_a_unit_has_is_doubted(gain: float, words: str) -> None:
+    found = gain_doubt("tip", gain)
+    assert found is not None
+    assert words in found
+    assert "at tip" in found
+
+
+def test_an_added_mass_is_doubted_where_it_is_many_times_the_body_s() -> None:
+    assert mass_doubt("carriage", 50.0, 2.0, "kg") is None
+    assert "1100 times the 0.095 kg" in str(mass_doubt("carriage", 101.0, 0.095, "kg"))
+
+
 @pytest.mark.slow
 def test_a_log_in_millimetres_is_told_in_the_advice() -> None:
     log = measured()
@@ -39,3 +73,37 @@ def test_a_log_in_millimetres_is_told_in_the_advice() -> None:
     assert found.advice is not None
     assert found.advice.startswith("At acc_")
     assert "times what was measured: check its channel and unit" in found.advice
+
+
+def emps(tmp_path: Path, shared_data: Path, *, mass: str = "95.0", scale: Sequence[float] = (1.0, 1.0)) -> str:
+    """Advice on six seconds of a free axis, whose position and force are read in other units."""
+    text = (shared_data / "models" / "emps.toml").read_text(encoding="utf-8")
+    model = tmp_path / "axis.toml"
+    model.write_text(text.replace("mass = 95.0", f"mass = {mass}"), encoding="utf-8")
+    with chladni.open_log(shared_data / "emps.mcap") as log:
+        series = log.read(["/axis.position[0]", "/axis.effort[0]"], end_s=6.0)
+    scaled = replace(series, values=series.values * np.array(scale)[:, None])
+    # What is told rests on no search for a second cause.
+    return diagnose_gap(model, scaled, leave_out=sorted(CATALOGUE.keys() - {"gain_error", "added_mass"})).advice or ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scale", "times"), [((1e3, 1.0), "0.0014"), ((1.0, 1e3), "1400"), ((1.0, 1e-3), "0.0014")])
+def test_a_free_axis_in_another_unit_is_told_first(
+    tmp_path: Path, shared_data: Path, scale: tuple[float, float], times: str
+) -> None:
+    found = emps(tmp_path, shared_data, scale=scale)
+    assert found.startswith(f"At position the model as it is gives {times}")
+
+
+@pytest.mark.slow
+def test_a_free_axis_in_its_own_units_is_not_doubted(tmp_path: Path, shared_data: Path) -> None:
+    found = emps(tmp_path, shared_data)
+    assert "unit" not in found
+
+
+@pytest.mark.slow
+def test_a_mass_a_thousand_times_too_small_is_told(tmp_path: Path, shared_data: Path) -> None:
+    found = emps(tmp_path, shared_data, mass="0.095")
+    assert found.startswith("What is added at carriage is ")
+    assert "the 0.095 kg that the model has there: check that number and its unit" in found
