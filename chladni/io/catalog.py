@@ -250,5 +250,7 @@ def with_setup(source: ChannelSource, setup: ChannelSetup | None) -> ChannelSour
         direction=setup.direction or channel.direction,
         role=setup.role or channel.role,
         overload=overload,
+        # What is stated for this very channel goes before what its type is documented to hold.
+        units_possible=() if setup.unit or setup.sensitivity else channel.units_possible,
     )
     return replace(source, channel=refined, factor=factor)

@@ -37,6 +37,13 @@ _ROS_RULES: tuple[tuple[str, str, str], ...] = (
     (r"sensor_msgs/BatteryState", r"current", "A"),
 )
 
+# A joint turns or slides: which of the two the log doesn't say, but nothing else is possible.
+_OPEN_UNITS: Mapping[tuple[str, str], tuple[str, ...]] = {
+    ("sensor_msgs/JointState", "position"): ("m", "rad"),
+    ("sensor_msgs/JointState", "velocity"): ("m/s", "rad/s"),
+    ("sensor_msgs/JointState", "effort"): ("N", "N m"),
+}
+
 _PX4_UNITS: Mapping[str, Mapping[str, str]] = {
     "VehicleAcceleration": {"xyz": _ACCELERATION},
     "VehicleAngularVelocity": {"xyz": _ANGULAR_VELOCITY, "xyz_derivative": _ANGULAR_ACCELERATION},
@@ -105,6 +112,17 @@ def known_unit(schema_name: str, leaf: str) -> str | None:
         if re.fullmatch(type_pattern, kind) and re.search(f"{path_pattern}$", leaf):
             return unit
     return None
+
+
+def possible_units(schema_name: str, leaf: str) -> tuple[str, ...]:
+    """Units among which the documentation of a well-known message type leaves a leaf's open; empty for all others.
+
+    Examples
+    --------
+    >>> possible_units("sensor_msgs/msg/JointState", "velocity")
+    ('m/s', 'rad/s')
+    """
+    return _OPEN_UNITS.get((message_type(schema_name), leaf), ())
 
 
 def has_signals(schema_name: str) -> bool:

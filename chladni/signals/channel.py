@@ -38,6 +38,9 @@ class Channel:
         ``reference`` for an excitation, ``response`` otherwise.
     overload
         Largest magnitude, in `unit`, that the sensor can tell; None when unknown.
+    units_possible
+        SI units that the message's type leaves open while `unit` is ``1``, such as ``m`` and ``rad`` of a joint's
+        position; empty when anything is possible.
     """
 
     name: str
@@ -46,6 +49,7 @@ class Channel:
     direction: Vector | None = None
     role: Role = "response"
     overload: float | None = None
+    units_possible: tuple[str, ...] = ()
 
     def with_name(self, name: str) -> Self:
         """Give the same channel under another name."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chladni.io.decoding import FieldInfo
-from chladni.io.known_schemas import has_signals, is_signal, known_unit, likely_role, message_type
+from chladni.io.known_schemas import has_signals, is_signal, known_unit, likely_role, message_type, possible_units
 
 
 @pytest.mark.parametrize(
@@ -38,6 +38,20 @@ from chladni.io.known_schemas import has_signals, is_signal, known_unit, likely_
 )
 def test_units(schema: str, leaf: str, unit: str | None) -> None:
     assert known_unit(schema, leaf) == unit
+
+
+@pytest.mark.parametrize(
+    ("schema", "leaf", "units"),
+    [
+        ("sensor_msgs/msg/JointState", "position", ("m", "rad")),
+        ("sensor_msgs/JointState", "velocity", ("m/s", "rad/s")),
+        ("sensor_msgs::msg::dds_::JointState_", "effort", ("N", "N m")),
+        ("my_msgs/msg/JointState", "position", ()),
+        ("std_msgs/msg/Float64", "data", ()),
+    ],
+)
+def test_units_that_a_type_leaves_open(schema: str, leaf: str, units: tuple[str, ...]) -> None:
+    assert possible_units(schema, leaf) == units
 
 
 def field(path: str, kind: str = "number", dtype: str = "f8", array: object = None) -> FieldInfo:

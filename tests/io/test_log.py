@@ -542,6 +542,12 @@ def test_joints_by_index_and_by_name(tmp_path: Path) -> None:
         series = log.read(["/joints.position[elbow]", "/joints.position[0]"])
         np.testing.assert_array_equal(series.values, position[::-1])
         assert [channel.name for channel in series.channels] == ["/joints.position[elbow]", "/joints.position[0]"]
+        assert {channel.units_possible for channel in series.channels} == {("m", "rad")}
+    stated = tmp_path / "setup.toml"
+    stated.write_text('format = "chladni.setup/1"\nchannel = [{ path = "/joints.position[0]", unit = "mm" }]\n')
+    with open_log(tmp_path / "a.mcap", setup=stated) as log:
+        told = [(channel.unit, channel.units_possible) for channel in log.channels]
+        assert told == [("m", ()), ("1", ("m", "rad"))]
 
 
 def test_joints_of_two_publishers_on_one_topic(tmp_path: Path) -> None:

@@ -246,6 +246,7 @@ def _factor(terminal: Terminal, channel: Channel, where: str, kind: str) -> floa
     """Give what turns a channel into the terminal's unit; `ModelError` when they don't fit."""
     # A channel without unit is a log that doesn't say; the model does.
     if channel.unit == "1":
+        _require_possible(terminal, channel, where, kind)
         return 1.0
     try:
         factor, si_unit = si_factor(channel.unit)
@@ -257,6 +258,18 @@ def _factor(terminal: Terminal, channel: Channel, where: str, kind: str) -> floa
         f"{where}channel {channel.name!r} is in {channel.unit}, {kind} {terminal.name!r} of the model in "
         f"{terminal.unit}; connect another channel, or state the channel's true unit in the setup"
     )
+
+
+def _require_possible(terminal: Terminal, channel: Channel, where: str, kind: str) -> None:
+    """Refuse a channel that by its message's type holds another quantity than the terminal's."""
+    wanted = si_factor(terminal.unit)[1]
+    # A signal without unit, as of a block scheme, may be anything.
+    if channel.units_possible and wanted not in (*channel.units_possible, "1"):
+        raise ModelError(
+            f"{where}channel {channel.name!r} is in {' or '.join(channel.units_possible)} by its message's type, "
+            f"{kind} {terminal.name!r} of the model in {terminal.unit}; correct what the {kind} is in the model, "
+            "connect another channel, or state the channel's true unit in the setup"
+        )
 
 
 def _undriven(inputs: Sequence[_Match]) -> tuple[str, ...]:

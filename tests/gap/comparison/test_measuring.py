@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -107,6 +108,24 @@ def test_units_that_do_not_fit_name_both_sides(tmp_path: Path, channel: str, ter
     with pytest.raises(ModelError, match="in rad/s") as error:
         measurement_of(model_of(tmp_path), recording({**WHOLE, channel: "rad/s"}), log="log.mcap")
     for part in ("log.mcap", channel, terminal, wanted):
+        assert part in str(error.value)
+
+
+@pytest.mark.parametrize(("measures", "fits"), [("acceleration", False), ("velocity", False), ("displacement", True)])
+def test_a_type_s_quantity_must_be_the_terminal_s_while_the_log_gives_no_unit(
+    tmp_path: Path, measures: str, fits: bool
+) -> None:
+    model = model_of(tmp_path, LOOP.split("[[controller]]")[0].replace("displacement", measures))
+    series = recording({"/axis.effort": "1", "/axis.position": "1"})
+    open_units = (("N", "N m"), ("m", "rad"))
+    channels = (replace(one, units_possible=of) for one, of in zip(series.channels, open_units, strict=True))
+    series = replace(series, channels=tuple(channels))
+    if fits:
+        assert measurement_of(model, series, log="log.mcap")[1] == ()
+        return
+    with pytest.raises(ModelError, match="is in m or rad by its message's type") as error:
+        measurement_of(model, series, log="log.mcap")
+    for part in ("log.mcap: channel '/axis.position'", "output 'position' of the model in m/s", "setup"):
         assert part in str(error.value)
 
 
