@@ -20,7 +20,7 @@ from chladni.models.effects.effect_kind import EffectKind
 from chladni.models.effects.wording import nearest
 from chladni.models.files.model_file import load_model
 from chladni.signals.errors import LogError, SetupError
-from chladni.signals.time_series import TimeSeries
+from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 StepProgress = Callable[[str, float], None]
 Recording = Log | TimeSeries | Path | str
@@ -160,7 +160,10 @@ def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
             f"{some_of(held, count=NAMES_TOLD)}, the model listens to {some_of(sorted(wanted), count=NAMES_TOLD)}"
         )
     series = log.read(chosen, start_s=span.start_s, end_s=span.end_s)
-    return _with_use(matched_log(model, series, log=name, held=held), series, damage_sentences(log.damage))
+    damage = damage_sentences(log.damage)
+    begins_s = (series.start_time_ns - log.start_time_ns) / NS_PER_S
+    found = matched_log(model, series, log=name, held=held, begins_s=begins_s, damage=damage)
+    return _with_use(found, series, damage)
 
 
 def _of_series(model: Model, series: TimeSeries, name: str) -> _Read:
@@ -175,8 +178,9 @@ def _with_use(found: MatchedLog, series: TimeSeries, damage: tuple[str, ...] = (
         recorded_s=series.samples / series.sample_rate_hz,
         sample_rate_hz=series.sample_rate_hz,
         losses=losses,
+        warnings=found.warnings,
     )
-    return _Read(measurement=seen, use=use, remarks=(*losses, *found.remarks))
+    return _Read(measurement=seen, use=use, remarks=(*found.warnings, *losses, *found.remarks))
 
 
 def _listened_to(model: Model) -> set[str]:

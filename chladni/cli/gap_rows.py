@@ -25,6 +25,10 @@ def print_diagnosis(out: Output, found: "Diagnosis") -> None:
     from chladni.viewers import gap_tables as tables
     from chladni.viewers.gap_summary import naive_sentence, summary
 
+    # What makes an answer mean little is read before it, or not at all.
+    warnings = [warning for one in found.used for warning in one.warnings]
+    for warning in warnings:
+        out.line(f"Warning: {warning}", style="yellow")
     first, *rest = summary(found)
     out.line(first, style="bold")
     for sentence in rest:
@@ -47,7 +51,7 @@ def print_diagnosis(out: Output, found: "Diagnosis") -> None:
     if found.next_measurement is not None:
         out.line("Measure next", style="bold")
         out.line(found.next_measurement)
-    told = {loss for one in found.used for loss in one.losses}
+    told = {*warnings, *(loss for one in found.used for loss in one.losses)}
     out.lines((*found.levels, *(remark for remark in found.remarks if remark not in told)))
 
 

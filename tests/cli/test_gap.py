@@ -120,6 +120,33 @@ def test_what_was_lost_of_a_log_stands_right_below_the_answer(
     assert "was held." in shown[len(answer) :]
 
 
+def test_a_model_without_input_is_told_before_the_answer(
+    run: Run, engine: StandIn, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    text = files[0].read_text(encoding="utf-8")
+    undriven = tmp_path / "undriven.toml"
+    undriven.write_text(text[: text.index("[[input]]")] + text[text.index("[[output]]") :], encoding="utf-8")
+    first, rest = run("gap", undriven, files[1]).out.split("\n", 1)
+    assert first.startswith("Warning: model 'arm' has no [[input]]: in it only what starts in motion moves")
+    assert "has no [[input]]" not in rest
+
+
+def test_a_log_with_a_hole_is_refused_with_the_part_that_is_whole(
+    run: Run, engine: StandIn, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    series = made.log_series()
+    values = series.values.copy()
+    values[:, 2 * values.shape[1] // 5 : 3 * values.shape[1] // 5] = np.nan
+    holed = tmp_path / "holed.mcap"
+    write_mcap(replace(series, values=values), holed)
+    refused = run("gap", files[0], holed, "--start", 0.5)
+    assert refused.code == 2
+    # What it says to do is what works.
+    options = refused.err.partition("(--start")[2].partition(")")[0].split()
+    found = run("gap", files[0], holed, "--start", *options)
+    assert "Used: 3.2 s of holed.mcap" in found.out
+
+
 def test_no_option_replaces_the_model_or_the_log(
     run: Run, engine: StandIn, files: tuple[Path, Path], tmp_path: Path
 ) -> None:

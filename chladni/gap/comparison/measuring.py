@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.comparison.whole_stretch import Read, good_samples, whole_stretch
 from chladni.gap.records.measurement import Measurement
 from chladni.io.log_info import some_of
 from chladni.models.core.compiled_model import CompiledModel
@@ -18,15 +19,10 @@ from chladni.signals.units import si_factor
 from chladni.signals.wording import counted
 
 Matrix = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
-# With fewer samples nothing can be told apart from noise at all.
-FEWEST_SAMPLES = 32
 # Below these an answer is possible, but poor.
 FEW_SAMPLES = 200
 FEW_CYCLES = 5.0
-# A stretch without gaps stands for the log when it is at least this share of it.
-LEAST_SHARE = 0.5
 # A channel with this share of its samples missing is no measurement: it's left out rather than the log refused.
 MOSTLY_MISSING = 0.5
 # Sampled more slowly than this many times a cycle, a mode can't be followed between the samples.
@@ -58,13 +54,17 @@ class MatchedLog:
     measurement
         SI, without a missing sample: the longest stretch in which all channels are there, if it is at least half of
         the log.
+    warnings
+        Sentences that come before any answer, which means little with them: nothing drives the model, the log is
+        very short.
     losses
-        Sentences on what an answer can't be read without: gaps that cost a part of the log, inputs that never move.
+        Sentences on what an answer can't be read without: gaps that cost a part of the log.
     remarks
-        Sentences on what else limits an answer: outputs that the log doesn't hold, a short log, a low rate.
+        Sentences on what else limits an answer: outputs that the log doesn't hold, few cycles, a low rate.
     """
 
     measurement: Measurement
+    warnings: tuple[str, ...]
     losses: tuple[str, ...]
     remarks: tuple[str, ...]
 
@@ -72,12 +72,20 @@ class MatchedLog:
 def measurement_of(
     model: Model, recording: TimeSeries, *, log: str, held: Sequence[str] | None = None
 ) -> tuple[Measurement, tuple[str, ...]]:
-    """Give the measurement of `matched_log`, and all that is said of it: losses first, then remarks."""
+    """Give the measurement of `matched_log`, and all that is said of it: warnings first, then losses."""
     found = matched_log(model, recording, log=log, held=held)
-    return found.measurement, (*found.losses, *found.remarks)
+    return found.measurement, (*found.warnings, *found.losses, *found.remarks)
 
 
-def matched_log(model: Model, recording: TimeSeries, *, log: str, held: Sequence[str] | None = None) -> MatchedLog:
+def matched_log(
+    model: Model,
+    recording: TimeSeries,
+    *,
+    log: str,
+    held: Sequence[str] | None = None,
+    begins_s: float = 0.0,
+    damage: Sequence[str] = (),
+) -> MatchedLog:
     """Match the channels of a log to the inputs and outputs of a model.
 
     A terminal of the model listens to the channel that it names, else to the channel that has its own name. The
@@ -94,6 +102,8 @@ def matched_log(model: Model, recording: TimeSeries, *, log: str, held: Sequence
         Name of the log, for messages.
     held
         Names of all channels that the log holds, for messages; those of the recording if not given.
+    begins_s, damage
+        Where in the log the recording begins, and what of the file couldn't be read, for messages.
 
     Returns
     -------
@@ -113,11 +123,12 @@ def matched_log(model: Model, recording: TimeSeries, *, log: str, held: Sequence
     told = some_of([one.name for one in recording.channels] if held is None else held, count=NAMES_TOLD)
     inputs = [_matched(terminal, recording) for terminal in compiled.inputs]
     _require_inputs(inputs, model.name, log, held=told)
-    outputs, remarks = _usable_outputs(compiled, recording, log)
+    driving = [match.row for match in inputs if match.row is not None]
+    outputs, remarks = _usable_outputs(compiled, recording, log, driving)
     _require_outputs(outputs, remarks, model.name, log, held=told)
-    rows = [match.row for match in inputs if match.row is not None]
-    rows += [match.row for match in outputs if match.row is not None]
-    stretch, gaps = _whole_stretch(recording, rows, log)
+    rows = [*driving, *(match.row for match in outputs if match.row is not None)]
+    read = Read(log=log, begins_s=begins_s, damage=damage)
+    stretch, gaps = whole_stretch(recording, rows, driving, read)
     measurement = Measurement(
         log=log,
         sample_rate_hz=recording.sample_rate_hz,
@@ -129,7 +140,8 @@ def matched_log(model: Model, recording: TimeSeries, *, log: str, held: Sequence
     )
     return MatchedLog(
         measurement=measurement,
-        losses=(*gaps, *_at_rest(inputs, measurement, recording)),
+        warnings=(*_at_rest(inputs, model.name, measurement, recording), *_very_short(measurement)),
+        losses=gaps,
         remarks=(*remarks, *_undriven(inputs), *_limits(compiled, measurement)),
     )
 
@@ -156,13 +168,15 @@ def _require_inputs(inputs: Sequence[_Match], model: str, log: str, *, held: str
         )
 
 
-def _usable_outputs(compiled: CompiledModel, recording: TimeSeries, log: str) -> tuple[list[_Match], tuple[str, ...]]:
+def _usable_outputs(
+    compiled: CompiledModel, recording: TimeSeries, log: str, driving: Sequence[int]
+) -> tuple[list[_Match], tuple[str, ...]]:
     """Give outputs that were measured, and sentences on the others."""
     used: list[_Match] = []
     remarks: list[str] = []
     for terminal in compiled.outputs:
         match = _matched(terminal, recording)
-        reason = _why_unusable(match, recording, log)
+        reason = _why_unusable(match, recording, log, driving)
         if reason is None:
             used.append(match)
         else:
@@ -179,11 +193,18 @@ def _require_outputs(used: Sequence[_Match], left_out: Sequence[str], model: str
         )
 
 
-def _why_unusable(match: _Match, recording: TimeSeries, log: str) -> str | None:
+def _why_unusable(match: _Match, recording: TimeSeries, log: str, driving: Sequence[int]) -> str | None:
     if match.row is None:
         return f"{log} holds no channel {match.wanted!r}"
     # Judged alone: one dead sensor shouldn't cost the samples of all others.
-    good = _good(recording, [match.row])
+    good = good_samples(recording, [match.row])
+    apart = [row for row in driving if not np.any(good & good_samples(recording, [row]))]
+    if good.any() and apart:
+        return (
+            f"channel {match.wanted!r} has samples {_span(recording, match.row)} only, input channel "
+            f"{recording.channels[apart[0]].name!r} {_span(recording, apart[0])}: at no time both; take stamps of "
+            "one clock (--stamp log), or record both together"
+        )
     if np.mean(good) < MOSTLY_MISSING:
         return f"channel {match.wanted!r} misses {np.mean(~good):.0%} of its samples"
     values = recording.values[match.row][good]
@@ -192,45 +213,13 @@ def _why_unusable(match: _Match, recording: TimeSeries, log: str) -> str | None:
     return None
 
 
-def _good(recording: TimeSeries, rows: Sequence[int]) -> Mask:
-    """Samples that every one of these rows has."""
-    chosen = list(rows)
-    good = np.isfinite(recording.values[chosen]).all(axis=0)
-    if recording.valid is not None:
-        good &= recording.valid[chosen].all(axis=0)
-    return np.asarray(good)
-
-
-def _whole_stretch(recording: TimeSeries, rows: Sequence[int], log: str) -> tuple[slice, tuple[str, ...]]:
-    """Give the longest stretch without a missing sample, and a sentence when it isn't all of the log."""
-    good = _good(recording, rows)
-    # Stretches begin where good samples do, and end where they end.
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
-    firsts, lasts = edges[::2], edges[1::2]
-    longest = int(np.argmax(lasts - firsts)) if firsts.size else 0
-    first, last = (int(firsts[longest]), int(lasts[longest])) if firsts.size else (0, 0)
-    rate_hz, samples = recording.sample_rate_hz, good.size
-    if samples < FEWEST_SAMPLES:
-        raise LogError(
-            f"{log}: {samples / rate_hz:g} s at {rate_hz:g} Hz are {counted(samples, 'sample')}; at least "
-            f"{FEWEST_SAMPLES} samples are needed; take a longer part, or record longer"
-        )
-    if last - first < LEAST_SHARE * samples or last - first < FEWEST_SAMPLES:
-        missing = [int((~_good(recording, [row])).sum()) for row in rows]
-        worst = recording.channels[rows[int(np.argmax(missing))]].name
-        raise LogError(
-            f"{log}: the longest stretch without missing samples is {(last - first) / rate_hz:g} s "
-            f"({counted(last - first, 'sample')}) of {samples / rate_hz:g} s; at least half of the log and "
-            f"{FEWEST_SAMPLES} samples are needed; {worst!r} lacks {counted(max(missing), 'sample')}; leave that "
-            "channel out of the model, or cut the log"
-        )
-    if last - first == samples:
-        return slice(first, last), ()
-    told = (
-        f"{log} lacks {counted(int((~good).sum()), 'sample')}; used is its longest stretch without gaps, "
-        f"{first / rate_hz:g} s to {last / rate_hz:g} s of {samples / rate_hz:g} s"
-    )
-    return slice(first, last), (told,)
+def _span(recording: TimeSeries, row: int) -> str:
+    """Say from when to when a channel has samples."""
+    places = np.flatnonzero(good_samples(recording, [row]))
+    if not places.size:
+        return "at no time"
+    rate_hz = recording.sample_rate_hz
+    return f"from {places[0] / rate_hz:g} to {(places[-1] + 1) / rate_hz:g} s"
 
 
 def _signals(matches: Sequence[_Match], recording: TimeSeries, stretch: slice, kind: str, log: str) -> Matrix:
@@ -277,8 +266,16 @@ def _undriven(inputs: Sequence[_Match]) -> tuple[str, ...]:
     return (f"not logged, taken as zero: input {', '.join(idle)}",) if idle else ()
 
 
-def _at_rest(inputs: Sequence[_Match], measurement: Measurement, recording: TimeSeries) -> tuple[str, ...]:
+def _at_rest(
+    inputs: Sequence[_Match], model: str, measurement: Measurement, recording: TimeSeries
+) -> tuple[str, ...]:
     """Name the inputs when none of them ever moves, as after a wrong channel or a drive that was off."""
+    if not inputs:
+        undriven = (
+            f"model {model!r} has no [[input]]: in it only what starts in motion moves, and all that drove the "
+            f"machine in {measurement.log} counts as a gap; give it an [[input]] with the channel that holds that"
+        )
+        return (undriven,)
     if np.any(np.ptp(measurement.inputs, axis=1) > 0):
         return ()
     told = ", ".join(
@@ -293,12 +290,20 @@ def _at_rest(inputs: Sequence[_Match], measurement: Measurement, recording: Time
     return (still,)
 
 
+def _very_short(measurement: Measurement) -> tuple[str, ...]:
+    if measurement.samples >= FEW_SAMPLES:
+        return ()
+    short = (
+        f"{measurement.log} is short: {measurement.samples} samples, {FEW_SAMPLES} or more tell more; "
+        "take a longer part, or record longer"
+    )
+    return (short,)
+
+
 def _limits(compiled: CompiledModel, measurement: Measurement) -> tuple[str, ...]:
-    """Sentences on a log that is too short or too coarse for a good answer."""
+    """Sentences on a log that holds too few cycles or is too coarse for a good answer."""
     remarks = []
     duration_s, rate_hz = measurement.duration_s, measurement.sample_rate_hz
-    if measurement.samples < FEW_SAMPLES:
-        remarks.append(f"the log is short: {measurement.samples} samples, {FEW_SAMPLES} or more tell more")
     modes_hz = _modes_hz(compiled)
     if modes_hz.size and duration_s * modes_hz.min() < FEW_CYCLES:
         remarks.append(

@@ -16,7 +16,9 @@ class LogUse:
     sample_rate_hz
         Samples a second.
     losses
-        Sentences on damage, stretches that were dropped, inputs that never move; they stand among the remarks, too.
+        Sentences on damage and stretches that were dropped; they stand among the remarks, too.
+    warnings
+        Sentences that come before any answer, which means little with them; likewise.
     """
 
     log: str
@@ -24,3 +26,4 @@ class LogUse:
     recorded_s: float
     sample_rate_hz: float
     losses: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()

@@ -271,7 +271,50 @@ def test_an_input_that_never_moves_is_told(tmp_path: Path) -> None:
     assert "input 'hammer' ('/hammer.force') is 0 throughout" in told
     # An answer can't be read without it.
     found = matched_log(model_of(tmp_path), still, log="log.mcap")
-    assert (found.losses, told in found.remarks) == ((told,), False)
+    assert (found.warnings, told in found.remarks) == ((told,), False)
+
+
+def test_a_model_without_input_is_told_what_that_means(tmp_path: Path) -> None:
+    text = "\n".join(line for line in ARM.splitlines() if not line.startswith("input"))
+    found = matched_log(model_of(tmp_path, text), recording(WHOLE), log="log.mcap")
+    (told,) = found.warnings
+    assert told.startswith("model 'arm' has no [[input]]: in it only what starts in motion moves")
+    assert "log.mcap" in told
+
+
+def test_channels_that_are_apart_in_time_are_told_as_such(tmp_path: Path) -> None:
+    series = with_gap(recording(WHOLE), "/wrist.accel", slice(100, SAMPLES))
+    apart = with_gap(series, "/hammer.force", slice(0, 400))
+    valid = np.asarray(series.valid) & np.asarray(apart.valid)
+    _, remarks = measurement_of(model_of(tmp_path), replace(series, valid=valid), log="log.mcap")
+    (told,) = [remark for remark in remarks if "acc_wrist" in remark]
+    assert "'/wrist.accel' has samples from 0 to 0.1 s only, input channel '/hammer.force' from 0.4 to 1 s" in told
+
+
+def halved(channel: str) -> TimeSeries:
+    """A recording that lacks a fifth of a second of one channel, in its middle."""
+    return with_gap(recording(WHOLE), channel, slice(400, 600))
+
+
+def test_a_damaged_file_is_told_with_the_part_that_is_whole(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="longest stretch") as error:
+        matched_log(
+            model_of(tmp_path), halved("/hammer.force"), log="log.mcap", begins_s=3.0,
+            damage=("Damage at byte 7 (Chunk): not zstd; 200 messages lost.",),
+        )  # fmt: skip
+    assert "log.mcap: the file is damaged (at byte 7 (Chunk): not zstd; 200 messages lost); the longest" in str(
+        error.value
+    )
+    assert str(error.value).endswith(
+        "'/hammer.force' lacks 200 samples; take that stretch alone (--start 3 --end 3.4)"
+    )
+
+
+def test_an_output_with_gaps_may_be_left_out_an_input_may_not(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"\(--end 0\.4\), or leave that output out of the model$"):
+        matched_log(model_of(tmp_path), halved("/wrist.accel"), log="log.mcap")
+    with pytest.raises(LogError, match=r"\(--end 0\.4\)$"):
+        matched_log(model_of(tmp_path), halved("/hammer.force"), log="log.mcap")
 
 
 def test_measured_axis(shared_data: Path) -> None:
