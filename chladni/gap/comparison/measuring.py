@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.comparison.short_log import modes_of, shortness
 from chladni.gap.comparison.whole_stretch import Read, good_samples, whole_stretch
 from chladni.gap.records.measurement import Measurement
 from chladni.io.log_info import some_of
@@ -20,15 +21,12 @@ from chladni.signals.wording import counted
 
 Matrix = NDArray[np.float64]
 
-# Below these an answer is possible, but poor.
-FEW_SAMPLES = 200
+# With fewer of the lowest mode an answer is possible, but poor.
 FEW_CYCLES = 5.0
 # A channel with this share of its samples missing is no measurement: it's left out rather than the log refused.
 MOSTLY_MISSING = 0.5
 # Sampled more slowly than this many times a cycle, a mode can't be followed between the samples.
 SAMPLES_A_CYCLE = 2.5
-# Poles below this share of the fastest are rigid-body motion or integrators, which have no cycle.
-AT_REST = 1e-7
 NAMES_TOLD = 8
 
 
@@ -138,11 +136,12 @@ def matched_log(
         output_names=tuple(match.terminal.name for match in outputs),
         output_units=tuple(match.terminal.unit for match in outputs),
     )
+    short = shortness(compiled, measurement)
     return MatchedLog(
         measurement=measurement,
-        warnings=(*_at_rest(inputs, model.name, measurement, recording), *_very_short(measurement)),
+        warnings=(*_at_rest(inputs, model.name, measurement, recording), *filter(None, [short])),
         losses=gaps,
-        remarks=(*remarks, *_undriven(inputs), *_limits(compiled, measurement)),
+        remarks=(*remarks, *_undriven(inputs), *_limits(compiled, measurement, short=short is not None)),
     )
 
 
@@ -290,22 +289,13 @@ def _at_rest(
     return (still,)
 
 
-def _very_short(measurement: Measurement) -> tuple[str, ...]:
-    if measurement.samples >= FEW_SAMPLES:
-        return ()
-    short = (
-        f"{measurement.log} is short: {measurement.samples} samples, {FEW_SAMPLES} or more tell more; "
-        "take a longer part, or record longer"
-    )
-    return (short,)
-
-
-def _limits(compiled: CompiledModel, measurement: Measurement) -> tuple[str, ...]:
+def _limits(compiled: CompiledModel, measurement: Measurement, *, short: bool) -> tuple[str, ...]:
     """Sentences on a log that holds too few cycles or is too coarse for a good answer."""
     remarks = []
     duration_s, rate_hz = measurement.duration_s, measurement.sample_rate_hz
-    modes_hz = _modes_hz(compiled)
-    if modes_hz.size and duration_s * modes_hz.min() < FEW_CYCLES:
+    modes_hz = modes_of(compiled)
+    # Once: a log that is shorter still was told as such.
+    if modes_hz.size and duration_s * modes_hz.min() < FEW_CYCLES and not short:
         remarks.append(
             f"the log is short: {duration_s:.3g} s hold {duration_s * modes_hz.min():.2g} cycles of the lowest mode "
             f"({modes_hz.min():.3g} Hz), {FEW_CYCLES:g} or more tell more"
@@ -317,12 +307,3 @@ def _limits(compiled: CompiledModel, measurement: Measurement) -> tuple[str, ...
             f"{rate_hz / SAMPLES_A_CYCLE:.3g} Hz"
         )
     return tuple(remarks)
-
-
-def _modes_hz(compiled: CompiledModel) -> Matrix:
-    """Natural frequencies of the model's vibrating modes, one for each pair of poles."""
-    if not compiled.states:
-        return np.empty(0)
-    poles = np.linalg.eigvals(compiled.a)
-    vibrating = poles.imag > AT_REST * float(np.abs(poles).max(initial=0.0))
-    return np.asarray(np.abs(poles[vibrating]) / (2 * np.pi))

@@ -11,9 +11,11 @@ from chladni.gap.comparison.distortion import Distortion, distortion_of
 from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, regime_shares
+from chladni.gap.comparison.short_log import shortness
 from chladni.gap.diagnosis.advice import advice_on, measure_next
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
+from chladni.gap.diagnosis.even_odds import at_even_odds
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
 from chladni.gap.diagnosis.other_logs import closing_elsewhere
 from chladni.gap.diagnosis.parting_runs import causes_found
@@ -84,6 +86,8 @@ def diagnose(
     study, causes = causes_found(study, lambda done: tell("explaining", 0.3 + 0.6 * done))
     tell("measuring the closing", 0.9)
     found = _assembled(study, causes, [one.log for one in measurements], seed)
+    if shortness(study.model.compile(), study.measurement) is not None:
+        found = at_even_odds(found)
     # Periods tell noise from distortion at every level, as they did for the first log.
     others = [closing_elsewhere(study, causes, one, seed=seed) for one in measurements[1:]]
     levels = compare_levels([with_period(one) for one in measurements]) if len(measurements) > 1 else ()

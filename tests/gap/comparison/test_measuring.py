@@ -231,8 +231,13 @@ def test_gaps_all_over_are_an_error_that_names_the_worst_channel(tmp_path: Path)
 def test_short_logs_are_told_and_very_short_ones_refused(tmp_path: Path) -> None:
     model = model_of(tmp_path)
     _, remarks = measurement_of(model, recording(WHOLE, samples=150, rate_hz=4000.0), log="log.mcap")
-    assert any("150 samples" in remark for remark in remarks)
-    assert any("cycles of the lowest mode" in remark for remark in remarks)
+    # Before all else, and once.
+    assert remarks[0].startswith(
+        "log.mcap is short: 150 samples, where 200 or more tell more; 0.0375 s hold 1.7 cycles"
+    )
+    assert sum("cycles of the lowest mode" in remark for remark in remarks) == 1
+    _, remarks = measurement_of(model, recording(WHOLE, samples=400, rate_hz=4000.0), log="log.mcap")
+    assert remarks == ("the log is short: 0.1 s hold 4.4 cycles of the lowest mode (44 Hz), 5 or more tell more",)
     with pytest.raises(LogError, match="32 samples") as error:
         measurement_of(model, recording(WHOLE, samples=20), log="log.mcap")
     # Nothing is missing in it: to cut it further or to leave a channel out would be false advice.
