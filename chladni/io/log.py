@@ -157,7 +157,7 @@ class Log:
         if sample_rate_hz is not None:
             return _on_one_grid(groups, sample_rate_hz, list(dict.fromkeys(paths)) if paths is not None else None)
         if len(groups) > 1:
-            told = [(one.channels, one.sample_rate_hz) for one in groups]
+            told = [(one.channels, one.sample_rate_hz, one.start_time_ns) for one in groups]
             raise LogError(several_grids(self.path.name, told))
         return groups[0]
 

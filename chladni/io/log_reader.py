@@ -11,11 +11,11 @@ from chladni.io.gathering import Gathering, LostMessages, gather, windowed
 from chladni.io.grid_blocks import BlockGrid, PlacedPiece, blocks_of
 from chladni.io.grid_buffer import GridBuffer, grid_rows
 from chladni.io.mcap.container import McapContainer
-from chladni.io.placement import Group, Placement, group_placements
+from chladni.io.placement import ALIGNED, Group, Placement, group_placements
 from chladni.io.stream import Piece, Stream, read_pieces
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
-from chladni.signals.time_series import TimeSeries
+from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 #: A grid may be this much longer than the samples on it, and this many times as long.
 EMPTY_GRID = 1 << 24
@@ -213,7 +213,7 @@ class LogReader:
             When there are several.
         """
         if len(groups) > 1:
-            told = [(grid_rows(group, self.order).channels, group.rate_hz) for group in groups]
+            told = [(grid_rows(group, self.order).channels, group.rate_hz, group.start_ns) for group in groups]
             raise LogError(f"{several_grids(self.container.path.name, told)}, or read channels that share one")
         return groups[0]
 
@@ -244,7 +244,8 @@ class LogReader:
             label = group.placements[0].stream.label
             raise LogError(
                 f"{self.container.path.name}: {label}: {samples} samples on a grid of {last - first}: stamps leap, "
-                "or it paused for long: read the parts with start_s= and end_s=, or choose stamp='log'"
+                "or it paused for long: read the parts, each between a start and an end, or take the log's own times "
+                "(--stamp log, in Python stamp='log')"
             )
 
     def _laid_out(self, group: Group, gatherings: dict[int, Gathering]) -> TimeSeries | None:
@@ -285,14 +286,32 @@ class LogReader:
             yield PlacedPiece(rows=rows[member], index=placements[member].samples_index(part), values=piece.values)
 
 
-def several_grids(file: str, told: Iterable[tuple[Sequence[Channel], float]]) -> str:
-    """Say that channels don't share one grid, and what to do."""
-    grids = [f"{_names(channels)} at {rate_hz:.6g} Hz" for channels, rate_hz in told]
+def several_grids(file: str, told: Sequence[tuple[Sequence[Channel], float, int]]) -> str:
+    """Say that channels, with rates and times of a sample in ns, don't share one grid, in what, and what to do."""
+    _, first_hz, first_ns = told[0]
+    grids = [
+        f"{_names(channels)} at {_beside(rate_hz, start_ns, first_hz, first_ns) if place else f'{rate_hz:.6g} Hz'}"
+        for place, (channels, rate_hz, start_ns) in enumerate(told)
+    ]
+    highest_hz = f"{max(rate_hz for _, rate_hz, _ in told):.6g}"
     return (
-        f"{file}: channels have {len(grids)} different sampling grids: {'; '.join(grids)}; "
-        f"bring them to one by band-limited resampling with sample_rate_hz= (chladni convert {file} OUT.mcap "
-        "--rate HZ), take each alone with read_groups()"
+        f"{file}: channels have {len(grids)} different sampling grids: {'; '.join(grids)}; bring them to one by "
+        f"band-limited resampling: chladni convert {file} OUT.mcap --rate {highest_hz}, in Python "
+        f"sample_rate_hz={highest_hz}"
     )
+
+
+def _beside(rate_hz: float, start_ns: int, first_hz: float, first_ns: int) -> str:
+    """Say a rate, and in what the grid differs from the first where the rate alone doesn't show it."""
+    if f"{rate_hz:.6g}" != f"{first_hz:.6g}":
+        return f"{rate_hz:.6g} Hz"
+    later = (start_ns - first_ns) / NS_PER_S * rate_hz
+    between = later - round(later)
+    if abs(between) > ALIGNED:
+        when = "after" if between > 0 else "before"
+        return f"{rate_hz:.6g} Hz, {1e3 * abs(between) / rate_hz:.3g} ms {when} those of the first"
+    # Grids that agree where they begin drift apart, or are too far apart to be one.
+    return f"{rate_hz:.10g} Hz, beginning {later / rate_hz:.6g} s after the first, which is at {first_hz:.10g} Hz"
 
 
 def _names(channels: Sequence[Channel]) -> str:

@@ -445,8 +445,23 @@ def test_different_rates_on_one_grid(tmp_path: Path) -> None:
 def test_the_same_rate_half_a_sample_apart_is_another_grid(tmp_path: Path) -> None:
     times = START_NS + np.arange(300) * 10_000_000
     write_scalars(tmp_path / "a.mcap", {"/a": (times, range(300)), "/b": (times + 5_000_000, range(300))})
-    with open_log(tmp_path / "a.mcap") as log, pytest.raises(LogError, match="2 different sampling grids"):
+    with open_log(tmp_path / "a.mcap") as log, pytest.raises(LogError, match="2 different sampling grids") as caught:
         log.read()
+    # The rates are the same: what differs is told.
+    assert "/a.data at 100 Hz; /b.data at 100 Hz, 5 ms after those of the first;" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("period_ns", "told"),
+    [(10_000_050, "/b.data at 99.9995 Hz;"), (9_999_997, "/b.data at 100.00003 Hz, beginning 0 s after the first")],
+)
+def test_grids_that_drift_apart_are_told_by_their_rates(tmp_path: Path, period_ns: int, told: str) -> None:
+    samples = np.arange(60_000)
+    times = {"/a": START_NS + samples * 10_000_000, "/b": START_NS + samples * period_ns}
+    write_scalars(tmp_path / "a.mcap", {name: (at, samples) for name, at in times.items()})
+    with open_log(tmp_path / "a.mcap") as log, pytest.raises(LogError, match="2 different sampling grids") as caught:
+        log.read()
+    assert told in str(caught.value)
 
 
 def test_recordings_hours_apart_are_no_single_grid(tmp_path: Path) -> None:
@@ -523,7 +538,7 @@ def test_channels_on_several_grids_are_refused_with_the_remedy_of_either_surface
     write_scalars(tmp_path / "a.mcap", {"/a": (fast, range(1000)), "/b": (slow, range(300))})
     with open_log(tmp_path / "a.mcap") as log, pytest.raises(LogError, match="different sampling grids") as caught:
         log.read()
-    for remedy in ("sample_rate_hz=", "read_groups()", "chladni convert a.mcap OUT.mcap --rate HZ"):
+    for remedy in ("in Python sample_rate_hz=100", "chladni convert a.mcap OUT.mcap --rate 100,"):
         assert remedy in str(caught.value)
 
 
