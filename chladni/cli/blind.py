@@ -9,6 +9,7 @@ from chladni.cli import options
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.words import count as counted
+from chladni.signals.wording import counted as cases
 
 # As many as one reads.
 MOST_MISSED = 30
@@ -42,7 +43,8 @@ def make(
     to = Output(json)
     with to.progress("making cases") as show:
         made = make_campaign(directory, count=count, seed=seed, jobs=jobs, progress=show)
-    to.line(f"made {counted(made)} of {counted(count)} cases in {directory / 'cases'}; the others were there")
+    there = f"; {counted(count - made)} of {counted(count)} were there" if made < count else ""
+    to.line(f"made {cases(made, 'case')} in {directory / 'cases'}{there}")
     to.line(f"their truths are in {directory / 'truth'}: move it away before the run, and back for the score")
     to.json({"format": "chladni.blind-make/1", "directory": str(directory), "count": count, "seed": seed,
              "made": made})  # fmt: skip

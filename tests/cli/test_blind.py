@@ -69,7 +69,12 @@ def test_make_writes_cases_and_truths(run: Run, tmp_path: Path) -> None:
         "cases/case-0001/case.json", "cases/case-0001/log.mcap", "cases/case-0001/model.toml", "truth/campaign.json",
         "truth/case-0001.json",
     ]  # fmt: skip
-    assert run("blind", "make", tmp_path, "--count", 1, "--seed", 2, "--jobs", 1).code == 0
+    assert "made 1 case in" in done.err
+    assert "there" not in done.err
+    again = run("blind", "make", tmp_path, "--count", 1, "--seed", 2, "--jobs", 1)
+    assert again.code == 0
+    assert "made 0 cases in" in again.out
+    assert "; 1 of 1 were there" in again.out
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

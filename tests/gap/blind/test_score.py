@@ -166,6 +166,18 @@ def test_calibration_error_is_the_weighted_distance():
     assert calibration_error([]) is None
 
 
+@pytest.mark.parametrize(("count", "median", "tenth", "calibration"), [
+    (1, "too few", "too few", "too few"), (2, "yes", "too few", "too few"), (10, "yes", "yes", "too few"),
+    (15, "yes", "yes", "no"),
+])  # fmt: skip
+def test_numbers_of_few_cases_meet_and_miss_nothing(count, median, tenth, calibration):
+    marks = [answered("effect", "delay@m", "delay@m") for _ in range(count)]
+    rows = {row[0]: row for row in score_rows(scored(marks))}
+    assert rows["gap closed over the true law's, median"][5] == median
+    assert rows["gap closed, 10th percentile"][5] == tenth
+    assert rows["expected calibration error"][5] == calibration
+
+
 @pytest.mark.parametrize(
     ("result", "told"),
     [
