@@ -106,10 +106,14 @@ class Output:
         """Give a function that takes the share done; a bar shows after a second, on a terminal only."""
         from time import monotonic
 
+        from rich.progress import BarColumn, SpinnerColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
         from rich.progress import Progress as Bar
 
         console = Console(stderr=True)
-        bar = Bar(console=console, transient=True, disable=not console.is_terminal)
+        # A step may take minutes: what turns and counts meanwhile tells it from one that hangs.
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(),
+                   TimeElapsedColumn())  # fmt: skip
+        bar = Bar(*columns, console=console, transient=True, disable=not console.is_terminal)
         task = bar.add_task(escape(title), total=1.0)
         begun = monotonic()
 
