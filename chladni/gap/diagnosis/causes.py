@@ -142,7 +142,7 @@ def _searched(
         if leaves_another():
             found += second_causes(study, lead)
     if leaves_another():
-        found += paired_causes(study, best().chi)
+        found += paired_causes(study)
     if len(best().hypothesis.effects) > 1:
         found += exchanged(study, best())
         found += sibling_causes(study, [best()])

@@ -23,7 +23,7 @@ Matrix = NDArray[np.float64]
 _SECOND, _EACH, _PLACES = 4, 2, 4
 #: Linear words that are fitted beside the parameters behind a first effect.
 _LINEAR = 4
-#: Two forces must leave less than this of what is left; pairs that are as good as the best are screened too, so
+#: Two forces must leave less than this of what one leaves; pairs that are as good as the best are screened too, so
 #: many, and those searched whose laws promise most.
 _PAIR_GAIN, _PAIR_TIE, _SCREENED, _PAIRS = 0.6, 1.3, 8, 3
 #: An unknown force at the best place that leaves more than this, over the noise, isn't alone: of made machines with
@@ -80,16 +80,11 @@ def _beside(found: Contestant, kept: tuple[AttachedEffect, ...], one: Hypothesis
     return hypothesis_of((*kept, *one.effects), z, screened=one.screened, initial=found.fit.initial)
 
 
-def paired_causes(study: Study, left: float) -> list[Contestant]:
-    """Enter two effects at two places at once, which one after the other may miss.
-
-    Parameters
-    ----------
-    left
-        What is left over the noise's power by the best that is named so far: two forces must leave less.
-    """
+def paired_causes(study: Study) -> list[Contestant]:
+    """Enter two effects at two places at once, which one after the other may miss."""
     pairs = located_pairs(study.location)
-    if not pairs or pairs[0].profile.chi > _PAIR_GAIN * left:
+    single = study.location.ranked[0].profile.chi if study.location.ranked else 0.0
+    if not pairs or pairs[0].profile.chi > _PAIR_GAIN * single:
         return []
     near = [one for one in pairs if one.profile.chi < _PAIR_TIE * pairs[0].profile.chi][:_SCREENED]
     weighed = [(pair, forms_at(study.location, [pair], study.leave_out, study.own)) for pair in near]

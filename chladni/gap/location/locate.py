@@ -26,8 +26,9 @@ _RECORD_LINES = 1500
 _FOLLOWED, _FOLLOWED_AGAIN, _TIED, _MOST = 5, 4, 1.5, 10
 #: Patterns tell places apart only when there are more sensors than forces.
 _PAIR_SENSORS = 3
-#: Places that are paired with every other one, at least; over the best one's misfit up to which another is its equal.
-_LEADING, _LEVEL = 2, 1.1
+#: Places that are paired with every other one, at least and at most; over the best one's misfit up to which another is
+#: its equal.
+_LEADING, _LEVEL = (2, 3), 1.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,7 +135,8 @@ def located_pairs(location: Location, rough: int = 5) -> list[Located]:
     if len(problem.measured) < _PAIR_SENSORS:
         return []
     followed = list(location.ranked[:rough])
-    leading = max(_LEADING, sum(one.profile.chi < _LEVEL * followed[0].profile.chi for one in followed))
+    level = sum(one.profile.chi < _LEVEL * followed[0].profile.chi for one in followed)
+    leading = min(max(_LEADING[0], level), _LEADING[1])
     known = {one.places[0] for one in followed}
     pairs = [(one, other.places[0]) for place, one in enumerate(followed) for other in followed[place + 1 :]]
     pairs += [(one, other) for one in followed[:leading] for other in location.places if other not in known]
