@@ -31,8 +31,9 @@ Step = Callable[[float], None]
 #: Nats that a wrong parameter must bring to be named, and an effect: what is modelled is doubted before something is
 #: added.
 WRONG, NAMED = 3.0, 6.0
-#: First effects beside which a second one is looked for while all leave something.
-_LEADS = 2
+#: First effects beside which a second one is looked for while all leave something; progress where the search beside
+#: each begins, that for pairs, and that for each again beside the other.
+_LEADS, _BESIDE = 2, (0.80, 0.85, 0.90, 0.95)
 #: A fit that leaves less than this, over the noise's power, leaves nothing to be explained.
 _CLEAN = 1.6
 #: Probability that a cause is all of it, with which it's named.
@@ -86,7 +87,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
     nothing = without_cause(study)
     progress(0.1)
     singles = single_causes(study, progress)
-    entered, instead = _searched(study, nothing, singles.ranked)
+    entered, instead = _searched(study, nothing, singles.ranked, progress)
     progress(1.0)
     together = weighed([nothing, *entered])
     tuned = next(one for one in together if one.fit is nothing.fit)
@@ -123,7 +124,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
 
 
 def _searched(
-    study: Study, nothing: Contestant, singles: Sequence[Contestant]
+    study: Study, nothing: Contestant, singles: Sequence[Contestant], progress: Step
 ) -> tuple[list[Contestant], Instead | None]:
     """Every contestant with a cause: single ones, and two where one leaves something that nothing else explains."""
     added = added_nats(study.location)
@@ -138,11 +139,14 @@ def _searched(
     instead = explained_instead(study, best())
     if instead is not None or not leaves_another():
         return found, instead
-    for lead in _leads(weighed(found)):
+    for place, lead in enumerate(_leads(weighed(found))):
+        progress(_BESIDE[place])
         if leaves_another():
             found += second_causes(study, lead)
+    progress(_BESIDE[-2])
     if leaves_another():
         found += paired_causes(study)
+    progress(_BESIDE[-1])
     if len(best().hypothesis.effects) > 1:
         found += exchanged(study, best())
         found += sibling_causes(study, [best()])

@@ -26,8 +26,8 @@ _RECORD_LINES = 1500
 _FOLLOWED, _FOLLOWED_AGAIN, _TIED, _MOST = 5, 4, 1.5, 10
 #: Patterns tell places apart only when there are more sensors than forces.
 _PAIR_SENSORS = 3
-#: Places that are paired with every other one, at least and at most; over the best one's misfit up to which another is
-#: its equal.
+#: Places that are paired with every other one, at least and at most; misfit over the best one's of a place that is
+#: level with it.
 _LEADING, _LEVEL = (2, 3), 1.1
 
 
