@@ -13,6 +13,7 @@ from chladni.gap.explanation.hypotheses import effect_hypotheses, polished, sibl
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.linear_words import linear_hypotheses
 from chladni.gap.explanation.shooting import Shooting, Shot
+from chladni.gap.explanation.sticking import sticking_hypotheses
 from chladni.gap.location.locate import Located, Location
 from chladni.signals.errors import EstimateError
 
@@ -96,6 +97,8 @@ def single_causes(study: Study, progress: Step) -> Singles:
     if least_left(found) > ALONE:
         others = _others(effect_hypotheses(candidates, study.own, count=_AGAIN), hypotheses)
         found += sound(study, contest.enter_all(others))
+    if is_lost(location, least_left(found)) and "coulomb_friction" not in study.leave_out:
+        found += sound(study, contest.enter_all(sticking_hypotheses(location)))
     shots = _followed(study, hypotheses) if is_lost(location, least_left(found)) else None
     found += shots or []
     ranked = weighed([*found, *sibling_causes(study, weighed(found))])
@@ -150,10 +153,10 @@ def _others(found: Sequence[Hypothesis], tried: Sequence[Hypothesis]) -> list[Hy
 
 
 def sibling_causes(study: Study, ranked: Sequence[Contestant]) -> list[Contestant]:
-    """Enter the law that Coulomb friction is a special case of, when that leads, alone or beside another effect."""
-    if not ranked or "stribeck_friction" in study.leave_out:
-        return []
-    return sound(study, study.contest.enter_all(siblings(ranked[0], study.contest.run)))
+    """Enter the other of Coulomb's and Stribeck's friction where one leads, alone or beside another effect."""
+    others = siblings(ranked[0], study.contest.run) if ranked else []
+    allowed = [one for one in others if study.leave_out.isdisjoint(effect.effect for effect in one.effects)]
+    return sound(study, study.contest.enter_all(allowed))
 
 
 def _best_forms(ranked: Sequence[Contestant]) -> list[Contestant]:

@@ -23,6 +23,8 @@ EFFECTIVE_SAMPLES = 200.0
 SLACK = 0.3
 #: Least of them that tell a state at the start of a window.
 _LEAST_SAMPLES = 2.0
+#: Nats by which fits of one form differ that ended at the same place.
+_SAME = 0.5
 _BLOCK_S = 0.75
 #: Every so manieth block is held out.
 _EVERY = 3
@@ -153,6 +155,27 @@ def weighed(contestants: Sequence[Contestant]) -> list[Contestant]:
         for one in contestants
     ]
     return sorted(found, key=lambda one: -one.log_evidence)
+
+
+def distinct(ranked: Sequence[Contestant]) -> list[Contestant]:
+    """Give weighed contestants without those that ended where another of the same name and form did.
+
+    Searches from several starts often find one fit; in a share of probabilities it counts once.
+    """
+    found: list[Contestant] = []
+    for one in ranked:
+        if not any(_is_same(one, other) for other in found):
+            found.append(one)
+    return found
+
+
+def _is_same(one: Contestant, other: Contestant) -> bool:
+    forms = [
+        {(effect.effect, effect.site, effect.variant, effect.source) for effect in each.hypothesis.effects}
+        for each in (one, other)
+    ]
+    close = abs(one.log_evidence - other.log_evidence) < _SAME
+    return close and forms[0] == forms[1] and one.hypothesis.wide == other.hypothesis.wide
 
 
 def lowest(contestants: Sequence[Contestant]) -> Matrix:

@@ -97,32 +97,49 @@ def effect_of(one: Screened, own: Mapping[str, EffectKind]) -> AttachedEffect | 
 
 
 def siblings(found: Contestant, run: FreeRun) -> list[Hypothesis]:
-    """Give the Stribeck frictions that begin where a Coulomb friction ended, for each: nested laws compete."""
+    """Give the other friction that begins where one ended, Stribeck's for Coulomb's and back: nested laws compete."""
     fit, hypotheses = found.fit, []
-    for place, plain in enumerate(fit.effects):
-        if plain.effect != "coulomb_friction":
-            continue
-        try:
-            velocity = run.motion(fit.z, fit.effects, site=plain.site).velocity
-        except ModelError:
-            continue
-        for share in _STRIBECK_SPEEDS:
-            richer = _stribeck_beside(plain, share * float(np.sqrt(np.mean(velocity**2))))
-            effects = (*fit.effects[:place], richer, *fit.effects[place + 1 :])
+    for place, one in enumerate(fit.effects):
+        for other in _other_frictions(found, run, one):
+            effects = (*fit.effects[:place], other, *fit.effects[place + 1 :])
             hypotheses.append(hypothesis_of(effects, fit.z, screened=found.hypothesis.screened, initial=fit.initial))
     return hypotheses
+
+
+def _other_frictions(found: Contestant, run: FreeRun, one: AttachedEffect) -> list[AttachedEffect]:
+    if one.effect == "stribeck_friction":
+        return [_coulomb_beside(one)]
+    if one.effect != "coulomb_friction":
+        return []
+    try:
+        velocity = run.motion(found.fit.z, found.fit.effects, site=one.site).velocity
+    except ModelError:
+        return []
+    speed = float(np.sqrt(np.mean(velocity**2)))
+    return [_stribeck_beside(one, share * speed) for share in _STRIBECK_SPEEDS]
+
+
+def _coulomb_beside(curve: AttachedEffect) -> AttachedEffect:
+    """Give the Coulomb friction of the same size and form as a Stribeck friction that slides."""
+    return attached(
+        "coulomb_friction", curve.site, {"force": curve.values["coulomb"], **_bristles(curve)}, variant=curve.variant
+    )
 
 
 def _stribeck_beside(plain: AttachedEffect, speed: float) -> AttachedEffect:
     """Give the Stribeck friction of the same size and form as a Coulomb friction, somewhat higher at rest."""
     force = plain.values["force"]
-    details = {name: plain.values[name] for name in ("presliding", "creep_speed") if name in plain.values}
     return attached(
         "stribeck_friction",
         plain.site,
-        {"coulomb": 0.9 * force, "static": 1.3 * force, "speed": speed, **details},
+        {"coulomb": 0.9 * force, "static": 1.3 * force, "speed": speed, **_bristles(plain)},
         variant=plain.variant,
     )
+
+
+def _bristles(friction: AttachedEffect) -> dict[str, float]:
+    """Give how a friction begins to slide."""
+    return {name: friction.values[name] for name in ("presliding", "creep_speed") if name in friction.values}
 
 
 def polished(coarse: Hypothesis, fit: OutputErrorFit) -> Hypothesis | None:

@@ -1,5 +1,7 @@
 """The search for one cause, where it begins."""
 
+from dataclasses import replace
+
 import pytest
 
 import chladni
@@ -22,3 +24,16 @@ def test_a_stribeck_curve_that_falls_slowly_isnt_lost_to_coulombs() -> None:
     best = min(found, key=lambda one: one.chi)
     assert best.chi < coulomb.chi - 0.03
     assert best.fit.effects[0].values["speed"] == pytest.approx(1.0, rel=0.2)
+
+
+def test_a_stribeck_curve_hands_on_to_the_coulomb_friction_that_it_ends_at() -> None:
+    log = measured((chladni.attached("coulomb_friction", "elbow", {"force": 5.0}),), noise=0.005)
+    study = study_of(arm(), log, leave_out=frozenset(), own={})
+    curve = chladni.attached("stribeck_friction", "elbow", {"coulomb": 4.5, "static": 5.5, "speed": 0.1})
+    stribeck = study.contest.enter(hypothesis_of((curve,), study.location.tuned.z))
+    assert stribeck is not None
+    (plain,) = sibling_causes(study, [stribeck])
+    assert plain.hypothesis.named[0].effect == "coulomb_friction"
+    assert plain.fit.effects[0].values["force"] == pytest.approx(5.0, rel=0.02)
+    without = replace(study, leave_out=frozenset({"coulomb_friction"}))
+    assert sibling_causes(without, [stribeck]) == []

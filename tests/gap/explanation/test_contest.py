@@ -9,6 +9,7 @@ from chladni.gap.explanation.contest import (
     EFFECTIVE_SAMPLES,
     SLACK,
     Contest,
+    distinct,
     held_gap,
     log_evidence,
     training_mask,
@@ -66,6 +67,21 @@ def runs() -> Contest:
     )  # fmt: skip
     windows = [(place * RUN, (place + 1) * RUN) for place in range(len(STARTS))]
     return Contest(FreeRun(free_axis(), log, windows=windows), white_floor([noise]), training_in_windows(windows))
+
+
+def named(site: str, log_evidence: float, variant: str = "drift") -> Contestant:
+    values = {"relative_change": 0.1, "time": 3.0, **({"rise": 0.1} if variant == "step" else {})}
+    effect = attached("varying_stiffness", site, values, variant=variant)
+    return replace(left(1.0), hypothesis=hypothesis_of((effect,), np.zeros(0)), log_evidence=log_evidence)
+
+
+def test_one_fit_that_several_searches_found_counts_once() -> None:
+    first, again, worse = named("j0", -10.0), named("j0", -10.3), named("j0", -14.0)
+    elsewhere, other_form = named("j1", -10.1), named("j0", -10.2, "step")
+    found = distinct([first, elsewhere, other_form, again, worse])
+    assert [any(one is each for each in found) for one in (first, elsewhere, other_form, again, worse)] == [
+        True, True, True, False, True,
+    ]  # fmt: skip
 
 
 def test_a_third_is_held_out_in_blocks_over_the_whole_log() -> None:

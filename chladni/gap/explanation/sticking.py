@@ -1,0 +1,48 @@
+"""A joint that mostly sticks: its way is too small for a law to be weighed along it, but its force is told."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from chladni.gap.explanation.hypotheses import hypothesis_of
+from chladni.gap.explanation.hypothesis import Hypothesis
+from chladni.gap.location.locate import Located, Location
+from chladni.gap.location.recovered import recovered
+from chladni.gap.plant.places import Site
+from chladni.models.effects.attached_effect import attached
+
+#: Misfit over the best place's up to which a place is looked at, and most joints that are.
+_PLAUSIBLE, _MOST = 3.0, 3
+#: Quantile of the joint's force that sliding begins with, and share of its speed below which it creeps: a steeper law
+#: has minima that no slope leads out of.
+_SLIDING, _CREEP = 0.9, 0.15
+
+
+def sticking_hypotheses(location: Location) -> list[Hypothesis]:
+    """Give Coulomb friction at the joints where the cause may be, as large as most of the force that they pass on.
+
+    Of a joint that sticks sensors tell the whole force, friction with spring and damper: what they miss of the way
+    goes to the one as it comes from the other.
+    """
+    return [_sticking(location, located, site) for located, site in list(_joints(location))[:_MOST]]
+
+
+def _joints(location: Location) -> Iterator[tuple[Located, Site]]:
+    enough = _PLAUSIBLE * min((one.profile.chi for one in location.ranked), default=0.0)
+    for located in location.ranked:
+        if located.profile.forces and located.profile.chi < enough:
+            yield from ((located, site) for site in located.places[0].sites if site.kind == "joint")
+
+
+def _sticking(location: Location, located: Located, site: Site) -> Hypothesis:
+    problem = location.problem
+    motion = recovered(problem, located.profile, site)
+    compiled = problem.view(motion.z).compiled
+    port = compiled.ports[compiled.port_index(site.name, "joint")]
+    passed = motion.force + port.stiffness * motion.displacement + port.damping * motion.velocity
+    values = {
+        "force": float(np.quantile(np.abs(passed - np.median(passed)), _SLIDING)),
+        "creep_speed": _CREEP * float(np.std(motion.velocity)),
+    }
+    effect = attached("coulomb_friction", site.name, values, variant="regularised")
+    return hypothesis_of((effect,), located.profile.z)
