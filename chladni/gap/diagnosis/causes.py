@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.completeness import completeness, completeness_among, known_share
+from chladni.gap.diagnosis.grown import Grown
 from chladni.gap.diagnosis.instead import Instead, explained_instead
 from chladni.gap.diagnosis.own_signal import share_of_own_signal
 from chladni.gap.diagnosis.pairs import added_nats, exchanged, paired_causes, second_causes, without_one
@@ -21,7 +22,7 @@ from chladni.gap.diagnosis.search import (
 )
 from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
 from chladni.gap.diagnosis.study import Study
-from chladni.gap.explanation.contest import lowest, weighed
+from chladni.gap.explanation.contest import distinct, lowest, weighed
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.diagnosis import Verdict
 from chladni.gap.records.noise_floor import NoiseFloor
@@ -32,8 +33,8 @@ Step = Callable[[float], None]
 #: added.
 WRONG, NAMED = 3.0, 6.0
 #: First effects beside which a second one is looked for while all leave something; progress where the search beside
-#: each begins, that for pairs, and that for each again beside the other.
-_LEADS, _BESIDE = 2, (0.80, 0.85, 0.90, 0.95)
+#: each begins, that for pairs, that for what grows beside them, and that for each again beside the other.
+_LEADS, _BESIDE = 2, (0.80, 0.84, 0.88, 0.92, 0.96)
 #: A fit that leaves less than this, over the noise's power, leaves nothing to be explained.
 _CLEAN = 1.6
 #: Probability that a cause is all of it, with which it's named.
@@ -89,7 +90,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
     singles = single_causes(study, progress)
     entered, instead = _searched(study, nothing, singles.ranked, progress)
     progress(1.0)
-    together = weighed([nothing, *entered])
+    together = distinct(weighed([nothing, *entered]))
     tuned = next(one for one in together if one.fit is nothing.fit)
     added = added_nats(study.location)
     best = _best(together, tuned, added)
@@ -143,12 +144,19 @@ def _searched(
         progress(_BESIDE[place])
         if leaves_another():
             found += second_causes(study, lead)
-    progress(_BESIDE[-2])
+    progress(_BESIDE[-3])
     if leaves_another():
         found += paired_causes(study)
+    progress(_BESIDE[-2])
+    grown = Grown(study)
+    for lead in _leads(weighed(found)):
+        if leaves_another():
+            found += grown.beside(lead)
     progress(_BESIDE[-1])
     if len(best().hypothesis.effects) > 1:
         found += exchanged(study, best())
+        # A richer law may only stand in for details of a plainer one.
+        found.append(detailed(study, best()))
         found += sibling_causes(study, [best()])
         found += [detailed(study, best()), *without_one(study, best())]
     return [one for one in found if _is_plausible(study, one)], None

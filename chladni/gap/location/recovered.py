@@ -38,6 +38,8 @@ class Recovered(Value):
         ``[sample]`` at the port; of an input the command, of an output the signal without its error.
     z, transient
         Parameters and transients with which it was recovered.
+    beside
+        Other sites at which a force was free, with it ``[sample]``.
     reliable
         ``[line]`` share of the force's power that is no noise, on `all_lines`.
     """
@@ -50,6 +52,7 @@ class Recovered(Value):
     reliable: Matrix
     z: Matrix
     transient: Matrix
+    beside: tuple[tuple[Site, Matrix], ...] = ()
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -70,22 +73,22 @@ class Recovered(Value):
         return np.asarray(self.reliable[self.lines.index - 1], dtype=np.float64)
 
     def position_at(self, problem: LinearProblem, port: int) -> Matrix:
-        """``[sample]`` displacement at another port, under the same force."""
+        """``[sample]`` displacement at another port, under the same forces."""
         view, acting = self._acting(problem)
-        motion = view.motion(port, self.transient, [acting])
+        motion = view.motion(port, self.transient, acting)
         return np.asarray(view.lines.signal(motion[0])[0], dtype=np.float64)
 
     def states(self, problem: LinearProblem) -> Matrix:
-        """``[state, sample]`` of the linear part under the same force, in the order of the compiled model's."""
+        """``[state, sample]`` of the linear part under the same forces, in the order of the compiled model's."""
         view, acting = self._acting(problem)
-        found = view.states(self.transient, [acting])
+        found = view.states(self.transient, acting)
         return np.asarray(view.lines.signal(found)[:, 0], dtype=np.float64)
 
-    def _acting(self, problem: LinearProblem) -> tuple[LinearView, tuple[Way, Spectrum]]:
-        """Give the model on all lines, and the force on it with the way that it takes in."""
+    def _acting(self, problem: LinearProblem) -> tuple[LinearView, list[tuple[Way, Spectrum]]]:
+        """Give the model on all lines, and the forces on it with the ways that they take in."""
         whole = problem.on(all_lines(problem.measurement.samples, problem.measurement.sample_rate_hz))
-        view = whole.view(self.z)
-        return view, (whole.way(view, self.site), whole.lines.spectrum(self.force))
+        view, forces = whole.view(self.z), ((self.site, self.force), *self.beside)
+        return view, [(whole.way(view, site), whole.lines.spectrum(force)) for site, force in forces]
 
     def spectrum(self, signal: Matrix) -> Spectrum:
         """``[line]`` of a signal ``[sample]``."""
@@ -137,6 +140,7 @@ def recovered(problem: LinearProblem, found: Profile, site: Site, others: Sequen
         reliable=first.reliable,
         z=found.z,
         transient=first.transient,
+        beside=tuple((one, lines.signal(free.force[None])[0]) for one, free in zip(others, beside, strict=True)),
     )
 
 

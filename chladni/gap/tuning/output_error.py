@@ -234,7 +234,9 @@ def _fit(problem: FitProblem, start: Point, most: int, precision: float) -> tupl
         except (ModelError, EstimateError):
             spent = 0
         problem.coarse = False
-    here, slopes, converged, more = _descend(problem, problem.evaluate(start), max(most - spent, _FINE), precision)
+    here, slopes, converged, more = _descend(
+        problem, problem.evaluate(start), max(most - spent, min(most, _FINE)), precision
+    )
     return here, slopes, converged, spent + more
 
 

@@ -1,0 +1,106 @@
+"""Second effects that grow from little beside a first one, where what that leaves has lost its run.
+
+Taken from the log, a law that is only half of the cause leaves a rest that no place and no law explains: another one
+beside it would have led it elsewhere. Then every word at every site begins beside it, and all numbers move together.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cached_property
+
+from chladni.gap.diagnosis.search import sound
+from chladni.gap.diagnosis.study import Study
+from chladni.gap.explanation.candidates import screened
+from chladni.gap.explanation.hypotheses import effect_of, hypothesis_of
+from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.gap.explanation.screen import Screened
+from chladni.gap.location.locate import Located, Location
+from chladni.gap.location.profile import profiled
+from chladni.gap.plant.law_run import can_run
+from chladni.signals.errors import ModelError
+
+#: Words at sites that begin beside a first effect, steps that they are given, and those that go on to the end.
+_TRIED, _STEPS, _ENTERED = 48, 2, 4
+#: Numbers that make an effect larger, and what it begins with of them: screened alone it stood for both.
+_SIZES = frozenset(
+    {"gap", "force", "coulomb", "static", "cubic", "coefficient", "amplitude", "relative_change", "mass"}
+)
+_LITTLE = 0.1
+
+
+class Grown:
+    """Words that begin beside a first effect.
+
+    Parameters
+    ----------
+    study
+        Of the log.
+    """
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+
+    @cached_property
+    def _candidates(self) -> list[Screened]:
+        study = self.study
+        return screened(study.location, _everywhere(study.location), study.leave_out, study.own)
+
+    def beside(self, lead: Contestant) -> list[Contestant]:
+        """Enter the words that, beside a fit of one effect, explain most in their first steps."""
+        study = self.study
+        begun = sound(study, list(self._begun(lead)))
+        begun.sort(key=lambda one: one.chi)
+        return sound(study, study.contest.enter_all([_on_from(one) for one in begun[:_ENTERED]]))
+
+    def _begun(self, lead: Contestant) -> Iterator[Contestant]:
+        study, fit = self.study, lead.fit
+        tried: set[tuple[str, str]] = set()
+        # At the same site a second word would mend the details of the first one's law.
+        taken = {one.site for one in fit.effects}
+        for one in self._candidates:
+            key = (one.trial.effect, one.trial.site.name)
+            effect = None if key in tried or key[1] in taken else effect_of(_little(one), study.own)
+            if effect is None:
+                continue
+            tried.add(key)
+            both = hypothesis_of((*fit.effects, effect), fit.z, screened=one.chi, initial=fit.initial)
+            begun = study.contest.enter(both, max_iterations=_STEPS) if self._is_quick(both) else None
+            if begun is not None:
+                yield begun
+            if len(tried) == _TRIED:
+                return
+
+    def _is_quick(self, both: Hypothesis) -> bool:
+        """Whether its slopes come with its run; a law beside a delay takes a run for each number instead.
+
+        A word that its site is no place for, such as softening where there is no spring, has no run at all.
+        """
+        try:
+            compiled = self.study.contest.run.compiled(both.start_z, both.effects)
+        except ModelError:
+            return False
+        return not compiled.laws or can_run(compiled)
+
+
+def _little(one: Screened) -> Screened:
+    values = {name: (_LITTLE if name in _SIZES else 1.0) * value for name, value in one.values.items()}
+    return replace(one, values=values)
+
+
+def _on_from(begun: Contestant) -> Hypothesis:
+    fit = begun.fit
+    return hypothesis_of(fit.effects, fit.z, screened=begun.hypothesis.screened, initial=fit.initial)
+
+
+def _everywhere(location: Location) -> list[Located]:
+    """Every place: beside a first effect the second may be where it alone explains nothing."""
+    ranked = {one.places[0] for one in location.ranked}
+    others = [place for place in location.places if place not in ranked]
+    start = location.tuned.z
+    return [
+        *location.ranked,
+        *(
+            Located(places=(place,), profile=profiled(location.problem, (place.sites[0],), start, iterations=2))
+            for place in others
+        ),
+    ]
