@@ -49,6 +49,8 @@ class Resolvent:
     def at(self, s: ComplexMatrix) -> ComplexMatrix:
         """Give H at points s of the complex plane in rad/s, ``[point]``; not with a dead time inside a loop."""
         count = self._diagonal.size
+        # An undamped pole to the last digit; beside it the response is finite.
+        s = np.where(np.isin(s, self._diagonal), s.real + 1j * np.nextafter(s.imag, np.inf), s)
         solved = np.empty((count, s.size), dtype=np.complex128)
         for row in range(count - 1, -1, -1):
             coupled = self._triangle[row, row + 1 :] @ solved[row + 1 :]

