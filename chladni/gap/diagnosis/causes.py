@@ -13,9 +13,12 @@ from chladni.gap.diagnosis.own_signal import share_of_own_signal
 from chladni.gap.diagnosis.pairs import added_nats, exchanged, paired_causes, second_causes, without_one
 from chladni.gap.diagnosis.search import (
     ALONE,
+    Singles,
     detailed,
+    is_far,
     is_lost,
     is_one_force,
+    plausible_places,
     sibling_causes,
     single_causes,
     without_cause,
@@ -37,6 +40,8 @@ WRONG, NAMED = 3.0, 6.0
 _LEADS, _BESIDE = 2, (0.80, 0.84, 0.88, 0.92, 0.96)
 #: A fit that leaves less than this, over the noise's power, leaves nothing to be explained.
 _CLEAN = 1.6
+#: Share of the gap's power with which two causes come near to what one force explains.
+_NEAR = 0.03
 #: Probability that a cause is all of it, with which it's named.
 _COMPLETE = 0.5
 #: Share of what a sensor leaves that follows its own signal in a curve: more is no noise.
@@ -88,7 +93,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
     nothing = without_cause(study)
     progress(0.1)
     singles = single_causes(study, progress)
-    entered, instead = _searched(study, nothing, singles.ranked, progress)
+    entered, instead = _searched(study, nothing, singles, progress)
     progress(1.0)
     together = distinct(weighed([nothing, *entered]))
     tuned = next(one for one in together if one.fit is nothing.fit)
@@ -125,11 +130,11 @@ def causes_of(study: Study, progress: Step) -> Causes:
 
 
 def _searched(
-    study: Study, nothing: Contestant, singles: Sequence[Contestant], progress: Step
+    study: Study, nothing: Contestant, singles: Singles, progress: Step
 ) -> tuple[list[Contestant], Instead | None]:
     """Every contestant with a cause: single ones, and two where one leaves something that nothing else explains."""
     added = added_nats(study.location)
-    found = list(singles)
+    found = list(singles.ranked)
 
     def best() -> Contestant:
         return _best(weighed([nothing, *found]), nothing, added)
@@ -150,7 +155,8 @@ def _searched(
     progress(_BESIDE[-2])
     grown = Grown(study)
     for lead in _leads(weighed(found)):
-        if leaves_another():
+        # A law that follows the log over short windows is entered over long ones next.
+        if leaves_another() and not singles.followed and is_far(study.location, best().chi):
             found += grown.beside(lead)
     progress(_BESIDE[-1])
     if len(best().hypothesis.effects) > 1:
@@ -159,7 +165,7 @@ def _searched(
         found.append(detailed(study, best()))
         found += sibling_causes(study, [best()])
         found += [detailed(study, best()), *without_one(study, best())]
-    return [one for one in found if _is_plausible(study, one)], None
+    return [one for one in found if _is_plausible(study, nothing, one)], None
 
 
 def _leaves_another(study: Study, best: Contestant, nothing: Contestant, floor: Matrix) -> bool:
@@ -170,9 +176,16 @@ def _leaves_another(study: Study, best: Contestant, nothing: Contestant, floor: 
     return not is_one_force(study.location) or is_lost(study.location, best.chi)
 
 
-def _is_plausible(study: Study, found: Contestant) -> bool:
-    """Whether one cause, or two; where one force explains all, two must do so as well, or they only come near it."""
-    return len(found.hypothesis.effects) < 2 or not is_one_force(study.location) or found.chi < ALONE
+def _is_plausible(study: Study, nothing: Contestant, found: Contestant) -> bool:
+    """Whether one cause, or two; where one force explains all, two must do so as well, or they only come near it.
+
+    Two at places each of which explains all are one force to the sensors: those need only come near.
+    """
+    sites = {one.site for one in found.hypothesis.effects}
+    if len(sites) < 2 or not is_one_force(study.location):
+        return True
+    alike = {name for place in plausible_places(study.location) for name in place.places[0].names}
+    return found.chi < (max(ALONE, _NEAR * nothing.chi) if sites <= alike else ALONE)
 
 
 def _leads(ranked: Sequence[Contestant]) -> list[Contestant]:

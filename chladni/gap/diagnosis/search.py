@@ -141,6 +141,12 @@ def is_lost(location: Location, left: float) -> bool:
     return left > _LOST * _least_force(location)
 
 
+def is_far(location: Location, left: float) -> bool:
+    """Whether runs leave far more than the best place does, a sensor's or an input's own as well as a force's."""
+    best = location.best
+    return best is None or left > _LOST * max(best.profile.chi, 1.0)
+
+
 def least_left(found: Sequence[Contestant]) -> float:
     """Give what the best of contestants leaves, over the noise's power; infinite without any."""
     return min((one.chi for one in found), default=np.inf)

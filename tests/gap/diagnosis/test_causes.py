@@ -165,10 +165,27 @@ def test_another_cause_is_looked_for_where_a_small_gap_is_half_explained(explain
         assert not _leaves_another(study, nothing, nothing, np.ones(2))
 
 
+def pair(chi: float, *sites: str) -> Contestant:
+    """Two gains that leave this mean square, in units of the noise."""
+    two = tuple(attached("gain_error", site, {"gain": 2.0}) for site in sites)
+    return replace(left(chi), hypothesis=Hypothesis(effects=two, fitted=((), ()), start_z=np.zeros(0)))
+
+
 def test_two_causes_instead_of_one_force_must_explain_all(explained_by_one_force) -> None:
     one, several = explained_by_one_force
-    two = tuple(attached("gain_error", site, {"gain": 2.0}) for site in ("a", "b"))
-    both = Hypothesis(effects=two, fitted=((), ()), start_z=np.zeros(0))
-    near, all_of_it = (replace(left(chi), hypothesis=both) for chi in (1.6, 1.1))
-    assert [_is_plausible(one, found) for found in (near, all_of_it, left(9.0))] == [False, True, True]
-    assert _is_plausible(several, near)
+    nothing = left(100.0)
+    assert [_is_plausible(one, nothing, pair(chi, "a", "b")) for chi in (1.2, 1.5)] == [True, False]
+    assert _is_plausible(several, nothing, pair(1.5, "a", "b"))
+    assert _is_plausible(one, nothing, left(5.0))
+
+
+def test_two_causes_where_either_s_force_explains_all_need_only_come_near(explained_by_one_force) -> None:
+    one, _ = explained_by_one_force
+    first, second = (replace(one.location.ranked[0], places=(place,)) for place in one.location.places[:2])
+    other = one.location.places[2].names[0]
+    alike = replace(one, location=replace(one.location, ranked=(first, second)))
+    sites = first.places[0].names[0], second.places[0].names[0]
+    nothing = left(100.0)
+    assert [_is_plausible(alike, nothing, pair(chi, *sites)) for chi in (1.2, 2.5, 4.0)] == [True, True, False]
+    # A place whose force leaves more isn't one of them.
+    assert not _is_plausible(alike, nothing, pair(2.5, sites[0], other))
