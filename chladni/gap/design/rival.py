@@ -81,7 +81,7 @@ class Rival:
         return float(0.5 * np.sum(self.sure * (there**2 - here**2)))
 
     def is_slow(self, run: FreeRun) -> bool:
-        """Whether slopes take a run of the integrator each: dead time in a loop, laws before a late clock."""
+        """Whether slopes take a run of the integrator each: laws or dead times in a loop before a late clock."""
         compiled = run.compiled(self._z, self._effects)
         return not (can_run(compiled) or is_plain(compiled))
 

@@ -71,7 +71,7 @@ class Grown:
                 return
 
     def _is_quick(self, both: Hypothesis) -> bool:
-        """Whether its slopes come with its run; a law beside a delay takes a run for each number instead.
+        """Whether its slopes come with its run; a law before a late clock takes a run for each number instead.
 
         A word that its site is no place for, such as softening where there is no spring, has no run at all.
         """

@@ -140,7 +140,9 @@ class FreeRun:
         rate = self.measurement.sample_rate_hz
         hold = hold_of(compiled, rate)
         # An integrator counts time from the start of its own window; a law may want the log's.
-        if len(self.windows) == 1 or not can_run(compiled) or hold.kinked.size or np.any(hold.rate >= 0):
+        if len(self.windows) == 1 or not compiled.laws or not can_run(compiled):
+            return None
+        if compiled.delays or hold.kinked.size or np.any(hold.rate >= 0):
             return None
         equation = equations(compiled, self.measurement.inputs, rate, self.rows, PARTS)
         starts = initial_states(initial, len(self.windows), len(compiled.states))

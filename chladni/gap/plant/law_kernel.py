@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.plant.dead_times import DeadTimes, begin_dead_times, look_back, see_own_step
 from chladni.models.integrator.machine_code import call_law, inlined_code, machine_code, part_code
 
 Matrix = NDArray[np.float64]
@@ -47,6 +48,8 @@ class Laws(NamedTuple):
         Of trial, of rates, of the states at the end.
     scale
         ``[4 port + law state]`` size of each argument, so that differences are taken on it.
+    lagged, now
+        ``[port]`` what dead times give of steps before, and their share of the displacement after the step itself.
     """
 
     table: Integers
@@ -56,6 +59,8 @@ class Laws(NamedTuple):
     rates: Matrix
     address: Integers
     scale: Matrix
+    lagged: Matrix
+    now: Matrix
 
 
 class Room(NamedTuple):
@@ -140,9 +145,9 @@ def _bend(laws: Laws, law: int, room: Room, port: int, h: float, t: float) -> No
 
 @inlined_code
 def force_of(laws: Laws, room: Room, port: int, h: float, t: float) -> float:
-    """Force of all laws at a port, at the motion after the step; sets their states."""
+    """Force of all laws and dead times at a port, at the motion after the step; sets the states of laws."""
     p = room.force.size
-    total = 0.0
+    total: float = laws.lagged[port] + laws.now[port] * room.given[port]
     for law in range(laws.first[port], laws.first[port + 1]):
         if laws.counts[law] > 0:
             _bend(laws, law, room, port, h, t)
@@ -310,10 +315,12 @@ def _advance(march: March, room: Room, step: int) -> None:
 
 
 @machine_code
-def law_march(march: March, laws: Laws, room: Room, h: float, begin_s: float) -> int:
+def law_march(march: March, laws: Laws, delays: DeadTimes, room: Room, h: float, begin_s: float) -> int:
     """March through one window; gives how many steps did not meet their laws."""
     n, p, width = march.x.shape[1], room.force.size, march.rows.shape[1]
+    begin_dead_times(delays, laws.lagged, laws.now)
     failed = begin(march, laws, room, begin_s)
+    see_own_step(delays, laws.now)
     size = 1e-300
     for step in range(march.rows.shape[0]):
         _record(march, laws, room, step)
@@ -322,6 +329,10 @@ def law_march(march: March, laws: Laws, room: Room, h: float, begin_s: float) ->
         if step == march.rows.shape[0] - 1:
             break
         _advance(march, room, step)
+        for port in range(p):
+            laws.lagged[port] = 0.0
+        for delay in range(delays.port.size):
+            laws.lagged[delays.port[delay]] += look_back(delays, delay, march.motion, step + 1, step)
         failed += meet(laws, room, march.ends, h, begin_s + (step + 1) * h, size)
         for row in range(n):
             for port in range(p):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.plant.dead_times import DeadTimes, dead_times
 from chladni.gap.plant.law_kernel import Laws, March, Room, law_march
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import responses
@@ -34,6 +35,8 @@ class Equations:
         ``[step, width]`` inputs of all steps of the record.
     laws
         Addresses, parameters and first states.
+    delays
+        Dead times in loops.
     parts
         Steps between samples.
     """
@@ -45,13 +48,14 @@ class Equations:
     output: Matrix
     rows: Matrix
     laws: LawTable
+    delays: DeadTimes
     plan: PortPlan
     parts: int
 
 
 def can_run(compiled: CompiledModel) -> bool:
-    """Whether a model is one for these kernels: laws, and nothing that looks back or reads between samples."""
-    return bool(compiled.laws) and not compiled.delays and not any(compiled.output_offsets_s)
+    """Whether a model is one for these kernels: laws or dead times in loops, and no reading between samples."""
+    return bool(compiled.laws or compiled.delays) and not any(compiled.output_offsets_s)
 
 
 def equations(
@@ -89,6 +93,7 @@ def equations(
         output=np.hstack([plan.c[rows], plan.d[rows], none, plan.h[rows]]),
         rows=_finer(input_rows(compiled, hold, signals, sample_rate_hz, extra=0), hold, parts),
         laws=law_table(compiled, plan),
+        delays=dead_times(plan, sample_rate_hz * parts),
         plan=plan,
         parts=parts,
     )
@@ -131,7 +136,7 @@ def run_laws(equation: Equations, windows: Windows, initial: Matrix, sample_rate
     records, failed = [], 0
     for (start, stop), first in zip(windows, initial, strict=True):
         record = new_record(equation, start, stop, first)
-        failed += law_march(record, laws, room, h, start / sample_rate_hz)
+        failed += law_march(record, laws, equation.delays, room, h, start / sample_rate_hz)
         if not np.all(np.isfinite(record.x[-1])):
             raise ModelError(f"the model diverges between {start / sample_rate_hz:g} and {stop / sample_rate_hz:g} s")
         records.append(record)
@@ -177,6 +182,7 @@ def kernel_laws(equation: Equations, room: Room) -> Laws:
     return Laws(
         laws.table.copy(), np.array([len(law.state) for law in laws.laws], dtype=np.int64), laws.first,
         trial, rates, address, np.concatenate([np.full(4 * p, 1e-300), np.full(count, 1e-3)]),
+        np.zeros(p), np.zeros(p),
     )  # fmt: skip
 
 

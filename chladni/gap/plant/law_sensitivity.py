@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.plant.dead_times import DeadTimes
 from chladni.gap.plant.law_kernel import March
 from chladni.gap.plant.law_run import Equations, Windows, kernel_laws, kernel_room, new_record
 from chladni.gap.plant.law_slopes import Change, Unknowns, law_slopes
@@ -13,6 +14,7 @@ from chladni.models.integrator.integrator import Integration
 from chladni.signals.errors import ModelError
 
 Matrix = NDArray[np.float64]
+Integers = NDArray[np.int64]
 #: Modal coordinates worse conditioned than this (a double integrator has none) are not taken.
 _CONDITION = 1e7
 
@@ -78,7 +80,7 @@ def sensitivities(
         found[start:stop, :, : len(changed)] = outputs
         unknowns = fixed._replace(lead=lead, lead_start=lead_start)
         law_slopes(
-            record, laws, room, _change(equation, q), unknowns, found[start:stop],
+            record, laws, equation.delays, room, _change(equation, q, len(record.x)), unknowns, found[start:stop],
             1.0 / sample_rate_hz, start / sample_rate_hz,
         )  # fmt: skip
     slopes = np.ascontiguousarray(found.transpose(2, 1, 0))
@@ -119,6 +121,7 @@ def _fixed(
             if mine.parameters != its.parameters:
                 other.append((place, law, int(one.laws.table[law, 1])))
                 by.append(size)
+    line, lines = _other_lines(equation, changed)
     empty = np.zeros((1, 0, len(changed)))
     return Unknowns(
         table=np.ascontiguousarray(table), ends=equation.ends,
@@ -127,7 +130,23 @@ def _fixed(
         force_output=np.ascontiguousarray(equation.output[:, n + width :]),
         lead=empty, lead_start=empty[0], initial=to_modal,
         other=np.array(other, dtype=np.int64).reshape(-1, 3), by=np.array(by, dtype=np.float64),
+        line=line, lines=lines, line_by=np.array([changed[place][1] for place in line[:, 0]], dtype=np.float64),
     )  # fmt: skip
+
+
+def _other_lines(equation: Equations, changed: Sequence[tuple[Equations, float]]) -> tuple[Integers, DeadTimes]:
+    """``[changed dead time, 2]`` parameter and dead time, and how those are then."""
+    mine = equation.plan.delay_s
+    found = [
+        (place, delay) for place, (one, _) in enumerate(changed) for delay in np.flatnonzero(one.plan.delay_s != mine)
+    ]
+    lines = [changed[place][0].delays for place, _ in found]
+    which = [delay for _, delay in found]
+    return np.array(found, dtype=np.int64).reshape(-1, 2), DeadTimes(
+        np.array([one.port[at] for one, at in zip(lines, which, strict=True)], dtype=np.int64),
+        np.array([one.ago[at] for one, at in zip(lines, which, strict=True)], dtype=np.int64),
+        np.array([one.share[at] for one, at in zip(lines, which, strict=True)]).reshape(-1, 4),
+    )
 
 
 def _leads(
@@ -165,15 +184,17 @@ def _leads(
 
 def _require_same_form(equation: Equations, other: Equations) -> None:
     mine, its = ([law.function for law in one.laws.laws] for one in (equation, other))
-    if equation.step.shape != other.step.shape or mine != its or equation.plan.ports != other.plan.ports:
+    same_plan = equation.plan.ports == other.plan.ports and equation.plan.delay_s.size == other.plan.delay_s.size
+    if equation.step.shape != other.step.shape or mine != its or not same_plan:
         raise ModelError("a small change of a parameter gives a model of another form; start from another value")
 
 
-def _change(equation: Equations, q: int) -> Change:
+def _change(equation: Equations, q: int, steps: int) -> Change:
     n, p, count = len(equation.plan.a), len(equation.plan.ports), equation.laws.state.size
     arguments = 4 * p + count
     x, after, given, force, fresh, own, own_state = (
         np.zeros((rows, q)) for rows in (n, n + 2 * p, arguments, p, p, p, count)
     )
     slope, bend, level = np.zeros((p, arguments)), np.zeros((count, arguments)), np.zeros(count)
-    return Change(x, after, given, force, fresh, own, own_state, slope, bend, level)
+    past = np.zeros((steps if equation.delays.port.size else 1, equation.delays.port.size, q))
+    return Change(x, after, given, force, fresh, own, own_state, slope, bend, level, past)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.plant.dead_times import DeadTimes, begin_dead_times, look_back, see_own_step
 from chladni.gap.plant.law_kernel import (
     FINE,
     Laws,
@@ -43,6 +44,9 @@ class Unknowns(NamedTuple):
         ``[which, 3]`` parameter, law, address of the law's parameters when that parameter is changed.
     by
         ``[which]`` that change.
+    line
+        ``[changed dead time, 2]`` parameter and dead time; `lines` how it is when the parameter is changed, and
+        `line_by` that change.
     """
 
     table: Matrix
@@ -56,6 +60,9 @@ class Unknowns(NamedTuple):
     initial: Matrix
     other: Integers
     by: Matrix
+    line: Integers
+    lines: DeadTimes
+    line_by: Matrix
 
 
 class Change(NamedTuple):
@@ -75,6 +82,8 @@ class Change(NamedTuple):
         ``[port, argument]``, ``[law state, argument]``, no unknown.
     level
         ``[law state]`` the law states themselves.
+    past
+        ``[step, delay]`` displacements at the ports of dead times.
     """
 
     x: Matrix
@@ -87,6 +96,7 @@ class Change(NamedTuple):
     slope: Matrix
     bend: Matrix
     level: Matrix
+    past: NDArray[np.float64]
 
 
 @part_code
@@ -153,6 +163,27 @@ def _own(laws: Laws, room: Room, change: Change, unknowns: Unknowns, h: float, t
         for place in range(low, high):
             change.own_state[place, unknown] += (room.state[place] - change.level[place]) / by
             room.state[place] = change.level[place]
+
+
+@part_code
+def _look_back(march: March, delays: DeadTimes, change: Change, unknowns: Unknowns, step: int) -> None:
+    """What dead times add to forces: displacements of steps before, and another dead time."""
+    for delay in range(delays.port.size):
+        for node in range(delays.share.shape[1]):
+            past = step - delays.ago[delay] - node
+            if 0 <= past < step:
+                _add(change.own, delays.port[delay], delays.share[delay, node], change.past[past], delay)
+    for which in range(unknowns.line_by.size):
+        unknown, delay = unknowns.line[which, 0], unknowns.line[which, 1]
+        there = look_back(unknowns.lines, which, march.motion, step, step)
+        here = look_back(delays, delay, march.motion, step, step)
+        change.own[delays.port[delay], unknown] += (there - here) / unknowns.line_by[which]
+
+
+@part_code
+def _keep(delays: DeadTimes, change: Change, step: int) -> None:
+    for delay in range(delays.port.size):
+        _copy(change.past[step], delay, change.given, delays.port[delay])
 
 
 @inlined_code
@@ -267,14 +298,18 @@ def _open(march: March, laws: Laws, room: Room, change: Change, unknowns: Unknow
 
 @machine_code
 def law_slopes(
-    march: March, laws: Laws, room: Room, change: Change, unknowns: Unknowns, found: Matrix, h: float, begin_s: float
-) -> None:
+    march: March, laws: Laws, delays: DeadTimes, room: Room, change: Change, unknowns: Unknowns, found: Matrix,
+    h: float, begin_s: float,
+) -> None:  # fmt: skip
     """Add to ``found [sample, output, unknown]`` what changes along a march that was made.
 
     The march is differentiated as it was made, step by step, laws that switch included.
     """
     n, p = change.x.shape[0], room.force.size
+    begin_dead_times(delays, laws.lagged, laws.now)
     _open(march, laws, room, change, unknowns, begin_s)
+    see_own_step(delays, laws.now)
+    _keep(delays, change, 0)
     for step in range(march.rows.shape[0]):
         _pass_on(room, change)
         _write(change, unknowns, found, step)
@@ -289,7 +324,9 @@ def law_slopes(
             room.given[4 * p + place] = room.state[place]
         _slopes(laws, room, change, h, t)
         _own(laws, room, change, unknowns, h, t)
+        _look_back(march, delays, change, unknowns, step + 1)
         _settle(room, change, unknowns.ends, n)
+        _keep(delays, change, step + 1)
         for row in range(n):
             for unknown in range(change.x.shape[1]):
                 change.x[row, unknown] = change.next[row, unknown]

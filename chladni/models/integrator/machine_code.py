@@ -31,13 +31,10 @@ PART_SIGNATURE = _WORD(_WORD, _WORD, _NUMBER, _NUMBER)
 _OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy", "_nrt": False}
 
 
-def _stamp() -> tuple[float, int]:
-    """Newest time and total size of the sources of all kernels."""
-    found = [path.stat() for path in Path(__file__).parent.glob("*.py")]
+def _stamp(beside: Path) -> tuple[float, int]:
+    """Newest time and total size of the sources of these kernels, and of those beside another one."""
+    found = [path.stat() for folder in {Path(__file__).parent, beside} for path in folder.glob("*.py")]
     return max(each.st_mtime for each in found), sum(each.st_size for each in found)
-
-
-_STAMP = _stamp()
 
 
 def machine_code(function: FunctionT) -> FunctionT:
@@ -49,7 +46,7 @@ def machine_code(function: FunctionT) -> FunctionT:
     # numba looks at the file of a kernel only: a part that changed in another file would go on running as it was.
     kept = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if kept is not None:
-        vars(kept)["_source_stamp"] = _STAMP
+        vars(kept)["_source_stamp"] = _stamp(Path(function.__code__.co_filename).parent)
     return compiled
 
 
