@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from chladni.gap.location.noise_behind import noise_behind
 from chladni.gap.location.profile import Profile, profiled
-from chladni.gap.plant.linear_problem import LinearProblem, Scaled
+from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.neighbours import Scaled
 from chladni.gap.plant.places import Place, Site, placed, sites_of
 from chladni.gap.plant.record_lines import RecordLines, all_lines, segment_lines, telling_lines
 from chladni.gap.records.measurement import Measurement

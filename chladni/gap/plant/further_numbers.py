@@ -7,7 +7,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.plant.linear_problem import LinearProblem, Scaled
+from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.neighbours import Scaled
 from chladni.models.core.compiled_model import CompiledModel
 
 Matrix = NDArray[np.float64]

@@ -1,46 +1,24 @@
 """A measurement beside the linear part of a model: residual spectra, and how they move with the parameters."""
 
-from collections.abc import Mapping, Sequence
-from typing import Protocol, Self
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.plant.linear_view import LinearView, Way
+from chladni.gap.plant.neighbours import STEP, Neighbours, Scaled, Varied
 from chladni.gap.plant.places import Site, way_to
 from chladni.gap.plant.record_lines import RecordLines
 from chladni.gap.plant.view_slopes import same_frame, view_slopes
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
-from chladni.models.core.compiled_model import CompiledModel
 
 Matrix = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
-#: Of a tunable's sigma: small against curvature, large against rounding. Equations round less than responses.
-_STEP, _RESPONSE_STEP = 1e-5, 1e-4
+#: Of a tunable's sigma: small against curvature, large against rounding of responses.
+_RESPONSE_STEP = 1e-4
 #: Complex numbers that slopes of some parameters at once may need beside their result: 64 MB.
 _AT_ONCE = 4_000_000
-
-
-class Scaled(Protocol):
-    """Parameters that may move, in units of their tolerance."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names."""
-
-    def values(self, z: Matrix) -> Mapping[str, float]:
-        """Values ``nominal exp(tolerance z)`` by name."""
-
-
-class Varied(Protocol):
-    """A model as far as its equations and numbers go."""
-
-    def with_values(self, values: Mapping[str, float]) -> Self:
-        """Give the model with some parameters replaced."""
-
-    def compile(self) -> CompiledModel:
-        """Give the equations."""
 
 
 class LinearProblem:
@@ -50,6 +28,8 @@ class LinearProblem:
     ----------
     model, measurement, noise, tunables, lines
         What is compared, and where.
+    neighbours
+        Equations that problems of one model share.
     """
 
     def __init__(
@@ -59,9 +39,12 @@ class LinearProblem:
         noise: NoiseFloor,
         tunables: Scaled,
         lines: RecordLines,
+        *,
+        neighbours: Neighbours | None = None,
     ) -> None:
         self.model, self.measurement, self.tunables, self.lines = model, measurement, tunables, lines
         self.noise = noise
+        self._neighbours = Neighbours(model, tunables) if neighbours is None else neighbours
         self._inputs: dict[tuple[float, ...], Spectrum] = {}
         self._view: tuple[bytes, LinearView] | None = None
         compiled = model.compile()
@@ -77,17 +60,23 @@ class LinearProblem:
 
     def on(self, lines: RecordLines) -> "LinearProblem":
         """Give the same problem on other lines."""
-        return LinearProblem(self.model, self.measurement, self.noise, self.tunables, lines)
+        return LinearProblem(
+            self.model, self.measurement, self.noise, self.tunables, lines, neighbours=self._neighbours
+        )
 
     def with_noise(self, noise: NoiseFloor) -> "LinearProblem":
         """Give the same problem with another noise."""
-        return LinearProblem(self.model, self.measurement, noise, self.tunables, self.lines)
+        return LinearProblem(
+            self.model, self.measurement, noise, self.tunables, self.lines, neighbours=self._neighbours
+        )
 
     def view(self, z: Matrix) -> LinearView:
         """Give the linear part at parameters z."""
         # What is profiled at some parameters is linearised there next.
         if self._view is None or self._view[0] != z.tobytes():
-            view = LinearView(self._at(z), self.lines, self.measurement.inputs, self.rows, known=self._inputs)
+            view = LinearView(
+                self._neighbours.at(z), self.lines, self.measurement.inputs, self.rows, known=self._inputs
+            )
             self._view = z.tobytes(), view
         return self._view[1]
 
@@ -115,16 +104,13 @@ class LinearProblem:
             return np.zeros((0, *self.measured.shape), dtype=np.complex128)
         view = self.view(z)
         ways = [(self.way(view, site), force) for site, force in forces]
-        # From the model at z each takes one new number.
-        base = self.model.with_values(self.tunables.values(z))
-        steps = z + _STEP * np.eye(z.size)
+        changed = self._neighbours.changed(z)
         found = np.empty((z.size, *self.measured.shape), dtype=np.complex128)
         count = max(1, _AT_ONCE // (max(1, len(view.compiled.states)) * self.measured[0].size))
         for first in range(0, z.size, count):
             places = range(first, min(first + count, z.size))
-            changed = {place: base.with_values(self.tunables.values(steps[place])).compile() for place in places}
             plain = [place for place in places if same_frame(view.compiled, changed[place])]
-            slopes = view_slopes(view, [changed[place] for place in plain], _STEP, transient, ways)
+            slopes = view_slopes(view, [changed[place] for place in plain], STEP, transient, ways)
             found[plain] = slopes * self.weight
             for place in set(places) - set(plain):
                 found[place] = self._difference(z, place, transient, forces)
@@ -136,10 +122,9 @@ class LinearProblem:
         """Slope along a parameter that moves a dead time, which isn't in the equations."""
         here = self.response(z, transient, forces)
         moved = z + _RESPONSE_STEP * np.eye(z.size)[place]
-        there = LinearView(self._at(moved), self.lines, self.measurement.inputs, self.rows, known=self._inputs)
+        there = LinearView(
+            self._neighbours.at(moved), self.lines, self.measurement.inputs, self.rows, known=self._inputs
+        )
         ways = [(self.way(there, site), force) for site, force in forces]
         slope = (there.response(transient, ways) * self.weight - here) / _RESPONSE_STEP
         return np.asarray(slope, dtype=np.complex128)
-
-    def _at(self, z: Matrix) -> CompiledModel:
-        return (self.model.with_values(self.tunables.values(z)) if z.size else self.model).compile()

@@ -238,8 +238,10 @@ class CompiledModel(Value):
             matrix = getattr(self, name)
             if matrix.shape != shape:
                 raise ModelError(f"compiled model: {name} has shape {matrix.shape}, {shape} was expected")
-            if not np.isfinite(matrix).all():
-                raise ModelError(f"compiled model: {name} holds a number that is not finite")
+        # All at once: a model is compiled thousands of times.
+        if not np.isfinite(np.concatenate([getattr(self, name).ravel() for name in expected])).all():
+            name = next(name for name in expected if not np.isfinite(getattr(self, name)).all())
+            raise ModelError(f"compiled model: {name} holds a number that is not finite")
         for name, values, count in (
             ("input_delays_s", self.input_delays_s, len(self.inputs)),
             ("output_offsets_s", self.output_offsets_s, p),

@@ -1,0 +1,79 @@
+"""Equations of a model at some parameters, and at those with one of them changed."""
+
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from typing import Protocol, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.core.compiled_model import CompiledModel
+
+Matrix = NDArray[np.float64]
+FoundT = TypeVar("FoundT")
+#: Of a tunable's sigma: small against curvature, large against rounding of equations.
+STEP = 1e-5
+#: Settings that are kept: places are profiled one after another, each from the same start.
+_KEPT = 8
+
+
+class Scaled(Protocol):
+    """Parameters that may move, in units of their tolerance."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names."""
+
+    def values(self, z: Matrix) -> Mapping[str, float]:
+        """Values ``nominal exp(tolerance z)`` by name."""
+
+
+class Varied(Protocol):
+    """A model as far as its equations and numbers go."""
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """Give the model with some parameters replaced."""
+
+    def compile(self) -> CompiledModel:
+        """Give the equations."""
+
+
+class Neighbours:
+    """Equations of one model, kept while they are asked for again.
+
+    Parameters
+    ----------
+    model, tunables
+        What varies.
+    """
+
+    def __init__(self, model: Varied, tunables: Scaled) -> None:
+        self._model, self._tunables = model, tunables
+        self._at: OrderedDict[bytes, CompiledModel] = OrderedDict()
+        self._changed: OrderedDict[bytes, tuple[CompiledModel, ...]] = OrderedDict()
+
+    def at(self, z: Matrix) -> CompiledModel:
+        """Give the equations at ``z [parameter]``, in units of their tolerance."""
+        return _kept(self._at, z, lambda: self._set(z).compile())
+
+    def changed(self, z: Matrix) -> tuple[CompiledModel, ...]:
+        """``[parameter]``: equations with each parameter `STEP` further than at z."""
+        return _kept(self._changed, z, lambda: self._steps(z))
+
+    def _set(self, z: Matrix) -> Varied:
+        return self._model.with_values(self._tunables.values(z)) if z.size else self._model
+
+    def _steps(self, z: Matrix) -> tuple[CompiledModel, ...]:
+        # From the model at z each takes one new number.
+        base, there = self._set(z), self._tunables.values(z + STEP)
+        return tuple(base.with_values({name: there[name]}).compile() for name in self._tunables.names)
+
+
+def _kept(found: OrderedDict[bytes, FoundT], z: Matrix, make: Callable[[], FoundT]) -> FoundT:
+    key = z.tobytes()
+    if key not in found:
+        found[key] = make()
+        if len(found) > _KEPT:
+            found.popitem(last=False)
+    found.move_to_end(key)
+    return found[key]
