@@ -31,8 +31,6 @@ class Course:
         What the experiment's record would be like: names, rate, length.
     windows
         None in free run.
-    logged
-        The log's own course, whose slopes serve another level of it when slopes are slow; None for itself.
 
     Raises
     ------
@@ -46,13 +44,12 @@ class Course:
         rivals: Sequence[Rival],
         measurement: Measurement,
         windows: Windows | None,
-        logged: "Course | None" = None,
     ) -> None:
         self.experiment, self._rivals = experiment, rivals
         self._run = FreeRun(experiment.model, replace(measurement, inputs=experiment.inputs), windows=windows)
         self._kept: dict[tuple[int, int], Matrix] = {}
         #: Of each candidate.
-        self.predictions: list[Prediction] = [self._predicted(place, logged) for place in range(len(rivals))]
+        self.predictions: list[Prediction] = [one.predicted(self._run, self._initial(one)) for one in rivals]
 
     def again(self, experiment: Experiment) -> "Course":
         """Give an experiment with the same course, that is averaged or has more sensors."""
@@ -98,13 +95,6 @@ class Course:
         power = np.mean(noise.whitened(wanted)[rows] ** 2, axis=-1)
         sums = self._sums(noise, pair) if at is None else self._sums_at(noise, pair, at)
         return Part(gain * sums[:, rows], 1.0 + SLACK + gain * detail[rows] * power, wanted.shape[-1])
-
-    def _predicted(self, place: int, logged: "Course | None") -> Prediction:
-        rival, level = self._rivals[place], self.experiment.level
-        initial = self._initial(rival)
-        if logged is not None and level is not None and rival.is_slow(self._run):
-            return rival.scaled(self._run, initial, logged.predictions[place], level)
-        return rival.predicted(self._run, initial)
 
     def _sums(self, noise: NoiseFloor, pair: tuple[int, int]) -> Matrix:
         if pair not in self._kept:

@@ -9,7 +9,6 @@ from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.law_plant import Setting, fine_run, slopes_of
 from chladni.gap.plant.law_run import can_run
-from chladni.gap.plant.linear_run import is_plain
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.tuning.decay import decay
 from chladni.gap.tuning.effect_scale import EffectNumber, effect_numbers, with_numbers
@@ -19,8 +18,8 @@ Matrix = NDArray[np.float64]
 _LIMIT = 3.0
 #: How far an effect's parameter may go in one linear step, in factors of e.
 _TRUST = 1.0
-#: Step of differences, in ln(value): large against the errors of a run's steps where there are laws.
-_APART, _APART_WITH_LAWS = 1e-5, 1e-3
+#: Step of differences, in ln(value).
+_APART = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,26 +79,10 @@ class Rival:
         there, here = at - self.believed, -self.believed
         return float(0.5 * np.sum(self.sure * (there**2 - here**2)))
 
-    def is_slow(self, run: FreeRun) -> bool:
-        """Whether slopes take a run of the integrator each: laws or dead times in a loop before a late clock."""
-        compiled = run.compiled(self._z, self._effects)
-        return not (can_run(compiled) or is_plain(compiled))
-
     @property
     def unknowns(self) -> int:
         """How many numbers a refit would move."""
         return int(self.low.size)
-
-    def scaled(self, run: FreeRun, initial: Matrix, logged: Prediction, level: float) -> Prediction:
-        """Predict the log's own course at another level, with slopes that grow as the level does.
-
-        Raises
-        ------
-        ModelError
-            When it diverges there.
-        """
-        outputs = run.outputs(self._z, self._effects, initial)
-        return Prediction(outputs, level * logged.own, logged.starts, logged.at)
 
     def predicted(self, run: FreeRun, initial: Matrix, at: Matrix | None = None) -> Prediction:
         """Predict an experiment.
@@ -121,13 +104,13 @@ class Rival:
         compiled = run.compiled(here.z, here.effects)
         if can_run(compiled):
             made = fine_run(run, here, initial)
-            steps = self._steps(x, _APART)
+            steps = self._steps(x)
             changed = [(self._setting(x + row), by) for row, by in zip(np.diag(steps), steps, strict=True)]
             own, starts = slopes_of(run, made, changed)
             return Prediction(made.outputs, own, starts, x)
         outputs = run.outputs(here.z, here.effects, initial)
         own = np.empty((x.size, *outputs.shape))
-        for place, by in enumerate(self._steps(x, _APART_WITH_LAWS if compiled.laws else _APART)):
+        for place, by in enumerate(self._steps(x)):
             moved = x.copy()
             moved[place] += by
             there = self._setting(moved)
@@ -141,6 +124,6 @@ class Rival:
         count = self._z.size
         return Setting(self._z + x[:count], with_numbers(self._effects, self._numbers, x[count:]))
 
-    def _steps(self, x: Matrix, apart: float) -> Matrix:
-        steps = np.concatenate([apart / self._tolerance, np.full(len(self._numbers), apart)])
+    def _steps(self, x: Matrix) -> Matrix:
+        steps = np.concatenate([_APART / self._tolerance, np.full(len(self._numbers), _APART)])
         return np.asarray(np.where(x + steps > self.high, -steps, steps))

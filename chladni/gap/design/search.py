@@ -15,7 +15,7 @@ from chladni.gap.design.more_sensors import MoreSensor, more_sensors, with_noise
 from chladni.gap.design.rival import Rival
 from chladni.gap.design.separation import Record, Separation
 from chladni.gap.explanation.hypothesis import Contestant
-from chladni.gap.plant.free_run import FreeRun, Windows
+from chladni.gap.plant.free_run import Windows
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
@@ -23,8 +23,8 @@ from chladni.models.core.model import Model
 from chladni.signals.errors import EstimateError, ModelError
 
 Matrix = NDArray[np.float64]
-#: Samples that are simulated of each experiment; of candidates whose slopes are slow.
-_SAMPLES, _SLOW_SAMPLES = 6000, 4000
+#: Samples that are simulated of each experiment.
+_SAMPLES = 6000
 #: Share of a stretch from the middle of a log over which its inputs are faded in.
 _FADE = 0.1
 #: Candidates that are compared.
@@ -77,10 +77,7 @@ class Search:
         suspects = {named.site.split(".")[0] for one in candidates for named in one.hypothesis.named}
         self._sensors = more_sensors(model, measurement, suspects)
         self._own = tuple(range(len(measurement.output_names)))
-        # Their slopes are taken once, on the log's own course.
-        self._slow = any(one.is_slow(FreeRun(model, measurement)) for one in self._rivals)
-        self._passes = 1 if self._slow else _PASSES
-        stretch, begin, self._windows = _stretch(measurement, candidates, _SLOW_SAMPLES if self._slow else _SAMPLES)
+        stretch, begin, self._windows = _stretch(measurement, candidates, _SAMPLES)
         self._duration_s = measurement.duration_s
         self._reach = Reach(
             model=with_sensors(model, self._sensors), measurement=stretch, begins_with_log=begin == 0, seed=seed
@@ -92,7 +89,7 @@ class Search:
         )
         detail = _details(candidates[0], all_noise, self._logged.outputs)
         self._separation = Separation(self._rivals, all_noise, detail)
-        self.now_nats = self._nats([(self._logged, self._own)], self._passes)
+        self.now_nats = self._nats([(self._logged, self._own)], _PASSES)
 
     def best(self) -> tuple[Design, ...]:
         """Designs that tell the candidates apart, the least effort first; else the one that comes nearest.
@@ -100,7 +97,7 @@ class Search:
         At most two: one changes how the machine is driven, the other the sensors or the input's place.
         """
         tried = [*self._with_sensors(), *self._each(self._reach.levels())]
-        for more in () if self._slow else (self._reach.courses, self._reach.positions):
+        for more in (self._reach.courses, self._reach.positions):
             if not self._enough(tried):
                 tried += self._each(more())
         self.tried = frozenset(one.design.change for one in tried)
@@ -144,7 +141,7 @@ class Search:
     def _course(self, experiment: Experiment) -> Course:
         if experiment.change == "repeats":
             return self._logged.again(experiment)
-        return Course(experiment, self._rivals, self._record, self._windows, self._logged)
+        return Course(experiment, self._rivals, self._record, self._windows)
 
     def _found(self, experiment: Experiment, course: Course, chosen: tuple[int, ...]) -> _Found:
         design = Design(
@@ -158,7 +155,7 @@ class Search:
         return _Found(design, course, chosen)
 
     def _precise(self, found: _Found) -> _Found:
-        nats = self._nats([(self._logged, self._own), (found.course, found.chosen)], self._passes)
+        nats = self._nats([(self._logged, self._own), (found.course, found.chosen)], _PASSES)
         return replace(found, design=replace(found.design, nats=nats))
 
     def _nats(self, records: list[Record], passes: int) -> float:

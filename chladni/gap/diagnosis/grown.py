@@ -16,8 +16,6 @@ from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.screen import Screened
 from chladni.gap.location.locate import Located, Location
 from chladni.gap.location.profile import profiled
-from chladni.gap.plant.law_run import can_run
-from chladni.signals.errors import ModelError
 
 #: Words at sites that begin beside a first effect, steps that they are given, and those that go on to the end.
 _TRIED, _STEPS, _ENTERED = 48, 2, 4
@@ -64,22 +62,11 @@ class Grown:
                 continue
             tried.add(key)
             both = hypothesis_of((*fit.effects, effect), fit.z, screened=one.chi, initial=fit.initial)
-            begun = study.contest.enter(both, max_iterations=_STEPS) if self._is_quick(both) else None
+            begun = study.contest.enter(both, max_iterations=_STEPS)
             if begun is not None:
                 yield begun
             if len(tried) == _TRIED:
                 return
-
-    def _is_quick(self, both: Hypothesis) -> bool:
-        """Whether its slopes come with its run; a law before a late clock takes a run for each number instead.
-
-        A word that its site is no place for, such as softening where there is no spring, has no run at all.
-        """
-        try:
-            compiled = self.study.contest.run.compiled(both.start_z, both.effects)
-        except ModelError:
-            return False
-        return not compiled.laws or can_run(compiled)
 
 
 def _little(one: Screened) -> Screened:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.plant.late_clock import read_late
 from chladni.gap.plant.law_run import Marched, can_run, equations, run_laws
 from chladni.gap.plant.linear_run import LinearRuns, is_plain
 from chladni.gap.plant.tunable import Tunables
@@ -112,13 +113,17 @@ class FreeRun:
             When parameters are impossible or the model diverges.
         """
         compiled, rate = self.compiled(z, effects), self.measurement.sample_rate_hz
-        late_s = np.asarray(compiled.output_offsets_s)[self.rows]
+        late_s = self.late_s(compiled)
         if len(self.windows) == 1 or not np.any(late_s):
             return self._run(compiled, _key(z, effects), initial)
         # A clock that is early or late reads from the window after or before, not from beyond its own's ends.
         in_time = replace(compiled, output_offsets_s=(0.0,) * len(compiled.outputs), output_maps=())
         read = self._run(in_time, ("in time", _key(z, effects)), initial)
-        return mapped_outputs(compiled, self.rows, _read_late(read, late_s, rate), rate)
+        return mapped_outputs(compiled, self.rows, read_late(read, late_s, rate), rate)
+
+    def late_s(self, compiled: CompiledModel) -> Matrix:
+        """``[output]`` how late the clocks of the measured outputs are."""
+        return np.asarray(compiled.output_offsets_s, dtype=np.float64)[self.rows]
 
     def _run(self, compiled: CompiledModel, key: object, initial: Matrix | None) -> Matrix:
         rate = self.measurement.sample_rate_hz
@@ -133,7 +138,7 @@ class FreeRun:
         return parts[0] if len(parts) == 1 else np.hstack(parts)
 
     def marched(self, z: Matrix | None, effects: Sequence[AttachedEffect], initial: Matrix | None) -> Marched | None:
-        """Windows of a model with laws, outputs before maps of samples; None where `integrations` does it better."""
+        """Windows of a model with laws, outputs before clocks and maps; None where `integrations` does it better."""
         return self._marched(self.compiled(z, effects), initial)
 
     def _marched(self, compiled: CompiledModel, initial: Matrix | None) -> Marched | None:
@@ -235,18 +240,6 @@ def mapped_outputs(
         for row in np.flatnonzero(rows == place):
             mapped[row] = sample_map(mapped[row], sample_rate_hz)
     return mapped
-
-
-def _read_late(outputs: Matrix, offsets_s: Matrix, sample_rate_hz: float) -> Matrix:
-    """``[output, sample]`` as read by clocks that are late by `offsets_s` each; before the start as at the start."""
-    from scipy.interpolate import CubicSpline
-
-    times_s = np.arange(outputs.shape[1]) / sample_rate_hz
-    read = outputs.copy()
-    for row in np.flatnonzero(offsets_s):
-        asked = np.clip(times_s - offsets_s[row], 0.0, times_s[-1])
-        read[row] = CubicSpline(times_s, outputs[row])(asked)
-    return read
 
 
 def _key(z: Matrix | None, effects: Sequence[AttachedEffect]) -> object:

@@ -1,12 +1,13 @@
 """A model with laws as a fit sees it: free runs, coarse or fine, and their slopes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.plant.free_run import PARTS, FreeRun, initial_states, mapped_outputs
+from chladni.gap.plant.late_clock import read_late
 from chladni.gap.plant.law_kernel import March
 from chladni.gap.plant.law_run import Equations, equations, new_record, run_laws
 from chladni.gap.plant.law_sensitivity import recorded, sensitivities
@@ -28,10 +29,14 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class LawRunResult:
-    """Outputs ``[output, sample]`` of a run, before and after maps of samples, and what its slopes need."""
+    """Outputs ``[output, sample]`` of a run, before late clocks, before maps of samples and behind both.
+
+    What its slopes need is beside them.
+    """
 
     outputs: Matrix
     before_maps: Matrix
+    in_time: Matrix
     setting: Setting
     compiled: CompiledModel
     equation: Equations
@@ -44,8 +49,7 @@ def coarse_run(run: FreeRun, setting: Setting, initial: Matrix) -> LawRunResult:
     equation = _equations(run, compiled)
     starts = initial_states(initial, len(run.windows), len(compiled.states))
     marched = run_laws(equation, run.windows, starts, run.measurement.sample_rate_hz)
-    outputs = _mapped(run, compiled, marched.outputs)
-    return LawRunResult(outputs, marched.outputs, setting, compiled, equation, marched.records)
+    return _read(run, setting, compiled, equation, marched.outputs, marched.records)
 
 
 def fine_run(run: FreeRun, setting: Setting, initial: Matrix) -> LawRunResult:
@@ -56,17 +60,27 @@ def fine_run(run: FreeRun, setting: Setting, initial: Matrix) -> LawRunResult:
     if marched is not None:
         pairs = zip(run.windows, marched.records, strict=True)
         records = tuple(_at_samples(equation, window, record) for window, record in pairs)
-        return LawRunResult(
-            _mapped(run, compiled, marched.outputs), marched.outputs, setting, compiled, equation, records
-        )
+        return _read(run, setting, compiled, equation, marched.outputs, records)
     made = [integration for _, integration in run.integrations(setting.z, setting.effects, initial)]
-    outputs = np.hstack([integration.outputs[run.rows] for integration in made])
     records = recorded(equation, run.windows, made)
-    before = outputs
-    if compiled.output_maps:
-        seen = [np.hstack([record.x, record.rows, record.force]) for record in records]
-        before = np.hstack([equation.output @ one.T for one in seen])
-    return LawRunResult(outputs, before, setting, compiled, equation, records)
+    late = np.any(run.late_s(compiled))
+    if not (compiled.output_maps or late):
+        outputs = np.hstack([integration.outputs[run.rows] for integration in made])
+        return LawRunResult(outputs, outputs, outputs, setting, compiled, equation, records)
+    seen = [np.hstack([record.x, record.rows, record.force]) for record in records]
+    read = _read(run, setting, compiled, equation, np.hstack([equation.output @ one.T for one in seen]), records)
+    if late and len(run.windows) > 1:
+        return read
+    # An integrator reads between samples without a spline.
+    return replace(read, outputs=np.hstack([integration.outputs[run.rows] for integration in made]))
+
+
+def _read(
+    run: FreeRun, setting: Setting, compiled: CompiledModel, equation: Equations, in_time: Matrix,
+    records: tuple[March, ...],
+) -> LawRunResult:  # fmt: skip
+    before = read_late(in_time, run.late_s(compiled), run.measurement.sample_rate_hz)
+    return LawRunResult(_mapped(run, compiled, before), before, in_time, setting, compiled, equation, records)
 
 
 def _at_samples(equation: Equations, window: tuple[int, int], record: March) -> March:
@@ -85,20 +99,20 @@ def slopes_of(run: FreeRun, result: LawRunResult, changed: Sequence[tuple[Settin
     tables = [(_equations(run, other), by) for other, (_, by) in zip(others, changed, strict=True)]
     rate = run.measurement.sample_rate_hz
     own, starts = sensitivities(result.equation, result.records, run.windows, tables, rate)
+    late_s = run.late_s(result.compiled)
+    own, starts = read_late(own, late_s, rate), read_late(starts, late_s, rate)
+    for place, (other, (_, by)) in enumerate(zip(others, changed, strict=True)):
+        if not np.array_equal(run.late_s(other), late_s):
+            moved = read_late(result.in_time, run.late_s(other), rate)
+            own[place] += (moved - read_late(result.in_time, late_s, rate)) / by
     if result.compiled.output_maps:
+        here = _mapped(run, result.compiled, result.before_maps)
         for place, (other, (_, by)) in enumerate(zip(others, changed, strict=True)):
-            own[place] = _through_maps(run, result, other, own[place], by)
+            own[place] = (_mapped(run, other, result.before_maps + by * own[place]) - here) / by
         for place, one in enumerate(starts):
-            starts[place] = _through_maps(
-                run, result, result.compiled, one, _MAP_CHANGE / max(np.abs(one).max(), 1e-300)
-            )
+            by = _MAP_CHANGE / max(np.abs(one).max(), 1e-300)
+            starts[place] = (_mapped(run, result.compiled, result.before_maps + by * one) - here) / by
     return own, starts
-
-
-def _through_maps(run: FreeRun, result: LawRunResult, other: CompiledModel, slope: Matrix, by: float) -> Matrix:
-    """Slope behind the maps of samples, which may have changed too."""
-    moved = _mapped(run, other, result.before_maps + by * slope)
-    return np.asarray((moved - result.outputs) / by)
 
 
 def _mapped(run: FreeRun, compiled: CompiledModel, outputs: Matrix) -> Matrix:

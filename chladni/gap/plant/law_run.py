@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from chladni.gap.plant.dead_times import DeadTimes, dead_times
 from chladni.gap.plant.law_kernel import Laws, March, Room, law_march
+from chladni.gap.plant.linear_run import is_plain
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import responses
 from chladni.models.integrator.hold import Hold, hold_of
@@ -54,8 +55,11 @@ class Equations:
 
 
 def can_run(compiled: CompiledModel) -> bool:
-    """Whether a model is one for these kernels: laws or dead times in loops, and no reading between samples."""
-    return bool(compiled.laws or compiled.delays) and not any(compiled.output_offsets_s)
+    """Whether a model is one for these kernels: laws, dead times in loops, clocks that read between samples.
+
+    All else is a recursion from sample to sample, whose runs cost less than slopes along them.
+    """
+    return not is_plain(compiled)
 
 
 def equations(

@@ -19,8 +19,6 @@ from chladni.signals.errors import EstimateError
 Matrix = NDArray[np.float64]
 #: How far apart the two runs of a difference are, in ln(value) of a parameter.
 _APART = 1e-5
-#: The same for laws, whose runs carry the errors of their steps.
-_APART_WITH_LAWS = 1e-3
 #: Precision of an effect's parameter before a log is seen: none, but for what keeps the equations regular.
 _UNKNOWN = 1e-6
 #: Curvatures beyond this say that neighbouring motions part, not what a parameter does.
@@ -247,7 +245,7 @@ class FitProblem:
         """Slopes ``[unknown, output, sample]``, and whitened ``[state, output, training sample]`` of each window."""
         if here.made is None:
             return self._differences(here), self._local(here.point)
-        steps = self._steps(here.point.x, _APART)
+        steps = self._steps(here.point.x)
         changed = [(self._setting(here.point.x + row), by) for row, by in zip(np.diag(steps), steps, strict=True)]
         own, starts = slopes_of(self.run, here.made, changed)
         white = self.whitening.whitened(starts)
@@ -258,17 +256,18 @@ class FitProblem:
 
     def _differences(self, here: Evaluation) -> Matrix:
         """``[unknown, output, sample]``: change of the outputs, by differences."""
-        apart = _APART_WITH_LAWS if self.has_laws else _APART
         columns = np.empty((here.point.x.size, *here.outputs.shape))
-        for place, by in enumerate(self._steps(here.point.x, apart)):
+        for place, by in enumerate(self._steps(here.point.x)):
             x = here.point.x.copy()
             x[place] += by
             columns[place] = (self._outputs(x, here.point.initial) - here.outputs) / by
         return columns
 
-    def _steps(self, x: Matrix, apart: float) -> Matrix:
+    def _steps(self, x: Matrix) -> Matrix:
         """Steps of each unknown, away from the nearer bound."""
-        steps = np.concatenate([apart / self.run.tunables.tolerance[: self.tuned], np.full(len(self.numbers), apart)])
+        steps = np.concatenate(
+            [_APART / self.run.tunables.tolerance[: self.tuned], np.full(len(self.numbers), _APART)]
+        )
         return np.asarray(np.where(x + steps > self.high, -steps, steps))
 
     def _spread(self, point: Point) -> Matrix:

@@ -148,9 +148,7 @@ def test_a_model_that_diverges_says_so(run):
         run_laws(equation, ((0, SAMPLES),), np.full((1, 6), 1e160), RATE_HZ)
 
 
-def test_what_looks_back_or_between_samples_is_left_to_the_integrator():
+def test_a_recursion_from_sample_to_sample_runs_by_itself():
     model = three_bodies().with_effects([LAWS["hardening"]])
     assert can_run(model.compile())
     assert not can_run(three_bodies().compile())
-    late = attached("time_offset", "a0", {"offset": 1e-4})
-    assert not can_run(model.with_effects([*model.effects, late]).compile())

@@ -1,0 +1,24 @@
+"""What clocks that are late or early read of outputs."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Matrix = NDArray[np.float64]
+
+
+def read_late(outputs: Matrix, offsets_s: Matrix, sample_rate_hz: float) -> Matrix:
+    """Give ``[..., output, sample]`` as read by clocks that are late by ``offsets_s [output]``.
+
+    By cubic splines between samples; before the start as at the start, after the end as at the end.
+    """
+    late = np.flatnonzero(offsets_s)
+    if not late.size:
+        return outputs
+    from scipy.interpolate import CubicSpline
+
+    times_s = np.arange(outputs.shape[-1]) / sample_rate_hz
+    read = outputs.copy()
+    for row in late:
+        asked = np.clip(times_s - offsets_s[row], 0.0, times_s[-1])
+        read[..., row, :] = CubicSpline(times_s, outputs[..., row, :], axis=-1)(asked)
+    return read
