@@ -155,8 +155,7 @@ def _searched(
     progress(_BESIDE[-2])
     grown = Grown(study)
     for lead in _leads(weighed(found)):
-        # A law that follows the log over short windows is entered over long ones next.
-        if leaves_another() and not singles.followed and is_far(study.location, best().chi):
+        if leaves_another() and is_far(study.location, best().chi):
             found += grown.beside(lead)
     progress(_BESIDE[-1])
     if len(best().hypothesis.effects) > 1:

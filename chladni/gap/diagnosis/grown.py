@@ -62,7 +62,7 @@ class Grown:
                 continue
             tried.add(key)
             both = hypothesis_of((*fit.effects, effect), fit.z, screened=one.chi, initial=fit.initial)
-            begun = study.contest.enter(both, max_iterations=_STEPS)
+            begun = study.contest.enter(both, max_iterations=_STEPS, only_coarse=True)
             if begun is not None:
                 yield begun
             if len(tried) == _TRIED:

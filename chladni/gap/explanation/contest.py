@@ -62,7 +62,13 @@ class Contest:
         self.run, self.noise, self.training, self.states = run, noise, training, states
 
     def enter(
-        self, hypothesis: Hypothesis, *, max_iterations: int = 12, tune: bool = True, initial: Matrix | None = None
+        self,
+        hypothesis: Hypothesis,
+        *,
+        max_iterations: int = 12,
+        tune: bool = True,
+        initial: Matrix | None = None,
+        only_coarse: bool = False,
     ) -> Contestant | None:
         """Fit a hypothesis, from some initial states ``[window, state]``; None when its start already diverges."""
         try:
@@ -73,7 +79,7 @@ class Contest:
                 effects=hypothesis.effects, fitted=hypothesis.fitted or None, training=self.training,
                 start_z=np.clip(hypothesis.start_z, -3.0, 3.0) if not hypothesis.wide else hypothesis.start_z,
                 z_limit={name: hypothesis.wide.get(name, 3.0) for name in self.run.tunables.names},
-                start_initial=initial, max_iterations=max_iterations, tune=tune,
+                start_initial=initial, max_iterations=max_iterations, tune=tune, only_coarse=only_coarse,
                 # Over windows each start is free: of a free axis a constant is the same thing again.
                 offsets=len(self.run.windows) == 1,
             )  # fmt: skip
