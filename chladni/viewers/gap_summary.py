@@ -13,6 +13,8 @@ LIKELY, PROBABLE = 0.9, 0.6
 FAINT = 3.0
 # Candidates that are named when none explains the gap.
 NEAREST = 3
+# Of what closes on the first log, the share below which little carries over to another.
+CARRIED = 0.5
 
 
 def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -128,8 +130,16 @@ def _elsewhere(found: Diagnosis) -> Iterator[str]:
     for gap in found.elsewhere:
         log = gap.held_out[0].log if gap.held_out else "another log"
         brings = f"from {percent(gap.before)} to {percent(gap.after)}, noise {percent(gap.noise)}"
-        verdict = "" if gap.after < gap.before else ": what was found doesn't carry over"
-        yield f"On {log}, which nothing was fitted to, the error goes {brings}{verdict}."
+        yield f"On {log}, which nothing was fitted to, the error goes {brings}{_carried(found.gap, gap)}."
+
+
+def _carried(here: Closing, there: Closing) -> str:
+    """What is said where less closes on another log than on the first."""
+    if there.after >= there.before:
+        return ": what was found doesn't carry over"
+    if there.closed is not None and here.closed is not None and there.closed < CARRIED * here.closed:
+        return ": little of what was found carries over"
+    return ""
 
 
 def _reservations(cause: Cause) -> Iterator[str]:

@@ -234,6 +234,13 @@ def test_a_cause_that_makes_another_log_worse_is_said_not_to_carry_over() -> Non
     assert any(one.endswith("noise 1.0 %: what was found doesn't carry over.") for one in told)
 
 
+def test_a_cause_that_closes_little_of_another_log_is_said_to() -> None:
+    found = made.periodic()
+    little = replace(found.elsewhere[0], before=0.52, after=0.41, closed=0.2, interval=(0.1, 0.3))
+    told = summary(replace(found, elsewhere=(little,)))
+    assert any(one.endswith("noise 1.0 %: little of what was found carries over.") for one in told)
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [

@@ -17,7 +17,7 @@ from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.even_odds import at_even_odds
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
-from chladni.gap.diagnosis.other_logs import closing_elsewhere
+from chladni.gap.diagnosis.other_logs import tried_elsewhere
 from chladni.gap.diagnosis.parting_runs import causes_found
 from chladni.gap.diagnosis.remarks import remarks_on
 from chladni.gap.diagnosis.study import Study, study_of
@@ -89,13 +89,12 @@ def diagnose(
     if shortness(study.model.compile(), study.measurement) is not None:
         found = at_even_odds(found)
     # Periods tell noise from distortion at every level, as they did for the first log.
-    others = [closing_elsewhere(study, causes, one, seed=seed) for one in measurements[1:]]
+    elsewhere, diverging = tried_elsewhere(study, causes, measurements[1:], seed=seed)
     levels = compare_levels([with_period(one) for one in measurements]) if len(measurements) > 1 else ()
     tell("measuring the closing", 1.0)
     # What is said of a level there needn't be said of its log again.
     remarks = tuple(one for one in found.remarks if not any(one in told for told in levels))
-    elsewhere = tuple(one for one in others if one is not None)
-    return replace(found, elsewhere=elsewhere, levels=levels, remarks=remarks)
+    return replace(found, elsewhere=elsewhere, levels=levels, remarks=(*remarks, *diverging))
 
 
 def _silent(_step: str, _share: float) -> None:

@@ -1,5 +1,7 @@
 """What was found on one log, tried on others that nothing was fitted to."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +22,23 @@ from chladni.signals.errors import EstimateError, ModelError
 Matrix = NDArray[np.float64]
 
 
+def tried_elsewhere(
+    study: Study, causes: Causes, measurements: Sequence[Measurement], *, seed: int
+) -> tuple[tuple[Closing, ...], tuple[str, ...]]:
+    """Give what `closing_elsewhere` says of other logs, and a sentence on each of which it can't say anything."""
+    if causes.shaken is not None:
+        # A floor's motion is that of one log.
+        return (), ()
+    found = [(one.log, closing_elsewhere(study, causes, one, seed=seed)) for one in measurements]
+    diverging = [
+        f"{log}: the model diverges there, as it is or with what was found, so nothing could be tried on it; "
+        "check the units of its inputs"
+        for log, closing in found
+        if closing is None
+    ]
+    return tuple(closing for _, closing in found if closing is not None), tuple(diverging)
+
+
 def closing_elsewhere(study: Study, causes: Causes, measurement: Measurement, *, seed: int) -> Closing | None:
     """Say how far the gap closes on another log, with parameters and effects as the first log told them.
 
@@ -29,10 +48,8 @@ def closing_elsewhere(study: Study, causes: Causes, measurement: Measurement, *,
     Returns
     -------
     Closing or None
-        None where a floor shakes, or where the model diverges on that log.
+        None where the model diverges on that log.
     """
-    if causes.shaken is not None:
-        return None
     measurement = with_period(measurement)
     windows = None if study.windows is None else short_windows(study.model, measurement)
     run, noise = FreeRun(study.model, measurement, windows=windows), estimate_noise(measurement)
