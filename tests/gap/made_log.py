@@ -74,7 +74,8 @@ def measured(model, signals, *, noise=0.01, seed=0, initial=None, outputs=None, 
     chosen = list(range(len(found))) if outputs is None else outputs
     found = found[chosen]
     rms = noise * found.std(axis=1)
-    found = found + rms[:, None] * np.random.default_rng(seed).standard_normal(found.shape) + offset
+    # Not the numbers that `band_noise` makes an input of: noise that follows the input is none.
+    found = found + rms[:, None] * np.random.default_rng([seed, 1]).standard_normal(found.shape) + offset
     terminals = [compiled.outputs[place] for place in chosen]
     log = Measurement(
         log="made", sample_rate_hz=rate_hz, inputs=signals, outputs=found,

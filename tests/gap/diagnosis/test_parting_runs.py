@@ -31,7 +31,7 @@ def machine():
 @pytest.mark.parametrize("kept", [{"ripple"}, set()])
 def test_teeth_that_catch_are_named_over_windows_and_not_without_their_word(kept) -> None:
     toothed = machine().with_effects((attached("ripple", "j0", TEETH),))
-    log, _ = measured(toothed, band_noise(6000, rms=60.0), noise=5e-3)
+    log, _ = measured(toothed, band_noise(3000, rms=60.0), noise=5e-3)
     out = frozenset(CATALOGUE) - BESIDE - kept
     told = []
     study, causes = causes_found(study_of(machine(), log, leave_out=out, own={}), told.append)

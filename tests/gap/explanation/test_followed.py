@@ -30,7 +30,8 @@ def screen():
     off = np.sin(3.0 * np.arange(len(tunables.names)))
     machine = MODEL.with_values(tunables.values(off))
     spring = attached("hardening_stiffness", "j1", {"cubic": 3e10})
-    log, floor = measured(machine.with_effects((spring,)), band_noise(SAMPLES, rms=150.0), outputs=[0, 2])
+    # How far a promise is from what is kept depends on the noise: with this one it is more than twice.
+    log, floor = measured(machine.with_effects((spring,)), band_noise(SAMPLES, rms=150.0), outputs=[0, 2], seed=1)
     problem = LinearProblem(MODEL, log, floor, tunables, all_lines(SAMPLES, RATE_HZ))
     place = profiled(problem, (JOINT,), np.zeros(off.size))
     motion = recovered(problem, place, JOINT)
