@@ -104,7 +104,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
     verdict = _verdict(together, tuned, best, floor)
     if instead is not None:
         verdict = "unknown"
-    shaken = shaken_by(study) if verdict == "unknown" and instead is None else None
+    shaken = shaken_by(study, tuned) if verdict == "unknown" and instead is None else None
     if shaken is not None or (verdict == "none" and study.lattices):
         verdict = "effect"
     distorted = _distorted(study, tuned) if verdict in ("none", "unknown") else ()

@@ -21,7 +21,6 @@ from chladni.gap.diagnosis.other_logs import tried_elsewhere
 from chladni.gap.diagnosis.parting_runs import causes_found
 from chladni.gap.diagnosis.remarks import remarks_on
 from chladni.gap.diagnosis.study import Study, study_of
-from chladni.gap.explanation.shaken_ground import predicted_by_others
 from chladni.gap.linear_algebra import in_one_thread
 from chladni.gap.location.profile import profile_at
 from chladni.gap.location.recovered import Recovered, recovered
@@ -107,7 +106,7 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
     shown = causes.best if causes.verdict in ("effect", "parameters") else causes.tuned
     after = shown.fit.outputs
     if causes.shaken is not None:
-        after = predicted_by_others(study.location.problem, causes.shaken.profile)
+        after = causes.shaken.predicted
     motion = _evidence(study, causes, said)
     distortion = _distortion(study.measurement)
     return Diagnosis(

@@ -2,13 +2,23 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.any_law import left_by_any_law
+from chladni.gap.explanation.contest import held_gap
+from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.explanation.shaken_ground import predicted_by_others
 from chladni.gap.location.locate import Located
 from chladni.gap.location.profile import Profile
 
-#: How well the ground must explain, how nearly as well as the best place; and where another can't be told from it.
-_CHI, _BEST, _TIED = 1.5, 1.02, 1.1
+Matrix = NDArray[np.float64]
+#: How well the ground must explain, how nearly as well as the best place.
+_CHI, _BEST = 1.5, 1.02
+#: Where another place can't be told from it: what that leaves over what the best one does, or of the gap. Beside
+#: floors that shook the next place left 0.02 of it, beside a stop between a body and the ground 0.0001.
+_TIED, _TIED_OF_GAP = 1.1, 0.003
 #: Share of the gap that any law of a site's motion, or a filter of the inputs, must leave there. Of a floor that
 #: shook the best law at a joint left 0.2 to 0.5 in made machines, of an effect at that joint at most 0.12; at an
 #: input 0.34 against 0.08.
@@ -17,29 +27,45 @@ _LEFT = {"joint": 0.15, "input": 0.2, "ground": 0.5}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShakenGround:
-    """The ground's profile, and the names of sites that can't be told from it, itself first."""
+    """The ground's profile, the names of sites that can't be told from it, itself first, and what follows from it.
+
+    `predicted` is ``[output, sample]``: each sensor by what the others tell of the floor.
+    """
 
     profile: Profile
     group: tuple[str, ...]
+    predicted: Matrix
 
 
-def shaken_by(study: Study) -> ShakenGround | None:
+def shaken_by(study: Study, tuned: Contestant) -> ShakenGround | None:
     """Give the ground when no law is left but a motion of its own; None when something else may act.
 
     With a machine that stands on one joint, a force there is nearly the ground's motion. What tells them apart is
-    that a law of the joint follows its motion, and an actuator's the inputs; the floor follows neither.
+    that a law of the joint follows its motion, and an actuator's the inputs; the floor follows neither. A motion of
+    its own for every sample explains much: of a floor the other sensors must tell more than the model alone does.
+
+    Parameters
+    ----------
+    tuned
+        The model without any cause.
     """
     if "base_vibration" in study.leave_out or len(study.measurement.output_names) < 2:
         return None
     first = study.location.ranked[0].profile.chi
-    tied = [one for one in study.location.ranked if one.profile.chi < _TIED * first]
+    alike = max(_TIED * first, first + _TIED_OF_GAP * (study.location.tuned.chi - first))
+    tied = [one for one in study.location.ranked if one.profile.chi < alike]
     ground = next((one for one in tied if _has_ground(one)), None)
     if ground is None or ground.profile.chi > min(_CHI, _BEST * first):
         return None
     if any(_follows(study, one) for one in tied):
         return None
+    predicted = predicted_by_others(study.location.problem, ground.profile)
+    measured = study.measurement.outputs
+    by_others, alone = (held_gap(measured, one, study.held) for one in (predicted, tuned.fit.outputs))
+    if not by_others < alone:
+        return None
     names = ["ground", *(name for one in (ground, *tied) for name in one.places[0].names)]
-    return ShakenGround(profile=ground.profile, group=tuple(dict.fromkeys(names)))
+    return ShakenGround(profile=ground.profile, group=tuple(dict.fromkeys(names)), predicted=predicted)
 
 
 def _has_ground(located: Located) -> bool:

@@ -11,10 +11,11 @@ from tests.gap.arm import RATE_HZ, arm, measured
 
 LOOP = attached("hysteresis", "elbow", {"force": 20.0, "yield": 1e-4, "shape": 2.0})
 DRAG = attached("quadratic_damping", "elbow", {"coefficient": 300.0})
+SPRING = attached("hardening_stiffness", "shoulder", {"cubic": 1e12})
 
 
-def study(effect: AttachedEffect) -> Study:
-    return study_of(arm(), measured((effect,), seed=5), leave_out=frozenset(), own={})
+def study(*effects: AttachedEffect) -> Study:
+    return study_of(arm(), measured(effects, seed=5), leave_out=frozenset(), own={})
 
 
 def believed(effect: AttachedEffect, left: float) -> Contestant:
@@ -54,3 +55,11 @@ def test_along_one_orbit_any_force_is_a_function_and_nothing_is_contradicted() -
     log = measured((DRAG,), seed=5, force=force)
     orbit = study_of(arm(), log, leave_out=frozenset(), own={})
     assert explained_instead(orbit, believed(LOOP, 1.0 + 0.05 * orbit.location.tuned.chi)) is None
+
+
+def test_where_another_force_acts_too_a_function_contradicts_no_loop(dragged: Study) -> None:
+    both = study(DRAG, SPRING)
+    assert next(one.profile.chi for one in both.location.ranked if "elbow" in one.places[0].names) > 1.5
+    left = 1.0 + 0.9 * both.location.tuned.chi
+    assert explained_instead(dragged, believed(LOOP, left)) is not None
+    assert explained_instead(both, believed(LOOP, left)) is None
