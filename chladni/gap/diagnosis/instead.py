@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.diagnosis.pairs import TWO_FORCES
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.any_coupling import Coupling, any_coupling
 from chladni.gap.explanation.any_law import left_by_any_law
@@ -18,8 +19,6 @@ _OF_GAP, _ASKED = 0.01, 1.1
 #: Intervals of displacement and of velocity with equally many samples, and the share of their pairs in which a motion
 #: must be for a fifth of an equal share of the time: along one orbit every force is a function of both.
 _INTERVALS, _VISITED, _OFTEN = 8, 0.8, 0.2
-#: Any force at a joint that leaves more than this, over the noise, isn't alone: a loop there may leave another's.
-_ALONE = 1.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +61,8 @@ def explained_instead(study: Study, best: Contestant) -> Instead | None:
 
 def _left_by_function(location: Location, name: str) -> float | None:
     """Share of the gap that any function of displacement and velocity leaves; None where that says nothing."""
-    for located in (one for one in location.ranked if one.profile.chi < _ALONE):
+    # Where another force acts too, what a loop leaves may be that one's.
+    for located in (one for one in location.ranked if one.profile.chi < TWO_FORCES):
         for site in located.places[0].sites:
             if site.name == name and _visited(recovered(location.problem, located.profile, site)) > _VISITED:
                 return left_by_any_law(location, located, site)

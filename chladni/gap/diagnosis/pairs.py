@@ -26,9 +26,9 @@ _LINEAR = 4
 #: Two forces must leave less than this of what one leaves; pairs that are as good as the best are screened too, so
 #: many, and those searched whose laws promise most.
 _PAIR_GAIN, _PAIR_TIE, _SCREENED, _PAIRS = 0.6, 1.3, 8, 3
-#: An unknown force at the best place that leaves more than this, over the noise, isn't alone: of made machines with
+#: An unknown force at a place that leaves more than this, over the noise, isn't alone: of made machines with
 #: one effect one in twenty leaves as much, of those with two four in five.
-_TWO_FORCES = 1.2
+TWO_FORCES = 1.2
 #: Nats that a second effect must bring beside the first: a law that differs from the machine's leaves what another
 #: effect could mend a little. Where no force at one place could, it needn't bring more than a first one.
 _ADDED, _ADDED_BY_PLACE = 100.0, 12.0
@@ -37,7 +37,7 @@ _ADDED, _ADDED_BY_PLACE = 100.0, 12.0
 def added_nats(location: Location) -> float:
     """Nats that a second effect must bring beside the first."""
     best = location.best
-    apart = best is not None and bool(best.profile.forces) and best.profile.chi > _TWO_FORCES
+    apart = best is not None and bool(best.profile.forces) and best.profile.chi > TWO_FORCES
     return _ADDED_BY_PLACE if apart else _ADDED
 
 

@@ -11,14 +11,13 @@ from chladni.gap.explanation.contest import held_gap
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.explanation.shaken_ground import predicted_by_others
 from chladni.gap.location.locate import Located
-from chladni.gap.location.profile import Profile
 
 Matrix = NDArray[np.float64]
-#: How well the ground must explain, how nearly as well as the best place.
-_CHI, _BEST = 1.5, 1.02
-#: Where another place can't be told from it: what that leaves over what the best one does, or of the gap. Beside
-#: floors that shook the next place left 0.02 of it, beside a stop between a body and the ground 0.0001.
-_TIED, _TIED_OF_GAP = 1.1, 0.003
+#: How well the ground must explain, how nearly as well as the best place; and where another can't be told from it.
+_CHI, _BEST, _TIED = 1.5, 1.02, 1.1
+#: What another place leaves of the gap beyond the best one, where the cause may still be: beside floors that shook
+#: the next place left 0.02, beside a stop between a body and the ground that joint 0.0001.
+_NEAR = 0.003
 #: Share of the gap that any law of a site's motion, or a filter of the inputs, must leave there. Of a floor that
 #: shook the best law at a joint left 0.2 to 0.5 in made machines, of an effect at that joint at most 0.12; at an
 #: input 0.34 against 0.08.
@@ -27,12 +26,11 @@ _LEFT = {"joint": 0.15, "input": 0.2, "ground": 0.5}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShakenGround:
-    """The ground's profile, the names of sites that can't be told from it, itself first, and what follows from it.
+    """The names of sites that can't be told from the ground, itself first, and what follows from its motion.
 
     `predicted` is ``[output, sample]``: each sensor by what the others tell of the floor.
     """
 
-    profile: Profile
     group: tuple[str, ...]
     predicted: Matrix
 
@@ -52,20 +50,20 @@ def shaken_by(study: Study, tuned: Contestant) -> ShakenGround | None:
     if "base_vibration" in study.leave_out or len(study.measurement.output_names) < 2:
         return None
     first = study.location.ranked[0].profile.chi
-    alike = max(_TIED * first, first + _TIED_OF_GAP * (study.location.tuned.chi - first))
-    tied = [one for one in study.location.ranked if one.profile.chi < alike]
+    tied = [one for one in study.location.ranked if one.profile.chi < _TIED * first]
     ground = next((one for one in tied if _has_ground(one)), None)
     if ground is None or ground.profile.chi > min(_CHI, _BEST * first):
-        return None
-    if any(_follows(study, one) for one in tied):
         return None
     predicted = predicted_by_others(study.location.problem, ground.profile)
     measured = study.measurement.outputs
     by_others, alone = (held_gap(measured, one, study.held) for one in (predicted, tuned.fit.outputs))
     if not by_others < alone:
         return None
+    near = max(_TIED * first, first + _NEAR * (study.location.tuned.chi - first))
+    if any(_follows(study, one) for one in study.location.ranked if one.profile.chi < near):
+        return None
     names = ["ground", *(name for one in (ground, *tied) for name in one.places[0].names)]
-    return ShakenGround(profile=ground.profile, group=tuple(dict.fromkeys(names)), predicted=predicted)
+    return ShakenGround(group=tuple(dict.fromkeys(names)), predicted=predicted)
 
 
 def _has_ground(located: Located) -> bool:
