@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.completeness import completeness, completeness_among, known_share
 from chladni.gap.diagnosis.grown import Grown
-from chladni.gap.diagnosis.instead import Instead, explained_instead
+from chladni.gap.diagnosis.instead import Instead, explained_elsewhere, explained_instead
 from chladni.gap.diagnosis.own_signal import share_of_own_signal
 from chladni.gap.diagnosis.pairs import added_nats, exchanged, paired_causes, second_causes, without_one
 from chladni.gap.diagnosis.search import (
@@ -102,6 +102,8 @@ def causes_of(study: Study, progress: Step) -> Causes:
     noise = study.contest.noise.lowered(best.held)
     floor = lowest(together)
     verdict = _verdict(together, tuned, best, floor)
+    if verdict == "effect":
+        instead = instead or explained_elsewhere(study, best)
     if instead is not None:
         verdict = "unknown"
     shaken = shaken_by(study, tuned) if verdict == "unknown" and instead is None else None

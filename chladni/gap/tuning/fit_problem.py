@@ -273,7 +273,8 @@ class FitProblem:
     def _spread(self, point: Point) -> Matrix:
         """``[state]`` one sigma of an initial state, so wide that it only keeps the equations regular."""
         if not self._wide.size:
-            alone = np.sqrt(np.mean(self._decays(point) ** 2, axis=(1, 2)))
+            with np.errstate(over="ignore"):
+                alone = np.sqrt(np.mean(self._decays(point) ** 2, axis=(1, 2)))
             measured = np.mean(self.whitening.whitened(self.run.measurement.outputs) ** 2)
             # What grows beyond all numbers is seen all the more.
             alone = np.where(np.isfinite(alone), alone, 1e100)

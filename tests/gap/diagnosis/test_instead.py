@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.gap.diagnosis.instead import explained_instead
+from chladni.gap.diagnosis.instead import explained_elsewhere, explained_instead
 from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.models.effects.attached_effect import AttachedEffect, attached
@@ -63,3 +63,19 @@ def test_where_another_force_acts_too_a_function_contradicts_no_loop(dragged: St
     left = 1.0 + 0.9 * both.location.tuned.chi
     assert explained_instead(dragged, believed(LOOP, left)) is not None
     assert explained_instead(both, believed(LOOP, left)) is None
+
+
+def test_one_force_by_a_law_elsewhere_explains_more_than_what_is_named(dragged: Study) -> None:
+    left = 1.0 + 0.05 * dragged.location.tuned.chi
+    found = explained_elsewhere(dragged, believed(SPRING, left))
+    assert found is not None
+    assert found.elsewhere == "elbow"
+    assert "at elbow" in found.sentence()
+    assert explained_elsewhere(dragged, believed(DRAG, left)) is None
+    assert explained_elsewhere(dragged, believed(SPRING, 1.2)) is None
+
+
+def test_two_forces_are_no_one_force_elsewhere() -> None:
+    both = study(DRAG, SPRING)
+    load = attached("added_mass", "wrist", {"mass": 1.0})
+    assert explained_elsewhere(both, believed(load, 1.0 + 0.9 * both.location.tuned.chi)) is None
