@@ -10,7 +10,7 @@ from chladni.gap.diagnosis.completeness import completeness, completeness_among,
 from chladni.gap.diagnosis.grown import Grown
 from chladni.gap.diagnosis.instead import Instead, explained_elsewhere, explained_instead
 from chladni.gap.diagnosis.own_signal import share_of_own_signal
-from chladni.gap.diagnosis.pairs import added_nats, exchanged, paired_causes, second_causes, without_one
+from chladni.gap.diagnosis.pairs import added_nats, exchanged, paired_causes, second_causes, two_act, without_one
 from chladni.gap.diagnosis.search import (
     ALONE,
     Singles,
@@ -157,7 +157,7 @@ def _searched(
     progress(_BESIDE[-2])
     grown = Grown(study)
     for lead in _leads(weighed(found)):
-        if leaves_another() and is_far(study.location, best().chi):
+        if leaves_another() and (is_far(study.location, best().chi) or _lacks_another(study, best())):
             found += grown.beside(lead)
     progress(_BESIDE[-1])
     if len(best().hypothesis.effects) > 1:
@@ -175,6 +175,11 @@ def _leaves_another(study: Study, best: Contestant, nothing: Contestant, floor: 
         return best is not nothing and completeness(nothing, best, floor) < _COMPLETE
     # One force may do what two do, elsewhere; but then no law follows it.
     return not is_one_force(study.location) or is_lost(study.location, best.chi)
+
+
+def _lacks_another(study: Study, best: Contestant) -> bool:
+    """Whether two forces act for certain, of which one was found."""
+    return two_act(study.location) and len(best.hypothesis.effects) == 1
 
 
 def _is_plausible(study: Study, nothing: Contestant, found: Contestant) -> bool:

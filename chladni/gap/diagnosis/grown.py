@@ -24,6 +24,8 @@ _SIZES = frozenset(
     {"gap", "force", "coulomb", "static", "cubic", "coefficient", "amplitude", "relative_change", "mass"}
 )
 _LITTLE = 0.1
+#: Words that differ in the sign of their number.
+_OPPOSITE = {"hardening_stiffness": "softening_stiffness", "softening_stiffness": "hardening_stiffness"}
 
 
 class Grown:
@@ -41,7 +43,8 @@ class Grown:
     @cached_property
     def _candidates(self) -> list[Screened]:
         study = self.study
-        return screened(study.location, _everywhere(study.location), study.leave_out, study.own)
+        found = screened(study.location, _everywhere(study.location), study.leave_out, study.own)
+        return [each for one in found for each in (one, *_turned(one)) if each.trial.effect not in study.leave_out]
 
     def beside(self, lead: Contestant) -> list[Contestant]:
         """Enter the words that, beside a fit of one effect, explain most in their first steps."""
@@ -67,6 +70,14 @@ class Grown:
                 yield begun
             if len(tried) == _TRIED:
                 return
+
+
+def _turned(one: Screened) -> list[Screened]:
+    """Give a softening spring as a hardening one and back: alone it stood for what is left of both effects."""
+    other = _OPPOSITE.get(one.trial.effect)
+    if other is None or set(one.values) != {"cubic"}:
+        return []
+    return [replace(one, trial=replace(one.trial, effect=other), values={"cubic": -one.values["cubic"]})]
 
 
 def _little(one: Screened) -> Screened:

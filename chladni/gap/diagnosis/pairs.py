@@ -36,9 +36,13 @@ _ADDED, _ADDED_BY_PLACE = 100.0, 12.0
 
 def added_nats(location: Location) -> float:
     """Nats that a second effect must bring beside the first."""
+    return _ADDED_BY_PLACE if two_act(location) else _ADDED
+
+
+def two_act(location: Location) -> bool:
+    """Whether an unknown force at the best place leaves what only another one may explain."""
     best = location.best
-    apart = best is not None and bool(best.profile.forces) and best.profile.chi > TWO_FORCES
-    return _ADDED_BY_PLACE if apart else _ADDED
+    return best is not None and bool(best.profile.forces) and best.profile.chi > TWO_FORCES
 
 
 def second_causes(

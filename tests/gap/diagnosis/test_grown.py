@@ -51,3 +51,21 @@ def test_a_word_without_its_place_is_no_second() -> None:
     # The joint to the ground has no spring that could soften.
     grown = {one.effect for both in Grown(study).beside(lead) for one in both.fit.effects if one.site == "j0"}
     assert grown == {"coulomb_friction"}
+
+
+def test_a_spring_that_looked_soft_alone_grows_hard_beside_another() -> None:
+    springs = (
+        chladni.attached("softening_stiffness", "j0", {"cubic": -8e9}),
+        chladni.attached("hardening_stiffness", "j1", {"cubic": 3e8}),
+    )
+    machine = chain([7.5, 8.3], [7.2e5, 2.8e5], [45.0, 22.0])
+    log, _ = measured(machine.with_effects(springs), band_noise(4000, rms=200.0), noise=0.005)
+    leave_out = frozenset(CATALOGUE) - {"hardening_stiffness", "softening_stiffness"}
+    study = study_of(machine, log, leave_out=leave_out, own={})
+    lead = study.contest.enter(hypothesis_of(springs[:1], study.location.tuned.z))
+    assert lead is not None
+    found = weighed(Grown(study).beside(lead))[0]
+    assert {one.site: one.values["cubic"] for one in found.fit.effects} == pytest.approx(
+        {"j0": -8e9, "j1": 3e8}, rel=0.1
+    )
+    assert np.max(found.held) < 0.8 * np.max(lead.held)
