@@ -18,7 +18,7 @@ from chladni.gap.diagnosis.search import (
     is_far,
     is_lost,
     is_one_force,
-    plausible_places,
+    same_places,
     sibling_causes,
     single_causes,
     without_cause,
@@ -190,7 +190,7 @@ def _is_plausible(study: Study, nothing: Contestant, found: Contestant) -> bool:
     sites = {one.site for one in found.hypothesis.effects}
     if len(sites) < 2 or not is_one_force(study.location):
         return True
-    alike = {name for place in plausible_places(study.location) for name in place.places[0].names}
+    alike = {name for place in same_places(study.location) for name in place.places[0].names}
     return found.chi < (max(ALONE, _NEAR * nothing.chi) if sites <= alike else ALONE)
 
 

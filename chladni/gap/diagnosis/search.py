@@ -28,6 +28,9 @@ ALONE = 1.3
 #: An unknown force that leaves less than this explains all; with more than so many sensors that says something. A
 #: place at which it leaves so many times more is another one.
 _ONE_FORCE, _PATTERN_SENSORS, _SAME_PLACE = 1.15, 2, 1.25
+#: What another place leaves of the gap beyond the best one, where the cause may still be: beside floors that shook
+#: the next place left 0.02, beside a stop between a body and the ground that joint 0.0001.
+_NEAR = 0.003
 #: Named effects that leave so many times what an unknown force does may have lost the run; over short windows a law
 #: follows the log that leaves at most so many times that; most that go on from there, and hypotheses that are tried.
 _LOST, _FOLLOWING, _GROWN, _TRIED = 3.0, 3.0, 3, 6
@@ -59,10 +62,20 @@ def is_one_force(location: Location) -> bool:
 
 
 def plausible_places(location: Location) -> list[Located]:
-    """Give the places at which the cause may be: all, unless one alone leaves nothing that another can match."""
-    if not is_one_force(location):
-        return list(location.ranked)
+    """Give the places at which the cause may be: all, unless one alone leaves nothing."""
+    return near_places(location, _SAME_PLACE) if is_one_force(location) else list(location.ranked)
+
+
+def same_places(location: Location) -> list[Located]:
+    """Give the places that explain as much as the best one: one force to the sensors."""
     enough = _SAME_PLACE * location.ranked[0].profile.chi
+    return [one for one in location.ranked if one.profile.chi < enough]
+
+
+def near_places(location: Location, same: float) -> list[Located]:
+    """Give the places that leave at most `same` times what the best one does, or little more of the gap."""
+    first = location.ranked[0].profile.chi
+    enough = max(same * first, first + _NEAR * (location.tuned.chi - first))
     return [one for one in location.ranked if one.profile.chi < enough]
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.diagnosis.search import near_places
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.any_law import left_by_any_law
 from chladni.gap.explanation.contest import held_gap
@@ -15,9 +16,6 @@ from chladni.gap.location.locate import Located
 Matrix = NDArray[np.float64]
 #: How well the ground must explain, how nearly as well as the best place; and where another can't be told from it.
 _CHI, _BEST, _TIED = 1.5, 1.02, 1.1
-#: What another place leaves of the gap beyond the best one, where the cause may still be: beside floors that shook
-#: the next place left 0.02, beside a stop between a body and the ground that joint 0.0001.
-_NEAR = 0.003
 #: Share of the gap that any law of a site's motion, or a filter of the inputs, must leave there. Of a floor that
 #: shook the best law at a joint left 0.2 to 0.5 in made machines, of an effect at that joint at most 0.12; at an
 #: input 0.34 against 0.08.
@@ -59,8 +57,7 @@ def shaken_by(study: Study, tuned: Contestant) -> ShakenGround | None:
     by_others, alone = (held_gap(measured, one, study.held) for one in (predicted, tuned.fit.outputs))
     if not by_others < alone:
         return None
-    near = max(_TIED * first, first + _NEAR * (study.location.tuned.chi - first))
-    if any(_follows(study, one) for one in study.location.ranked if one.profile.chi < near):
+    if any(_follows(study, one) for one in near_places(study.location, _TIED)):
         return None
     names = ["ground", *(name for one in (ground, *tied) for name in one.places[0].names)]
     return ShakenGround(group=tuple(dict.fromkeys(names)), predicted=predicted)

@@ -108,6 +108,9 @@ def test_a_place_that_explains_less_than_another_one_is_left_out() -> None:
     )
     second = replace(first, profile=replace(first.profile, misfit=1.5 * first.profile.expected))
     assert plausible_places(replace(location, ranked=(first, second))) == [first]
+    # Beside a large gap that little more tells nothing: the ground and the joint on it print nearly one pattern.
+    large = replace(location.tuned, misfit=500.0 * location.tuned.expected)
+    assert plausible_places(replace(location, tuned=large, ranked=(first, second))) == [first, second]
     # Where even the best place leaves something, the force between samples is taken for straight: all may be.
     first = replace(first, profile=replace(first.profile, misfit=1.4 * first.profile.expected))
     assert len(plausible_places(replace(location, ranked=(first, second)))) == 2
