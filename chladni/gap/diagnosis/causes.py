@@ -21,6 +21,7 @@ from chladni.gap.diagnosis.search import (
     same_places,
     sibling_causes,
     single_causes,
+    twin_causes,
     without_cause,
 )
 from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
@@ -94,10 +95,11 @@ def causes_of(study: Study, progress: Step) -> Causes:
     progress(0.1)
     singles = single_causes(study, progress)
     entered, instead = _searched(study, nothing, singles, progress)
+    added = added_nats(study.location)
+    entered += twin_causes(study, _best(weighed([nothing, *entered]), nothing, added))
     progress(1.0)
     together = distinct(weighed([nothing, *entered]))
     tuned = next(one for one in together if one.fit is nothing.fit)
-    added = added_nats(study.location)
     best = _best(together, tuned, added)
     noise = study.contest.noise.lowered(best.held)
     floor = lowest(together)

@@ -1,6 +1,7 @@
 """From contestants to named causes: groups, alternatives, probabilities, fitted numbers."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
 
 
 def ranking_of(causes: Causes, causes_said: Sequence[Cause]) -> tuple[Ranked, ...]:
-    """Give every candidate once, by falling probability; what is said as a cause keeps its probability."""
+    """Give every candidate once, by falling probability; what wasn't weighed keeps what it was told with."""
     said = {(one.effect, one.site): one.probability for one in causes_said}
     rows = {
         key: Ranked(effect=key[0], site=key[1], probability=probability, gap=None, log_evidence=None)
@@ -47,10 +48,11 @@ def ranking_of(causes: Causes, causes_said: Sequence[Cause]) -> tuple[Ranked, ..
     for one in reversed(causes.ranked):
         for candidate in one.hypothesis.named:
             key = (candidate.effect, candidate.site)
+            own = probability_of(causes, candidate)
             rows[key] = Ranked(
                 effect=key[0],
                 site=key[1],
-                probability=said.get(key, probability_of(causes, candidate)),
+                probability=own if candidate in causes.best.hypothesis.named else said.get(key, own),
                 gap=one.gap,
                 log_evidence=one.log_evidence,
             )
@@ -82,12 +84,14 @@ def _cause(causes: Causes, place: int) -> Cause:
     best = causes.best
     candidate = best.hypothesis.named[place]
     near = _in_its_place(causes, candidate)
+    group = dict.fromkeys([candidate.site, *(one.site for one in near if one.effect == candidate.effect)])
     effect = best.fit.effects[place] if place < len(best.fit.effects) else None
     return Cause(
         effect=candidate.effect,
         site=candidate.site,
-        probability=probability_of(causes, candidate),
-        group=tuple(dict.fromkeys([candidate.site, *(one.site for one in near if one.effect == candidate.effect)])),
+        # Of the word at any of the sites that it's told for.
+        probability=probability_of(causes, *(replace(candidate, site=site) for site in group)),
+        group=tuple(group),
         alternatives=tuple(dict.fromkeys(one for one in near if one.effect != candidate.effect)),
         parameters=_numbers(best, place),
         variant=effect.variant if effect is not None else None,
@@ -114,10 +118,10 @@ def _in_its_place(causes: Causes, candidate: Candidate) -> list[Candidate]:
     return found
 
 
-def probability_of(causes: Causes, candidate: Candidate) -> float:
-    """Probability of a word at a site, all forms of its law and all that it stands beside together."""
+def probability_of(causes: Causes, *candidates: Candidate) -> float:
+    """Probability of a word at one of some sites, all forms of its law and all that it stands beside together."""
     pairs = zip(causes.ranked, causes.probabilities, strict=True)
-    return float(sum(share for one, share in pairs if candidate in one.hypothesis.named))
+    return float(sum(share for one, share in pairs if not set(candidates).isdisjoint(one.hypothesis.named)))
 
 
 def _numbers(found: Contestant, place: int) -> dict[str, FittedNumber]:

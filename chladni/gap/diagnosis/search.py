@@ -9,7 +9,13 @@ from chladni.gap.diagnosis.study import Study, recovered_states
 from chladni.gap.explanation.candidates import screened
 from chladni.gap.explanation.contest import weighed
 from chladni.gap.explanation.degenerate import is_degenerate
-from chladni.gap.explanation.hypotheses import effect_hypotheses, polished, siblings, wrong_parameters
+from chladni.gap.explanation.hypotheses import (
+    effect_hypotheses,
+    polished,
+    siblings,
+    twins,
+    wrong_parameters,
+)
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.linear_words import linear_hypotheses
 from chladni.gap.explanation.shooting import Shooting, Shot
@@ -176,6 +182,12 @@ def sibling_causes(study: Study, ranked: Sequence[Contestant]) -> list[Contestan
     others = siblings(ranked[0], study.contest.run) if ranked else []
     allowed = [one for one in others if study.leave_out.isdisjoint(effect.effect for effect in one.effects)]
     return sound(study, study.contest.enter_all(allowed))
+
+
+def twin_causes(study: Study, found: Contestant) -> list[Contestant]:
+    """Enter the effects of a fit at the other sites that print the same pattern."""
+    places = (one.places[0] for one in study.location.ranked)
+    return sound(study, study.contest.enter_all(twins(found, places)))
 
 
 def _best_forms(ranked: Sequence[Contestant]) -> list[Contestant]:

@@ -1,6 +1,6 @@
 """From screened trials and wide parameters to hypotheses that are worth a fit."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.screen import Screened
 from chladni.gap.location.locate import Location, tuned_stepwise
 from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.places import Place
 from chladni.gap.tuning.effect_scale import usually_fitted
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.core.parameter import Parameter
@@ -104,6 +105,33 @@ def siblings(found: Contestant, run: FreeRun) -> list[Hypothesis]:
             effects = (*fit.effects[:place], other, *fit.effects[place + 1 :])
             hypotheses.append(hypothesis_of(effects, fit.z, screened=found.hypothesis.screened, initial=fit.initial))
     return hypotheses
+
+
+def twins(found: Contestant, places: Iterable[Place]) -> list[Hypothesis]:
+    """Give every effect of a fit at the other sites of its place where the same word may act, begun where it ended.
+
+    A force that follows a joint's way may as well come from the input that acts across it. At an input it pushes
+    where at a joint it resists: half a turn of a phase is the other sign, both are tried.
+    """
+    fit, hypotheses = found.fit, []
+    places = list(places)
+    for number, one in enumerate(fit.effects):
+        for moved in _moved(one, places):
+            effects = (*fit.effects[:number], moved, *fit.effects[number + 1 :])
+            hypotheses.append(hypothesis_of(effects, fit.z, screened=found.hypothesis.screened, initial=fit.initial))
+    return hypotheses
+
+
+def _moved(effect: AttachedEffect, places: Sequence[Place]) -> Iterator[AttachedEffect]:
+    there = dict.fromkeys(site for place in places if effect.site in place.names for site in place.sites)
+    for site in there:
+        if site.name == effect.site or site.kind not in effect.kind.sites or effect.source is not None:
+            continue
+        moved = replace(effect, site=site.name)
+        yield moved
+        if "phase" in effect.values:
+            phase = effect.values["phase"]
+            yield replace(moved, values={**effect.values, "phase": phase - np.copysign(np.pi, phase)})
 
 
 def _other_frictions(found: Contestant, run: FreeRun, one: AttachedEffect) -> list[AttachedEffect]:
