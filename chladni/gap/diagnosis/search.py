@@ -215,5 +215,10 @@ def detailed(study: Study, found: Contestant) -> Contestant:
 
 
 def sound(study: Study, entered: Sequence[Contestant]) -> list[Contestant]:
-    """Leave out what is its law in name only."""
-    return [one for one in entered if not is_degenerate(study.contest.run, one)]
+    """Leave out what is its law in name only, and what steps larger than a sensor's signal make of it."""
+    return [one for one in entered if not is_degenerate(study.contest.run, one) and not _is_rounding(study, one)]
+
+
+def _is_rounding(study: Study, one: Contestant) -> bool:
+    """Whether an effect is at a sensor of which only steps are left: what these take looks like tones and gains."""
+    return not study.coarse.isdisjoint(effect.site for effect in one.hypothesis.effects)

@@ -22,6 +22,7 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.signals.channel import Channel
+from chladni.signals.errors import ModelError
 from chladni.signals.sensor_quality import sensor_quality
 from chladni.signals.time_series import TimeSeries
 
@@ -70,6 +71,11 @@ class Study:
         return ~self.contest.training
 
     @property
+    def coarse(self) -> frozenset[str]:
+        """Outputs whose steps are larger than their signal's RMS: what rounding takes follows the signal."""
+        return _coarse(self.measurement, self.lattices)
+
+    @property
     def horizon_s(self) -> float | None:
         """Length of a window, None in free run."""
         if self.windows is None:
@@ -86,7 +92,7 @@ def study_of(
     if len(measurement.output_names) < 2 and noise.upper_bound.any():
         noise = quiet_floor(measurement)
     lattices = {} if "quantization" in leave_out else _lattices(measurement, noise)
-    noise = _with_rounding(noise, measurement.output_names, lattices)
+    noise = _with_rounding(noise, model, measurement, lattices)
     location = locate(model, measurement, noise, Tunables.of(model))
     windows = None if _runs_free(model, location) else windows_for(model, measurement)
     run = FreeRun(model, measurement, windows=windows)
@@ -172,7 +178,34 @@ def _values_held(signal: Matrix) -> int:
     return int(np.unique(signal[1:][np.diff(signal) == 0]).size)
 
 
-def _with_rounding(noise: NoiseFloor, names: Sequence[str], lattices: Mapping[str, Lattice]) -> NoiseFloor:
+def _with_rounding(
+    noise: NoiseFloor, model: Model, measurement: Measurement, lattices: Mapping[str, Lattice]
+) -> NoiseFloor:
     """Give the floor with the rounding of coarse steps in it: no law of motion explains that."""
-    rounding = np.array([lattices[name].rounding_rms if name in lattices else 0.0 for name in names])
-    return noise.raised(rounding)
+    rounding = {name: lattice.rounding_rms for name, lattice in lattices.items()}
+    coarse = _coarse(measurement, lattices)
+    for name, measured, row in _simulated(model, measurement) if coarse else ():
+        if name in coarse:
+            rounding[name] = max(rounding[name], _rounded_off(row, measured, lattices[name].step))
+    return noise.raised(np.array([rounding.get(name, 0.0) for name in measurement.output_names]))
+
+
+def _coarse(measurement: Measurement, lattices: Mapping[str, Lattice]) -> frozenset[str]:
+    rows = zip(measurement.output_names, measurement.outputs, strict=True)
+    return frozenset(name for name, row in rows if name in lattices and lattices[name].step > np.std(row))
+
+
+def _simulated(model: Model, measurement: Measurement) -> list[tuple[str, Matrix, Matrix]]:
+    """Name, measured and simulated signal of each output by the nominal model; nothing where that diverges."""
+    try:
+        simulated = FreeRun(model, measurement).outputs()
+    except ModelError:
+        return []
+    return list(zip(measurement.output_names, measurement.outputs, simulated, strict=True))
+
+
+def _rounded_off(simulated: Matrix, measured: Matrix, step: float) -> float:
+    """RMS of what rounding takes from a signal like the simulated one: all of it where it stays below a step."""
+    rounded = [step * np.round(simulated / step), step * np.floor(simulated / step)]
+    nearest = min(rounded, key=lambda row: float(np.std(row - measured)))
+    return float(np.std(nearest - simulated))

@@ -9,8 +9,9 @@ Matrix = NDArray[np.float64]
 #: ``abs(mean exp(2 pi i y/step))`` of a signal without steps stays far below; of a quantised one it's near 1.
 _CLEAR = 0.9
 _BINS = 1 << 16
-#: Samples away from the level where most stand that are needed to see a lattice.
-_MOVING = 200
+#: Samples away from the level where most stand that are needed to see a lattice, and where all values repeat; levels
+#: that they stand on.
+_MOVING, _LEAVING, _LEVELS = 200, 20, 2
 #: Different values over samples, below which values repeat.
 _REPEATED = 0.1
 
@@ -59,22 +60,31 @@ def lattice_of(signal: Matrix) -> Lattice | None:
 
 def _coarsest(signal: Matrix, step: float) -> float:
     """Largest multiple of a step on which the samples stand too: steps that the signal spans a few times only."""
-    longest = float(np.ptp(signal))
+    longest, middle = float(np.ptp(signal)), float(np.median(signal))
+    # Those that stand where most do stand on every multiple.
+    moving = signal[np.abs(signal - middle) > 0.5 * step]
     for factor in (2, 3, 5):
-        while factor * step < longest and abs(np.mean(np.exp(2j * np.pi * signal / (factor * step)))) > _CLEAR:
+        while (
+            factor * step < longest and min(_stands(one, factor * step, middle) for one in (signal, moving)) > _CLEAR
+        ):
             step *= factor
     return step
+
+
+def _stands(signal: Matrix, step: float, level: float) -> float:
+    """How sharply samples stand on the lattice of a level, 1 when all do; of no samples 0."""
+    return float(np.mean(np.cos(2.0 * np.pi * (signal - level) / step))) if signal.size else 0.0
 
 
 def _mostly_still(signal: Matrix, step: float) -> bool:
     """Whether the samples seem to stand on a lattice because most of them stand at one level."""
     middle = float(np.median(signal))
     # A signal that repeats its values exactly has steps, however few; one that doesn't may rest beside a jump.
-    beyond = 0.5 if np.unique(signal).size < _REPEATED * signal.size else 1.5
-    moving = signal[np.abs(signal - middle) > beyond * step]
-    if moving.size < _MOVING:
+    repeats = np.unique(signal).size < _REPEATED * signal.size
+    moving = signal[np.abs(signal - middle) > (0.5 if repeats else 1.5) * step]
+    if moving.size < (_LEAVING if repeats else _MOVING) or np.unique(moving).size < _LEVELS:
         return True
-    return float(np.abs(np.mean(np.exp(2j * np.pi * moving / step)))) < _CLEAR
+    return _stands(moving, step, middle) < _CLEAR
 
 
 def _sharpened(signal: Matrix, step: float, span: float) -> tuple[float, float]:

@@ -29,3 +29,11 @@ def test_a_signal_that_stands_still_most_of_the_time_has_none() -> None:
 
 def test_a_constant_has_none() -> None:
     assert lattice_of(np.ones(100)) is None
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_step_is_found_where_few_samples_leave_the_level_of_most(seed: int) -> None:
+    signal = np.random.default_rng(seed).normal(size=20_000)
+    found = lattice_of(5.0 * np.round(signal / 5.0))
+    assert found is not None
+    assert found.step == pytest.approx(5.0)
