@@ -5,11 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
-from chladni.gap.diagnosis.study import Study, training_of
+from chladni.gap.diagnosis.study import Study, floor_of, training_of
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.windows import short_windows
@@ -52,7 +51,7 @@ def closing_elsewhere(study: Study, causes: Causes, measurement: Measurement, *,
     """
     measurement = with_period(measurement)
     windows = None if study.windows is None else short_windows(study.model, measurement)
-    run, noise = FreeRun(study.model, measurement, windows=windows), estimate_noise(measurement)
+    run, noise = FreeRun(study.model, measurement, windows=windows), floor_of(measurement)
     training = training_of(measurement, windows)
     believed = causes.best if causes.verdict in ("effect", "parameters") else causes.tuned
     horizon = None if windows is None else max(stop - start for start, stop in windows) / measurement.sample_rate_hz

@@ -88,9 +88,7 @@ def study_of(
 ) -> Study:
     """Prepare the study of one log."""
     measurement = with_period(measurement)
-    noise = estimate_noise(measurement)
-    if len(measurement.output_names) < 2 and noise.upper_bound.any():
-        noise = quiet_floor(measurement)
+    noise = floor_of(measurement)
     lattices = {} if "quantization" in leave_out else _lattices(measurement, noise)
     noise = _with_rounding(noise, model, measurement, lattices)
     location = locate(model, measurement, noise, Tunables.of(model))
@@ -108,6 +106,12 @@ def study_of(
         leave_out=leave_out,
         own=own,
     )
+
+
+def floor_of(measurement: Measurement) -> NoiseFloor:
+    """Give the noise of a log; of an only output without periods the quiet band's, since no fit tells that apart."""
+    noise = estimate_noise(measurement)
+    return quiet_floor(measurement) if len(measurement.output_names) < 2 and noise.upper_bound.any() else noise
 
 
 def over_windows(study: Study) -> Study | None:
