@@ -4,21 +4,28 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.pairs import TWO_FORCES
 from chladni.gap.diagnosis.search import ALONE
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.any_coupling import Coupling, any_coupling
 from chladni.gap.explanation.any_law import left_by_any_law
+from chladni.gap.explanation.any_relaxation import Relaxation, any_relaxation
 from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.explanation.linear_words import fitted_beside
 from chladni.gap.location.locate import Located, Location
 from chladni.gap.location.recovered import Recovered, recovered
 from chladni.gap.plant.places import Site
+from chladni.gap.tuning.effect_scale import effect_numbers
+from chladni.models.effects.attached_effect import AttachedEffect
 
 #: Of what the believed cause leaves beyond the noise's power: what leaves less than this share of it is better.
 _BETTER = 0.5
-#: What a coupling may leave of the gap; most of the noise's power with which nothing else is asked for.
+#: What a linear law may leave of the gap; most of the noise's power with which nothing else is asked for.
 _OF_GAP, _ASKED = 0.01, 1.1
+#: Nats that a joint that relaxes must bring beyond a linear word.
+_SURE = 10.0
 #: Of what the believed cause leaves beyond the noise's power: what a law at another site leaves is better with less.
 #: In made machines it was 0.54 at most where the named site was wrong, 4.5 at least where it was right.
 _ELSEWHERE = 0.7
@@ -33,8 +40,8 @@ class Instead:
 
     Attributes
     ----------
-    coupled
-        Velocities of bodies that push each other.
+    linear
+        Velocities of bodies that push each other, or a joint that relaxes.
     loopless
         The joint whose force is a function where a loop was named.
     elsewhere
@@ -42,14 +49,14 @@ class Instead:
         other sites.
     """
 
-    coupled: Coupling | None = None
+    linear: Coupling | Relaxation | None = None
     loopless: str | None = None
     elsewhere: str | None = None
 
     def sentence(self) -> str:
         """Say what fits."""
-        if self.coupled is not None:
-            return f"What fits is no effect of the catalogue: {self.coupled.sentence()}."
+        if self.linear is not None:
+            return f"What fits is no effect of the catalogue: {self.linear.sentence()}."
         if self.elsewhere is not None:
             return (
                 f"One force at {self.elsewhere}, by a law of what moves there that is not in the catalogue, explains "
@@ -64,22 +71,66 @@ class Instead:
 def explained_instead(study: Study, best: Contestant) -> Instead | None:
     """Give what leaves less than half of what the believed cause does, None when nothing of it does.
 
-    A late sensor and a mount do much the same as a wheel that spins between two bodies, but leave more. A loop of
-    hysteresis does much the same as a function of displacement and velocity, which is no loop, but leaves more.
+    A late sensor and a mount do much the same as a wheel that spins between two bodies, but leave more. A mass on a
+    soft mount that is damped much does much the same as a joint that relaxes, but leaves more. A loop of hysteresis
+    does much the same as a function of displacement and velocity, which is no loop, but leaves more.
     """
+    linear = _linear(study, best)
+    if linear is not None:
+        return Instead(linear=linear)
+    loopless = _loopless(study.location, best)
+    return None if loopless is None else Instead(loopless=loopless)
+
+
+def _linear(study: Study, best: Contestant) -> Coupling | Relaxation | None:
+    """Give the linear law that is no word and explains more than the believed cause does; None without."""
+    location, word = study.location, _linear_word(best)
+    if best.chi < _ASKED and word is None:
+        return None
+    relaxing = _relaxing(location)
+    if word is not None and relaxing is not None and _brings_more(study, relaxing, word, best.fit.z):
+        return relaxing
     if best.chi < _ASKED:
         return None
-    left = _BETTER * (best.chi - 1.0)
-    gap = study.location.tuned.chi - 1.0
-    found = any_coupling(study.location)
-    if found is not None and found.chi - 1.0 < min(left, _OF_GAP * gap):
-        return Instead(coupled=found)
+    left, gap = _BETTER * (best.chi - 1.0), location.tuned.chi - 1.0
+    # A coupling of every body with every other has so many numbers that little of a small gap says nothing.
+    bounds = ((any_coupling(location), _OF_GAP * gap), (relaxing, max(_OF_GAP * gap, _ASKED - 1.0)))
+    found = [law for law, most in bounds if law is not None and law.chi - 1.0 < min(left, most)]
+    return min(found, key=lambda law: law.chi, default=None)
+
+
+def _linear_word(best: Contestant) -> AttachedEffect | None:
     effects = best.hypothesis.effects
-    if len(effects) == 1 and effects[0].effect == "hysteresis":
-        share = _left_by_function(study.location, effects[0].site)
-        if share is not None and share * gap < left:
-            return Instead(loopless=effects[0].site)
-    return None
+    return best.fit.effects[0] if len(effects) == 1 and effects[0].kind.linear else None
+
+
+def _relaxing(location: Location) -> Relaxation | None:
+    """Give the joint that explains most by relaxing, among those at which one unknown force explains all."""
+    joints = ((located, site) for located, site in _alone(location) if site.kind == "joint")
+    found = (any_relaxation(location, located, site) for located, site in joints)
+    return min((law for law in found if law is not None), key=lambda law: law.chi, default=None)
+
+
+def _brings_more(study: Study, relaxing: Relaxation, word: AttachedEffect, z: NDArray[np.float64]) -> bool:
+    """Whether a joint that relaxes is far likelier than a linear word, both fitted alike to the whole record."""
+    if relaxing.chi > ALONE:
+        return False
+    fitted = fitted_beside(study.model, study.location, word, z)
+    if fitted is None:
+        return False
+    expected = study.location.tuned.expected
+    numbers = relaxing.numbers - len(effect_numbers((word,)))
+    return (fitted.chi - relaxing.chi) * expected > _SURE + 0.5 * numbers * float(np.log(2 * expected))
+
+
+def _loopless(location: Location, best: Contestant) -> str | None:
+    """Give the joint of a believed loop where a function leaves less; None without."""
+    effects = best.hypothesis.effects
+    if best.chi < _ASKED or len(effects) != 1 or effects[0].effect != "hysteresis":
+        return None
+    site, gap = effects[0].site, location.tuned.chi - 1.0
+    share = _left_by_function(location, site)
+    return site if share is not None and share * gap < _BETTER * (best.chi - 1.0) else None
 
 
 def explained_elsewhere(study: Study, best: Contestant) -> Instead | None:

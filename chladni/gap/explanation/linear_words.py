@@ -34,7 +34,19 @@ _UNBOUNDED = 1e3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Fitted:
+class LinearFit:
+    """A linear effect fitted together with the parameters.
+
+    Attributes
+    ----------
+    effect
+        With the numbers found.
+    z
+        ``[parameter]`` in units of their tolerance.
+    chi
+        Misfit over what noise alone leaves.
+    """
+
     effect: AttachedEffect
     z: Matrix
     chi: float
@@ -62,7 +74,7 @@ def linear_hypotheses(
     there = {site.name: one for one in location.ranked if one.profile.chi < enough for site in one.places[0].sites}
     worth = [one for one in screened if one.trial.site.name in there]
     effects = [effect for one in worth if (effect := effect_of(one, own)) is not None and effect.kind.linear]
-    found = [_fitted(model, location, effect, there[effect.site].profile.z) for effect in effects[:count]]
+    found = [fitted_beside(model, location, effect, there[effect.site].profile.z) for effect in effects[:count]]
     ranked = sorted((one for one in found if one is not None), key=lambda one: one.chi)
     return [hypothesis_of((one.effect,), one.z, screened=one.chi) for one in ranked[:_ENTERED]]
 
@@ -76,7 +88,7 @@ def _starts(effect: AttachedEffect) -> list[AttachedEffect]:
     ]
 
 
-def _fitted(model: Model, location: Location, effect: AttachedEffect, z: Matrix) -> _Fitted | None:
+def fitted_beside(model: Model, location: Location, effect: AttachedEffect, z: Matrix) -> LinearFit | None:
     """Fit from the start that is best over short segments; None where none converges."""
     numbers = effect_numbers((effect,))
     limit = np.repeat([OUTSIDE, _UNBOUNDED], [z.size, len(numbers)])
@@ -94,7 +106,7 @@ def _fitted(model: Model, location: Location, effect: AttachedEffect, z: Matrix)
         found = tuned_stepwise(problems, best.z, limit)
     except (ModelError, np.linalg.LinAlgError):
         return None
-    return _Fitted(effect=_moved(start, found.z[z.size :]), z=found.z[: z.size], chi=found.chi)
+    return LinearFit(effect=_moved(start, found.z[z.size :]), z=found.z[: z.size], chi=found.chi)
 
 
 def _beside(problem: LinearProblem, model: Model, effect: AttachedEffect) -> LinearProblem:

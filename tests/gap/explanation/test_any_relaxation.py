@@ -1,0 +1,99 @@
+"""A joint of rubber is told from all else that is linear."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import chladni
+from chladni.gap.comparison.noise_estimate import estimate_noise
+from chladni.gap.diagnosis.diagnose import diagnose
+from chladni.gap.explanation.any_relaxation import Relaxation, any_relaxation
+from chladni.gap.location.locate import locate
+from chladni.gap.plant.tunable import Tunables
+from chladni.models.core.compiled_model import CompiledModel
+from tests.gap.arm import arm, measured
+
+#: N/m of each branch; corners half a decade apart, from far below the first resonance to above the last.
+STIFFNESS, CORNERS_HZ = 1.5e4, (2.0, 6.3, 20.0, 63.0, 200.0)
+
+
+@dataclass(frozen=True)
+class Rubber:
+    """Maxwell's branches across a joint, in matrices."""
+
+    site: str = "shoulder"
+    effect: str = "viscoelastic"
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        return {}
+
+    def attach(self, compiled: CompiledModel) -> CompiledModel:
+        joint, count, new = compiled.port_index(self.site, "joint"), len(compiled.states), len(CORNERS_HZ)
+        force = np.zeros((len(compiled.ports), count + new))
+        # A force at a joint is positive where it resists.
+        force[joint, count:] = STIFFNESS
+
+        def widened(matrix: np.ndarray) -> np.ndarray:
+            return np.hstack([matrix, np.zeros((len(matrix), new))])
+
+        speeds = np.hstack([np.tile(compiled.velocity_state[joint], (new, 1)), -2 * np.pi * np.diag(CORNERS_HZ)])
+        g = np.vstack([compiled.g, np.zeros((new, compiled.g.shape[1]))])
+        return replace(
+            compiled,
+            a=np.vstack([widened(compiled.a), speeds]) + g @ force,
+            b=np.vstack([compiled.b, np.tile(compiled.velocity_column[joint], (new, 1))]),
+            g=g,
+            c=widened(compiled.c) + compiled.h @ force,
+            displacement_state=widened(compiled.displacement_state),
+            velocity_state=widened(compiled.velocity_state),
+            states=(*compiled.states, *(f"rubber{place}" for place in range(new))),
+        )
+
+
+def relaxation_of(*effects, joint: str) -> tuple[float, Relaxation | None]:
+    log = measured(effects, seed=3)
+    location = locate(arm(), log, estimate_noise(log), Tunables.of(arm()))
+    located = next(one for one in location.ranked if joint in one.places[0].names)
+    site = next(one for one in located.places[0].sites if one.name == joint)
+    return location.tuned.chi, any_relaxation(location, located, site)
+
+
+@pytest.mark.parametrize("joint", ["shoulder", "elbow", "hand"])
+def test_branches_a_decade_apart_do_what_closer_ones_do(joint: str) -> None:
+    before, found = relaxation_of(Rubber(site=joint), joint=joint)
+    assert before > 10.0
+    assert found is not None
+    assert found.chi < 1.1
+    s = 2j * np.pi * np.array(found.band_hz)[:, None]
+    low, high = np.sum(STIFFNESS * s / (s + 2 * np.pi * np.array(CORNERS_HZ)), axis=1)
+    assert found.rise == pytest.approx(high.real - low.real, rel=0.1)
+    assert found.loss == pytest.approx(STIFFNESS, rel=0.5)
+    assert f"stiffness of {joint} that rises" in found.sentence()
+    assert found.unit == "N/m"
+
+
+@pytest.mark.parametrize(
+    ("word", "site", "values", "joint"),
+    [
+        ("extra_mode", "column", {"mass": 0.8, "frequency": 30.0, "damping_ratio": 0.05}, "shoulder"),
+        ("added_mass", "column", {"mass": 3.0}, "shoulder"),
+        ("hardening_stiffness", "elbow", {"cubic": 1e12}, "elbow"),
+        ("coulomb_friction", "elbow", {"force": 8.0}, "elbow"),
+        ("delay", "shaker", {"delay": 1e-3}, "hand"),
+    ],
+)
+def test_relaxing_explains_no_other_effect(word: str, site: str, values: dict[str, float], joint: str) -> None:
+    before, found = relaxation_of(chladni.attached(word, site, values), joint=joint)
+    assert before > 3.0
+    assert found is None or found.chi > 2.0
+
+
+@pytest.mark.slow
+def test_rubber_is_no_mass_on_a_mount_and_the_answer_says_what_fits() -> None:
+    found = diagnose(arm(), [measured((Rubber(),), seed=3)])
+    assert found.verdict == "unknown"
+    assert found.advice is not None
+    assert "stiffness of shoulder that rises by" in found.advice
