@@ -9,7 +9,8 @@ Matrix = NDArray[np.float64]
 def read_late(outputs: Matrix, offsets_s: Matrix, sample_rate_hz: float) -> Matrix:
     """Give ``[..., output, sample]`` as read by clocks that are late by ``offsets_s [output]``.
 
-    By cubic splines between samples; before the start as at the start, after the end as at the end.
+    By cubic splines between samples; before the start as at the start, after the end as at the end. What isn't finite
+    somewhere is nowhere: a spline through it would have no numbers.
     """
     late = np.flatnonzero(offsets_s)
     if not late.size:
@@ -20,5 +21,8 @@ def read_late(outputs: Matrix, offsets_s: Matrix, sample_rate_hz: float) -> Matr
     read = outputs.copy()
     for row in late:
         asked = np.clip(times_s - offsets_s[row], 0.0, times_s[-1])
-        read[..., row, :] = CubicSpline(times_s, outputs[..., row, :], axis=-1)(asked)
+        seen = outputs[..., row, :]
+        finite = np.isfinite(seen).all(axis=-1)
+        read[..., row, :] = np.nan
+        read[finite, row, :] = CubicSpline(times_s, seen[finite], axis=-1)(asked)
     return read

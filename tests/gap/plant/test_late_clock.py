@@ -37,6 +37,17 @@ def test_a_late_clock_reads_what_was_and_the_start_before_it():
     np.testing.assert_allclose(read[1, 1], 2 * np.maximum(np.arange(50.0) - 1.5, 0.0), atol=1e-12)
 
 
+@pytest.mark.parametrize("beyond", [np.nan, np.inf])
+def test_what_left_the_numbers_stays_beyond_them_and_the_rest_is_read(beyond):
+    """Slopes along motions that part overflow: the fit says so, when it's asked for them."""
+    sound = np.sin(0.1 * np.arange(150.0)).reshape(3, 1, 50)
+    lost = sound.copy()
+    lost[1, 0, 20] = beyond
+    read = read_late(lost, np.array([1.5]), 1.0)
+    assert np.isnan(read[1]).all()
+    np.testing.assert_array_equal(read[::2], read_late(sound, np.array([1.5]), 1.0)[::2])
+
+
 @pytest.mark.parametrize("laws", [(), (LAW,)], ids=["alone", "beside a law"])
 @pytest.mark.parametrize("samples", [1.3, -0.6])
 def test_slopes_are_differences_of_the_march(samples, laws, run):
