@@ -29,6 +29,8 @@ _SURE = 10.0
 #: Of what the believed cause leaves beyond the noise's power: what a law at another site leaves is better with less.
 #: In made machines it was 0.54 at most where the named site was wrong, 4.5 at least where it was right.
 _ELSEWHERE = 0.7
+#: Most that one law leaves beyond the noise's power, and of the gap as above, to do what several words do.
+_NOTHING = 0.5
 #: Intervals of displacement and of velocity with equally many samples, and the share of their pairs in which a motion
 #: must be for a fifth of an equal share of the time: along one orbit every force is a function of both.
 _INTERVALS, _VISITED, _OFTEN = 8, 0.8, 0.2
@@ -60,7 +62,7 @@ class Instead:
         if self.elsewhere is not None:
             return (
                 f"One force at {self.elsewhere}, by a law of what moves there that is not in the catalogue, explains "
-                "more than any effect does: what comes near acts at other sites."
+                "the gap: the effects that come near act at other sites."
             )
         return (
             f"The force at {self.loopless} is a function of displacement and velocity: "
@@ -137,15 +139,18 @@ def explained_elsewhere(study: Study, best: Contestant) -> Instead | None:
     """Give the site at which one force by any law explains more than what is named elsewhere; None without.
 
     Nothing is said where a law at a named site explains as much: then it's the details of the named one that are off.
+    Several words must do what no single law does: equal mounts on all sensors only imitate a filter of the command.
     """
     effects = best.hypothesis.effects
-    if not effects or best.chi < ALONE:
+    if not effects or (best.chi < ALONE and len(effects) < 2):
         return None
     named, gap = {one.site for one in effects}, study.location.tuned.chi - 1.0
+    alone = min(_NOTHING, _OF_GAP * gap) if len(effects) > 1 else 0.0
+    enough = max(_ELSEWHERE * (best.chi - 1.0), alone)
     better: dict[str, float] = {}
     for located, site in _alone(study.location):
         left = gap * left_by_any_law(study.location, located, site)
-        if left < _ELSEWHERE * (best.chi - 1.0):
+        if left < enough:
             better[site.name] = left
     if not better or not named.isdisjoint(better):
         return None

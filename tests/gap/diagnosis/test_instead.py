@@ -18,9 +18,10 @@ def study(*effects: AttachedEffect) -> Study:
     return study_of(arm(), measured(effects, seed=5), leave_out=frozenset(), own={})
 
 
-def believed(effect: AttachedEffect, left: float) -> Contestant:
-    """An effect that leaves this mean square, in units of the noise."""
-    hypothesis = Hypothesis(effects=(effect,), fitted=((),), start_z=np.zeros(0))
+def believed(effect: AttachedEffect, left: float, *others: AttachedEffect) -> Contestant:
+    """Effects that leave this mean square, in units of the noise."""
+    effects = (effect, *others)
+    hypothesis = Hypothesis(effects=effects, fitted=((),) * len(effects), start_z=np.zeros(0))
     return Contestant(hypothesis=hypothesis, fit=None, held=np.full(3, left), gap=0.0, prior=0.0)
 
 
@@ -79,3 +80,24 @@ def test_two_forces_are_no_one_force_elsewhere() -> None:
     both = study(DRAG, SPRING)
     load = attached("added_mass", "wrist", {"mass": 1.0})
     assert explained_elsewhere(both, believed(load, 1.0 + 0.9 * both.location.tuned.chi)) is None
+
+
+def test_equal_mounts_on_all_sensors_are_no_two_causes_where_one_filter_of_the_command_does_as_much() -> None:
+    lagging = study(attached("lag", "shaker", {"time_constant": 5e-4}))
+    mounts = tuple(
+        attached("mounting_resonance", f"acc_{name}", {"frequency": 150.0, "damping_ratio": 0.7})
+        for name in ("column", "arm", "wrist")
+    )
+    assert lagging.location.tuned.chi > 10.0
+    found = explained_elsewhere(lagging, believed(mounts[0], 1.05, *mounts[1:]))
+    assert found is not None
+    assert found.elsewhere in ("shaker", "wrist")
+    # One word that leaves only noise stays: nothing says that a law elsewhere is likelier.
+    assert explained_elsewhere(lagging, believed(mounts[0], 1.05)) is None
+
+
+def test_two_causes_that_are_two_are_not_contradicted(dragged: Study) -> None:
+    mount = attached("mounting_resonance", "acc_arm", {"frequency": 150.0, "damping_ratio": 0.1})
+    both = study(DRAG, mount)
+    assert explained_elsewhere(both, believed(DRAG, 1.05, mount)) is None
+    assert explained_elsewhere(dragged, believed(SPRING, 1.05, DRAG)) is None
