@@ -34,6 +34,7 @@ def hammer_or_sensor():
     return contested(gain, *hypotheses, outputs=[2])
 
 
+@pytest.mark.slow
 def test_hardening_against_a_stiffer_spring_asks_for_a_higher_level(hardening_or_stiffer):
     first = Search(*hardening_or_stiffer, seed=1).best()[0]
     assert first.change == "level"
@@ -42,6 +43,7 @@ def test_hardening_against_a_stiffer_spring_asks_for_a_higher_level(hardening_or
     assert first.nats > 10 * first.now_nats
 
 
+@pytest.mark.slow
 def test_measuring_as_advised_tells_hardening_from_a_stiffer_spring(hardening_or_stiffer):
     model, log, _, candidates, floor = hardening_or_stiffer
     apart = candidates[0].log_evidence - candidates[1].log_evidence
@@ -83,6 +85,7 @@ def test_an_input_against_the_only_sensor_asks_for_a_sensor(hammer_or_sensor):
     assert all(one.design.nats < 1e-3 for one in search._each(search._reach.courses()))
 
 
+@pytest.mark.slow
 def test_the_sentence_names_what_to_do_and_numbers(hardening_or_stiffer):
     said = next_measurement(*hardening_or_stiffer, seed=1)
     pattern = (
@@ -119,6 +122,7 @@ def test_candidates_that_nothing_tells_apart_are_said_to_be_one(hammer_or_sensor
     )
 
 
+@pytest.mark.slow
 def test_a_clock_that_is_late_before_a_law_is_compared_too():
     late = attached("time_offset", "a1", {"offset": 2e-3})
     both = hypothesis_of(
@@ -131,6 +135,7 @@ def test_a_clock_that_is_late_before_a_law_is_compared_too():
     assert best[0].nats >= search.now_nats
 
 
+@pytest.mark.slow
 def test_an_experiment_in_which_a_candidate_diverges_is_never_asked_for(hardening_or_stiffer):
     search = Search(*hardening_or_stiffer, seed=1)
     logged = search._reach.as_logged()

@@ -30,6 +30,7 @@ def rounded(cut):
     return replace(log, outputs=outputs), step, float(np.std(outputs[1] - log.outputs[1]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", [np.round, np.floor])
 def test_only_the_steps_are_named(cut) -> None:
     log, step, _ = rounded(cut)

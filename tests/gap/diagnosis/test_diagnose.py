@@ -218,6 +218,7 @@ def repeated(rms: float, seed: int = 0) -> Measurement:
     )
 
 
+@pytest.mark.slow
 def test_what_a_period_tells_of_distortion_is_told() -> None:
     # Not a single effect is weighed: of the cause nothing is asked here.
     found = diagnose(arm(), [repeated(200.0)], leave_out=frozenset(CATALOGUE))

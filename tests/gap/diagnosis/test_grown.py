@@ -39,6 +39,7 @@ def test_the_second_play_grows_beside_the_first() -> None:
     assert all(len({each.site for each in one.fit.effects}) == 2 for one in Grown(study).beside(lead))
 
 
+@pytest.mark.slow
 def test_a_word_without_its_place_is_no_second() -> None:
     axis = chain([2.0, 3.0], [0.0, 4e5], [30.0, 60.0])
     rubbing = axis.with_effects((chladni.attached("coulomb_friction", "j0", {"force": 20.0}),))

@@ -30,6 +30,7 @@ def dragged() -> Study:
     return study(DRAG)
 
 
+@pytest.mark.slow
 def test_drag_is_no_loop(dragged: Study) -> None:
     gap = dragged.location.tuned.chi
     assert gap > 10.0
@@ -43,6 +44,7 @@ def test_other_words_are_not_contradicted_by_a_function(dragged: Study) -> None:
     assert explained_instead(dragged, believed(DRAG, 1.0 + 0.05 * dragged.location.tuned.chi)) is None
 
 
+@pytest.mark.slow
 def test_a_loop_that_leaves_little_stays() -> None:
     looped = study(LOOP)
     assert looped.location.tuned.chi > 10.0
@@ -50,6 +52,7 @@ def test_a_loop_that_leaves_little_stays() -> None:
     assert explained_instead(looped, believed(LOOP, 1.05)) is None
 
 
+@pytest.mark.slow
 def test_along_one_orbit_any_force_is_a_function_and_nothing_is_contradicted() -> None:
     turns = 2.0 * np.pi * 11.3 * np.arange(4000) / RATE_HZ
     force = 200.0 * np.sin(turns)
@@ -58,6 +61,7 @@ def test_along_one_orbit_any_force_is_a_function_and_nothing_is_contradicted() -
     assert explained_instead(orbit, believed(LOOP, 1.0 + 0.05 * orbit.location.tuned.chi)) is None
 
 
+@pytest.mark.slow
 def test_where_another_force_acts_too_a_function_contradicts_no_loop(dragged: Study) -> None:
     both = study(DRAG, SPRING)
     assert next(one.profile.chi for one in both.location.ranked if "elbow" in one.places[0].names) > 1.5
@@ -76,6 +80,7 @@ def test_one_force_by_a_law_elsewhere_explains_more_than_what_is_named(dragged: 
     assert explained_elsewhere(dragged, believed(SPRING, 1.2)) is None
 
 
+@pytest.mark.slow
 def test_two_forces_are_no_one_force_elsewhere() -> None:
     both = study(DRAG, SPRING)
     load = attached("added_mass", "wrist", {"mass": 1.0})

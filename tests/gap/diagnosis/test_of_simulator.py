@@ -96,6 +96,7 @@ def of_friction():
     return found, told
 
 
+@pytest.mark.slow
 def test_friction_by_another_law_is_named():
     found, _ = of_friction()
     assert found.verdict == "effect"
@@ -161,6 +162,7 @@ def test_the_simulators_own_step_is_told():
     assert not any("half the simulator's step" in remark for remark in found.remarks)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_no_effect_where_only_parameters_are_off(seed):
     found = diagnose_simulator(slide(), log_of([], MOVED, seed=seed))

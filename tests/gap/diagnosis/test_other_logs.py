@@ -31,6 +31,7 @@ def answer():
     return study, causes_of(study, [].append)
 
 
+@pytest.mark.slow
 def test_another_log_closes_and_one_on_which_the_model_diverges_is_told(answer):
     study, causes = answer
     assert causes.verdict == "effect"
@@ -60,6 +61,7 @@ def pushed(seed: int, count: int):
     return np.tile(80.0 * slow / slow.std(), count)
 
 
+@pytest.mark.slow
 def test_a_log_without_periods_is_begun_by_what_its_quiet_band_tells():
     rubbing = axis().with_effects((attached("coulomb_friction", "j0", {"force": 30.0}),))
     first, _ = measured(rubbing, pushed(1, 4), noise=1e-5, seed=7)

@@ -23,10 +23,12 @@ def nats(*effects: AttachedEffect) -> float:
     return added_nats(locate(arm(), log, estimate_noise(log), Tunables.of(arm())))
 
 
+@pytest.mark.slow
 def test_two_causes_that_no_single_place_explains_need_less() -> None:
     assert nats(SPRING, LATE) < 20.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effects", [(), (SPRING,), (LATE,)])
 def test_details_of_one_law_mustn_t_name_a_second(effects: tuple[AttachedEffect, ...]) -> None:
     assert nats(*effects) == 100.0

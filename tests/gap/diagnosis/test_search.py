@@ -14,6 +14,7 @@ from tests.gap.made_log import band_noise, chain
 from tests.gap.made_log import measured as made
 
 
+@pytest.mark.slow
 def test_a_stribeck_curve_that_falls_slowly_isnt_lost_to_coulombs() -> None:
     # It falls over four times the speed that is usual there: from a curve that falls at once the search ends at
     # Coulomb's friction, with static and sliding force alike.
@@ -29,6 +30,7 @@ def test_a_stribeck_curve_that_falls_slowly_isnt_lost_to_coulombs() -> None:
     assert best.fit.effects[0].values["speed"] == pytest.approx(1.0, rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_stribeck_curve_hands_on_to_the_coulomb_friction_that_it_ends_at() -> None:
     log = measured((chladni.attached("coulomb_friction", "elbow", {"force": 5.0}),), noise=0.005)
     study = study_of(arm(), log, leave_out=frozenset(), own={})
@@ -42,6 +44,7 @@ def test_a_stribeck_curve_hands_on_to_the_coulomb_friction_that_it_ends_at() -> 
     assert sibling_causes(without, [stribeck]) == []
 
 
+@pytest.mark.slow
 def test_a_ripple_of_the_joint_that_an_input_acts_across_may_be_the_inputs() -> None:
     machine = chain([2.0, 2.5], [2.6e4, 1.7e4], [5.0, 4.0])
     cogging = chladni.attached("ripple", "j0", {"amplitude": 30.0, "period": 0.01, "phase": 0.3})

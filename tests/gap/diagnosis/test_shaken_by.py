@@ -43,6 +43,7 @@ def test_what_the_model_alone_tells_better_than_other_sensors_is_no_floor(shaken
     assert shaken_by(study, near) is None
 
 
+@pytest.mark.slow
 def test_a_spring_between_a_body_and_the_ground_is_no_floor_though_it_leaves_more_than_one() -> None:
     study, tuned = studied(SPRING)
     ground, joint = study.location.ranked[:2]

@@ -54,6 +54,7 @@ def test_the_bodies_and_both_coefficients_are_found() -> None:
     assert found.on_first == pytest.approx(COEFFICIENT, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("word", "site", "values"),
     [

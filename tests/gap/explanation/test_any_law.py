@@ -30,6 +30,7 @@ def left_at(effect, name: str) -> float:
     return left_by_any_law(location, located, site)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("word", "values"), LAWS)
 def test_a_law_of_the_joint_is_followed_whatever_its_name(word: str, values: dict[str, float]) -> None:
     assert left_at(chladni.attached(word, "shoulder", values), "shoulder") < 0.12
@@ -67,11 +68,13 @@ def test_a_stiffness_that_turns_with_a_shaft_is_followed() -> None:
     assert left_at(shaft, "shoulder") < 0.12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("word", "values"), [("lag", {"time_constant": 1e-3}), ("rate_limit", {"rate": 2e4})])
 def test_what_an_actuator_does_with_the_command_is_followed(word: str, values: dict[str, float]) -> None:
     assert left_at(chladni.attached(word, "shaker", values), "shaker") < 0.12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["shoulder", "ground"])
 def test_a_floor_that_shakes_follows_nothing(name: str) -> None:
     floor = chladni.attached("base_vibration", "ground", {"level": 1.0, "band": 150.0, "band_start": 5.0})

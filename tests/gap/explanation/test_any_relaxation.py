@@ -61,6 +61,7 @@ def relaxation_of(*effects, joint: str) -> tuple[float, Relaxation | None]:
     return location.tuned.chi, any_relaxation(location, located, site)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", ["shoulder", "elbow", "hand"])
 def test_branches_a_decade_apart_do_what_closer_ones_do(joint: str) -> None:
     before, found = relaxation_of(Rubber(site=joint), joint=joint)
@@ -75,6 +76,7 @@ def test_branches_a_decade_apart_do_what_closer_ones_do(joint: str) -> None:
     assert found.unit == "N/m"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("word", "site", "values", "joint"),
     [

@@ -98,6 +98,7 @@ def test_teeth_are_told_with_their_second_harmonic():
     assert sine.misfit > 3 * best.misfit
 
 
+@pytest.mark.slow
 def test_bristles_that_bend_within_a_sample_are_found():
     dahl = attached("coulomb_friction", "j0", {"force": 20.0, "presliding": 2e-6}, variant="bristle")
     screen = screened_at_an_oscillator(dahl, measures="acceleration", samples=6000, rms=100.0)

@@ -40,6 +40,7 @@ def near(share: float):
     return hypothesis_of((attached("ripple", "j0", off),), np.zeros(6))
 
 
+@pytest.mark.slow
 def test_teeth_whose_run_is_lost_from_a_near_start_are_found_over_windows(made) -> None:
     contest, shooting = made
     lost = contest.enter(near(1.03))
@@ -49,6 +50,7 @@ def test_teeth_whose_run_is_lost_from_a_near_start_are_found_over_windows(made) 
     assert dict(shot.fit.effects[0].values) == pytest.approx(TEETH, rel=0.02)
 
 
+@pytest.mark.slow
 def test_windows_grow_as_long_as_the_run_follows(made) -> None:
     _, shooting = made
     grown = shooting.grown(shooting.shot(near(1.03)))
@@ -58,6 +60,7 @@ def test_windows_grow_as_long_as_the_run_follows(made) -> None:
     assert shooting.shot(near(2.0)).misfit > 10.0
 
 
+@pytest.mark.slow
 def test_a_run_of_one_end_only_is_entered_where_windows_led() -> None:
     softly = attached("ripple", "j0", {**TEETH, "amplitude": 3.0})
     log, floor = measured(machine().with_effects((softly,)), band_noise(4000, rms=60.0), noise=5e-3)

@@ -40,6 +40,7 @@ def tuned(model, log, floor, **options):
     return fit_output_error(run, floor, start_z=start, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_a_random_chain_is_tuned_to_its_noise(seed):
     model, log, floor = random_case(seed)
@@ -49,6 +50,7 @@ def test_a_random_chain_is_tuned_to_its_noise(seed):
     assert np.abs(fit.z).max() <= 3.0
 
 
+@pytest.mark.slow
 def test_one_free_run_at_once_would_be_caught_elsewhere():
     """Seeds above at which a fit over the whole record stops at another minimum: else nothing would be shown."""
     caught = 0

@@ -40,6 +40,7 @@ def scatter(colour: tuple[float, ...], coloured: bool) -> float:
     return float(np.sqrt(np.mean(np.square(list(fits(colour, coloured))))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("colour", [WHITE, SLOW, RINGING])
 def test_spreads_are_those_of_many_logs(colour: tuple[float, ...]) -> None:
     assert scatter(colour, True) == pytest.approx(1.0, abs=0.35)

@@ -58,6 +58,7 @@ def test_a_start_at_rest_is_not_taken_for_motion(signals):
     assert np.all(np.sqrt(np.mean(moving**2, axis=1)) < 0.2 * floor.rms)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("true", "start", "fitted"),
     [

@@ -51,6 +51,7 @@ def test_sharp_peaks_between_few_lines(method):
     np.testing.assert_allclose(modes.damping_ratio, [0.001], rtol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.003, 0.03])
 def test_error_bars_cover_the_truth(method, noise):
     """Two modes, two references; 95 % intervals of 60 runs cover 90 % at least.

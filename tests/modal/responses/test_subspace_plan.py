@@ -56,6 +56,7 @@ def test_low_modes_far_below_high_ones_are_told_of():
     assert "identify the low modes on their own" in chosen.notes[0]
 
 
+@pytest.mark.slow
 def test_a_band_finer_than_the_default_lines_gets_finer_ones():
     record = resonance((0.4, 90.0), 400.0, 3000)
     opened = open_record(record)

@@ -92,6 +92,7 @@ def test_a_quantity_that_doesn_t_exist_says_so() -> None:
     assert "there is none" in best.advice[0]
 
 
+@pytest.mark.slow
 def test_an_instrument_knows_what_steps_and_what_counts() -> None:
     servo = INSTRUMENTS["dc-servo"]
     wish = Wish(quantity="overshoot", sense="at_most", limit=2.0)
