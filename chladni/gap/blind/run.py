@@ -95,6 +95,10 @@ def _diagnosed(results: Path, diagnose: Diagnose, seed: int, case: CaseFolder) -
         content = diagnose(case.model, [case.log], leave_out=case.leave_out, seed=seed)
     except ChladniError as error:
         content = {"format": FAILURE_FORMAT, "error": str(error)}
+    except Exception as error:
+        # A mistake of ours ends the run, whose other cases say nothing of it; who mends it needs this one.
+        error.add_note(f"while case {case.name} was diagnosed: {case.model.parent}")
+        raise
     write_json(results / f"{case.name}.json", content)
     return case.name, time.perf_counter() - began, content.get("format") != FAILURE_FORMAT
 

@@ -16,6 +16,8 @@ Spectrum = NDArray[np.complex128]
 _TOLD = 1e-3
 #: Of the largest singular value: below it columns are the same but for rounding.
 _RANK = 1e-10
+#: Share of its own curvature that each unknown is given where rounding leaves a bounded minimum without a root.
+_UNDETERMINED = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -206,14 +208,26 @@ def bounded_minimum(normal: Matrix, toward: Matrix, low: Matrix, high: Matrix) -
     """Minimise ``x'Nx/2 - x't`` within bounds."""
     if not toward.size:
         return toward
-    root = np.linalg.cholesky(normal)
-    right = solve_triangular(root, toward, lower=True)
-    plain = solve_triangular(root.T, right)
+    root, size = _root(normal)
+    right = solve_triangular(root, toward / size, lower=True)
+    plain = solve_triangular(root.T, right) / size
     if np.all(plain >= low) and np.all(plain <= high):
         return np.asarray(plain, dtype=np.float64)
     # A start on a bound is inside by rounding only.
-    bounds = (np.minimum(low, -1e-12), np.maximum(high, 1e-12))
-    return np.asarray(lsq_linear(root.T, right, bounds=bounds, method="bvls").x, dtype=np.float64)
+    bounds = (np.minimum(low, -1e-12) * size, np.maximum(high, 1e-12) * size)
+    return np.asarray(lsq_linear(root.T, right, bounds=bounds, method="bvls").x / size, dtype=np.float64)
+
+
+def _root(normal: Matrix) -> tuple[Matrix, Matrix]:
+    """Factorise in units of each unknown's own curvature; give the lower factor and the units."""
+    size: Matrix = np.sqrt(np.diag(normal))
+    scaled = normal / size / size[:, None]
+    try:
+        root = np.linalg.cholesky(scaled)
+    except np.linalg.LinAlgError:
+        # Slopes beside a transient that runs away are of any size, and what is alike but for rounding has no root.
+        root = np.linalg.cholesky(scaled + _UNDETERMINED * np.eye(size.size))
+    return np.asarray(root, dtype=np.float64), size
 
 
 def _searched(problem: LinearProblem, best: Profile, step: Matrix) -> _Fit | None:

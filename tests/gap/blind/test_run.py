@@ -48,6 +48,19 @@ def test_a_run_needs_no_truth(campaign):
     assert "too few" in json.loads((campaign / "results" / "c.json").read_text())["error"]
 
 
+def test_a_mistake_of_the_diagnosis_says_in_which_case(campaign):
+    def mistaken(model, logs, *, leave_out, seed):
+        if model.parent.name == "b":
+            raise ZeroDivisionError
+        return answer(model, logs, leave_out=leave_out, seed=seed)
+
+    with pytest.raises(ZeroDivisionError) as raised:
+        run_cases(campaign, mistaken)
+    (said,) = raised.value.__notes__
+    assert "case b" in said
+    assert str(campaign / "cases" / "b") in said
+
+
 def test_a_run_goes_on_where_it_ended(campaign):
     (campaign / "results").mkdir()
     (campaign / "results" / "a.json").write_text("{}")

@@ -137,3 +137,16 @@ def test_bounds_hold_and_bind_where_the_minimum_lies_outside():
     bound = bounded_minimum(normal, np.array([3.0, 3.0]), np.full(2, -9.0), np.array([0.5, 9.0]))
     np.testing.assert_allclose(bound, [0.5, 1.25], rtol=1e-12)
     assert bounded_minimum(np.zeros((0, 0)), np.zeros(0), np.zeros(0), np.zeros(0)).size == 0
+
+
+def test_slopes_that_are_alike_but_for_rounding_still_have_a_minimum():
+    # Beside a transient that runs away slopes are of any size: the rounding of their squares takes the prior of 1/2.
+    slopes = np.array([[3e9, 4e9], [3e9, 4e9], [0.0, 2.0]])
+    normal = slopes @ slopes.T + np.eye(3) / 2
+    with pytest.raises(np.linalg.LinAlgError):
+        np.linalg.cholesky(normal)
+    rest = np.array([3e9, 4e9])
+    free = bounded_minimum(normal, slopes @ rest, np.full(3, -9.0), np.full(3, 9.0))
+    assert free[:2].sum() == pytest.approx(1.0, rel=1e-6)
+    bound = bounded_minimum(normal, slopes @ rest, np.full(3, -9.0), np.array([0.25, 0.5, 9.0]))
+    np.testing.assert_allclose(bound[:2], [0.25, 0.5], rtol=1e-9)
