@@ -61,6 +61,7 @@ def test_nothing_to_run_is_one_line(run: Run, tmp_path: Path) -> None:
     assert done.err.strip().endswith(f"holds no case; make some with chladni blind make {tmp_path}")
 
 
+@pytest.mark.slow
 def test_make_writes_cases_and_truths(run: Run, tmp_path: Path) -> None:
     done = run("blind", "make", tmp_path, "--count", 1, "--seed", 2, "--jobs", 1, "--json", "-")
     assert done.code == 0
