@@ -29,8 +29,9 @@ def _degenerate(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool
         # A change that is over at once, or never comes, is a stiffness.
         return not (0.02 < share < 0.98 if effect.variant == "step" else share > 0.1)
     if effect.effect == "extra_mode":
-        # Resonant well above all that moved, it's a mass.
-        return values["frequency"] > STIFF_MOUNT * excited_band_hz(run.measurement)[1]
+        # Resonant well above all that moved, it's a mass; one that doesn't swing once is a spring to where it stands.
+        band_hz = excited_band_hz(run.measurement)[1]
+        return not 1.0 / run.measurement.duration_s < values["frequency"] < STIFF_MOUNT * band_hz
     if effect.effect in (
         "hysteresis",
         "coulomb_friction",

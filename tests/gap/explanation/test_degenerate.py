@@ -1,0 +1,41 @@
+"""What a fit drove an effect to, where that is no longer what its word means."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from chladni.gap.explanation.body_trials import STIFF_MOUNT
+from chladni.gap.explanation.degenerate import is_degenerate
+from chladni.gap.explanation.excited_band import excited_band_hz
+from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.gap.plant.free_run import FreeRun
+from chladni.models.effects.attached_effect import attached
+from tests.gap.arm import arm, measured
+
+
+@pytest.fixture(scope="module")
+def run() -> FreeRun:
+    return FreeRun(arm(), measured(()))
+
+
+def hanging(frequency_hz: float) -> Contestant:
+    """A fit that ended at a mass that hangs at a body with this frequency."""
+    values = {"mass": 0.5, "frequency": frequency_hz, "damping_ratio": 0.02}
+    effect = attached("extra_mode", "arm", values)
+    hypothesis = Hypothesis(effects=(effect,), fitted=((),), start_z=np.zeros(0))
+    return Contestant(
+        hypothesis=hypothesis, fit=SimpleNamespace(effects=(effect,)), held=np.ones(3), gap=0.0, prior=0.0
+    )
+
+
+def test_an_oscillator_that_never_swings_in_a_log_is_a_spring_to_where_it_stands(run: FreeRun) -> None:
+    once_hz = 1.0 / run.measurement.duration_s
+    assert is_degenerate(run, hanging(0.5 * once_hz))
+    assert not is_degenerate(run, hanging(2.0 * once_hz))
+
+
+def test_an_oscillator_far_above_all_that_moved_is_a_mass(run: FreeRun) -> None:
+    highest_hz = excited_band_hz(run.measurement)[1]
+    assert not is_degenerate(run, hanging(0.9 * STIFF_MOUNT * highest_hz))
+    assert is_degenerate(run, hanging(1.1 * STIFF_MOUNT * highest_hz))
