@@ -1,6 +1,6 @@
 """Saturation: an actuator whose force is limited."""
 
-from math import tanh
+from math import exp, log1p, tanh
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,14 @@ def smooth(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates:
     return float(parameters[0] * tanh(d / parameters[0]) - d)
 
 
+def rounded(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    """Give the clip of d, averaged over a bell ``sech(./width)^2`` of the corners' width, less d."""
+    limit, width = parameters[0], parameters[0] * parameters[1]
+    # ln cosh x = abs(x) + ln(1 + exp(-2 abs(x))) - ln 2: the first is the clip, what is left doesn't overflow.
+    corners = log1p(exp(-2.0 * abs(d + limit) / width)) - log1p(exp(-2.0 * abs(d - limit) / width))
+    return float(min(max(d, -limit), limit) + 0.5 * width * corners - d)
+
+
 def clipped_samples(samples: Matrix, _sample_rate_hz: float, limit: float) -> Matrix:
     """Give the samples, none beyond the limit."""
     return np.clip(samples, -limit, limit)
@@ -35,8 +43,19 @@ def smooth_samples(samples: Matrix, _sample_rate_hz: float, limit: float) -> Mat
     return np.asarray(limit * np.tanh(samples / limit), dtype=np.float64)
 
 
+def rounded_samples(samples: Matrix, _sample_rate_hz: float, limit: float, knee: float) -> Matrix:
+    """Give the samples, none beyond the limit, bent away from the line over the corners' width."""
+    width = limit * knee
+    above, below = (np.log1p(np.exp(-2.0 * np.abs(samples + side) / width)) for side in (limit, -limit))
+    return np.asarray(np.clip(samples, -limit, limit) + 0.5 * width * (above - below), dtype=np.float64)
+
+
 def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
     return (values["limit"],)
+
+
+def _rounded_numbers(values: Values, _port: Port) -> tuple[float, ...]:
+    return values["limit"], values["knee"]
 
 
 SATURATION = EffectKind(
@@ -62,5 +81,21 @@ SATURATION = EffectKind(
             formula="u_acts = limit tanh(u/limit)",
             odd=True,
         ),
+        Variant(
+            name="rounded",
+            attach=ShapedSignal(shape=rounded_samples, law=rounded, numbers=_rounded_numbers),
+            formula="u_acts = w/2 ln(cosh((u + limit)/w)/cosh((u - limit)/w)), w = knee limit",
+            parameters=Parameters(
+                (
+                    # Wider ones would bend the line at rest, which is a gain.
+                    Parameter(
+                        name="knee", value=0.2, unit="1", low=0.02, high=0.5, minimum=1e-6, maximum=0.5,
+                        meaning="width of the corners over the limit",
+                    ),
+                )
+            ),
+            odd=True,
+            fitted=("knee",),
+        ),
     ),
-)
+)  # fmt: skip

@@ -25,6 +25,22 @@ def test_samples_outside_of_loops_and_the_law_inside_take_one_shape(variant: str
         assert sample + force(law, d=sample) == pytest.approx(shape(sample), rel=1e-9, abs=1e-12)
 
 
+def test_rounded_corners_are_those_of_the_clip_averaged_over_a_bell() -> None:
+    limit, knee = 3.0, 0.25
+    effect = attached("saturation", "motor", {"limit": limit, "knee": knee}, variant="rounded")
+    outside, inside = effect.attach(one_body()), effect.attach(with_loop(one_body()))
+    ((_, action),) = outside.input_maps
+    (law,) = inside.laws
+    # Of sech(x/w)^2/(2 w), whose integral is 1, by the trapezoidal rule: it falls as exp(-2 x/w), so nothing is cut.
+    width = knee * limit
+    away = np.linspace(-20.0 * width, 20.0 * width, 20001)
+    bell = 1.0 / (2.0 * width * np.cosh(away / width) ** 2)
+    for sample in (*SAMPLES, limit, -limit):
+        wanted = np.trapezoid(np.clip(sample + away, -limit, limit) * bell, away)
+        assert action(np.array([sample]), 100.0)[0] == pytest.approx(wanted, rel=1e-7, abs=1e-12)
+        assert sample + force(law, d=sample) == pytest.approx(wanted, rel=1e-7, abs=1e-9)
+
+
 def test_behind_a_gain_it_limits_what_the_gain_gives() -> None:
     louder = attached("gain_error", "motor", {"gain": -2.0}).attach(one_body())
     limited = attached("saturation", "motor", {"limit": 3.0}).attach(louder)

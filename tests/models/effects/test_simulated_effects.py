@@ -160,6 +160,7 @@ def test_laws_of_force_agree_with_scipy(effect: AttachedEffect, tolerance: float
 LOOP_LAWS = [
     (attached("saturation", "motor", {"limit": 15.0}), SWITCHING),
     (attached("saturation", "motor", {"limit": 15.0}, variant="smooth"), SMOOTH),
+    (attached("saturation", "motor", {"limit": 15.0, "knee": 0.3}, variant="rounded"), SMOOTH),
     (attached("dead_zone", "motor", {"width": 6.0}), SWITCHING),
     (attached("rate_limit", "motor", {"rate": 800.0}), SWITCHING),
     (attached("clipping", "place", {"limit": 0.01}), SWITCHING),
