@@ -87,7 +87,8 @@ def test_a_cube_whose_middle_lies_beside_rest_is_told_with_its_square():
 def test_teeth_are_told_with_their_second_harmonic():
     values = {"amplitude": 6.0, "period": 1.3e-3, "phase": 0.8, "second_sine": -0.25, "second_cosine": 0.2}
     teeth = attached("ripple", "j0", values, variant="harmonics")
-    best, *others = screened_at_an_oscillator(teeth, noise=1e-3)
+    # The actuator's ripple is the joint's with the other sign: which of the two comes first is rounding's choice.
+    best, *others = (one for one in screened_at_an_oscillator(teeth, noise=1e-3) if one.trial.site.name == "j0")
     assert (best.trial.effect, best.trial.variant) == ("ripple", "harmonics")
     # But for the phase: where the middle of the way lies no spectrum without its mean tells.
     assert best.values["amplitude"] == pytest.approx(values["amplitude"], rel=0.1)
