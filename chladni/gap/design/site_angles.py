@@ -5,27 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.plant.linear_view import LinearView
-from chladni.gap.plant.places import Site, way_to
-from chladni.gap.records.noise_floor import NoiseFloor
-
 Matrix = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
-
-
-def printed_patterns(view: LinearView, sites: Sequence[Site], outputs: Sequence[str], noise: NoiseFloor) -> Spectrum:
-    """``[site, output, line]`` that a force of one (a change of an input, an error) at each site prints, over noise.
-
-    Parameters
-    ----------
-    outputs
-        Names of the view's outputs, which `noise` is of. One without noise counts nothing.
-    """
-    density = noise.density(view.lines.cycles)
-    # Of an output without noise nothing is known, such as a sensor to be added where the log's input moves nothing.
-    known = density > 0
-    weight = np.where(known, 1.0 / np.sqrt(np.where(known, density, 1.0)), 0.0)
-    return np.stack([view.pattern(way_to(view, site, outputs)) * weight for site in sites])
 
 
 def angles_deg(patterns: Spectrum, chosen: Sequence[int]) -> Matrix:

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from chladni.gap.design.experiments import excited_band_hz
 from chladni.gap.design.more_sensors import MoreSensor, more_sensors, with_noise_of, with_sensors
-from chladni.gap.design.site_angles import angles_deg, printed_patterns
+from chladni.gap.design.site_angles import angles_deg
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.linear_view import LinearView
-from chladni.gap.plant.places import Site, placed, sites_of
+from chladni.gap.plant.places import Site, placed, printed_patterns, sites_of
 from chladni.gap.plant.record_lines import RecordLines
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
@@ -127,7 +127,7 @@ def _patterns(
     wanted = [site for name in names for site in every if site.name == name]
     wanted = wanted or [site for site in every if site.kind in ("joint", "body")]
     # Sites that even all these sensors see as one are one place.
-    sites = [place.sites[0] for place in placed(view, wanted, outputs)][:_SITES]
+    sites = [place.sites[0] for place in placed(view, wanted, outputs, floor)][:_SITES]
     if not sites:
         return np.zeros((0, len(rows), 1), dtype=np.complex128), []
     return printed_patterns(view, sites, outputs, floor), sites

@@ -101,7 +101,7 @@ def locate(
     start = np.zeros(len(tunables.names)) if start_z is None else np.clip(start_z, -3.0, 3.0)
     segments, tuned = _tuned_on_segments(model, whole, start)
     view = segments[-1].view(tuned.z)
-    places = placed(view, sites_of(view.compiled, measurement.output_names), measurement.output_names)
+    places = placed(view, sites_of(view.compiled, measurement.output_names), measurement.output_names, noise)
     record = whole.on(_telling(whole))
     plain = profiled(record, (), tuned.z, iterations=6)
     rough = _roughly((*segments, record), plain, places, start)

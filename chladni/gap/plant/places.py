@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.plant.linear_view import LinearView, Way
+from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import PortKind
 
@@ -74,13 +75,36 @@ def way_to(view: LinearView, site: Site, outputs: Sequence[str]) -> Way:
     return view.way_of_port(view.compiled.port_index(site.name, site.kind))
 
 
-def placed(view: LinearView, sites: Sequence[Site], outputs: Sequence[str]) -> tuple[Place, ...]:
-    """Put together sites whose patterns are proportional on every line."""
+def printed_patterns(view: LinearView, sites: Sequence[Site], outputs: Sequence[str], noise: NoiseFloor) -> Spectrum:
+    """``[site, output, line]`` that a force of one (a change of an input, an error) at each site prints, over noise.
+
+    Parameters
+    ----------
+    outputs
+        Names of the view's outputs, which `noise` is of. One without noise counts nothing.
+    """
+    density = noise.density(view.lines.cycles)
+    # Of an output without noise nothing is known, such as a sensor to be added where the log's input moves nothing.
+    known = density > 0
+    weight = np.where(known, 1.0 / np.sqrt(np.where(known, density, 1.0)), 0.0)
+    found = np.zeros((len(sites), *density.shape), dtype=np.complex128)
+    for place, site in enumerate(sites):
+        found[place] = view.pattern(way_to(view, site, outputs)) * weight
+    return found
+
+
+def placed(view: LinearView, sites: Sequence[Site], outputs: Sequence[str], noise: NoiseFloor) -> tuple[Place, ...]:
+    """Put together sites whose patterns are proportional on every line.
+
+    Parameters
+    ----------
+    outputs, noise
+        See `printed_patterns`. Held against its noise each sensor counts: a motor's current beside a displacement in
+        metres has a million times its numbers.
+    """
+    acting = [site for site in sites if not _is_motion(view.compiled, site)]
     found: list[tuple[list[Site], Spectrum]] = []
-    for site in sites:
-        if _is_motion(view.compiled, site):
-            continue
-        printed = view.pattern(way_to(view, site, outputs))
+    for site, printed in zip(acting, printed_patterns(view, acting, outputs, noise), strict=True):
         size = np.sqrt(np.sum(np.abs(printed) ** 2, axis=0))
         if not np.any(size > 0):
             continue
