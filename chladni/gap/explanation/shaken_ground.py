@@ -4,15 +4,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.location.profile import Profile
+from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.record_lines import all_lines
 
 Matrix = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
+#: Of a force's power the most that is taken for the force's own: none is told without noise.
+_SUREST = 1.0 - 1e-12
 
 
 def predicted_by_others(problem: LinearProblem, found: Profile) -> Matrix:
     """Give ``[output, sample]``: what each sensor should have read if the force that all others tell acts.
+
+    The force is Wiener's estimate (Kay 1993, *Estimation theory*, section 12.7): the less it stands out of the noise
+    of the sensors that tell it, the less of that is believed. How strong it is around a line all sensors tell: where
+    the others hardly feel it, they couldn't tell that either.
 
     Parameters
     ----------
@@ -26,14 +32,14 @@ def predicted_by_others(problem: LinearProblem, found: Profile) -> Matrix:
     whole = problem.on(lines)
     view = whole.view(found.z)
     pattern = whole.pattern(view, found.sites[0])[:, 0]
-    linear = view.response(found.transient, ())
+    force = recovered(problem, found, found.sites[0])
+    linear = view.response(force.transient, ())
     residual = ((whole.measured - linear) * whole.weight)[:, 0]
     told, strength = pattern.conj() * residual, np.abs(pattern) ** 2
-    others = strength.sum(axis=0) - strength
-    force = (told.sum(axis=0) - told) / np.where(others > 0, others, np.inf)
-    # A line on which the others hardly feel the force tells nothing: there it's taken for absent.
-    power = np.abs(force) ** 2
-    share = np.maximum(power - 1.0 / np.where(others > 0, others, 1e-300), 0.0) / np.maximum(power, 1e-300)
-    predicted = linear[:, 0] + pattern / whole.weight[:, 0] * force * share
+    believed = np.minimum(force.reliable, _SUREST)
+    total = strength.sum(axis=0)
+    over_noise = np.where(total > 0, believed / (1.0 - believed) / np.where(total > 0, total, 1.0), 0.0)
+    others = (told.sum(axis=0) - told) * over_noise / (1.0 + (total - strength) * over_noise)
+    predicted = linear[:, 0] + pattern / whole.weight[:, 0] * others
     mean = measurement.outputs.mean(axis=1, keepdims=True)
     return np.asarray(lines.signal(predicted[:, None])[:, 0] + mean, dtype=np.float64)

@@ -149,6 +149,19 @@ def test_a_sensor_that_clips_hard_is_named_although_it_looks_noisy() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("sensors", [["acc_column", "acc_wrist"], ["acc_column", "acc_arm", "acc_wrist"]])
+def test_a_floor_that_shakes_is_told_and_its_sensors_foretell_each_other(sensors: list[str]) -> None:
+    floor = chladni.attached("base_vibration", "ground", {"level": 8.0, "band": 120.0, "band_start": 5.0})
+    found = diagnose(arm(), [with_outputs(measured((floor,)), sensors)])
+    (cause,) = found.causes
+    assert (cause.effect, cause.site) == ("base_vibration", "ground")
+    assert found.gap.by == "cross_sensor"
+    # Where a sensor is still and the others hardly feel the floor, a tenth of the gap stays their noise.
+    assert found.gap.closed is not None
+    assert found.gap.closed > 0.9
+
+
+@pytest.mark.slow
 def test_a_sensor_s_square_passes_for_no_noise() -> None:
     log = measured(seconds=5.0, seed=12)
     outputs = log.outputs.copy()
