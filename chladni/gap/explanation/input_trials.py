@@ -5,14 +5,12 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.explanation.rounded_limit import rounded_limit
 from chladni.gap.explanation.trial import Force, Shape, Spectrum, Trial, logarithms, numbers
 from chladni.gap.location.recovered import Recovered
 from chladni.models.effects.rate_limit import limited_samples
-from chladni.models.effects.saturation import rounded_samples
 
 Matrix = NDArray[np.float64]
-#: Widths of a limit's corners over the limit that are tried, and the widest.
-_KNEES, _WIDEST_KNEE = (0.08, 0.25), 0.5
 
 
 def input_trials(motion: Recovered) -> Iterator[Trial]:
@@ -69,7 +67,7 @@ def _limits(motion: Recovered) -> Iterator[Trial]:
             "limit",
             "smooth",
         )
-        yield _rounded(motion, limits)
+        yield rounded_limit(motion, "saturation", limits)
     widths = (rms * np.geomspace(0.01, 1.5, 18)).tolist()
     yield _known(motion, "dead_zone", lambda value: motion.spectrum(-np.clip(u, -value, value)), widths, "width")
     fastest = float(np.max(np.abs(np.diff(u)))) * rate
@@ -77,20 +75,6 @@ def _limits(motion: Recovered) -> Iterator[Trial]:
     yield _known(
         motion, "rate_limit", lambda value: motion.spectrum(limited_samples(u, rate, value, 0.0) - u), rates, "rate"
     )
-
-
-def _rounded(motion: Recovered, limits: Sequence[float]) -> Trial:
-    u, rate = motion.displacement, motion.lines.sample_rate_hz
-
-    def build(shape: Shape) -> Force:
-        limit, knee = numbers(shape)
-        return Force.known(motion.spectrum(rounded_samples(u, rate, limit, min(knee, _WIDEST_KNEE)) - u))
-
-    return Trial(
-        effect="saturation", site=motion.site, variant="rounded", build=build, grid=logarithms(limits, _KNEES),
-        values=lambda shape, _: {"limit": numbers(shape)[0], "knee": min(numbers(shape)[1], _WIDEST_KNEE)},
-        parameters=2,
-    )  # fmt: skip
 
 
 def _known(

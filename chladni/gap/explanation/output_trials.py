@@ -6,6 +6,7 @@ import numpy as np
 
 from chladni.gap.explanation.body_trials import tone_trials
 from chladni.gap.explanation.resonances import resonances
+from chladni.gap.explanation.rounded_limit import rounded_limit
 from chladni.gap.explanation.trial import Force, Matrix, Numbers, Shape, Spectrum, Trial, logarithms, numbers
 from chladni.gap.location.recovered import Recovered
 from chladni.gap.records.measurement import Measurement
@@ -103,6 +104,7 @@ def _clipping(motion: Recovered, measurement: Measurement) -> Iterator[Trial]:
             build=lambda shape: Force.known(motion.spectrum(np.clip(y, -numbers(shape)[0], numbers(shape)[0]) - y)),
             values=lambda shape, _: {"limit": numbers(shape)[0]},
         )  # fmt: skip
+        yield rounded_limit(motion, "clipping", inside)
 
 
 def _cross_axes(motion: Recovered, measurement: Measurement) -> Iterator[Trial]:

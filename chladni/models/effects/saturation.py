@@ -12,6 +12,11 @@ from chladni.models.effects.attaching import ShapedSignal
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 
 Matrix = NDArray[np.float64]
+#: Wider ones would bend the line at rest, which is a gain.
+KNEE = Parameter(
+    name="knee", value=0.2, unit="1", low=0.02, high=0.5, minimum=1e-6, maximum=0.5,
+    meaning="width of the corners over the limit",
+)  # fmt: skip
 
 
 def clipped(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -85,15 +90,7 @@ SATURATION = EffectKind(
             name="rounded",
             attach=ShapedSignal(shape=rounded_samples, law=rounded, numbers=_rounded_numbers),
             formula="u_acts = w/2 ln(cosh((u + limit)/w)/cosh((u - limit)/w)), w = knee limit",
-            parameters=Parameters(
-                (
-                    # Wider ones would bend the line at rest, which is a gain.
-                    Parameter(
-                        name="knee", value=0.2, unit="1", low=0.02, high=0.5, minimum=1e-6, maximum=0.5,
-                        meaning="width of the corners over the limit",
-                    ),
-                )
-            ),
+            parameters=Parameters((KNEE,)),
             odd=True,
             fitted=("knee",),
         ),

@@ -27,6 +27,16 @@ def test_a_controller_sees_the_end_of_the_range() -> None:
     assert closed.g[1, law.port] == pytest.approx(-300.0 / 2.0)
 
 
+def test_a_round_end_is_that_of_an_actuators_limit() -> None:
+    values = {"limit": 2.0, "knee": 0.2}
+    ((_, seen),) = attached("clipping", "speed", values, variant="rounded").attach(one_body()).output_maps
+    ((_, acts),) = attached("saturation", "motor", values, variant="rounded").attach(one_body()).input_maps
+    np.testing.assert_array_equal(seen(SAMPLES, 100.0), acts(SAMPLES, 100.0))
+    (law,) = attached("clipping", "place", values, variant="rounded").attach(one_body(), in_loop=True).laws
+    for sample, wanted in zip(SAMPLES, seen(SAMPLES, 100.0), strict=True):
+        assert sample + force(law, d=sample) == pytest.approx(wanted, rel=1e-12)
+
+
 def test_a_model_that_has_a_port_at_an_output_says_that_it_is_in_a_loop() -> None:
     with_port = attached("gain_error", "place", {"gain": 1.0}).attach(one_body(), in_loop=True)
     assert with_port.ports[-1].kind == "output"

@@ -164,6 +164,7 @@ LOOP_LAWS = [
     (attached("dead_zone", "motor", {"width": 6.0}), SWITCHING),
     (attached("rate_limit", "motor", {"rate": 800.0}), SWITCHING),
     (attached("clipping", "place", {"limit": 0.01}), SWITCHING),
+    (attached("clipping", "place", {"limit": 0.01, "knee": 0.2}, variant="rounded"), SMOOTH),
     (attached("quantization", "place", {"step": 0.01}), SWITCHING),
     (attached("tonal_disturbance", "place", {"amplitude": 0.01, "frequency": 33.0}), SMOOTH),
 ]
