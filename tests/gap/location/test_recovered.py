@@ -67,3 +67,17 @@ def test_another_force_is_neither_taken_for_this_one_nor_left_out_of_the_motion(
     apart, without = (np.std(one.velocity - truth.velocity) for one in (both, alone))
     assert apart < 0.2 * np.std(truth.velocity)
     assert apart < 0.6 * without
+
+
+def test_of_a_sensor_the_signal_is_what_the_model_shows_however_loud_its_noise_is_thought() -> None:
+    log, floor = measured(three_bodies(), band_noise(SAMPLES, rms=150.0))
+    range_end = 1.3 * np.std(log.outputs[0])
+    clipped = np.clip(log.outputs[0], -range_end, range_end)
+    seen = replace(log, outputs=np.stack([clipped, *log.outputs[1:]]))
+    loud = floor.raised(np.array([np.std(log.outputs[0] - clipped), 0.0, 0.0]))
+    problem = LinearProblem(
+        three_bodies(), seen, loud, FreeRun(three_bodies(), seen).tunables, all_lines(SAMPLES, RATE_HZ)
+    )
+    site = Site(name="a0", kind="output")
+    found = recovered(problem, profiled(problem, (site,), np.zeros(len(problem.tunables.names))), site)
+    assert np.std(found.displacement - log.outputs[0]) < 0.03 * np.std(log.outputs[0])
