@@ -74,15 +74,20 @@ def plausible_places(location: Location) -> list[Located]:
 
 def same_places(location: Location) -> list[Located]:
     """Give the places that explain as much as the best one: one force to the sensors."""
-    enough = _SAME_PLACE * location.ranked[0].profile.chi
+    enough = _SAME_PLACE * _least_chi(location)
     return [one for one in location.ranked if one.profile.chi < enough]
 
 
 def near_places(location: Location, same: float) -> list[Located]:
     """Give the places that leave at most `same` times what the best one does, or little more of the gap."""
-    first = location.ranked[0].profile.chi
+    first = _least_chi(location)
     enough = max(same * first, first + _NEAR * (location.tuned.chi - first))
     return [one for one in location.ranked if one.profile.chi < enough]
+
+
+def _least_chi(location: Location) -> float:
+    """Give what the best place leaves, over the noise's power; less than noise is no better than noise."""
+    return max(location.ranked[0].profile.chi, 1.0)
 
 
 def without_cause(study: Study) -> Contestant:

@@ -213,7 +213,8 @@ def _followed(record: LinearProblem, rough: Sequence[_Rough]) -> list[Located]:
 
 def _tied(chi: Sequence[float], rough: list[_Rough], least: int) -> list[_Rough]:
     """Keep the first few, and those behind them that are as good."""
-    tied = sum(one < _TIED * chi[0] for one in chi)
+    # Less than noise isn't better than noise: beside a floor that is too high others make use of what is spare.
+    tied = sum(one < _TIED * max(chi[0], 1.0) for one in chi)
     return rough[: min(max(least, tied), _MOST)]
 
 
