@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import logsumexp
 
 from chladni.gap.diagnosis.completeness import completeness, completeness_among, known_share
 from chladni.gap.diagnosis.grown import Grown
@@ -28,7 +29,7 @@ from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.contest import distinct, lowest, weighed
 from chladni.gap.explanation.hypothesis import Contestant
-from chladni.gap.records.diagnosis import Verdict
+from chladni.gap.records.diagnosis import Candidate, Verdict
 from chladni.gap.records.noise_floor import NoiseFloor
 
 Matrix = NDArray[np.float64]
@@ -36,6 +37,8 @@ Step = Callable[[float], None]
 #: Nats that a wrong parameter must bring to be named, and an effect: what is modelled is doubted before something is
 #: added.
 WRONG, NAMED = 3.0, 6.0
+#: Nats within which a log can't tell two candidates apart.
+CLOSE = 2.0
 #: First effects beside which a second one is looked for while all leave something; progress where the search beside
 #: each begins, that for pairs, that for what grows beside them, and that for each again beside the other.
 _LEADS, _BESIDE = 2, (0.80, 0.84, 0.88, 0.92, 0.96)
@@ -105,7 +108,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
     floor = lowest(together)
     verdict = _verdict(together, tuned, best, floor)
     if verdict == "effect":
-        instead = instead or explained_elsewhere(study, best)
+        instead = instead or explained_elsewhere(study, best, _as_likely(together, best))
     if instead is not None:
         verdict = "unknown"
     shaken = shaken_by(study, tuned) if verdict == "unknown" and instead is None else None
@@ -206,9 +209,18 @@ def _leads(ranked: Sequence[Contestant]) -> list[Contestant]:
 
 
 def _best(together: Sequence[Contestant], nothing: Contestant, added: float) -> Contestant:
-    """The most probable; `nothing` where no cause pays."""
-    found = max(together, key=lambda one: _paid(one, added))
-    return found if found.hypothesis.named else nothing
+    """The best form of the most probable names; `nothing` where no cause pays.
+
+    A word with several forms, none of which the log tells from the others, has the probability of all of them.
+    """
+    if not max(together, key=lambda one: _paid(one, added)).hypothesis.named:
+        return nothing
+    forms: dict[frozenset[Candidate], list[Contestant]] = {}
+    for one in distinct(together):
+        forms.setdefault(frozenset(one.hypothesis.named), []).append(one)
+    named = [alike for names, alike in forms.items() if names]
+    likeliest = max(named, key=lambda alike: logsumexp([_paid(one, added) for one in alike]))
+    return max(likeliest, key=lambda one: _paid(one, added))
 
 
 def _paid(one: Contestant, added: float) -> float:
@@ -216,6 +228,16 @@ def _paid(one: Contestant, added: float) -> float:
     effects = len(one.hypothesis.effects)
     first = NAMED if effects else WRONG * bool(one.hypothesis.wide)
     return one.log_evidence - first - added * max(effects - 1, 0)
+
+
+def _as_likely(together: Sequence[Contestant], best: Contestant) -> list[Contestant]:
+    """Those with the same words that this log can't tell from the best: at other sites of its place, say."""
+    close = (one for one in together if one.log_evidence > best.log_evidence - CLOSE)
+    return [one for one in close if _words(one) == _words(best)]
+
+
+def _words(one: Contestant) -> list[str]:
+    return sorted(effect.effect for effect in one.hypothesis.effects)
 
 
 def _distorted(study: Study, tuned: Contestant) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """What explains a gap better than the believed cause, without being a word of the catalogue."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -135,16 +135,24 @@ def _loopless(location: Location, best: Contestant) -> str | None:
     return site if share is not None and share * gap < _BETTER * (best.chi - 1.0) else None
 
 
-def explained_elsewhere(study: Study, best: Contestant) -> Instead | None:
+def explained_elsewhere(study: Study, best: Contestant, as_likely: Sequence[Contestant] = ()) -> Instead | None:
     """Give the site at which one force by any law explains more than what is named elsewhere; None without.
 
     Nothing is said where a law at a named site explains as much: then it's the details of the named one that are off.
     Several words must do what no single law does: equal mounts on all sensors only imitate a filter of the command.
+
+    Parameters
+    ----------
+    as_likely
+        Those that the log can't tell from the believed one: where these act isn't elsewhere either.
     """
     effects = best.hypothesis.effects
     if not effects or (best.chi < ALONE and len(effects) < 2):
         return None
-    named, gap = {one.site for one in effects}, study.location.tuned.chi - 1.0
+    named, gap = (
+        {one.site for each in (best, *as_likely) for one in each.hypothesis.effects},
+        study.location.tuned.chi - 1.0,
+    )
     alone = min(_NOTHING, _OF_GAP * gap) if len(effects) > 1 else 0.0
     enough = max(_ELSEWHERE * (best.chi - 1.0), alone)
     better: dict[str, float] = {}

@@ -5,14 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from chladni.gap.diagnosis.causes import Causes
+from chladni.gap.diagnosis.causes import CLOSE, Causes
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.diagnosis import Candidate, Cause, FittedNumber, Ranked
 from chladni.gap.tuning.output_error import OutputErrorFit
 
-#: Nats within which this log can't tell two candidates apart.
-_CLOSE = 2.0
 #: Of a floor that shakes and of a lattice: neither is a contest of likelihoods.
 _SHAKEN, _LATTICE = 0.9, 0.92
 
@@ -112,7 +110,7 @@ def _in_its_place(causes: Causes, candidate: Candidate) -> list[Candidate]:
     found = []
     for one in causes.ranked:
         named = one.hypothesis.named
-        close = one.log_evidence > best.log_evidence - _CLOSE
+        close = one.log_evidence > best.log_evidence - CLOSE
         if close and len(named) == len(best.hypothesis.named) and kept.issubset(named):
             found += [other for other in named if other not in kept]
     return found

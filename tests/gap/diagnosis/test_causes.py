@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.gap.diagnosis.causes import _is_plausible, _leaves_another
+from chladni.gap.diagnosis.causes import _as_likely, _best, _is_plausible, _leaves_another
 from chladni.gap.diagnosis.completeness import completeness as completeness_over
 from chladni.gap.diagnosis.completeness import completeness_among, known_share
 from chladni.gap.diagnosis.search import plausible_places
@@ -192,3 +192,37 @@ def test_two_causes_where_either_s_force_explains_all_need_only_come_near(explai
     assert [_is_plausible(alike, nothing, pair(chi, *sites)) for chi in (1.2, 2.5, 4.0)] == [True, True, False]
     # A place whose force leaves more isn't one of them.
     assert not _is_plausible(alike, nothing, pair(2.5, sites[0], other))
+
+
+def weighed_form(log_evidence: float, word: str = "", site: str = "motor", variant: str | None = None) -> Contestant:
+    """A contestant with one effect, or none, of this log evidence."""
+    numbers = {"delay": {"delay": 0.1}, "lag": {"time_constant": 0.1}, "saturation": {"limit": 1.0}}
+    effects = (attached(word, site, numbers[word], variant=variant),) if word else ()
+    hypothesis = Hypothesis(effects=effects, fitted=((),) * len(effects), start_z=np.zeros(0))
+    return replace(left(1.0), hypothesis=hypothesis, log_evidence=log_evidence)
+
+
+def test_a_word_s_forms_speak_for_it_together() -> None:
+    nothing = weighed_form(-60.0)
+    delay, lag = weighed_form(-3.3, "delay"), weighed_form(-3.4, "lag", variant="first_order")
+    other = weighed_form(-3.5, "lag", variant="second_order")
+    assert _best([delay, lag, nothing], nothing, 12.0) is delay
+    # e^-3.4 + e^-3.5 is more than e^-3.3; of the two the likelier one is shown.
+    assert _best([delay, lag, other, nothing], nothing, 12.0) is lag
+    # Two searches that ended at one fit are one form.
+    again = weighed_form(-3.45, "lag", variant="first_order")
+    assert _best([delay, lag, again, nothing], nothing, 12.0) is delay
+
+
+def test_forms_of_a_word_together_do_not_make_it_pay() -> None:
+    # Each brings 5.9 nats of the 6 that an effect must.
+    nothing = weighed_form(-60.0)
+    forms = [weighed_form(-54.1, "lag", variant=variant) for variant in ("first_order", "second_order")]
+    assert _best([nothing, *forms], nothing, 12.0) is nothing
+
+
+def test_as_likely_are_the_same_words_elsewhere_that_fit_as_well() -> None:
+    best = weighed_form(-3.0, "delay")
+    twin, worse = weighed_form(-3.9, "delay", "brake"), weighed_form(-9.0, "delay", "fan")
+    other = weighed_form(-3.1, "lag", "brake", variant="first_order")
+    assert _as_likely([best, twin, worse, other], best) == [best, twin]
