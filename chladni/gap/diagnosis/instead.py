@@ -1,6 +1,6 @@
 """What explains a gap better than the believed cause, without being a word of the catalogue."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,6 +86,8 @@ def explained_instead(study: Study, best: Contestant) -> Instead | None:
 
 def _linear(study: Study, best: Contestant) -> Coupling | Relaxation | None:
     """Give the linear law that is no word and explains more than the believed cause does; None without."""
+    if best.hypothesis.wide and best.chi < _ASKED:
+        return _relaxing_for_parameters(study.location, best)
     location, word = study.location, _linear_word(best)
     if best.chi < _ASKED and word is None:
         return None
@@ -101,15 +103,28 @@ def _linear(study: Study, best: Contestant) -> Coupling | Relaxation | None:
     return min(found, key=lambda law: law.chi, default=None)
 
 
+def _relaxing_for_parameters(location: Location, best: Contestant) -> Relaxation | None:
+    """Give the joint that relaxes where its stiffness or damping is said to be wrong, when that is far likelier.
+
+    What relaxes is stiffer and loses more than it does at rest: a value that is off comes near.
+    """
+    names, screened = best.hypothesis.wide, best.hypothesis.screened
+    relaxing = _relaxing(location, {name.rpartition(".")[0] for name in names})
+    if relaxing is None or screened is None or relaxing.chi > ALONE:
+        return None
+    return relaxing if _is_sure(location, screened - relaxing.chi, relaxing.numbers - len(names)) else None
+
+
 def _linear_word(best: Contestant) -> AttachedEffect | None:
     effects = best.hypothesis.effects
     return best.fit.effects[0] if len(effects) == 1 and effects[0].kind.linear else None
 
 
-def _relaxing(location: Location) -> Relaxation | None:
-    """Give the joint that explains most by relaxing, among those at which one unknown force explains all."""
+def _relaxing(location: Location, names: Container[str] | None = None) -> Relaxation | None:
+    """Give the joint that explains most by relaxing, among those (of some names) where one unknown force does all."""
     joints = ((located, site) for located, site in _alone(location) if site.kind == "joint")
-    found = (any_relaxation(location, located, site) for located, site in joints)
+    asked = ((located, site) for located, site in joints if names is None or site.name in names)
+    found = (any_relaxation(location, located, site) for located, site in asked)
     return min((law for law in found if law is not None), key=lambda law: law.chi, default=None)
 
 
@@ -120,9 +135,14 @@ def _brings_more(study: Study, relaxing: Relaxation, word: AttachedEffect, z: ND
     fitted = fitted_beside(study.model, study.location, word, z)
     if fitted is None:
         return False
-    expected = study.location.tuned.expected
-    numbers = relaxing.numbers - len(effect_numbers((word,)))
-    return (fitted.chi - relaxing.chi) * expected > _SURE + 0.5 * numbers * float(np.log(2 * expected))
+    further = relaxing.numbers - len(effect_numbers((word,)))
+    return _is_sure(study.location, fitted.chi - relaxing.chi, further)
+
+
+def _is_sure(location: Location, gained: float, further: int) -> bool:
+    """Whether misfit that was gained over the noise pays for further numbers (Schwarz 1978), and more."""
+    expected = location.tuned.expected
+    return gained * expected > _SURE + 0.5 * further * float(np.log(2 * expected))
 
 
 def _loopless(location: Location, best: Contestant) -> str | None:

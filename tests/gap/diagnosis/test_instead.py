@@ -5,9 +5,11 @@ import pytest
 
 from chladni.gap.diagnosis.instead import explained_elsewhere, explained_instead
 from chladni.gap.diagnosis.study import Study, study_of
+from chladni.gap.explanation.hypotheses import wrong_parameters
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.models.effects.attached_effect import AttachedEffect, attached
 from tests.gap.arm import RATE_HZ, arm, measured
+from tests.gap.rubber import Rubber
 
 LOOP = attached("hysteresis", "elbow", {"force": 20.0, "yield": 1e-4, "shape": 2.0})
 DRAG = attached("quadratic_damping", "elbow", {"coefficient": 300.0})
@@ -50,6 +52,23 @@ def test_a_loop_that_leaves_little_stays() -> None:
     assert looped.location.tuned.chi > 10.0
     assert explained_instead(looped, believed(LOOP, 1.0 + 0.02 * looped.location.tuned.chi)) is None
     assert explained_instead(looped, believed(LOOP, 1.05)) is None
+
+
+@pytest.mark.slow
+def test_a_joint_that_relaxes_a_little_passes_for_no_wrong_value() -> None:
+    assert told_for_parameters(study(Rubber(stiffness=2e3))) == "shoulder"
+    off = {"shoulder.damping": 2.0, "shoulder.stiffness": 1.2}
+    stiffer = study_of(arm(), measured(seed=5, off=off), leave_out=frozenset(), own={})
+    assert told_for_parameters(stiffer) is None
+
+
+def told_for_parameters(found: Study) -> str | None:
+    """The joint that relaxes, where values that are off leave as little as could be."""
+    hypothesis = wrong_parameters(found.location)
+    assert hypothesis is not None
+    best = Contestant(hypothesis=hypothesis, fit=None, held=np.full(3, 1.05), gap=0.0, prior=0.0)
+    instead = explained_instead(found, best)
+    return None if instead is None or instead.linear is None else instead.linear.joint
 
 
 @pytest.mark.slow

@@ -1,8 +1,5 @@
 """A joint of rubber is told from all else that is linear."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-
 import numpy as np
 import pytest
 
@@ -12,45 +9,8 @@ from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.gap.explanation.any_relaxation import Relaxation, any_relaxation
 from chladni.gap.location.locate import locate
 from chladni.gap.plant.tunable import Tunables
-from chladni.models.core.compiled_model import CompiledModel
 from tests.gap.arm import arm, measured
-
-#: N/m of each branch; corners half a decade apart, from far below the first resonance to above the last.
-STIFFNESS, CORNERS_HZ = 1.5e4, (2.0, 6.3, 20.0, 63.0, 200.0)
-
-
-@dataclass(frozen=True)
-class Rubber:
-    """Maxwell's branches across a joint, in matrices."""
-
-    site: str = "shoulder"
-    effect: str = "viscoelastic"
-
-    @property
-    def values(self) -> Mapping[str, float]:
-        return {}
-
-    def attach(self, compiled: CompiledModel) -> CompiledModel:
-        joint, count, new = compiled.port_index(self.site, "joint"), len(compiled.states), len(CORNERS_HZ)
-        force = np.zeros((len(compiled.ports), count + new))
-        # A force at a joint is positive where it resists.
-        force[joint, count:] = STIFFNESS
-
-        def widened(matrix: np.ndarray) -> np.ndarray:
-            return np.hstack([matrix, np.zeros((len(matrix), new))])
-
-        speeds = np.hstack([np.tile(compiled.velocity_state[joint], (new, 1)), -2 * np.pi * np.diag(CORNERS_HZ)])
-        g = np.vstack([compiled.g, np.zeros((new, compiled.g.shape[1]))])
-        return replace(
-            compiled,
-            a=np.vstack([widened(compiled.a), speeds]) + g @ force,
-            b=np.vstack([compiled.b, np.tile(compiled.velocity_column[joint], (new, 1))]),
-            g=g,
-            c=widened(compiled.c) + compiled.h @ force,
-            displacement_state=widened(compiled.displacement_state),
-            velocity_state=widened(compiled.velocity_state),
-            states=(*compiled.states, *(f"rubber{place}" for place in range(new))),
-        )
+from tests.gap.rubber import CORNERS_HZ, Rubber
 
 
 def relaxation_of(*effects, joint: str) -> tuple[float, Relaxation | None]:
@@ -69,9 +29,9 @@ def test_branches_a_decade_apart_do_what_closer_ones_do(joint: str) -> None:
     assert found is not None
     assert found.chi < 1.1
     s = 2j * np.pi * np.array(found.band_hz)[:, None]
-    low, high = np.sum(STIFFNESS * s / (s + 2 * np.pi * np.array(CORNERS_HZ)), axis=1)
+    low, high = np.sum(Rubber().stiffness * s / (s + 2 * np.pi * np.array(CORNERS_HZ)), axis=1)
     assert found.rise == pytest.approx(high.real - low.real, rel=0.1)
-    assert found.loss == pytest.approx(STIFFNESS, rel=0.5)
+    assert found.loss == pytest.approx(Rubber().stiffness, rel=0.5)
     assert f"stiffness of {joint} that rises" in found.sentence()
     assert found.unit == "N/m"
 
