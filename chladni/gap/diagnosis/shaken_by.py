@@ -16,6 +16,9 @@ from chladni.gap.location.locate import Located
 Matrix = NDArray[np.float64]
 #: How well the ground must explain, how nearly as well as the best place; and where another can't be told from it.
 _CHI, _BEST, _TIED = 1.5, 1.02, 1.1
+#: Most places that may be as good: the ground and the one joint on which a machine stands. Where forces inside the
+#: machine do as well, the sensors don't tell where it is moved.
+_ALIKE = 2
 #: Share of the gap that any law of a site's motion, or a filter of the inputs, must leave there. Of a floor that
 #: shook the best law at a joint left 0.2 to 0.5 in made machines, of an effect at that joint at most 0.12; at an
 #: input 0.34 against 0.08.
@@ -49,6 +52,8 @@ def shaken_by(study: Study, tuned: Contestant) -> ShakenGround | None:
         return None
     first = study.location.ranked[0].profile.chi
     tied = [one for one in study.location.ranked if one.profile.chi < _TIED * first]
+    if len(tied) > _ALIKE:
+        return None
     ground = next((one for one in tied if _has_ground(one)), None)
     if ground is None or ground.profile.chi > min(_CHI, _BEST * first):
         return None
