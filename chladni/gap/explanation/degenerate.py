@@ -15,6 +15,8 @@ from chladni.signals.errors import ModelError
 Matrix = NDArray[np.float64]
 #: Of the usual way and pace of a joint: a yield below is friction's presliding, a presliding above a hysteresis loop.
 _FRICTION, _LOOP = 0.12, 0.3
+#: Damping ratio from which an attached mass is no oscillator: critical damping is 1, and fits aren't exact.
+_DASHPOT = 2.0
 
 
 def is_degenerate(run: FreeRun, found: Contestant) -> bool:
@@ -29,9 +31,11 @@ def _degenerate(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool
         # A change that is over at once, or never comes, is a stiffness.
         return not (0.02 < share < 0.98 if effect.variant == "step" else share > 0.1)
     if effect.effect == "extra_mode":
-        # Resonant well above all that moved, it's a mass; one that doesn't swing once is a spring to where it stands.
+        # Resonant well above all that moved, it's a mass; one that doesn't swing once is a spring to where it stands;
+        # one that is damped far too much to swing is a mass that a dashpot carries.
         band_hz = excited_band_hz(run.measurement)[1]
-        return not 1.0 / run.measurement.duration_s < values["frequency"] < STIFF_MOUNT * band_hz
+        swings = values["damping_ratio"] < _DASHPOT
+        return not (swings and 1.0 / run.measurement.duration_s < values["frequency"] < STIFF_MOUNT * band_hz)
     if effect.effect in (
         "hysteresis",
         "coulomb_friction",

@@ -19,9 +19,9 @@ def run() -> FreeRun:
     return FreeRun(arm(), measured(()))
 
 
-def hanging(frequency_hz: float) -> Contestant:
+def hanging(frequency_hz: float, damping_ratio: float = 0.02) -> Contestant:
     """A fit that ended at a mass that hangs at a body with this frequency."""
-    values = {"mass": 0.5, "frequency": frequency_hz, "damping_ratio": 0.02}
+    values = {"mass": 0.5, "frequency": frequency_hz, "damping_ratio": damping_ratio}
     effect = attached("extra_mode", "arm", values)
     hypothesis = Hypothesis(effects=(effect,), fitted=((),), start_z=np.zeros(0))
     return Contestant(
@@ -33,6 +33,13 @@ def test_an_oscillator_that_never_swings_in_a_log_is_a_spring_to_where_it_stands
     once_hz = 1.0 / run.measurement.duration_s
     assert is_degenerate(run, hanging(0.5 * once_hz))
     assert not is_degenerate(run, hanging(2.0 * once_hz))
+
+
+def test_what_is_damped_far_too_much_to_swing_is_a_mass_that_a_dashpot_carries(run: FreeRun) -> None:
+    middle_hz = 0.5 * excited_band_hz(run.measurement)[1]
+    # Critical is 1; a fit isn't exact.
+    assert not is_degenerate(run, hanging(middle_hz, damping_ratio=1.2))
+    assert is_degenerate(run, hanging(middle_hz, damping_ratio=3.0))
 
 
 def test_an_oscillator_far_above_all_that_moved_is_a_mass(run: FreeRun) -> None:
