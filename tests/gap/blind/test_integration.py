@@ -35,6 +35,7 @@ def oscillator(mass=2.0, stiffness=8000.0, damping=8.0):
     return assembly
 
 
+@pytest.mark.slow
 def test_a_step_gives_the_oscillators_closed_form():
     m, k, c = 2.0, 8000.0, 8.0
     rate, count = 1000.0, 2000
