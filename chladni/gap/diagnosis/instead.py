@@ -169,10 +169,8 @@ def explained_elsewhere(study: Study, best: Contestant, as_likely: Sequence[Cont
     effects = best.hypothesis.effects
     if not effects or (best.chi < ALONE and len(effects) < 2):
         return None
-    named, gap = (
-        {one.site for each in (best, *as_likely) for one in each.hypothesis.effects},
-        study.location.tuned.chi - 1.0,
-    )
+    named = {one.site for each in (best, *as_likely) for one in each.hypothesis.effects}
+    gap = study.location.tuned.chi - 1.0
     alone = min(_NOTHING, _OF_GAP * gap) if len(effects) > 1 else 0.0
     enough = max(_ELSEWHERE * (best.chi - 1.0), alone)
     better: dict[str, float] = {}

@@ -63,6 +63,10 @@ def _rounded_numbers(values: Values, _port: Port) -> tuple[float, ...]:
     return values["limit"], values["knee"]
 
 
+#: What ends at a limit, sharply or with round corners: an actuator's force, or a sensor's range.
+CLIPPED = ShapedSignal(shape=clipped_samples, law=clipped, numbers=_numbers)
+ROUNDED = ShapedSignal(shape=rounded_samples, law=rounded, numbers=_rounded_numbers)
+
 SATURATION = EffectKind(
     name="saturation",
     family="actuator",
@@ -76,7 +80,7 @@ SATURATION = EffectKind(
     variants=(
         Variant(
             name="clipped",
-            attach=ShapedSignal(shape=clipped_samples, law=clipped, numbers=_numbers),
+            attach=CLIPPED,
             formula="u_acts = clip(u, -limit, limit)",
             odd=True,
         ),
@@ -88,7 +92,7 @@ SATURATION = EffectKind(
         ),
         Variant(
             name="rounded",
-            attach=ShapedSignal(shape=rounded_samples, law=rounded, numbers=_rounded_numbers),
+            attach=ROUNDED,
             formula="u_acts = w/2 ln(cosh((u + limit)/w)/cosh((u - limit)/w)), w = knee limit",
             parameters=Parameters((KNEE,)),
             odd=True,

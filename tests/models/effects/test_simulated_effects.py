@@ -1,6 +1,7 @@
 """Effects in simulations: exact ones against their closed form, laws against SciPy on the same law in Python."""
 
-from collections.abc import Mapping
+import runpy
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from tests.models.effects.small_models import one_body, with_loop
 from tests.models.structures.made_models import tree
 
 Array = NDArray[np.float64]
+Shape = Callable[[Array], Array]
 RATE_HZ = 1000.0
 COUNT = 300
 TIMES_S = np.arange(COUNT) / RATE_HZ
@@ -208,7 +210,9 @@ def test_several_effects_in_a_row_inside_a_loop_agree_with_scipy() -> None:
         ("gain_error", {"gain": -0.7}, "factor", lambda u: -0.7 * u),
     ],
 )
-def test_shapes_of_an_inputs_samples_are_exact(word: str, values: Mapping[str, float], variant: str, shape) -> None:  # type: ignore[no-untyped-def]
+def test_shapes_of_an_inputs_samples_are_exact(
+    word: str, values: Mapping[str, float], variant: str, shape: Shape
+) -> None:
     compiled = attached(word, "motor", values, variant=variant).attach(one_body())
     found = integrate(compiled, _push()[None], RATE_HZ).outputs
     wanted = integrate(one_body(), shape(_push())[None], RATE_HZ).outputs
@@ -228,7 +232,7 @@ def test_shapes_of_an_inputs_samples_are_exact(word: str, values: Mapping[str, f
         ),
     ],
 )
-def test_shapes_of_an_outputs_samples_are_exact(word: str, values: Mapping[str, float], shape) -> None:  # type: ignore[no-untyped-def]
+def test_shapes_of_an_outputs_samples_are_exact(word: str, values: Mapping[str, float], shape: Shape) -> None:
     before = integrate(one_body(), _push()[None], RATE_HZ).outputs
     after = integrate(attached(word, "acc", values).attach(one_body()), _push()[None], RATE_HZ).outputs
     np.testing.assert_allclose(after[0], shape(before[0]), rtol=1e-12, atol=1e-12)
@@ -349,8 +353,9 @@ def test_the_oracle_is_exact_on_a_linear_model() -> None:
     )
 
 
-def test_the_example_of_the_user_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_example_of_the_user_page_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = (Path(__file__).parents[3] / "docs" / "effects.md").read_text(encoding="utf-8")
-    example = page.split("```python\n")[1].split("```")[0]
-    exec(compile(example, "docs/effects.md", "exec"), {})  # noqa: S102 - the project's own page
+    example = tmp_path / "example.py"
+    example.write_text(page.split("```python\n")[1].split("```")[0], encoding="utf-8")
+    runpy.run_path(str(example))
     assert 8.0 < float(capsys.readouterr().out) <= 8.1
