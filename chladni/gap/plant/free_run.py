@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.plant.laid_inputs import LaidInputs
 from chladni.gap.plant.late_clock import read_late
 from chladni.gap.plant.law_run import Marched, can_run, equations, run_laws
 from chladni.gap.plant.linear_run import LinearRuns, is_plain
@@ -81,7 +82,8 @@ class FreeRun:
         self.tunables = Tunables.of(model)
         compiled = model.compile()
         self.rows = _rows(compiled, measurement)
-        self._linear = LinearRuns(measurement.inputs, measurement.sample_rate_hz)
+        self.inputs = LaidInputs(measurement.inputs, measurement.sample_rate_hz)
+        self._linear = LinearRuns(self.inputs)
         self._kept: OrderedDict[object, Integrator] = OrderedDict()
 
     def compiled(self, z: Matrix | None = None, effects: Sequence[Effect] = ()) -> CompiledModel:
@@ -149,7 +151,7 @@ class FreeRun:
             return None
         if compiled.delays or hold.kinked.size or np.any(hold.rate >= 0):
             return None
-        equation = equations(compiled, self.measurement.inputs, rate, self.rows, PARTS)
+        equation = equations(compiled, self.inputs, self.rows, PARTS)
         starts = initial_states(initial, len(self.windows), len(compiled.states))
         return run_laws(equation, self.windows, starts, rate)
 

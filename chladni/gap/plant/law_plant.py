@@ -120,5 +120,4 @@ def _mapped(run: FreeRun, compiled: CompiledModel, outputs: Matrix) -> Matrix:
 
 
 def _equations(run: FreeRun, compiled: CompiledModel) -> Equations:
-    measurement = run.measurement
-    return equations(compiled, measurement.inputs, measurement.sample_rate_hz, run.rows, 1)
+    return equations(compiled, run.inputs, run.rows, 1)

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.plant.dead_times import DeadTimes, dead_times
+from chladni.gap.plant.laid_inputs import LaidInputs
 from chladni.gap.plant.law_kernel import Laws, March, Room, law_march
 from chladni.gap.plant.linear_run import is_plain
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import responses
-from chladni.models.integrator.hold import Hold, hold_of
-from chladni.models.integrator.input_rows import input_rows
+from chladni.models.integrator.hold import hold_of
 from chladni.models.integrator.port_plan import LawTable, PortPlan, law_table, port_plan
 from chladni.signals.errors import ModelError
 
@@ -62,20 +62,19 @@ def can_run(compiled: CompiledModel) -> bool:
     return not is_plain(compiled)
 
 
-def equations(
-    compiled: CompiledModel, signals: Matrix, sample_rate_hz: float, rows: NDArray[np.int64], parts: int
-) -> Equations:
+def equations(compiled: CompiledModel, inputs: LaidInputs, rows: NDArray[np.int64], parts: int) -> Equations:
     """Make the tables of a compiled model.
 
     Parameters
     ----------
-    signals
-        ``[input, sample]`` of the whole record.
+    inputs
+        Of the whole record.
     rows
         Outputs that are wanted.
     parts
         Steps between samples.
     """
+    sample_rate_hz = inputs.sample_rate_hz
     hold = hold_of(compiled, sample_rate_hz)
     plan = port_plan(compiled, hold)
     p, m = len(plan.ports), hold.columns
@@ -95,27 +94,12 @@ def equations(
         start=np.hstack([plan.motion_state, plan.motion_column, padding, at_once]),
         through=np.ascontiguousarray(at_once),
         output=np.hstack([plan.c[rows], plan.d[rows], none, plan.h[rows]]),
-        rows=_finer(input_rows(compiled, hold, signals, sample_rate_hz, extra=0), hold, parts),
+        rows=inputs.rows(compiled, hold, parts),
         laws=law_table(compiled, plan),
         delays=dead_times(plan, sample_rate_hz * parts),
         plan=plan,
         parts=parts,
     )
-
-
-def _finer(rows: Matrix, hold: Hold, parts: int) -> Matrix:
-    """Rows of steps that are a part of the interval between samples."""
-    if parts == 1:
-        return rows
-    if np.any(hold.rate >= 0) or hold.kinked.size:
-        raise ModelError("an input with rates or a kink can't be divided")
-    m = hold.columns
-    share = np.arange(parts) / parts
-    finer = np.repeat(rows, parts, axis=0)
-    finer[:, hold.straight] += np.tile(share, len(rows))[:, None] * finer[:, m : m + hold.straight.size]
-    finer[:, m : m + hold.straight.size] /= parts
-    # The last row is the value at the end, with nothing after it.
-    return finer[: (len(rows) - 1) * parts + 1]
 
 
 @dataclass(frozen=True, slots=True)

@@ -172,7 +172,7 @@ def _leads(
     for place, (one, by) in enumerate(changed):
         first[:, place] = (one.start - equation.start) @ here[0] / by
     for place, (one, by) in enumerate(changed):
-        if not np.array_equal(one.rows, equation.rows):
+        if one.rows is not equation.rows:
             rows = (one.rows[start : start + steps] - record.rows) / by
             moved = equation.step[:, n : n + width].copy()
             moved[:n] = to_modal @ moved[:n]

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.plant.laid_inputs import LaidInputs
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import responses
-from chladni.models.integrator.hold import Hold, hold_of
-from chladni.models.integrator.input_rows import input_rows
+from chladni.models.integrator.hold import hold_of
 from chladni.models.integrator.linear_kernel import linear_march
 from chladni.signals.errors import ModelError
 
@@ -23,19 +23,14 @@ def is_plain(compiled: CompiledModel) -> bool:
 class LinearRuns:
     """Linear free runs under the inputs of one log.
 
-    Rows of inputs are laid out once: most effects and all parameters leave the inputs as they are.
-
     Parameters
     ----------
-    signals
-        ``[input, sample]``.
-    sample_rate_hz
+    inputs
         Of the log.
     """
 
-    def __init__(self, signals: Matrix, sample_rate_hz: float) -> None:
-        self._signals, self._rate_hz = signals, sample_rate_hz
-        self._kept: tuple[object, Matrix] | None = None
+    def __init__(self, inputs: LaidInputs) -> None:
+        self._inputs, self._rate_hz = inputs, inputs.sample_rate_hz
 
     def outputs(
         self, compiled: CompiledModel, rows: NDArray[np.int64], windows: Sequence[tuple[int, int]], initial: Matrix
@@ -53,7 +48,7 @@ class LinearRuns:
             When the model diverges.
         """
         hold = hold_of(compiled, self._rate_hz)
-        inputs = self._inputs(compiled, hold)
+        inputs = self._inputs.rows(compiled, hold)
         b, g = hold.spread(compiled.b), np.zeros((len(compiled.states), 0))
         step = responses(
             compiled.a, b, g, hold,
@@ -69,11 +64,3 @@ class LinearRuns:
             raise ModelError("the model diverges within the log; a loop is unstable, or a parameter is impossible")
         through = hold.spread(compiled.d[rows])
         return np.asarray(compiled.c[rows] @ state.T + through @ inputs[:, : hold.columns].T)
-
-    def _inputs(self, compiled: CompiledModel, hold: Hold) -> Matrix:
-        if compiled.input_maps or compiled.generated or any(compiled.input_delays_s):
-            return input_rows(compiled, hold, self._signals, self._rate_hz, extra=0)
-        layout = compiled.inputs
-        if self._kept is None or self._kept[0] != layout:
-            self._kept = layout, input_rows(compiled, hold, self._signals, self._rate_hz, extra=0)
-        return self._kept[1]

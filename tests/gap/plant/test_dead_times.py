@@ -62,7 +62,7 @@ def test_the_march_converges_to_the_integrator(samples, laws, run):
     exact = Integrator(compiled, RATE_HZ, tolerance=1e-10).run(run.measurement.inputs).outputs
     errors = [
         far_off(run_laws(made, ((0, SAMPLES),), start, RATE_HZ).outputs, exact)
-        for made in (equations(compiled, run.measurement.inputs, RATE_HZ, np.arange(4), parts) for parts in (2, 8))
+        for made in (equations(compiled, run.inputs, np.arange(4), parts) for parts in (2, 8))
     ]
     # Straight lines of force between steps have order 2: a sixteenth.
     assert errors[1] < errors[0] / 10

@@ -47,7 +47,7 @@ def test_the_march_converges_to_the_integrator(name, run):
     exact = Integrator(compiled, RATE_HZ, tolerance=1e-10).run(run.measurement.inputs, initial=start[0]).outputs
     errors = []
     for parts in (2, 8):
-        equation = equations(compiled, run.measurement.inputs, RATE_HZ, np.arange(3), parts)
+        equation = equations(compiled, run.inputs, np.arange(3), parts)
         found = run_laws(equation, ((0, SAMPLES),), start, RATE_HZ).outputs
         errors.append(np.sqrt(np.mean((found - exact) ** 2) / np.mean(exact**2)))
     # Straight lines between steps have order 2: a sixteenth. Contacts and sticking begin inside a step: order 1.
@@ -143,7 +143,7 @@ def test_a_double_integrator_has_no_modal_coordinates():
 
 def test_a_model_that_diverges_says_so(run):
     compiled = three_bodies().with_effects([LAWS["hardening"]]).compile()
-    equation = equations(compiled, run.measurement.inputs, RATE_HZ, np.arange(3), 1)
+    equation = equations(compiled, run.inputs, np.arange(3), 1)
     with pytest.raises(ModelError, match=r"diverges|missed"):
         run_laws(equation, ((0, SAMPLES),), np.full((1, 6), 1e160), RATE_HZ)
 

@@ -1,0 +1,70 @@
+"""Inputs of one log as rows of steps, laid out once for all models that take them alike."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.integrator.hold import Hold
+from chladni.models.integrator.input_rows import input_rows
+from chladni.signals.errors import ModelError
+
+Matrix = NDArray[np.float64]
+#: Ways that are kept: a fit asks for one, and for one more for each number of an actuator that it moves.
+_KEPT = 6
+
+
+class LaidInputs:
+    """Rows of steps, see `Hold`. Most effects and all parameters leave the inputs as they are.
+
+    Parameters
+    ----------
+    signals
+        ``[input, sample]`` of the whole record.
+    sample_rate_hz
+        Of the log.
+    """
+
+    def __init__(self, signals: Matrix, sample_rate_hz: float) -> None:
+        self._signals, self.sample_rate_hz = signals, sample_rate_hz
+        self._kept: list[tuple[object, Matrix]] = []
+
+    def rows(self, compiled: CompiledModel, hold: Hold, parts: int = 1) -> Matrix:
+        """Give ``[step, width]``; the same array for models that take the inputs alike.
+
+        Parameters
+        ----------
+        hold
+            Of the compiled model.
+        parts
+            Steps between samples.
+
+        Raises
+        ------
+        ModelError
+            When an input can't be late by less than nothing, or has rates or a kink that parts can't hold.
+        """
+        key = (
+            compiled.inputs, compiled.input_maps, compiled.input_delays_s, compiled.generated, hold.width, parts,
+        )  # fmt: skip
+        for place, (known, rows) in enumerate(self._kept):
+            if known == key:
+                self._kept.append(self._kept.pop(place))
+                return rows
+        made = _finer(input_rows(compiled, hold, self._signals, self.sample_rate_hz, extra=0), hold, parts)
+        self._kept = [*self._kept[1 - _KEPT :], (key, made)]
+        return made
+
+
+def _finer(rows: Matrix, hold: Hold, parts: int) -> Matrix:
+    """Rows of steps that are a part of the interval between samples."""
+    if parts == 1:
+        return rows
+    if np.any(hold.rate >= 0) or hold.kinked.size:
+        raise ModelError("an input with rates or a kink can't be divided")
+    m = hold.columns
+    share = np.arange(parts) / parts
+    finer = np.repeat(rows, parts, axis=0)
+    finer[:, hold.straight] += np.tile(share, len(rows))[:, None] * finer[:, m : m + hold.straight.size]
+    finer[:, m : m + hold.straight.size] /= parts
+    # The last row is the value at the end, with nothing after it.
+    return finer[: (len(rows) - 1) * parts + 1]
