@@ -11,10 +11,12 @@ from chladni.gap.diagnosis.completeness import completeness, completeness_among,
 from chladni.gap.diagnosis.grown import Grown
 from chladni.gap.diagnosis.instead import Instead, explained_elsewhere, explained_instead
 from chladni.gap.diagnosis.own_signal import share_of_own_signal
-from chladni.gap.diagnosis.pairs import added_nats, exchanged, paired_causes, second_causes, two_act, without_one
+from chladni.gap.diagnosis.pairs import exchanged, paired_causes, second_causes, two_act, without_one
+from chladni.gap.diagnosis.price import added_nats, leaves_for_sure, price_among
 from chladni.gap.diagnosis.search import (
     ALONE,
     Singles,
+    best_forms,
     detailed,
     is_far,
     is_lost,
@@ -34,9 +36,6 @@ from chladni.gap.records.noise_floor import NoiseFloor
 
 Matrix = NDArray[np.float64]
 Step = Callable[[float], None]
-#: Nats that a wrong parameter must bring to be named, and an effect: what is modelled is doubted before something is
-#: added.
-WRONG, NAMED = 3.0, 6.0
 #: Nats within which a log can't tell two candidates apart.
 CLOSE = 2.0
 #: First effects beside which a second one is looked for while all leave something; progress where the search beside
@@ -167,19 +166,26 @@ def _searched(
     progress(_BESIDE[-1])
     if len(best().hypothesis.effects) > 1:
         found += exchanged(study, best())
-        # A richer law may only stand in for details of a plainer one.
-        found.append(detailed(study, best()))
+        # A richer law may only stand in for details of a plainer one, of either effect.
+        found += _detailed(study, weighed(found), best())
         found += sibling_causes(study, [best()])
         found += [detailed(study, best()), *without_one(study, best())]
     return [one for one in found if _is_plausible(study, nothing, one)], None
 
 
+def _detailed(study: Study, ranked: Sequence[Contestant], best: Contestant) -> list[Contestant]:
+    """Details fitted of the first few forms with as many effects as the best one."""
+    alike = [one for one in ranked if len(one.hypothesis.effects) == len(best.hypothesis.effects)]
+    return [detailed(study, one) for one in best_forms(alike)]
+
+
 def _leaves_another(study: Study, best: Contestant, nothing: Contestant, floor: Matrix) -> bool:
     """Whether what the best cause leaves may be another one."""
-    if best.chi < ALONE:
+    # Sensors that hear only noise, or whose floor is too high, must not hide the one that hears more.
+    if best.most_left < ALONE:
         return best is not nothing and completeness(nothing, best, floor) < _COMPLETE
     # One force may do what two do, elsewhere; but then no law follows it.
-    return not is_one_force(study.location) or is_lost(study.location, best.chi)
+    return leaves_for_sure(best) or not is_one_force(study.location) or is_lost(study.location, best.chi)
 
 
 def _lacks_another(study: Study, best: Contestant) -> bool:
@@ -213,21 +219,15 @@ def _best(together: Sequence[Contestant], nothing: Contestant, added: float) -> 
 
     A word with several forms, none of which the log tells from the others, has the probability of all of them.
     """
-    if not max(together, key=lambda one: _paid(one, added)).hypothesis.named:
+    price = price_among(together, added)
+    if not max(together, key=price.paid).hypothesis.named:
         return nothing
     forms: dict[frozenset[Candidate], list[Contestant]] = {}
     for one in distinct(together):
         forms.setdefault(frozenset(one.hypothesis.named), []).append(one)
     named = [alike for names, alike in forms.items() if names]
-    likeliest = max(named, key=lambda alike: logsumexp([_paid(one, added) for one in alike]))
-    return max(likeliest, key=lambda one: _paid(one, added))
-
-
-def _paid(one: Contestant, added: float) -> float:
-    """Evidence in nats less what a cause, and every further effect, must bring to be named."""
-    effects = len(one.hypothesis.effects)
-    first = NAMED if effects else WRONG * bool(one.hypothesis.wide)
-    return one.log_evidence - first - added * max(effects - 1, 0)
+    likeliest = max(named, key=lambda alike: logsumexp([price.paid(one) for one in alike]))
+    return max(likeliest, key=price.paid)
 
 
 def _as_likely(together: Sequence[Contestant], best: Contestant) -> list[Contestant]:
@@ -261,7 +261,8 @@ def _verdict(together: Sequence[Contestant], tuned: Contestant, best: Contestant
 
 
 def _probabilities(contestants: Sequence[Contestant], tuned: Contestant, floor: Matrix, added: float) -> list[float]:
-    evidence = np.array([_paid(one, added) for one in contestants])
+    price = price_among(contestants, added)
+    evidence = np.array([price.paid(one) for one in contestants])
     weight = np.exp(evidence - evidence.max())
     known = known_share(tuned, floor)
     complete = [

@@ -29,14 +29,6 @@ _PAIR_GAIN, _PAIR_TIE, _SCREENED, _PAIRS = 0.6, 1.3, 8, 3
 #: An unknown force at a place that leaves more than this, over the noise, isn't alone: of made machines with
 #: one effect one in twenty leaves as much, of those with two four in five.
 TWO_FORCES = 1.2
-#: Nats that a second effect must bring beside the first: a law that differs from the machine's leaves what another
-#: effect could mend a little. Where no force at one place could, it needn't bring more than a first one.
-_ADDED, _ADDED_BY_PLACE = 100.0, 12.0
-
-
-def added_nats(location: Location) -> float:
-    """Nats that a second effect must bring beside the first."""
-    return _ADDED_BY_PLACE if two_act(location) else _ADDED
 
 
 def two_act(location: Location) -> bool:

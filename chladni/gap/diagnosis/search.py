@@ -128,7 +128,7 @@ def single_causes(study: Study, progress: Step) -> Singles:
     ranked = weighed([*found, *sibling_causes(study, weighed(found))])
     if ranked and ranked[0].chi > _DETAILED:
         # A detail of its law that was set by the screen's grid must not cost a word its place.
-        forms = _best_forms(ranked)
+        forms = best_forms(ranked)
         ranked = [*(_polished(study, one) for one in forms), *(one for one in ranked if one not in forms)]
     return Singles(ranked=weighed(ranked), followed=shots is not None)
 
@@ -191,11 +191,11 @@ def sibling_causes(study: Study, ranked: Sequence[Contestant]) -> list[Contestan
 
 def twin_causes(study: Study, found: Contestant) -> list[Contestant]:
     """Enter the effects of a fit at the other sites that print the same pattern."""
-    places = (one.places[0] for one in study.location.ranked)
-    return sound(study, study.contest.enter_all(twins(found, places)))
+    # All: where a second effect acts may explain too little alone to be followed.
+    return sound(study, study.contest.enter_all(twins(found, study.location.places)))
 
 
-def _best_forms(ranked: Sequence[Contestant]) -> list[Contestant]:
+def best_forms(ranked: Sequence[Contestant]) -> list[Contestant]:
     """The first few that differ in more than where their search began."""
     forms: dict[object, Contestant] = {}
     for one in ranked:

@@ -85,3 +85,8 @@ class Contestant:
     def chi(self) -> float:
         """Mean of `held` over the outputs."""
         return float(np.mean(self.held))
+
+    @property
+    def most_left(self) -> float:
+        """Largest of `held`: what the output misses that is explained least."""
+        return float(np.max(self.held))

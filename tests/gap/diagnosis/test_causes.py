@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.gap.diagnosis.causes import _as_likely, _best, _is_plausible, _leaves_another
+from chladni.gap.diagnosis.causes import _as_likely, _best, _detailed, _is_plausible, _leaves_another
 from chladni.gap.diagnosis.completeness import completeness as completeness_over
 from chladni.gap.diagnosis.completeness import completeness_among, known_share
 from chladni.gap.diagnosis.search import plausible_places
 from chladni.gap.diagnosis.study import study_of
+from chladni.gap.explanation.contest import weighed
+from chladni.gap.explanation.hypotheses import hypothesis_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.location.locate import located_pairs
 from chladni.models.effects.attached_effect import attached
@@ -161,6 +163,18 @@ def test_where_one_force_explains_all_another_cause_is_looked_for_only_when_no_l
     assert [_leaves_another(several, left(chi), nothing, floor) for chi in (1.2, 2.0, 5.0)] == [False, True, True]
 
 
+def test_one_sensor_that_hears_more_is_not_hidden_by_floors_that_are_too_high(explained_by_one_force) -> None:
+    _, several = explained_by_one_force
+    heard = replace(left(1.0), held=np.array([0.07, 2.4]))
+    assert heard.chi < 1.3
+    assert _leaves_another(several, heard, left(100.0), np.ones(2))
+
+
+def test_beside_a_factor_that_leaves_more_than_noise_another_cause_is_looked_for(explained_by_one_force) -> None:
+    one, _ = explained_by_one_force
+    assert _leaves_another(one, pair(1.5, "a"), left(100.0), np.ones(2))
+
+
 def test_another_cause_is_looked_for_where_a_small_gap_is_half_explained(explained_by_one_force) -> None:
     for study in explained_by_one_force:
         assert _leaves_another(study, left(1.25), left(1.6), np.ones(2))
@@ -169,9 +183,10 @@ def test_another_cause_is_looked_for_where_a_small_gap_is_half_explained(explain
 
 
 def pair(chi: float, *sites: str) -> Contestant:
-    """Two gains that leave this mean square, in units of the noise."""
-    two = tuple(attached("gain_error", site, {"gain": 2.0}) for site in sites)
-    return replace(left(chi), hypothesis=Hypothesis(effects=two, fitted=((), ()), start_z=np.zeros(0)))
+    """Gains that leave this mean square, in units of the noise."""
+    gains = tuple(attached("gain_error", site, {"gain": 2.0}) for site in sites)
+    hypothesis = Hypothesis(effects=gains, fitted=((),) * len(gains), start_z=np.zeros(0))
+    return replace(left(chi), hypothesis=hypothesis)
 
 
 def test_two_causes_instead_of_one_force_must_explain_all(explained_by_one_force) -> None:
@@ -226,3 +241,20 @@ def test_as_likely_are_the_same_words_elsewhere_that_fit_as_well() -> None:
     twin, worse = weighed_form(-3.9, "delay", "brake"), weighed_form(-9.0, "delay", "fan")
     other = weighed_form(-3.1, "lag", "brake", variant="first_order")
     assert _as_likely([best, twin, worse, other], best) == [best, twin]
+
+
+@pytest.mark.slow
+def test_details_of_a_first_effect_dont_cost_the_second_its_name() -> None:
+    mount = {"frequency": 120.0, "damping_ratio": 0.1, "carried": 0.6}
+    soft, load = attached("mounting_resonance", "acc_wrist", mount), attached("added_mass", "column", {"mass": 2.0})
+    study = study_of(arm(), measured((soft, load), seconds=4.0, seed=2), leave_out=frozenset(), own={})
+    plain = attached("mounting_resonance", "acc_wrist", {**mount, "carried": 0.0})
+    hung = attached("extra_mode", "column", {"mass": 2.0, "frequency": 200.0, "damping_ratio": 0.5})
+    pairs = [hypothesis_of((plain, second), study.location.tuned.z) for second in (load, hung)]
+    ranked = weighed(study.contest.enter_all(pairs))
+    assert all(one.chi > 1.3 for one in ranked)
+    finer = weighed(_detailed(study, ranked, ranked[0]))
+    # Of both, not of the one that led: with the details the load leaves far less.
+    assert {one.hypothesis.named for one in finer} == {one.hypothesis.named for one in ranked}
+    assert finer[0].hypothesis.effects[1].effect == "added_mass"
+    assert finer[0].most_left < 0.2 * ranked[0].most_left

@@ -5,7 +5,8 @@ import pytest
 
 import chladni
 from chladni.gap.comparison.noise_estimate import estimate_noise
-from chladni.gap.diagnosis.pairs import added_nats, second_causes
+from chladni.gap.diagnosis.pairs import second_causes
+from chladni.gap.diagnosis.price import added_nats
 from chladni.gap.diagnosis.search import single_causes
 from chladni.gap.diagnosis.study import study_of
 from chladni.gap.explanation.contest import weighed
