@@ -18,8 +18,8 @@ from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.even_odds import at_even_odds
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
 from chladni.gap.diagnosis.other_logs import tried_elsewhere
-from chladni.gap.diagnosis.parting_runs import causes_found
 from chladni.gap.diagnosis.remarks import remarks_on
+from chladni.gap.diagnosis.rounds import causes_found
 from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.linear_algebra import in_one_thread
 from chladni.gap.location.profile import profile_at

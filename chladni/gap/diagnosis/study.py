@@ -84,11 +84,16 @@ class Study:
 
 
 def study_of(
-    model: Model, measurement: Measurement, *, leave_out: frozenset[str], own: Mapping[str, EffectKind]
+    model: Model,
+    measurement: Measurement,
+    *,
+    leave_out: frozenset[str],
+    own: Mapping[str, EffectKind],
+    noise: NoiseFloor | None = None,
 ) -> Study:
-    """Prepare the study of one log."""
+    """Prepare the study of one log; without `noise` that is estimated from it."""
     measurement = with_period(measurement)
-    noise = floor_of(measurement)
+    noise = floor_of(measurement) if noise is None else noise
     lattices = {} if "quantization" in leave_out else _lattices(measurement, noise)
     noise = _with_rounding(noise, model, measurement, lattices)
     location = locate(model, measurement, noise, Tunables.of(model))
@@ -106,6 +111,11 @@ def study_of(
         leave_out=leave_out,
         own=own,
     )
+
+
+def over_floor(study: Study, noise: NoiseFloor) -> Study:
+    """Give the study of the same log over another floor."""
+    return study_of(study.model, study.measurement, leave_out=study.leave_out, own=study.own, noise=noise)
 
 
 def floor_of(measurement: Measurement) -> NoiseFloor:

@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 
 from chladni.gap.diagnosis.naming import causes_named
-from chladni.gap.diagnosis.parting_runs import causes_found
+from chladni.gap.diagnosis.rounds import causes_found
 from chladni.gap.diagnosis.study import study_of
 from chladni.gap.records.diagnosis import Candidate
 from chladni.models.effects.attached_effect import attached

@@ -1,0 +1,31 @@
+"""Noise as it shows behind the best cause, where the floor that was estimated without one is too high."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from chladni.gap.comparison.noise_estimate import estimate_noise, smaller_floor
+from chladni.gap.diagnosis.causes import Causes
+from chladni.gap.diagnosis.search import ALONE
+from chladni.gap.diagnosis.study import Study
+from chladni.gap.records.noise_floor import NoiseFloor
+
+#: A floor that is lowered by less says the same.
+_LOWER = 0.7
+
+
+def finer_floor(study: Study, causes: Causes) -> NoiseFloor | None:
+    """Give the noise of what the best cause leaves; None where that says nothing new.
+
+    Distortion that no response explains is in a floor that is estimated without a model: up to thirty times the
+    noise of a sensor, and a second effect hides there. Behind a first one much of it is gone. The floor is asked of
+    what is left again, and where that is lower, and more is left than it, the contest is worth another round.
+    """
+    measurement, noise, best = study.measurement, study.contest.noise, causes.best
+    if len(measurement.output_names) < 2 or not best.hypothesis.effects or causes.instead is not None:
+        return None
+    left = measurement.outputs - best.fit.outputs
+    finer = smaller_floor(noise, estimate_noise(replace(measurement, outputs=left)))
+    lower = bool(np.any(finer.rms < _LOWER * noise.rms))
+    more = bool(np.any(np.mean(left**2, axis=1) > ALONE * finer.rms**2))
+    return finer if lower and more else None

@@ -1,0 +1,61 @@
+"""Causes in further rounds: over a finer floor, and over windows where a free run parts from the log's."""
+
+from collections.abc import Callable
+
+from chladni.gap.diagnosis.causes import Causes, causes_of
+from chladni.gap.diagnosis.finer_floor import finer_floor
+from chladni.gap.diagnosis.search import is_lost
+from chladni.gap.diagnosis.study import Study, over_floor, over_windows
+
+Step = Callable[[float], None]
+#: Progress at the ends of the first contest, and of another one over a finer floor.
+_FIRST, _FINER = 0.6, 0.8
+
+
+def causes_found(study: Study, progress: Step) -> tuple[Study, Causes]:
+    """Judge a study; over a finer floor and over windows again, when effects are named there.
+
+    Behind the first answer noise may turn out far lower than it was estimated; what that leaves is another cause.
+
+    A machine that may come to rest at several places, or take several ways on, goes one that a model of almost the
+    same numbers doesn't. An unknown force goes with it: where that explains far more than any run does, and a law
+    follows as far over short windows, the states that it led through are where longer windows begin.
+    """
+    found = study, causes_of(study, _part(progress, 0.0, _FIRST))
+    finer = _over_finer_floor(*found)
+    if finer is not None:
+        found = _better(found, _again(found, finer, _part(progress, _FIRST, _FINER)))
+    windowed = over_windows(found[0]) if _parted(*found) else None
+    if windowed is not None:
+        found = _again(found, windowed, _part(progress, _FINER, 1.0))
+    progress(1.0)
+    return found
+
+
+def _part(progress: Step, start: float, stop: float) -> Step:
+    return lambda done: progress(start + (stop - start) * done)
+
+
+def _again(found: tuple[Study, Causes], study: Study, progress: Step) -> tuple[Study, Causes]:
+    """Judge another study of the same log; what was found before where that names nothing."""
+    causes = causes_of(study, progress)
+    return (study, causes) if causes.verdict == "effect" and causes.shaken is None else found
+
+
+def _over_finer_floor(study: Study, causes: Causes) -> Study | None:
+    """Give the study over the noise as it shows behind the best cause; None where that says nothing new."""
+    floor = finer_floor(study, causes)
+    finer = None if floor is None else over_floor(study, floor)
+    # Over windows another question is asked: what follows a machine for a moment needn't follow it further.
+    return finer if finer is not None and finer.windows == study.windows else None
+
+
+def _better(found: tuple[Study, Causes], again: tuple[Study, Causes]) -> tuple[Study, Causes]:
+    """Give the round whose answer leaves less on samples that no fit saw."""
+    return min((found, again), key=lambda one: one[1].best.gap)
+
+
+def _parted(study: Study, causes: Causes) -> bool:
+    """Whether nothing is named since runs part from the log's; where something else explains it, they don't."""
+    unexplained = causes.verdict == "unknown" and causes.instead is None
+    return unexplained and study.windows is None and causes.followed and is_lost(study.location, causes.best.chi)

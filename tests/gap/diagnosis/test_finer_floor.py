@@ -1,0 +1,62 @@
+"""A floor that is too high is asked for again behind the best cause, and only where that hides something."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import chladni
+from chladni.gap.diagnosis.finer_floor import finer_floor
+from chladni.gap.diagnosis.study import over_floor, study_of
+from chladni.gap.explanation.contest import Contest
+from chladni.gap.explanation.hypotheses import hypothesis_of
+from tests.gap.arm import arm, measured
+
+RUB = chladni.attached("coulomb_friction", "elbow", {"force": 8.0})
+NOISE = 0.01
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    """The study of an arm that rubs, over a floor of its wrist's sensor that is ten times too high."""
+    study = study_of(arm(), measured((RUB,), seconds=3.0, noise=NOISE, off={}), leave_out=frozenset(), own={})
+    contest, high = study.contest, np.array([0.0, 0.0, 10.0])
+    return replace(
+        study, contest=Contest(contest.run, contest.noise.raised(high * contest.noise.rms), contest.training)
+    )
+
+
+def answer(study, left):
+    """What a cause explains but for some signal that it leaves."""
+    found = study.contest.enter(hypothesis_of((RUB,), study.location.tuned.z))
+    missed = replace(found.fit, outputs=found.fit.outputs - left)
+    return SimpleNamespace(best=replace(found, fit=missed), instead=None)
+
+
+@pytest.mark.slow
+def test_the_noise_behind_a_cause_is_told_where_it_hid_something(rubbing) -> None:
+    outputs = rubbing.measurement.outputs
+    noise = NOISE * np.std(outputs, axis=1)
+    # What a force that nobody modelled does reaches all sensors, here with three times the noise of each.
+    square = outputs[2] ** 2 - np.mean(outputs[2] ** 2)
+    left = 3.0 * noise[:, None] * square / np.std(square)
+    finer = finer_floor(rubbing, answer(rubbing, left))
+    assert finer is not None
+    assert finer.rms[2] < 0.5 * rubbing.contest.noise.rms[2]
+    assert np.all(finer.rms <= rubbing.contest.noise.rms)
+
+
+@pytest.mark.slow
+def test_nothing_new_is_told_where_nothing_was_named_or_only_noise_is_left(rubbing) -> None:
+    nothing = answer(rubbing, np.zeros_like(rubbing.measurement.outputs))
+    assert finer_floor(rubbing, nothing) is None
+    plain = rubbing.contest.enter(hypothesis_of((), rubbing.location.tuned.z), tune=False)
+    assert finer_floor(rubbing, SimpleNamespace(best=plain, instead=None)) is None
+
+
+@pytest.mark.slow
+def test_another_round_is_held_over_the_floor_that_was_told(rubbing) -> None:
+    finer = over_floor(rubbing, rubbing.contest.noise.lowered(np.array([1.0, 1.0, 0.01])))
+    assert finer.contest.noise.rms[2] < 0.2 * rubbing.contest.noise.rms[2]
+    assert (finer.leave_out, finer.windows, finer.measurement.log) == (frozenset(), None, rubbing.measurement.log)
