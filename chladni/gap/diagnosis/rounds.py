@@ -22,9 +22,9 @@ def causes_found(study: Study, progress: Step) -> tuple[Study, Causes]:
     follows as far over short windows, the states that it led through are where longer windows begin.
     """
     found = study, causes_of(study, _part(progress, 0.0, _FIRST))
-    finer = _over_finer_floor(*found)
+    finer = finer_floor(*found)
     if finer is not None:
-        found = _better(found, _again(found, finer, _part(progress, _FIRST, _FINER)))
+        found = _better(found, _again(found, over_floor(study, finer), _part(progress, _FIRST, _FINER)))
     windowed = over_windows(found[0]) if _parted(*found) else None
     if windowed is not None:
         found = _again(found, windowed, _part(progress, _FINER, 1.0))
@@ -40,14 +40,6 @@ def _again(found: tuple[Study, Causes], study: Study, progress: Step) -> tuple[S
     """Judge another study of the same log; what was found before where that names nothing."""
     causes = causes_of(study, progress)
     return (study, causes) if causes.verdict == "effect" and causes.shaken is None else found
-
-
-def _over_finer_floor(study: Study, causes: Causes) -> Study | None:
-    """Give the study over the noise as it shows behind the best cause; None where that says nothing new."""
-    floor = finer_floor(study, causes)
-    finer = None if floor is None else over_floor(study, floor)
-    # Over windows another question is asked: what follows a machine for a moment needn't follow it further.
-    return finer if finer is not None and finer.windows == study.windows else None
 
 
 def _better(found: tuple[Study, Causes], again: tuple[Study, Causes]) -> tuple[Study, Causes]:

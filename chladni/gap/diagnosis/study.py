@@ -84,16 +84,11 @@ class Study:
 
 
 def study_of(
-    model: Model,
-    measurement: Measurement,
-    *,
-    leave_out: frozenset[str],
-    own: Mapping[str, EffectKind],
-    noise: NoiseFloor | None = None,
+    model: Model, measurement: Measurement, *, leave_out: frozenset[str], own: Mapping[str, EffectKind]
 ) -> Study:
-    """Prepare the study of one log; without `noise` that is estimated from it."""
+    """Prepare the study of one log."""
     measurement = with_period(measurement)
-    noise = floor_of(measurement) if noise is None else noise
+    noise = floor_of(measurement)
     lattices = {} if "quantization" in leave_out else _lattices(measurement, noise)
     noise = _with_rounding(noise, model, measurement, lattices)
     location = locate(model, measurement, noise, Tunables.of(model))
@@ -114,8 +109,11 @@ def study_of(
 
 
 def over_floor(study: Study, noise: NoiseFloor) -> Study:
-    """Give the study of the same log over another floor."""
-    return study_of(study.model, study.measurement, leave_out=study.leave_out, own=study.own, noise=noise)
+    """Give the study of the same log over another floor, its runs as long as they were."""
+    noise = _with_rounding(noise, study.model, study.measurement, study.lattices)
+    location = locate(study.model, study.measurement, noise, Tunables.of(study.model))
+    contest = Contest(study.contest.run, location.problem.noise, study.contest.training, study.contest.states)
+    return replace(study, location=location, contest=contest)
 
 
 def floor_of(measurement: Measurement) -> NoiseFloor:
