@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from chladni.gap.explanation.body_trials import STIFF_MOUNT
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.explanation.joint_trials import share_risen
 from chladni.gap.plant.free_run import FreeRun
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.errors import ModelError
@@ -17,6 +18,8 @@ Matrix = NDArray[np.float64]
 _FRICTION, _LOOP = 0.12, 0.3
 #: Damping ratio from which an attached mass is no oscillator: critical damping is 1, and fits aren't exact.
 _DASHPOT = 2.0
+#: Standard deviation over reach of a jump that is at 2 % of a log; instants at which a change is looked at.
+_JUMP, _INSTANTS = 0.14, 1000
 
 
 def is_degenerate(run: FreeRun, found: Contestant) -> bool:
@@ -27,9 +30,7 @@ def is_degenerate(run: FreeRun, found: Contestant) -> bool:
 def _degenerate(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool:
     values = effect.values
     if effect.effect == "varying_stiffness":
-        share = values["time"] / run.measurement.duration_s
-        # A change that is over at once, or never comes, is a stiffness.
-        return not (0.02 < share < 0.98 if effect.variant == "step" else share > 0.1)
+        return not _changes(effect.variant, values, run.measurement.duration_s)
     if effect.effect == "extra_mode":
         # Resonant well above all that moved, it's a mass; one that doesn't swing once is a spring to where it stands;
         # one that is damped far too much to swing is a mass that a dashpot carries.
@@ -47,6 +48,15 @@ def _degenerate(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool
         motion = _motion(run, found, effect)
         return motion is None or _never_seen(effect.effect, values, *motion)
     return False
+
+
+def _changes(variant: str, values: Mapping[str, float], duration_s: float) -> bool:
+    """Whether a log sees a stiffness change: what is over at once, or never comes, is a stiffness."""
+    if variant != "step":
+        return values["time"] > 0.1 * duration_s
+    # A slow one may be seen though its middle lies outside of the log.
+    share = share_risen(np.linspace(0.0, duration_s, _INSTANTS), values["time"], values["rise"])
+    return float(np.std(share)) > _JUMP * float(np.ptp(share))
 
 
 def _never_seen(word: str, values: Mapping[str, float], d: Matrix, s: Matrix) -> bool:

@@ -183,16 +183,18 @@ def _varying(motion: Recovered, port: Port) -> Iterator[Trial]:
     # From a jump to a change that takes half of the log.
     rises = (0.01 * length, 0.15 * length, 0.5 * length)
 
-    def risen(shape: Shape) -> Force:
-        time, rise = numbers(shape)
-        u = np.clip((t - time) / rise + 0.5, 0.0, 1.0)
-        return Force.of(motion.spectrum(d * u**3 * (10.0 + u * (6.0 * u - 15.0))))
-
     yield Trial(
-        effect="varying_stiffness", site=motion.site, variant="step", build=risen,
+        effect="varying_stiffness", site=motion.site, variant="step",
+        build=lambda shape: Force.of(motion.spectrum(d * share_risen(t, *numbers(shape)))),
         grid=logarithms(np.linspace(0.1 * length, 0.9 * length, 9).tolist(), rises),
         values=lambda shape, a: _with_rise(change(shape, a), shape), parameters=3,
     )  # fmt: skip
+
+
+def share_risen(t: Matrix, time: float, rise: float) -> Matrix:
+    """Give ``[sample]`` which share of a step's change is there at times t, as in `varying_stiffness`."""
+    u = np.clip((t - time) / rise + 0.5, 0.0, 1.0)
+    return np.asarray(u**3 * (10.0 + u * (6.0 * u - 15.0)), dtype=np.float64)
 
 
 def _with_rise(values: Numbers | None, shape: Shape) -> Numbers | None:

@@ -10,7 +10,7 @@ from chladni.gap.explanation.degenerate import is_degenerate
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.plant.free_run import FreeRun
-from chladni.models.effects.attached_effect import attached
+from chladni.models.effects.attached_effect import AttachedEffect, attached
 from tests.gap.arm import arm, measured
 
 
@@ -22,7 +22,16 @@ def run() -> FreeRun:
 def hanging(frequency_hz: float, damping_ratio: float = 0.02) -> Contestant:
     """A fit that ended at a mass that hangs at a body with this frequency."""
     values = {"mass": 0.5, "frequency": frequency_hz, "damping_ratio": damping_ratio}
-    effect = attached("extra_mode", "arm", values)
+    return ended_at(attached("extra_mode", "arm", values))
+
+
+def changing(at: float, rise: float) -> Contestant:
+    """A fit that ended at a spring that changes about a time, slowly or not."""
+    values = {"relative_change": 0.2, "time": at, "rise": rise}
+    return ended_at(attached("varying_stiffness", "elbow", values, variant="step"))
+
+
+def ended_at(effect: AttachedEffect) -> Contestant:
     hypothesis = Hypothesis(effects=(effect,), fitted=((),), start_z=np.zeros(0))
     return Contestant(
         hypothesis=hypothesis, fit=SimpleNamespace(effects=(effect,)), held=np.ones(3), gap=0.0, prior=0.0
@@ -46,3 +55,16 @@ def test_an_oscillator_far_above_all_that_moved_is_a_mass(run: FreeRun) -> None:
     highest_hz = excited_band_hz(run.measurement)[1]
     assert not is_degenerate(run, hanging(0.9 * STIFF_MOUNT * highest_hz))
     assert is_degenerate(run, hanging(1.1 * STIFF_MOUNT * highest_hz))
+
+
+def test_a_change_that_is_over_at_once_or_never_comes_is_a_stiffness(run: FreeRun) -> None:
+    length = run.measurement.duration_s
+    assert not is_degenerate(run, changing(0.04 * length, 0.01 * length))
+    assert is_degenerate(run, changing(0.01 * length, 0.005 * length))
+    assert is_degenerate(run, changing(0.99 * length, 0.005 * length))
+    assert is_degenerate(run, changing(1.5 * length, 0.1 * length))
+
+
+def test_a_slow_change_is_seen_though_half_of_it_comes_after_the_log(run: FreeRun) -> None:
+    length = run.measurement.duration_s
+    assert not is_degenerate(run, changing(1.02 * length, 2.0 * length))
