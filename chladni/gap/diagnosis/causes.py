@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 from chladni.gap.diagnosis.completeness import completeness, completeness_among, known_share
 from chladni.gap.diagnosis.grown import Grown
 from chladni.gap.diagnosis.instead import Instead, explained_elsewhere, explained_instead
-from chladni.gap.diagnosis.own_signal import share_of_own_signal
+from chladni.gap.diagnosis.own_signal import FOLLOWS, share_of_own_signal
 from chladni.gap.diagnosis.pairs import exchanged, paired_causes, second_causes, two_act, without_one
 from chladni.gap.diagnosis.price import added_nats, leaves_for_sure, price_among
 from chladni.gap.diagnosis.search import (
@@ -47,8 +47,6 @@ _CLEAN = 1.6
 _NEAR = 0.03
 #: Probability that a cause is all of it, with which it's named.
 _COMPLETE = 0.5
-#: Share of what a sensor leaves that follows its own signal in a curve: more is no noise.
-_DISTORTED = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -244,7 +242,7 @@ def _distorted(study: Study, tuned: Contestant) -> tuple[str, ...]:
     simulated = tuned.fit.outputs[:, study.held]
     shares = share_of_own_signal(simulated, study.measurement.outputs[:, study.held] - simulated)
     return tuple(
-        name for name, share in zip(study.measurement.output_names, shares, strict=True) if share > _DISTORTED
+        name for name, share in zip(study.measurement.output_names, shares, strict=True) if share > FOLLOWS
     )
 
 

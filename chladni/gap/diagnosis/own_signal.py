@@ -8,6 +8,8 @@ from chladni.gap.explanation.hats import hats
 Matrix = NDArray[np.float64]
 #: Points of the function. Of a few thousand samples of noise it explains a few per cent.
 _POINTS = 60
+#: A residual of which a curve explains more is no noise.
+FOLLOWS = 0.2
 
 
 def share_of_own_signal(simulated: Matrix, residual: Matrix) -> Matrix:
@@ -27,12 +29,25 @@ def share_of_own_signal(simulated: Matrix, residual: Matrix) -> Matrix:
     """
     found = np.zeros(len(simulated))
     for row, (signal, left) in enumerate(zip(simulated, residual, strict=True)):
-        plain = _left([np.ones_like(signal), signal], left)
-        found[row] = 1.0 - _left(hats(signal, _POINTS), left) / plain if plain > 0 else 0.0
+        plain = _power(_rest([np.ones_like(signal), signal], left))
+        found[row] = 1.0 - _power(_rest(hats(signal, _POINTS), left)) / plain if plain > 0 else 0.0
     return found
 
 
-def _left(functions: list[Matrix], target: Matrix) -> float:
+def without_own_signal(simulated: Matrix, residual: Matrix) -> Matrix:
+    """Give ``[output, sample]`` residuals without the curve over their own signal, where they follow one.
+
+    What is left of the others is as it was: a curve through noise would take some of that.
+    """
+    shares = share_of_own_signal(simulated, residual)
+    rows = zip(simulated, residual, shares, strict=True)
+    return np.stack([_rest(hats(signal, _POINTS), left) if share > FOLLOWS else left for signal, left, share in rows])
+
+
+def _rest(functions: list[Matrix], target: Matrix) -> Matrix:
     columns = np.stack(functions, axis=1)
-    rest = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
-    return float(rest @ rest)
+    return np.asarray(target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0])
+
+
+def _power(row: Matrix) -> float:
+    return float(row @ row)

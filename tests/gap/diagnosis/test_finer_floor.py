@@ -48,6 +48,20 @@ def test_the_noise_behind_a_cause_is_told_where_it_hid_something(rubbing) -> Non
 
 
 @pytest.mark.slow
+def test_a_clipped_sensor_s_distortion_is_not_in_the_floor_that_is_told(rubbing) -> None:
+    found = rubbing.contest.enter(hypothesis_of((RUB,), rubbing.location.tuned.z))
+    wrist, noise = found.fit.outputs[2], NOISE * np.std(rubbing.measurement.outputs[2])
+    cut = np.clip(wrist, *np.quantile(wrist, [0.1, 0.9])) - wrist
+    clipped = replace(
+        rubbing,
+        measurement=replace(rubbing.measurement, outputs=rubbing.measurement.outputs + [[0.0], [0.0], [1.0]] * cut),
+    )
+    finer = finer_floor(clipped, SimpleNamespace(best=found, instead=None))
+    assert finer is not None
+    assert finer.rms[2] == pytest.approx(noise, rel=0.15)
+
+
+@pytest.mark.slow
 def test_nothing_new_is_told_where_nothing_was_named_or_only_noise_is_left(rubbing) -> None:
     nothing = answer(rubbing, np.zeros_like(rubbing.measurement.outputs))
     assert finer_floor(rubbing, nothing) is None

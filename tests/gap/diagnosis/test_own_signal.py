@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.gap.diagnosis.own_signal import share_of_own_signal
+from chladni.gap.diagnosis.own_signal import share_of_own_signal, without_own_signal
 
 
 def test_curves_and_steps_are_seen_and_a_gain_and_noise_are_not() -> None:
@@ -22,3 +22,13 @@ def test_curves_and_steps_are_seen_and_a_gain_and_noise_are_not() -> None:
 
 def test_a_sensor_that_shows_nothing_follows_nothing() -> None:
     assert share_of_own_signal(np.zeros((1, 50)), np.zeros((1, 50)))[0] == 0.0
+
+
+def test_what_a_clipped_sensor_leaves_is_taken_away_and_noise_is_not() -> None:
+    rng = np.random.default_rng(8)
+    signal, noise = rng.standard_normal((2, 20_000)), 0.05 * rng.standard_normal((2, 20_000))
+    left = noise.copy()
+    left[0] += np.clip(signal[0], -1.2, 1.2) - signal[0]
+    found = without_own_signal(signal, left)
+    assert np.std(found[0]) == pytest.approx(0.05, rel=0.03)
+    np.testing.assert_array_equal(found[1], noise[1])
