@@ -28,6 +28,7 @@ def joint_trials(motion: Recovered, port: Port) -> Iterator[Trial]:
     yield _creeping(motion)
     yield from _polynomials(motion)
     if port.stiffness > 0:
+        yield _polynomial(motion, "softening_stiffness", motion.displacement**3, "cubic", sign=-1.0)
         yield _yielding(motion, port)
         yield _backlash(motion, port)
         yield from _varying(motion, port)
@@ -109,19 +110,18 @@ def _creeping(motion: Recovered) -> Trial:
     )  # fmt: skip
 
 
+def _polynomial(motion: Recovered, effect: str, signal: Matrix, name: str, *, sign: float = 1.0) -> Trial:
+    spectrum = motion.spectrum(signal)
+    return Trial(
+        effect=effect, site=motion.site, build=lambda _: Force.of(spectrum),
+        values=lambda _, a: {name: float(a[0])} if sign * a[0] > 0 else None, parameters=1,
+    )  # fmt: skip
+
+
 def _polynomials(motion: Recovered) -> Iterator[Trial]:
     d, s = motion.displacement, motion.velocity
-
-    def of(effect: str, signal: Matrix, name: str, sign: float) -> Trial:
-        spectrum = motion.spectrum(signal)
-        return Trial(
-            effect=effect, site=motion.site, build=lambda _: Force.of(spectrum),
-            values=lambda _, a: {name: float(a[0])} if sign * a[0] > 0 else None, parameters=1,
-        )  # fmt: skip
-
-    yield of("quadratic_damping", s * np.abs(s), "coefficient", 1.0)
-    yield of("hardening_stiffness", d**3, "cubic", 1.0)
-    yield of("softening_stiffness", d**3, "cubic", -1.0)
+    yield _polynomial(motion, "quadratic_damping", s * np.abs(s), "coefficient")
+    yield _polynomial(motion, "hardening_stiffness", d**3, "cubic")
     yield Trial(
         effect="hardening_stiffness", site=motion.site, variant="progressive",
         build=lambda _: Force.of(motion.spectrum(d**3), motion.spectrum(d**5)),

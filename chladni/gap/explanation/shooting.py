@@ -70,7 +70,10 @@ class Shooting:
         """Fit over the shortest windows; None when that fails, or when there are no shorter ones."""
         if not self.levels:
             return None
-        names = self.contest.run.compiled(None, hypothesis.effects).states
+        try:
+            names = self.contest.run.compiled(None, hypothesis.effects).states
+        except ModelError:
+            return None
         return self._shot(hypothesis, 0, self.states.at_starts(self.levels[0], names))
 
     def grown(self, shot: Shot) -> Shot:

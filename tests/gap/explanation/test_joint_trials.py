@@ -8,7 +8,9 @@ from scipy.integrate import solve_ivp
 
 from chladni.gap.explanation.candidates import screened
 from chladni.gap.explanation.hypotheses import effect_hypotheses, hypothesis_of
+from chladni.gap.explanation.joint_trials import joint_trials
 from chladni.gap.location.locate import locate
+from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
 from chladni.models.effects.attached_effect import attached
@@ -132,3 +134,17 @@ def test_a_few_forms_that_are_as_good_as_the_last_one_are_tried_too(found):
 def test_which_output_an_effect_listens_to_is_a_number_more():
     share = attached("cross_axis", "force", {"coefficient": 0.1}, source="way")
     assert hypothesis_of((share,), np.zeros(0)).freedom == 2
+
+
+@pytest.mark.parametrize(("stiffness", "there"), [(4e4, True), (0.0, False)])
+def test_a_joint_without_a_spring_has_none_that_could_soften_or_change(stiffness, there):
+    seen = (StructureOutput(name="motion", measures="displacement", at="b0"),)
+    model = replace(chain([1.0], [4e4], [20.0]), outputs=seen)
+    log, floor = measured(model, band_noise(500, rms=60.0), noise=2e-3)
+    location = locate(model, log, floor, Tunables.of(model))
+    place = next(one for one in location.ranked if "j0" in one.places[0].names)
+    motion = recovered(location.problem, place.profile, place.places[0].sites[0])
+    port = next(one for one in model.compile().ports if one.name == "j0")
+    words = {one.effect for one in joint_trials(motion, replace(port, stiffness=stiffness))}
+    assert words.isdisjoint({"softening_stiffness", "backlash", "varying_stiffness"}) != there
+    assert {"coulomb_friction", "hardening_stiffness"} <= words

@@ -70,3 +70,11 @@ def test_a_run_of_one_end_only_is_entered_where_windows_led() -> None:
     found = shooting.entered(shooting.shot(near(1.03)))
     assert found.chi < 1.3
     assert found.fit.effects[0].values["amplitude"] == pytest.approx(3.0, rel=0.05)
+
+
+@pytest.mark.slow
+def test_what_no_machine_could_have_is_not_shot(made) -> None:
+    _, shooting = made
+    # The first of the outputs is a place, but no joint.
+    nowhere = hypothesis_of((attached("backlash", "x0", {"gap": 1e-3}),), np.zeros(6))
+    assert shooting.shot(nowhere) is None
