@@ -73,7 +73,7 @@ def _of_periods_or_fit(measurement: Measurement) -> NoiseFloor:
     outputs = measurement.outputs
     floor = _floor(spectra, outputs, "periods", np.zeros(len(outputs), dtype=np.bool_))
     # A machine that changes, or is disturbed, between periods makes their scatter a poor bound.
-    return _chosen(fitted.rms < MOVED * floor.rms, floor, fitted)
+    return chosen_floor(fitted.rms < MOVED * floor.rms, floor, fitted)
 
 
 def _stepped(outputs: Matrix, floor: NoiseFloor) -> Mask:
@@ -139,11 +139,11 @@ def _line_edges(length: int) -> Matrix:
 
 def smaller_floor(first: NoiseFloor, second: NoiseFloor) -> NoiseFloor:
     """Give, output by output, the floor that is lower; both hold the same outputs."""
-    return _chosen(second.rms < first.rms, first, second)
+    return chosen_floor(second.rms < first.rms, first, second)
 
 
-def _chosen(lower: Mask, first: NoiseFloor, second: NoiseFloor) -> NoiseFloor:
-    """Give the second floor for the outputs marked, else the first."""
+def chosen_floor(lower: Mask, first: NoiseFloor, second: NoiseFloor) -> NoiseFloor:
+    """Give the second floor for the outputs marked ``[output]``, else the first; both hold the same outputs."""
     lags = max(first.whitening.shape[1], second.whitening.shape[1])
     padded = [np.pad(one.whitening, ((0, 0), (0, lags - one.whitening.shape[1]))) for one in (first, second)]
     methods = zip(lower, first.method, second.method, strict=True)

@@ -241,9 +241,7 @@ def _words(one: Contestant) -> list[str]:
 def _distorted(study: Study, tuned: Contestant) -> tuple[str, ...]:
     simulated = tuned.fit.outputs[:, study.held]
     shares = share_of_own_signal(simulated, study.measurement.outputs[:, study.held] - simulated)
-    return tuple(
-        name for name, share in zip(study.measurement.output_names, shares, strict=True) if share > FOLLOWS
-    )
+    return tuple(name for name, share in zip(study.measurement.output_names, shares, strict=True) if share > FOLLOWS)
 
 
 def _verdict(together: Sequence[Contestant], tuned: Contestant, best: Contestant, floor: Matrix) -> Verdict:

@@ -1,4 +1,4 @@
-"""Noise as it shows behind the best cause, where the floor that was estimated without one is too high."""
+"""Noise as it shows behind the best cause, where the floor that was estimated without one may be too high."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from chladni.gap.diagnosis.study import Study
 from chladni.gap.records.noise_floor import NoiseFloor
 
 #: A floor that is lowered by less says the same.
-_LOWER = 0.7
+LOWER = 0.7
 
 
 def finer_floor(study: Study, causes: Causes) -> NoiseFloor | None:
@@ -29,6 +29,6 @@ def finer_floor(study: Study, causes: Causes) -> NoiseFloor | None:
     left = measurement.outputs - best.fit.outputs
     rest = without_own_signal(best.fit.outputs, left)
     finer = smaller_floor(noise, estimate_noise(replace(measurement, outputs=rest)))
-    lower = bool(np.any(finer.rms < _LOWER * noise.rms))
+    lower = bool(np.any(finer.rms < LOWER * noise.rms))
     more = bool(np.any(np.mean(left**2, axis=1) > ALONE * finer.rms**2))
     return finer if lower and more else None

@@ -5,13 +5,14 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.diagnosis.search import ALONE, least_left, sound
+from chladni.gap.diagnosis.search import ALONE, least_left, near_places, sound
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.candidates import Form, forms_at, promised, screened, searched
 from chladni.gap.explanation.hypotheses import effect_hypotheses, hypothesis_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.known_effect import KnownEffect
 from chladni.gap.explanation.linear_words import linear_hypotheses
+from chladni.gap.explanation.screen import Screened
 from chladni.gap.location.locate import Located, Location, locate, located_pairs
 from chladni.gap.tuning.law_error import with_law_error
 from chladni.models.core.model import Model
@@ -19,8 +20,13 @@ from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.errors import ModelError
 
 Matrix = NDArray[np.float64]
-#: Fits of a second effect beside a first, and of each of two at once; places at which a second is looked for.
-_SECOND, _EACH, _PLACES = 4, 2, 4
+#: Fits of a second effect beside a first, and of each of two at once.
+_SECOND, _EACH = 4, 2
+#: Places at which a second effect is looked for; most of them, where others leave at most so many times what the best
+#: one does.
+_PLACES, _MOST_PLACES, _AS_GOOD = 4, 7, 1.1
+#: Share of what a first effect leaves below which a screened law leaves much less.
+_PROMISED = 0.6
 #: Linear words that are fitted beside the parameters behind a first effect.
 _LINEAR = 4
 #: Two forces must leave less than this of what one leaves; pairs that are as good as the best are screened too, so
@@ -54,13 +60,7 @@ def second_causes(
     if behind is None:
         return []
     model, location, known = behind
-    # At the same place a second word would mend the details of the first one's law.
-    taken = _same_places(study, {one.site for one in kept})
-    trials = [
-        one
-        for one in screened(location, location.ranked[:_PLACES], study.leave_out, study.own, known)
-        if one.trial.site.name not in taken
-    ]
+    trials = _second_trials(study, location, kept, known)
     singles = effect_hypotheses(trials, study.own, count=_SECOND)
     both = [_beside(found, kept, one, found.fit.z) for one in singles]
     entered = sound(study, study.contest.enter_all(both))
@@ -69,6 +69,30 @@ def second_causes(
         both = [_beside(found, kept, one, one.start_z) for one in linear]
         entered += sound(study, study.contest.enter_all(both))
     return entered
+
+
+def promises_another(study: Study, found: Contestant) -> bool:
+    """Whether a law at another place, screened on what a first effect leaves, promises to explain much of that.
+
+    Noise of any colour lets none do so, since there is no law that it follows.
+    """
+    behind = _behind(study, found, found.fit.effects)
+    if behind is None:
+        return False
+    _, location, known = behind
+    trials = _second_trials(study, location, found.fit.effects, known)
+    return min((one.chi for one in trials), default=np.inf) < _PROMISED * location.tuned.chi
+
+
+def _second_trials(
+    study: Study, location: Location, kept: Sequence[AttachedEffect], known: KnownEffect | None
+) -> list[Screened]:
+    """Screen the best places for a second effect, beside those that are kept."""
+    count = min(max(_PLACES, len(near_places(location, _AS_GOOD))), _MOST_PLACES)
+    trials = screened(location, location.ranked[:count], study.leave_out, study.own, known)
+    # At the same place a second word would mend the details of the first one's law.
+    taken = _same_places(study, {one.site for one in kept})
+    return [one for one in trials if one.trial.site.name not in taken]
 
 
 def _beside(found: Contestant, kept: tuple[AttachedEffect, ...], one: Hypothesis, z: Matrix) -> Hypothesis:

@@ -4,18 +4,20 @@ from collections.abc import Callable
 
 from chladni.gap.diagnosis.causes import Causes, causes_of
 from chladni.gap.diagnosis.finer_floor import finer_floor
+from chladni.gap.diagnosis.quieter_floor import quieter_study
 from chladni.gap.diagnosis.search import is_lost
 from chladni.gap.diagnosis.study import Study, over_floor, over_windows
 
 Step = Callable[[float], None]
-#: Progress at the ends of the first contest, and of another one over a finer floor.
-_FIRST, _FINER = 0.6, 0.8
+#: Progress at the ends of the first contest, of another one over a finer floor, and of one over the quiet band's.
+_FIRST, _FINER, _QUIETER = 0.6, 0.75, 0.9
 
 
 def causes_found(study: Study, progress: Step) -> tuple[Study, Causes]:
     """Judge a study; over a finer floor and over windows again, when effects are named there.
 
-    Behind the first answer noise may turn out far lower than it was estimated; what that leaves is another cause.
+    Behind the first answer noise may turn out far lower than it was estimated, or a law promise to explain what was
+    taken for noise; that is another cause.
 
     A machine that may come to rest at several places, or take several ways on, goes one that a model of almost the
     same numbers doesn't. An unknown force goes with it: where that explains far more than any run does, and a law
@@ -25,9 +27,14 @@ def causes_found(study: Study, progress: Step) -> tuple[Study, Causes]:
     finer = finer_floor(*found)
     if finer is not None:
         found = _better(found, _again(found, over_floor(study, finer), _part(progress, _FIRST, _FINER)))
+    quieter = quieter_study(*found)
+    if quieter is not None:
+        again = _again(found, quieter, _part(progress, _FINER, _QUIETER))
+        # Of one effect the quiet band's noise tells nothing but to be lower.
+        found = _better(found, again) if len(again[1].best.hypothesis.effects) > 1 else found
     windowed = over_windows(found[0]) if _parted(*found) else None
     if windowed is not None:
-        found = _again(found, windowed, _part(progress, _FINER, 1.0))
+        found = _again(found, windowed, _part(progress, _QUIETER, 1.0))
     progress(1.0)
     return found
 
