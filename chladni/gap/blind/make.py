@@ -137,12 +137,13 @@ def _terminals(case: Case) -> dict[str, Channel]:
 def truth_of(case: Case, seed: tuple[int, int]) -> dict[str, Any]:
     """Give all that is true of a case, ready for JSON."""
     ratios = case.ratios or (None,) * len(case.effects)
+    tuned = case.ratios_tuned or (case.ratio_tuned,) * len(case.effects)
     return {
         "kind": case.order.kind,
         "effects": [
             {"effect": one.effect, "site": one.site, "law": one.law, "parameters": dict(one.numbers),
-             "from": one.source or None, "severity": ratio}
-            for one, ratio in zip(case.effects, ratios, strict=True)
+             "from": one.source or None, "severity": ratio, "severity_tuned": left}
+            for one, ratio, left in zip(case.effects, ratios, tuned, strict=True)
         ],
         "off": dict(case.off),
         "parameters": dict(case.numbers),

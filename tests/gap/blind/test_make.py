@@ -202,6 +202,9 @@ def test_a_case_with_two_effects_has_both_at_different_sites():
     assert [one.effect for one in case.effects] == ["quadratic_damping", "gain_error"]
     assert len({one.site for one in case.effects}) == 2
     assert min(case.ratios) >= 2.8
+    # The tolerances of a model that lacks one of them must not imitate that one.
+    assert len(case.ratios_tuned) == 2
+    assert min(case.ratios_tuned) >= 1.0
 
 
 @pytest.mark.parametrize("colour", ["white", "pink", "low_pass", "resonant"])
