@@ -25,8 +25,8 @@ _SECOND, _EACH = 4, 2
 #: Places at which a second effect is looked for; most of them, where others leave at most so many times what the best
 #: one does.
 _PLACES, _MOST_PLACES, _AS_GOOD = 4, 7, 1.1
-#: Share of what a first effect leaves below which a screened law leaves much less.
-_PROMISED = 0.6
+#: Share of what others leave below which a screened law, and a fit, leaves much less.
+_PROMISED, _MUCH_LESS = 0.6, 0.5
 #: Linear words that are fitted beside the parameters behind a first effect.
 _LINEAR = 4
 #: Two forces must leave less than this of what one leaves; pairs that are as good as the best are screened too, so
@@ -55,20 +55,43 @@ def second_causes(
     effects
         Those of the fit that are taken for known, all by default.
     """
-    kept = tuple(found.fit.effects if effects is None else effects)
+    entered, good = _entered_beside(study, found, tuple(found.fit.effects if effects is None else effects))
+    stone = _stepping_stone(found, entered, good) if effects is None else None
+    if stone is not None:
+        _, again = _entered_beside(study, stone, stone.fit.effects[-1:])
+        good += again
+    return good
+
+
+def _entered_beside(
+    study: Study, found: Contestant, kept: tuple[AttachedEffect, ...]
+) -> tuple[list[Contestant], list[Contestant]]:
+    """Enter another effect beside those of a fit that are kept; all that were entered, and the sound ones."""
     behind = _behind(study, found, kept)
     if behind is None:
-        return []
+        return [], []
     model, location, known = behind
     trials = _second_trials(study, location, kept, known)
     singles = effect_hypotheses(trials, study.own, count=_SECOND)
-    both = [_beside(found, kept, one, found.fit.z) for one in singles]
-    entered = sound(study, study.contest.enter_all(both))
-    if least_left(entered) > ALONE:
+    entered = study.contest.enter_all([_beside(found, kept, one, found.fit.z) for one in singles])
+    good = sound(study, entered)
+    if least_left(good) > ALONE:
         linear = linear_hypotheses(model, location, trials, study.own, count=_LINEAR)
-        both = [_beside(found, kept, one, one.start_z) for one in linear]
-        entered += sound(study, study.contest.enter_all(both))
-    return entered
+        more = study.contest.enter_all([_beside(found, kept, one, one.start_z) for one in linear])
+        entered, good = [*entered, *more], [*good, *sound(study, more)]
+    return entered, good
+
+
+def _stepping_stone(
+    found: Contestant, entered: Sequence[Contestant], good: Sequence[Contestant]
+) -> Contestant | None:
+    """Give the fit that isn't sound but leaves much less than any other: what it added is right, if nothing else.
+
+    An oscillator that imitated rubber may turn into a spring once the second effect is known.
+    """
+    stone = min(entered, key=lambda one: one.chi, default=None)
+    others = min(least_left(good), found.chi)
+    return stone if stone is not None and stone.chi < _MUCH_LESS * others else None
 
 
 def promises_another(study: Study, found: Contestant) -> bool:
