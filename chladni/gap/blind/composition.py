@@ -14,7 +14,7 @@ from chladni.signals.errors import SetupError
 
 #: Cases of each kind in two hundred. A share of 5 % can't be told of fewer than twenty pairs, or faint effects.
 DEFAULT: Mapping[Kind, int] = {
-    "effect": 76, "none": 54, "parameters": 8, "two": 20, "faint": 20, "leave_out": 14, "outside": 8,
+    "effect": 78, "none": 52, "parameters": 8, "two": 20, "faint": 20, "leave_out": 14, "outside": 8,
 }  # fmt: skip
 #: Share of cases whose noise is coloured; of those without an effect it's half, exactly.
 _COLOURED = 0.4
