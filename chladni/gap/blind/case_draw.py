@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import permutations
 from typing import Literal
 
 import numpy as np
@@ -75,7 +76,7 @@ class Case:
     ratios
         Like `ratio`, of each effect alone.
     ratios_tuned
-        Like `ratio_tuned`, of each of several effects alone.
+        Like `ratio_tuned`, of each of two effects when the other is known but for its size.
     off
         Parameter that left its tolerance, and by how many sigma; empty when none did.
     steps
@@ -152,15 +153,15 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case | None:
     tuned = _left(bench, numbers, drive, effects, off, clean, after, noise)
     if tuned is not None and order.kind != "faint" and tuned < LEAST_LEFT:
         return None
-    # Beside the other one, too, nobody could find what a little more stiffness imitates.
-    alone = [_left_alone(bench, numbers, drive, one, clean, noise, steps) for one in effects if len(effects) > 1]
-    if alone and min(alone) < LEAST_LEFT:
+    # Beside the other one, too, nobody could find what a little more stiffness, or a larger other effect, imitates.
+    beside = tuple(_left_beside(bench, numbers, drive, *pair, noise, steps) for pair in permutations(effects, 2))
+    if beside and min(beside) < LEAST_LEFT:
         return None
     return Case(
         order=order, bench=bench, numbers=numbers, drive=drive, effects=effects, clean=after,
         recorded=_recorded(moved, effects, noise, rng), noise=noise, steps=steps, change=change,
         ratio=None if change is None else change / share, ratio_tuned=tuned,
-        ratios=tuple(one / share for one in changes), ratios_tuned=tuple(alone), off=off,
+        ratios=tuple(one / share for one in changes), ratios_tuned=beside, off=off,
     )  # fmt: skip
 
 
@@ -180,12 +181,15 @@ def _left(bench: Bench, numbers: Mapping[str, float], drive: Drive, effects: tup
     return left_after_tuning(kept, about, drive, change, before, noise)
 
 
-def _left_alone(bench: Bench, numbers: Mapping[str, float], drive: Drive, one: Hidden, clean: Mapping[str, Matrix],
-                noise: Mapping[str, SensorNoise], steps: int) -> float:  # fmt: skip
-    """What tuning leaves of one effect of several, RMS in units of noise."""
-    after = converted(perform(bench, numbers, drive, (one,), steps=steps), (one,), list(noise))
-    change = {name: after[name] - clean[name] for name in noise}
-    return left_after_tuning(bench, numbers, drive, change, clean, noise)
+def _left_beside(bench: Bench, numbers: Mapping[str, float], drive: Drive, one: Hidden, other: Hidden,
+                 noise: Mapping[str, SensorNoise], steps: int) -> float:  # fmt: skip
+    """What tuning leaves of one of two effects when the other is known but for its size, RMS in units of noise."""
+    without, both = (
+        converted(perform(bench, numbers, drive, effects, steps=steps), effects, list(noise))
+        for effects in ((other,), (one, other))
+    )
+    change = {name: both[name] - without[name] for name in noise}
+    return left_after_tuning(bench, numbers, drive, change, without, noise, beside=other)
 
 
 def _draw_bench(rng: np.random.Generator) -> Bench:

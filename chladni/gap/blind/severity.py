@@ -17,7 +17,7 @@ from chladni.signals.errors import EstimateError
 Matrix = NDArray[np.float64]
 _TRIES, _CLOSE = 9, 1.12
 #: Steps a sample while the size is searched for; what is kept is simulated finer.
-_SEARCH_STEPS = 32
+SEARCH_STEPS = 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +69,7 @@ def sized(draft: Draft, scene: Scene, drive: Drive, clean: Mapping[str, Matrix],
 def _tried(hidden: Hidden, scene: Scene, drive: Drive, clean: Mapping[str, Matrix], names: list[str]) -> Sized | None:
     try:
         moved = clean if hidden.law in ON_SAMPLES else perform(
-            scene.bench, scene.numbers, drive, (hidden,), steps=_SEARCH_STEPS
+            scene.bench, scene.numbers, drive, (hidden,), steps=SEARCH_STEPS
         )  # fmt: skip
     except EstimateError:
         return None

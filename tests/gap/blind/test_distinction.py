@@ -9,6 +9,7 @@ from chladni.gap.blind.distinction import left_after_tuning
 from chladni.gap.blind.excitation_draw import draw_drive
 from chladni.gap.blind.noise import SensorNoise
 from chladni.gap.blind.performance import measured, perform, rms
+from chladni.gap.blind.plan import Hidden
 from chladni.gap.blind.structure_draw import draw_structure
 
 
@@ -23,9 +24,9 @@ def scene():
     return bench, numbers, drive, clean, noise
 
 
-def left(scene, change):
+def left(scene, change, beside=None):
     bench, numbers, drive, clean, noise = scene
-    return left_after_tuning(bench, numbers, drive, change, clean, noise)
+    return left_after_tuning(bench, numbers, drive, change, clean, noise, beside=beside)
 
 
 def moved(scene, sigmas):
@@ -65,3 +66,21 @@ def test_what_no_number_imitates_stays(scene):
     }
     # A dozen numbers fit a dozen of thousands of random samples.
     assert left(scene, change) == pytest.approx(5.0, rel=0.05)
+
+
+def test_what_more_of_another_effect_does_is_imitated_by_it(scene):
+    bench, numbers, drive, _, noise = scene
+    # One number of the machine's is enough beside that of the other effect.
+    tolerance = {name: 0.1 if name == "joint1.damping" else 0.0 for name in bench.plan.tolerance}
+    bench = replace(bench, plan=replace(bench.plan, tolerance=tolerance))
+    speed = rms(perform(bench, numbers, drive, watched=True)["joint1.s"])
+    drag = Hidden(
+        effect="quadratic_damping", site="joint1", law="quadratic",
+        numbers={"coefficient": numbers["joint1.damping"] / speed, "laminar_speed": 0.0},
+    )  # fmt: skip
+    larger = replace(drag, numbers={**drag.numbers, "coefficient": 1.4 * drag.numbers["coefficient"]})
+    there, more = (perform(bench, numbers, drive, (one,), steps=32) for one in (drag, larger))
+    change = {name: more[name] - there[name] for name in noise}
+    scene = bench, numbers, drive, there, noise
+    assert size(scene, change) > 1
+    assert left(scene, change, beside=drag) < 0.02 * size(scene, change)

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import chladni
+from chladni.gap.blind import case_draw
 from chladni.gap.blind.case_draw import Order, draw_case
 from chladni.gap.blind.case_folder import case_folders, truth_of_case
 from chladni.gap.blind.composition import DEFAULT, counts, orders
@@ -202,9 +203,29 @@ def test_a_case_with_two_effects_has_both_at_different_sites():
     assert [one.effect for one in case.effects] == ["quadratic_damping", "gain_error"]
     assert len({one.site for one in case.effects}) == 2
     assert min(case.ratios) >= 2.8
-    # The tolerances of a model that lacks one of them must not imitate that one.
+    # Neither the tolerances of the model nor a larger other effect may imitate one of them.
     assert len(case.ratios_tuned) == 2
     assert min(case.ratios_tuned) >= 1.0
+
+
+@pytest.mark.parametrize(
+    ("rule", "refused", "accepted"),
+    [("_left_beside", 0.9, 1.1), ("loops_open", False, True)],
+    ids=["a half that the other imitates", "a loop that never opens"],
+)
+def test_what_a_rule_refuses_is_drawn_again(rule, refused, accepted, monkeypatch):
+    asked = []
+
+    def ruled(bench, *_, **__):
+        asked.append(bench)
+        return refused if bench is asked[0] else accepted
+
+    monkeypatch.setattr(case_draw, "_left_beside", lambda *_: 1.1)
+    monkeypatch.setattr(case_draw, rule, ruled)
+    order = Order(kind="two", words=("hysteresis", "gain_error"))
+    case = draw_case(order, np.random.default_rng(7))
+    assert case.bench is not asked[0]
+    assert any(case.bench is one for one in asked[1:])
 
 
 @pytest.mark.parametrize("colour", ["white", "pink", "low_pass", "resonant"])
