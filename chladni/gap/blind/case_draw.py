@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.blind.acting import loops_open
+from chladni.gap.blind.acting import all_act
 from chladni.gap.blind.distinction import left_after_tuning
 from chladni.gap.blind.draft import Scene
 from chladni.gap.blind.drive_draw import draw_drive_bench
@@ -144,7 +144,7 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case | None:
     if still is None:
         return None
     (steps, moved), names = still, measured(bench)
-    if not loops_open(bench, numbers, drive, effects, steps=steps):
+    if not all_act(bench, numbers, drive, effects, steps=steps):
         return None
     after = converted(moved, effects, names)
     change = pooled_change(bench, clean, after) if effects or off else None

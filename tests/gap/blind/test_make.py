@@ -210,8 +210,8 @@ def test_a_case_with_two_effects_has_both_at_different_sites():
 
 @pytest.mark.parametrize(
     ("rule", "refused", "accepted"),
-    [("_left_beside", 0.9, 1.1), ("loops_open", False, True)],
-    ids=["a half that the other imitates", "a loop that never opens"],
+    [("_left_beside", 0.9, 1.1), ("all_act", False, True)],
+    ids=["a half that the other imitates", "a law that does nothing of its own"],
 )
 def test_what_a_rule_refuses_is_drawn_again(rule, refused, accepted, monkeypatch):
     asked = []
