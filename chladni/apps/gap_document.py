@@ -116,6 +116,7 @@ def _ranked(row: Ranked) -> Document:
         "probability": _known(row.probability),
         "gap": _known(row.gap),
         "log_evidence": _known(row.log_evidence),
+        **_when_there({"beside": [_candidate(one) for one in row.beside] or None}),
     }
 
 

@@ -58,7 +58,7 @@ def ranking_table(found: Diagnosis, *, count: int = RANKED) -> Table:
     rows = [
         (
             effect_heading(one.effect),
-            one.site,
+            _place(one),
             chance(one.probability),
             "–" if one.gap is None else percent(one.gap),
             "–" if one.log_evidence is None else f"{one.log_evidence:.1f}",
@@ -70,6 +70,12 @@ def ranking_table(found: Diagnosis, *, count: int = RANKED) -> Table:
     if rows and len(found.causes) < 2 and others >= UNLIKELY:
         rows.append(("none of these", "–", chance(others), "–", "–"))
     return ("Effect", "Site", "Probability", "Error left", "ln evidence"), rows
+
+
+def _place(one: Ranked) -> str:
+    """Site, and what else the row's numbers are of."""
+    others = ", ".join(f"{effect_heading(each.effect)} at {each.site}" for each in one.beside)
+    return f"{one.site} (with {others})" if others else one.site
 
 
 def _standing(one: Ranked) -> tuple[float, float]:

@@ -53,6 +53,7 @@ def ranking_of(causes: Causes, causes_said: Sequence[Cause]) -> tuple[Ranked, ..
                 probability=own if candidate in causes.best.hypothesis.named else said.get(key, own),
                 gap=one.gap,
                 log_evidence=one.log_evidence,
+                beside=tuple(other for other in one.hypothesis.named if other != candidate),
             )
     return tuple(sorted(rows.values(), key=lambda row: -row.probability))
 

@@ -216,6 +216,11 @@ class SimulatorFindings:
                         probability=self.probability(effect, site),
                         gap=runs.gap(fit.outputs),
                         log_evidence=fit.log_evidence,
+                        beside=tuple(
+                            Candidate(effect=word, site=other)
+                            for word, other in fit.names
+                            if (word, other) != (effect, site)
+                        ),
                     ),
                 )
         for screened in self.search.singles:

@@ -71,13 +71,17 @@ class Cause:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ranked:
-    """A row of the ranking; `gap` and `log_evidence` (nats) on held-out samples, None when it wasn't fitted."""
+    """A row of the ranking; `gap` and `log_evidence` (nats) on held-out samples, None when it wasn't fitted.
+
+    Both are of its best form, with those that it stood `beside` there.
+    """
 
     effect: str
     site: str
     probability: float
     gap: float | None
     log_evidence: float | None
+    beside: tuple[Candidate, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
