@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from chladni.gap.diagnosis.completeness import completeness, completeness_among, known_share
+from chladni.gap.diagnosis.following import Entered
 from chladni.gap.diagnosis.grown import Grown
 from chladni.gap.diagnosis.instead import Instead, explained_elsewhere, explained_instead
 from chladni.gap.diagnosis.own_signal import FOLLOWS, share_of_own_signal
@@ -15,7 +16,6 @@ from chladni.gap.diagnosis.pairs import exchanged, paired_causes, second_causes,
 from chladni.gap.diagnosis.price import added_nats, leaves_for_sure, price_among
 from chladni.gap.diagnosis.search import (
     ALONE,
-    Singles,
     best_forms,
     detailed,
     is_far,
@@ -31,6 +31,7 @@ from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.contest import distinct, lowest, weighed
 from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.explanation.known_states import KnownStates
 from chladni.gap.records.diagnosis import Candidate, Verdict
 from chladni.gap.records.noise_floor import NoiseFloor
 
@@ -73,8 +74,9 @@ class Causes:
         Outputs whose residual, when nothing is named, follows their own signal in a curve.
     instead
         What explains the gap better without being a word; nothing is named then.
-    followed
-        Whether all runs of single causes were lost, and one of them follows the log over short windows.
+    states
+        That the machine went through, when all runs were lost and a law, or two, follow the log from these over short
+        windows; else None.
     """
 
     verdict: Verdict
@@ -86,7 +88,7 @@ class Causes:
     noise: NoiseFloor
     distorted: tuple[str, ...]
     instead: Instead | None
-    followed: bool
+    states: KnownStates | None
 
 
 def causes_of(study: Study, progress: Step) -> Causes:
@@ -94,7 +96,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
     nothing = without_cause(study)
     progress(0.1)
     singles = single_causes(study, progress)
-    entered, instead = _searched(study, nothing, singles, progress)
+    entered, instead, states = _searched(study, nothing, singles, progress)
     added = added_nats(study.location)
     entered += twin_causes(study, _best(weighed([nothing, *entered]), nothing, added))
     progress(1.0)
@@ -129,13 +131,13 @@ def causes_of(study: Study, progress: Step) -> Causes:
         noise=noise,
         distorted=distorted,
         instead=instead,
-        followed=singles.followed,
+        states=states,
     )
 
 
 def _searched(
-    study: Study, nothing: Contestant, singles: Singles, progress: Step
-) -> tuple[list[Contestant], Instead | None]:
+    study: Study, nothing: Contestant, singles: Entered, progress: Step
+) -> tuple[list[Contestant], Instead | None, KnownStates | None]:
     """Every contestant with a cause: single ones, and two where one leaves something that nothing else explains."""
     added = added_nats(study.location)
     found = list(singles.ranked)
@@ -148,14 +150,20 @@ def _searched(
 
     instead = explained_instead(study, best())
     if instead is not None or not leaves_another():
-        return found, instead
+        return found, instead, singles.states
+    # Where runs were lost, those of one of two laws are lost again: both at once come first.
+    pairs = paired_causes(study, best()) if study.contest.states is not None else Entered()
+    found += pairs.ranked
     for place, lead in enumerate(_leads(weighed(found))):
         progress(_BESIDE[place])
         if leaves_another():
             found += second_causes(study, lead)
     progress(_BESIDE[-3])
-    if leaves_another():
-        found += paired_causes(study)
+    if study.contest.states is None and leaves_another():
+        pairs = paired_causes(study, best())
+        found += pairs.ranked
+    # Of one force the states are those of a machine that lacks the other.
+    states = pairs.states or singles.states
     progress(_BESIDE[-2])
     grown = Grown(study)
     for lead in _leads(weighed(found)):
@@ -168,7 +176,7 @@ def _searched(
         found += _detailed(study, weighed(found), best())
         found += sibling_causes(study, [best()])
         found += [detailed(study, best()), *without_one(study, best())]
-    return [one for one in found if _is_plausible(study, nothing, one)], None
+    return [one for one in found if _is_plausible(study, nothing, one)], None, states
 
 
 def _detailed(study: Study, ranked: Sequence[Contestant], best: Contestant) -> list[Contestant]:

@@ -5,6 +5,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.diagnosis.following import Entered, followed, is_lost_beside
 from chladni.gap.diagnosis.search import ALONE, least_left, near_places, sound
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.candidates import Form, forms_at, promised, screened, searched
@@ -27,10 +28,12 @@ _SECOND, _EACH = 4, 2
 _PLACES, _MOST_PLACES, _AS_GOOD = 4, 7, 1.1
 #: Share of what others leave below which a screened law, and a fit, leaves much less.
 _PROMISED, _MUCH_LESS = 0.6, 0.5
+#: Sensors at which two forces explain everything.
+_EXPLAINED = 2
 #: Linear words that are fitted beside the parameters behind a first effect.
 _LINEAR = 4
-#: Two forces must leave less than this of what one leaves; pairs that are as good as the best are screened too, so
-#: many, and those searched whose laws promise most.
+#: Two forces, or where they'd explain anything two laws, must leave less than this of what one leaves; pairs that are
+#: as good as the best are screened too, so many, and those searched whose laws promise most.
 _PAIR_GAIN, _PAIR_TIE, _SCREENED, _PAIRS = 0.6, 1.3, 8, 3
 #: An unknown force at a place that leaves more than this, over the noise, isn't alone: of made machines with
 #: one effect one in twenty leaves as much, of those with two four in five.
@@ -123,17 +126,43 @@ def _beside(found: Contestant, kept: tuple[AttachedEffect, ...], one: Hypothesis
     return hypothesis_of((*kept, *one.effects), z, screened=one.screened, initial=found.fit.initial)
 
 
-def paired_causes(study: Study) -> list[Contestant]:
-    """Enter two effects at two places at once, which one after the other may miss."""
-    pairs = located_pairs(study.location)
-    single = study.location.ranked[0].profile.chi if study.location.ranked else 0.0
-    if not pairs or pairs[0].profile.chi > _PAIR_GAIN * single:
+def paired_causes(study: Study, best: Contestant) -> Entered:
+    """Enter two effects at two places at once, which one after the other may miss.
+
+    Parameters
+    ----------
+    best
+        The best one so far: where any two forces explain everything, two laws must promise much more than it does.
+    """
+    weighed = _weighed_pairs(study, best)
+    both = [_of_pair(study, pair, forms) for pair, forms in weighed]
+    found = sound(study, study.contest.enter_all([one for each in both for one in each]))
+    if not weighed or not is_lost_beside(weighed[0][0], min(best.chi, least_left(found))):
+        return Entered(ranked=found)
+    shots = followed(study, weighed[0][0], both[0])
+    return Entered(ranked=found) if shots is None else Entered(
+        ranked=[*found, *sound(study, shots.ranked)], states=shots.states
+    )  # fmt: skip
+
+
+def _weighed_pairs(study: Study, best: Contestant) -> list[tuple[Located, list[Form]]]:
+    """Give the pairs whose laws promise most while the other's force is free, with what was screened there."""
+    location = study.location
+    pairs = located_pairs(location)
+    tell = len(location.problem.measured) > _EXPLAINED
+    near = _near_pairs(location, pairs) if tell else pairs
+    weighed = [(pair, forms_at(location, [pair], study.leave_out, study.own)) for pair in near]
+    if not tell:
+        most = _PAIR_GAIN * best.chi * location.problem.scale
+        weighed = [one for one in weighed if promised(*one) < most]
+    return sorted(weighed, key=lambda one: promised(*one))[:_PAIRS]
+
+
+def _near_pairs(location: Location, pairs: Sequence[Located]) -> list[Located]:
+    """Pairs of forces that explain much more than one, about as much as the best pair."""
+    if not pairs or pairs[0].profile.chi > _PAIR_GAIN * location.ranked[0].profile.chi:
         return []
-    near = [one for one in pairs if one.profile.chi < _PAIR_TIE * pairs[0].profile.chi][:_SCREENED]
-    weighed = [(pair, forms_at(study.location, [pair], study.leave_out, study.own)) for pair in near]
-    weighed.sort(key=lambda one: promised(*one))
-    both = [one for pair, forms in weighed[:_PAIRS] for one in _of_pair(study, pair, forms)]
-    return sound(study, study.contest.enter_all(both))
+    return [one for one in pairs if one.profile.chi < _PAIR_TIE * pairs[0].profile.chi][:_SCREENED]
 
 
 def exchanged(study: Study, both: Contestant) -> list[Contestant]:

@@ -32,9 +32,9 @@ def causes_found(study: Study, progress: Step) -> tuple[Study, Causes]:
         again = _again(found, quieter, _part(progress, _FINER, _QUIETER))
         # Of one effect the quiet band's noise tells nothing but to be lower.
         found = _better(found, again) if len(again[1].best.hypothesis.effects) > 1 else found
-    windowed = over_windows(found[0]) if _parted(*found) else None
-    if windowed is not None:
-        found = _again(found, windowed, _part(progress, _QUIETER, 1.0))
+    states = found[1].states
+    if states is not None and _parted(*found):
+        found = _again(found, over_windows(found[0], states), _part(progress, _QUIETER, 1.0))
     progress(1.0)
     return found
 
@@ -57,4 +57,4 @@ def _better(found: tuple[Study, Causes], again: tuple[Study, Causes]) -> tuple[S
 def _parted(study: Study, causes: Causes) -> bool:
     """Whether nothing is named since runs part from the log's; where something else explains it, they don't."""
     unexplained = causes.verdict == "unknown" and causes.instead is None
-    return unexplained and study.windows is None and causes.followed and is_lost(study.location, causes.best.chi)
+    return unexplained and study.windows is None and is_lost(study.location, causes.best.chi)

@@ -1,11 +1,12 @@
 """The search for one cause: every plausible effect entered, more while all leave something."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from chladni.gap.diagnosis.study import Study, recovered_states
+from chladni.gap.diagnosis.following import Entered, followed, is_lost_beside
+from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.candidates import screened
 from chladni.gap.explanation.contest import weighed
 from chladni.gap.explanation.degenerate import is_degenerate
@@ -18,7 +19,6 @@ from chladni.gap.explanation.hypotheses import (
 )
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.linear_words import linear_hypotheses
-from chladni.gap.explanation.shooting import Shooting, Shot
 from chladni.gap.explanation.sticking import sticking_hypotheses
 from chladni.gap.location.locate import Located, Location
 from chladni.signals.errors import EstimateError
@@ -37,25 +37,8 @@ _ONE_FORCE, _PATTERN_SENSORS, _SAME_PLACE = 1.15, 2, 1.25
 #: What another place leaves of the gap beyond the best one, where the cause may still be: beside floors that shook
 #: the next place left 0.02, beside a stop between a body and the ground that joint 0.0001.
 _NEAR = 0.003
-#: Named effects that leave so many times what an unknown force does may have lost the run; over short windows a law
-#: follows the log that leaves at most so many times that; most that go on from there, and hypotheses that are tried.
-_LOST, _FOLLOWING, _GROWN, _TRIED = 3.0, 3.0, 3, 6
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Singles:
-    """Single causes that were entered.
-
-    Attributes
-    ----------
-    ranked
-        By falling evidence.
-    followed
-        Whether all runs were lost, and a law follows the log over short windows nearly as far as an unknown force.
-    """
-
-    ranked: list[Contestant]
-    followed: bool
+#: Named effects that leave so many times what the best place does leave far more.
+_FAR = 3.0
 
 
 def is_one_force(location: Location) -> bool:
@@ -105,7 +88,7 @@ def without_cause(study: Study) -> Contestant:
     return found
 
 
-def single_causes(study: Study, progress: Step) -> Singles:
+def single_causes(study: Study, progress: Step) -> Entered:
     """Enter every effect that the screen holds plausible, and parameters beyond their tolerance."""
     location, contest = study.location, study.contest
     places = plausible_places(location)
@@ -123,52 +106,26 @@ def single_causes(study: Study, progress: Step) -> Singles:
         found += sound(study, contest.enter_all(others))
     if is_lost(location, least_left(found)) and "coulomb_friction" not in study.leave_out:
         found += sound(study, contest.enter_all(sticking_hypotheses(location)))
-    shots = _followed(study, hypotheses) if is_lost(location, least_left(found)) else None
-    found += shots or []
+    lost = is_lost(location, least_left(found))
+    shots = followed(study, location.best, hypotheses) if lost else None
+    found += [] if shots is None else sound(study, shots.ranked)
     ranked = weighed([*found, *sibling_causes(study, weighed(found))])
     if ranked and ranked[0].chi > _DETAILED:
         # A detail of its law that was set by the screen's grid must not cost a word its place.
         forms = best_forms(ranked)
         ranked = [*(_polished(study, one) for one in forms), *(one for one in ranked if one not in forms)]
-    return Singles(ranked=weighed(ranked), followed=shots is not None)
-
-
-def _followed(study: Study, hypotheses: Sequence[Hypothesis]) -> list[Contestant] | None:
-    """Enter the hypotheses that follow the log over short windows, from there; None when none does.
-
-    Where an unknown force explains far more than any named one, its run may have gone another way than the log's.
-    """
-    states = recovered_states(study.location)
-    if states is None:
-        return None
-    shooting = Shooting(study.contest, states)
-    following = _following(study, shooting, hypotheses)
-    entered = [shooting.entered(shot) for shot in following]
-    return sound(study, [one for one in entered if one is not None]) if following else None
-
-
-def _following(study: Study, shooting: Shooting, hypotheses: Sequence[Hypothesis]) -> list[Shot]:
-    """Shoot the most promising hypotheses; those that explain nearly what an unknown force does, best first."""
-    shots = [shot for shot in map(shooting.shot, hypotheses[:_TRIED]) if shot is not None]
-    enough = _FOLLOWING * _least_force(study.location)
-    return sorted((one for one in shots if one.misfit < enough), key=lambda one: one.misfit)[:_GROWN]
-
-
-def _least_force(location: Location) -> float:
-    """Give what an unknown force at the best place leaves, over the noise's power, at least 1; infinite without."""
-    best = location.best
-    return np.inf if best is None or not best.profile.forces else max(best.profile.chi, 1.0)
+    return Entered(ranked=weighed(ranked), states=None if shots is None else shots.states)
 
 
 def is_lost(location: Location, left: float) -> bool:
     """Whether what the best runs leave, over the noise's power, is far more than an unknown force does."""
-    return left > _LOST * _least_force(location)
+    return is_lost_beside(location.best, left)
 
 
 def is_far(location: Location, left: float) -> bool:
     """Whether runs leave far more than the best place does, a sensor's or an input's own as well as a force's."""
     best = location.best
-    return best is None or left > _LOST * max(best.profile.chi, 1.0)
+    return best is None or left > _FAR * max(best.profile.chi, 1.0)
 
 
 def least_left(found: Sequence[Contestant]) -> float:

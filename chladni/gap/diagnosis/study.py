@@ -12,9 +12,10 @@ from chladni.gap.comparison.quiet_floor import quiet_floor
 from chladni.gap.explanation.contest import Contest, training_mask
 from chladni.gap.explanation.known_states import KnownStates
 from chladni.gap.explanation.lattice import Lattice, lattice_of
-from chladni.gap.location.locate import Location, locate
+from chladni.gap.location.locate import Located, Location, locate
 from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.plant.windows import short_windows, training_in_windows, windows_for
 from chladni.gap.records.measurement import Measurement
@@ -122,22 +123,19 @@ def floor_of(measurement: Measurement) -> NoiseFloor:
     return quiet_floor(measurement) if len(measurement.output_names) < 2 and noise.upper_bound.any() else noise
 
 
-def over_windows(study: Study) -> Study | None:
-    """Give the study of the same log over windows that begin at recovered states; None where no force tells these."""
-    states = recovered_states(study.location)
-    if states is None:
-        return None
+def over_windows(study: Study, states: KnownStates) -> Study:
+    """Give the study of the same log over windows that begin at known states."""
     windows = short_windows(study.model, study.measurement)
     run, training = FreeRun(study.model, study.measurement, windows=windows), training_in_windows(windows)
     return replace(study, windows=windows, contest=Contest(run, study.contest.noise, training, states))
 
 
-def recovered_states(location: Location) -> KnownStates | None:
-    """Give the states under the unknown force at the best place; None without any."""
-    best, problem = location.best, location.problem
-    if best is None or not best.profile.forces:
+def recovered_states(problem: LinearProblem, located: Located | None) -> KnownStates | None:
+    """Give the states under the unknown forces at a place, or at two; None without any."""
+    if located is None or not located.profile.forces:
         return None
-    motion = recovered(problem, best.profile, best.places[0].sites[0])
+    first, *others = located.profile.sites
+    motion = recovered(problem, located.profile, first, others)
     return KnownStates(names=problem.model.compile().states, values=motion.states(problem))
 
 

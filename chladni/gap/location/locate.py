@@ -25,8 +25,8 @@ _SEGMENT_LINES = 1500
 _RECORD_LINES = 1500
 #: Places that are followed to the end: so many, and more where the segments don't tell them apart.
 _FOLLOWED, _FOLLOWED_AGAIN, _TIED, _MOST = 5, 4, 1.5, 10
-#: Patterns tell places apart only when there are more sensors than forces.
-_PAIR_SENSORS = 3
+#: Two forces explain everything at two sensors, and any law at one.
+_PAIR_SENSORS = 2
 #: Places that are paired with every other one, at least and at most; misfit over the best one's of a place that is
 #: level with it.
 _LEADING, _LEVEL = (2, 3), 1.1
@@ -122,7 +122,10 @@ def locate(
 
 
 def located_pairs(location: Location, rough: int = 5) -> list[Located]:
-    """Profile forces at two places at a time; by rising misfit, none with too few sensors.
+    """Profile forces at two places at a time; by rising misfit, none with one sensor.
+
+    Two sensors don't tell pairs apart, since any two forces explain both; what is between them is whether the forces
+    follow laws.
 
     Parameters
     ----------

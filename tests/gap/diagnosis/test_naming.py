@@ -33,7 +33,7 @@ def weighed_causes(ranked: tuple[Contestant, ...], probabilities: tuple[float, .
         noise=None,
         distorted=(),
         instead=None,
-        followed=False,
+        states=None,
     )
 
 

@@ -1,21 +1,27 @@
 """How much a second effect must bring: where no force at one place explains a gap, no more than a first one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import chladni
 from chladni.gap.comparison.noise_estimate import estimate_noise
-from chladni.gap.diagnosis import search
+from chladni.gap.diagnosis import pairs, search
 from chladni.gap.diagnosis.pairs import second_causes
 from chladni.gap.diagnosis.price import added_nats
 from chladni.gap.diagnosis.search import single_causes
-from chladni.gap.diagnosis.study import study_of
+from chladni.gap.diagnosis.study import recovered_states, study_of
 from chladni.gap.explanation.contest import weighed
 from chladni.gap.explanation.hypotheses import hypothesis_of
 from chladni.gap.location.locate import locate
 from chladni.gap.plant.tunable import Tunables
 from chladni.models.effects.attached_effect import AttachedEffect
-from tests.gap.arm import arm, measured
+from chladni.models.effects.catalogue import CATALOGUE
+from chladni.models.structures.structure_output import StructureOutput
+from tests.gap import made_log
+from tests.gap.arm import arm, measured, with_outputs
+from tests.gap.made_log import band_noise, chain
 
 SPRING = chladni.attached("hardening_stiffness", "hand", {"cubic": 3e10})
 LATE = chladni.attached("time_offset", "acc_column", {"offset": 3e-4})
@@ -61,3 +67,46 @@ def test_a_second_effect_is_kept_though_the_first_turns_out_to_be_nothing(monkey
 
 def words(found) -> set[str]:
     return {one.effect for one in found.hypothesis.effects}
+
+
+def two_sensors(*effects: AttachedEffect, words: frozenset[str]):
+    """A study of two bodies that show one displacement and one acceleration: any two forces explain both."""
+    seen = (
+        StructureOutput(name="x0", measures="displacement", at="b0"),
+        StructureOutput(name="a1", measures="acceleration", at="b1"),
+    )
+    machine = replace(chain([2.0, 1.5], [5e4, 6e4], [12.0, 9.0]), outputs=seen)
+    log, _ = made_log.measured(machine.with_effects(effects), band_noise(3000, rms=60.0), noise=5e-3)
+    return study_of(machine, log, leave_out=frozenset(CATALOGUE) - words, own={})
+
+
+@pytest.mark.parametrize("first", [("coulomb_friction", {"force": 10.0}), ("hardening_stiffness", {"cubic": 2e9})])
+def test_of_two_sensors_laws_tell_where_two_effects_are(first) -> None:
+    effects = chladni.attached(first[0], "j0", first[1]), chladni.attached("coulomb_friction", "j1", {"force": 6.0})
+    study = two_sensors(*effects, words=frozenset({"coulomb_friction", "hardening_stiffness", "gain_error"}))
+    nothing = search.without_cause(study)
+    pair, forms = pairs._weighed_pairs(study, nothing)[0]
+    assert {name for place in pair.places for name in place.names} == {"j0", "b0", "hammer", "j1"}
+    at_j1 = [one for one, _ in forms if one.trial.site.name == "j1"]
+    assert min(at_j1, key=lambda one: one.cost).trial.effect == "coulomb_friction"
+    # Beside a fit that leaves no more than they promise they aren't worth any.
+    assert pairs._weighed_pairs(study, replace(nothing, held=np.ones_like(nothing.held))) == []
+
+
+@pytest.mark.slow
+def test_two_laws_whose_runs_are_lost_are_followed_from_the_states_that_two_forces_tell() -> None:
+    caught = chladni.attached("ripple", "j0", {"amplitude": 20.0, "period": 1e-3, "phase": 0.7})
+    rubbing = chladni.attached("coulomb_friction", "j1", {"force": 5.0})
+    study = two_sensors(caught, rubbing, words=frozenset({"ripple", "coulomb_friction"}))
+    found = pairs.paired_causes(study, search.without_cause(study))
+    assert words(weighed(found.ranked)[0]) == {"ripple", "coulomb_friction"}
+    assert found.states is not None
+    # Of either force alone the machine would have gone another way.
+    other = recovered_states(study.location.problem, study.location.best)
+    assert not np.allclose(found.states.values, other.values, rtol=0.05)
+
+
+def test_one_sensor_is_explained_by_any_force() -> None:
+    log = with_outputs(measured((SPRING,), seconds=4.0), ["acc_wrist"])
+    study = study_of(arm(), log, leave_out=frozenset(), own={})
+    assert pairs._weighed_pairs(study, search.without_cause(study)) == []

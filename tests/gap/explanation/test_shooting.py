@@ -31,7 +31,7 @@ def made():
     log, floor = measured(toothed, band_noise(6000, rms=60.0), noise=5e-3)
     study = study_of(machine(), log, leave_out=frozenset(), own={})
     contest = Contest(study.contest.run, floor, study.contest.training)
-    return contest, Shooting(contest, recovered_states(study.location))
+    return contest, Shooting(contest, recovered_states(study.location.problem, study.location.best))
 
 
 def near(share: float):
@@ -66,7 +66,7 @@ def test_a_run_of_one_end_only_is_entered_where_windows_led() -> None:
     log, floor = measured(machine().with_effects((softly,)), band_noise(4000, rms=60.0), noise=5e-3)
     study = study_of(machine(), log, leave_out=frozenset(), own={})
     contest = Contest(study.contest.run, floor, study.contest.training)
-    shooting = Shooting(contest, recovered_states(study.location))
+    shooting = Shooting(contest, recovered_states(study.location.problem, study.location.best))
     found = shooting.entered(shooting.shot(near(1.03)))
     assert found.chi < 1.3
     assert found.fit.effects[0].values["amplitude"] == pytest.approx(3.0, rel=0.05)
