@@ -52,6 +52,7 @@ SCHEMA: Mapping[str, Any] = {
 MORE = {
     "": {"naive", "advice", "remarks", "distortion", "levels", "elsewhere", "left"},
     ".causes": {"variant", "from", "share"},
+    ".ranking": {"beside"},
     ".gap": {"by", "horizon_s"},
 }
 KINDS = made.every_kind()
@@ -102,6 +103,15 @@ def test_the_numbers_are_those_of_the_diagnosis() -> None:
         "nominal": 20000.0, "value": 20400.0, "std": 80.0, "unit": "N/m"
     }  # fmt: skip
     assert document["naive"] == {"effect": "hysteresis", "site": "elbow"}
+
+
+def test_a_row_of_the_ranking_says_beside_what_its_numbers_are() -> None:
+    found = made.diagnosis()
+    half = replace(found.ranking[0], beside=(Candidate(effect="time_offset", site="acc_wrist"),))
+    document = written(replace(found, ranking=(half, *found.ranking[1:])))
+    hold(document, SCHEMA)
+    assert document["ranking"][0]["beside"] == [{"effect": "time_offset", "site": "acc_wrist"}]
+    assert "beside" not in document["ranking"][1]
 
 
 def test_groups_and_alternatives_are_lists_of_names_and_candidates() -> None:

@@ -272,6 +272,16 @@ def test_what_is_left_to_causes_that_were_not_weighed_has_a_row() -> None:
     assert all(row[0] != "none of these" for row in tables.ranking_table(both)[1])
 
 
+def test_a_row_whose_numbers_are_of_a_pair_says_so() -> None:
+    found = made.diagnosis()
+    half = replace(found.ranking[1], beside=(Candidate(effect="time_offset", site="acc_wrist"),))
+    rows = tables.ranking_table(replace(found, ranking=(found.ranking[0], half)))[1]
+    assert [row[:2] for row in rows[:2]] == [
+        ("Coulomb friction", "elbow"),
+        ("hysteresis", "elbow (with time offset at acc_wrist)"),
+    ]
+
+
 def test_candidates_without_a_chance_stand_by_their_evidence() -> None:
     found = made.unknown()
     hidden = tuple(

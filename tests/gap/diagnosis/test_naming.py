@@ -63,3 +63,12 @@ def test_a_word_at_sites_that_look_the_same_is_as_probable_as_all_of_them_togeth
     rows = {(one.effect, one.site): one.probability for one in ranking_of(causes, (named,))}
     assert rows["ripple", "elbow"] == 0.4
     assert rows["ripple", "shaker"] == 0.35
+
+
+def test_a_word_that_is_best_as_half_of_a_pair_says_beside_what() -> None:
+    # By falling evidence: the mount's best fit is the pair's, the lag's is its own.
+    ranked = (contestant(1.0, LAG), contestant(1.0, MOUNT, LAG), contestant(9.0, MOUNT))
+    causes = weighed_causes(ranked, (0.9, 0.05, 0.05))
+    rows = {one.effect: one for one in ranking_of(causes, causes_named(SimpleNamespace(lattices={}), causes))}
+    assert rows["lag"].beside == ()
+    assert [(one.effect, one.site) for one in rows["mounting_resonance"].beside] == [("lag", "shaker")]
