@@ -22,14 +22,16 @@ Ints = NDArray[np.int64]
 # A range that is named is reached a little early by offset and gain of a real amplifier.
 _NEAR_OVERLOAD = 0.999
 _SHORTEST_PLATEAU = 3
-_SHORTEST_HOLD = 8
+# Where values hardly repeat by chance, and where they may.
+_SHORTEST_HOLD, _SURE_HOLD = 4, 8
 # A leap is this many medians of the local step; Gaussian noise of 10^7 samples reaches 8.
 _LEAP = 30.0
 _LEAP_BLOCK = 4096
 _WIDEST_SPIKE = 3
 _QUIET_AROUND = 8
 _FEWEST = 16
-_CHANCE = 0.05
+# Faults of a record that may be due to values that repeat by chance: cut off at its end; held anywhere in it.
+_CHANCE, _CHANCE_HELD = 1e-3, 1e-5
 # What the whole record shows isn't counted.
 _THROUGHOUT = ("dead", "coarse")
 
@@ -106,11 +108,12 @@ def sensor_quality(series: TimeSeries) -> tuple[SensorFault, ...]:
 
     - clipped: at or above 99.9 % of the channel's overload; or at least three samples in a row at the very top (or
       bottom), three times as many there as on the value next to it, reached with a step above 0.1 m and 4 q, and
-      no more by chance than once in 20 where values repeat elsewhere (or reached with a step above 3 m). A top
+      no more by chance than once in 1000 where values repeat elsewhere (or reached with a step above 6 m). A top
       reached smoothly is where a motion turns or rests, and an end at exactly 0 is that of a quantity of one sign
       (a speed, a level), which no larger range would move.
     - dead: constant, or two or three values within 0.1 % of the mean or 0.01 % of the overload.
-    - dropouts: the same value for at least eight samples, not at an end of the range, between steps above 0.1 m
+    - dropouts: the same value for at least eight samples, or for four to seven where by the share of values that
+      repeat no more than 1e-5 such runs are due to chance, not at an end of the range, between steps above 0.1 m
       before and after; in a channel that otherwise moves.
     - spikes: 30 m and 4 q away and back within three samples (m of the 4096 around), steps of the eight samples
       before and after below a quarter of that. Force channels are left out, where that's a hit.
@@ -259,7 +262,7 @@ def _plateaus(record: _Record, level: float) -> Ints:
     entered = starts[(lengths >= _SHORTEST_PLATEAU) & (starts > 1)]
     entry = np.maximum(record.step(entered - 1), record.step(entered - 2))
     kinked = entry > max(0.1 * record.typical_step, 4 * record.smallest_step)
-    if _by_chance(record, there, lengths) and not np.any(entry > 3 * record.typical_step):
+    if _by_chance(record, there, lengths) and not np.any(entry > 6 * record.typical_step):
         return there[:0]
     cut_off = there.size >= 3 * beside and kinked.size > 0 and np.count_nonzero(kinked) >= 0.5 * kinked.size
     return there if cut_off else there[:0]
@@ -288,13 +291,20 @@ def _held(record: _Record) -> Ints:
     if record.still.size > 0.25 * record.samples.size:
         return record.still[:0]
     starts, lengths = _runs(record.still)
-    long = lengths >= _SHORTEST_HOLD - 1
+    long = lengths >= _shortest_hold(record) - 1
     starts, lengths = starts[long], lengths[long]
     entered = record.step(starts - 1) > 0.1 * record.typical_step
     left = record.step(starts + lengths) > max(0.1 * record.typical_step, 4 * record.smallest_step)
     level = record.samples[starts]
     chosen = entered & left & (level != record.high) & (level != record.low)
     return _filled(starts[chosen], lengths[chosen] + 1)
+
+
+def _shortest_hold(record: _Record) -> int:
+    """Samples of the same value that are hardly due to chance."""
+    repeating = record.still.size / record.samples.size
+    by_chance = record.samples.size * repeating ** np.arange(_SHORTEST_HOLD - 1, _SURE_HOLD - 1)
+    return _SHORTEST_HOLD + int(np.count_nonzero(by_chance > _CHANCE_HELD))
 
 
 def _spikes(record: _Record) -> Ints:

@@ -85,6 +85,9 @@ SOUND = {
     "coloured noise": smooth(),
     "quantised noise": np.round(noise() * 20) / 20,
     "quantised coloured noise": np.round(smooth() * 100) / 100,
+    "quantised growing noise": np.round(200 * noise() * np.linspace(0, 1, SAMPLES)),
+    "quantised bursts": np.round(50 * bursts_of_noise(0.04)),
+    "quantised ringing": np.round(2000 * ringing(1e-3)),
     "growing noise": noise() * np.linspace(0, 1, SAMPLES),
     "decaying noise": noise() * np.exp(-seconds() / 10),
     "bursts out of silence": bursts_of_noise(0.0),
@@ -237,6 +240,18 @@ def test_dropouts_in_a_moving_signal(held: str) -> None:
     assert fault.count == 70 + (0 if held == "zero" else 2), "a held value began with a true sample"
     assert fault.first_s == (3.0 if held == "zero" else 2.999)
     assert "transmission" in fault.sentence
+
+
+def test_one_message_that_is_lost_is_noticed_where_no_value_repeats() -> None:
+    values = noise(15)
+    values[500:503] = values[499]
+    assert only(faults_of(values)).count == 4
+
+
+def test_a_few_equal_samples_are_chance_where_every_tenth_repeats() -> None:
+    values = np.round(3 * noise(16))
+    values[500:503] = values[499]
+    assert faults_of(values) == ()
 
 
 @pytest.mark.parametrize("width", [1, 2, 3])
