@@ -15,6 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from chladni.apps.blind import make_campaign, run_campaign, score_campaign
+from chladni.apps.campaign_pictures import campaign_album
 from chladni.gap.blind.score_table import (
     HEADER,
     confusion_rows,
@@ -23,6 +24,7 @@ from chladni.gap.blind.score_table import (
     reliability_rows,
     score_rows,
 )
+from chladni.viewers.figures.saving import save_album
 
 
 @contextmanager
@@ -94,6 +96,7 @@ if __name__ == "__main__":
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, required=True, help="one that was never looked at")
     parser.add_argument("--jobs", type=int, default=None)
+    parser.add_argument("--figures", type=Path, default=None, help="folder for confusion, reliability, detection")
     arguments = parser.parse_args()
     folder = arguments.directory
     folder.mkdir(parents=True, exist_ok=True)
@@ -105,4 +108,8 @@ if __name__ == "__main__":
         show(f"the truths are in {away}: the campaign is made, and its run goes on")
     with truths_away(folder):
         run_campaign(folder, jobs=arguments.jobs, progress=shares("diagnosed"))
-    report(folder, dict(score_campaign(folder)))
+    score = dict(score_campaign(folder))
+    report(folder, score)
+    if arguments.figures is not None:
+        for path in save_album(campaign_album(score), arguments.figures):
+            show(f"figure: {path}")

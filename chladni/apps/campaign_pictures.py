@@ -76,8 +76,8 @@ def _confusion(table: Mapping[str, Mapping[str, int]]) -> Figure | None:
 def _detection(curve: Sequence[Mapping[str, Any]]) -> Figure | None:
     steps = [
         Detection(low=one["low"], high=one["high"], share=told["share"], interval=tuple(told["interval"]), what=what)
-        for what in ("noticed", "named")
+        for key, what in (("noticed", "noticed"), ("named", "named rightly"))
         for one in curve
-        if (told := one[what])["count"]
+        if (told := one[key])["count"]
     ]
     return detection_figure(steps) if steps else None

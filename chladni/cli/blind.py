@@ -73,7 +73,7 @@ def run(
 
 
 @blind.command()
-def score(directory: Folder, *, json: options.Json = None) -> None:
+def score(directory: Folder, *, figures: options.Figures = None, json: options.Json = None) -> None:
     """Verify the seals and hold the answers against the truths."""
     from chladni.apps.blind import score_campaign
     from chladni.gap.blind.score_table import (
@@ -85,7 +85,7 @@ def score(directory: Folder, *, json: options.Json = None) -> None:
         score_rows,
     )
 
-    require_places(reads=(), writes={"--json": json})
+    require_places(reads=(), writes={"--json": json}, folders={"--figures": figures})
     to = Output(json)
     found = score_campaign(directory)
     to.table(f"Score of {found['cases']} cases", HEADER, score_rows(found))
@@ -102,4 +102,10 @@ def score(directory: Folder, *, json: options.Json = None) -> None:
     if found["missing"]:
         to.lines([f"Warning: {len(found['missing'])} cases have no result yet; chladni blind run {directory}"])
     to.line(f"wrote {directory / 'score.json'}")
+    if figures is not None:
+        from chladni.apps.campaign_pictures import campaign_album
+        from chladni.viewers.figures.saving import save_album
+
+        for path in save_album(campaign_album(found), figures):
+            to.line(f"figure: {path}")
     to.json(found)

@@ -46,6 +46,19 @@ def test_run_and_score(run: Run, campaign: Path, monkeypatch: pytest.MonkeyPatch
     assert row.split() == ["case-0002", "effect", "delay", "at", "motor", "failed", "-"]
 
 
+def test_pictures_of_a_score(run: Run, campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(blind, "diagnosis_json", diagnosis)
+    assert run("blind", "run", campaign, "--jobs", 1).code == 0
+    pictures = tmp_path / "pictures"
+    done = run("blind", "score", campaign, "--figures", pictures)
+    assert done.code == 0
+    # Neither case is faint.
+    assert sorted(one.name for one in pictures.iterdir()) == [
+        "calibration.png", "calibration.svg", "confusion.png", "confusion.svg"
+    ]  # fmt: skip
+    assert f"figure: {pictures / 'confusion.png'}" in done.out
+
+
 def test_a_broken_seal_is_one_line(run: Run, campaign: Path) -> None:
     path = campaign / "truth" / "case-0001.json"
     path.write_text(path.read_text().replace("delay", "lag"))

@@ -105,7 +105,7 @@ class Detection:
     share, interval
         Of the cases, with its 95 % interval.
     what
-        ``noticed`` or ``named``.
+        ``noticed`` or ``named rightly``, as the legend says it.
     """
 
     low: float
@@ -129,7 +129,8 @@ def detection_figure(steps: Sequence[Detection]) -> Figure:
         axes.set_ylim(-0.02, 1.04)
         axes.set_xlabel("Effect over noise")
         axes.set_ylabel("Share of the cases")
-        axes.legend(loc="lower right", frameon=False)
+        # Above: intervals of a few cases reach everywhere.
+        axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=len(kinds), frameon=False)
     return figure
 
 
