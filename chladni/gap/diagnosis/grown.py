@@ -49,11 +49,12 @@ class Grown:
     def beside(self, lead: Contestant) -> list[Contestant]:
         """Enter the words that, beside a fit of one effect, explain most in their first steps."""
         study = self.study
-        begun = sound(study, list(self._begun(lead)))
+        begun = study.contest.enter_all([*self._begun(lead)], max_iterations=_STEPS, only_coarse=True)
+        begun = sound(study, begun)
         begun.sort(key=lambda one: one.chi)
         return sound(study, study.contest.enter_all([_on_from(one) for one in begun[:_ENTERED]]))
 
-    def _begun(self, lead: Contestant) -> Iterator[Contestant]:
+    def _begun(self, lead: Contestant) -> Iterator[Hypothesis]:
         study, fit = self.study, lead.fit
         tried: set[tuple[str, str]] = set()
         # At the same site a second word would mend the details of the first one's law.
@@ -64,10 +65,7 @@ class Grown:
             if effect is None:
                 continue
             tried.add(key)
-            both = hypothesis_of((*fit.effects, effect), fit.z, screened=one.chi, initial=fit.initial)
-            begun = study.contest.enter(both, max_iterations=_STEPS, only_coarse=True)
-            if begun is not None:
-                yield begun
+            yield hypothesis_of((*fit.effects, effect), fit.z, screened=one.chi, initial=fit.initial)
             if len(tried) == _TRIED:
                 return
 

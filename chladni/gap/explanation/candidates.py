@@ -20,6 +20,7 @@ from chladni.gap.location.recovered import Recovered, recovered
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.gap.records.measurement import Measurement
+from chladni.gap.side_by_side import side_by_side
 from chladni.models.effects.effect_kind import EffectKind
 
 #: Screened forms that are searched beyond their grid: of all, and of each site.
@@ -62,7 +63,8 @@ def searched(places: Sequence[Located], forms: Sequence[Form]) -> list[Screened]
     for one, screen in found:
         best.setdefault((one.trial.effect, one.trial.site.name, one.trial.variant, one.trial.source), (one, screen))
     worth = _worth_a_search([one for one, _ in best.values()], plausible)
-    ends = {place: _searched(one, screen) for place, (one, screen) in enumerate(best.values()) if place in worth}
+    chosen = {place: form for place, form in enumerate(best.values()) if place in worth}
+    ends = dict(zip(chosen, side_by_side(lambda form: _searched(*form), [*chosen.values()]), strict=True))
     sure = [one for one in ends.values() if one is not None]
     # What others leave is a promise of the linearisation at their place.
     unsure = [one for place, (one, _) in enumerate(best.values()) if ends.get(place) is None]
@@ -86,15 +88,17 @@ def forms_at(
     problem = location.problem
     measurement = problem.measurement if known is None else known.behind(problem.measurement)
     band = excited_band_hz(problem.measurement)
-    found: list[Form] = []
-    for located in places:
-        for site, others in sites_at(located):
-            motion = recovered(problem, located.profile, site, others)
-            motion = motion if known is None else known.along(motion, problem.measurement)
-            screen = Screen(problem, located.profile, site, others=others)
-            trials = [*trials_at(problem, measurement, motion, band), *own_trials(problem, motion, site, own)]
-            found += [(one, screen) for one in screen.run(one for one in trials if one.effect not in leave_out)]
-    return found
+
+    def weighed(at: tuple[Located, Site, tuple[Site, ...]]) -> list[Form]:
+        located, site, others = at
+        motion = recovered(problem, located.profile, site, others)
+        motion = motion if known is None else known.along(motion, problem.measurement)
+        screen = Screen(problem, located.profile, site, others=others)
+        trials = [*trials_at(problem, measurement, motion, band), *own_trials(problem, motion, site, own)]
+        return [(one, screen) for one in screen.run(one for one in trials if one.effect not in leave_out)]
+
+    sites = [(located, site, tuple(others)) for located in places for site, others in sites_at(located)]
+    return [one for each in side_by_side(weighed, sites) for one in each]
 
 
 def _searched(start: Screened, screen: Screen) -> Screened | None:

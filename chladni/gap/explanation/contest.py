@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.known_states import KnownStates
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.gap.side_by_side import side_by_side
 from chladni.gap.tuning.output_error import OutputErrorFit, fit_output_error, with_coloured_spread
 from chladni.signals.errors import EstimateError, ModelError
 
@@ -134,17 +136,16 @@ class Contest:
         return float(0.5 * added * np.log(max(EFFECTIVE_SAMPLES / windows, _LEAST_SAMPLES)))
 
     def enter_all(
-        self, hypotheses: Sequence[Hypothesis], progress: Callable[[float], None] | None = None
+        self,
+        hypotheses: Sequence[Hypothesis],
+        progress: Callable[[float], None] | None = None,
+        *,
+        max_iterations: int = 12,
+        only_coarse: bool = False,
     ) -> list[Contestant]:
-        """Fit hypotheses one after another; those that diverge are left out."""
-        found = []
-        for place, one in enumerate(hypotheses):
-            entered = self.enter(one)
-            if entered is not None:
-                found.append(entered)
-            if progress is not None:
-                progress((place + 1) / len(hypotheses))
-        return found
+        """Fit hypotheses, and give them in their order; those that diverge are left out."""
+        enter = partial(self.enter, max_iterations=max_iterations, only_coarse=only_coarse)
+        return [one for one in side_by_side(enter, hypotheses, progress) if one is not None]
 
 
 def weighed(contestants: Sequence[Contestant]) -> list[Contestant]:

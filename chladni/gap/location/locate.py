@@ -14,6 +14,7 @@ from chladni.gap.plant.places import Place, Site, placed, sites_of
 from chladni.gap.plant.record_lines import RecordLines, all_lines, segment_lines, telling_lines
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.gap.side_by_side import side_by_side
 from chladni.models.core.model import Model
 
 Matrix = NDArray[np.float64]
@@ -193,7 +194,7 @@ def _roughly(
     """
     if len(problems[-1].measured) < 2:
         return [(replace(plain, sites=(place.sites[0],)), place) for place in places]
-    found = [(_rough_profile(problems, plain, place, start), place) for place in places]
+    found = side_by_side(lambda place: (_rough_profile(problems, plain, place, start), place), places)
     return sorted(found, key=lambda one: one[0].chi)
 
 

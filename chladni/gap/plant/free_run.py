@@ -1,12 +1,12 @@
 """Free simulation of a model with a log's own inputs, as often as a fit wants it."""
 
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.laid_inputs import LaidInputs
 from chladni.gap.plant.late_clock import read_late
 from chladni.gap.plant.law_run import Marched, can_run, equations, run_laws
@@ -84,7 +84,7 @@ class FreeRun:
         self.rows = _rows(compiled, measurement)
         self.inputs = LaidInputs(measurement.inputs, measurement.sample_rate_hz)
         self._linear = LinearRuns(self.inputs)
-        self._kept: OrderedDict[object, Integrator] = OrderedDict()
+        self._integrators: Kept[Integrator] = Kept(_KEPT)
 
     def compiled(self, z: Matrix | None = None, effects: Sequence[Effect] = ()) -> CompiledModel:
         """Equations of the model at some parameters, with these effects behind those that it has."""
@@ -202,22 +202,18 @@ class FreeRun:
     def _integrations(
         self, compiled: CompiledModel, key: object, initial: Matrix | None
     ) -> list[tuple[tuple[int, int], Integration]]:
-        integrator = self._integrator(compiled, key)
+        # For this run alone: an integrator's tables grow while it runs.
+        integrator = self._integrators.take(
+            key, lambda: Integrator(compiled, self.measurement.sample_rate_hz, tolerance=self.tolerance)
+        )
         starts = initial_states(initial, len(self.windows), len(compiled.states))
-        return [
-            (window, integrator.run(self.measurement.inputs[:, slice(*window)], initial=start))
-            for window, start in zip(self.windows, starts, strict=True)
-        ]
-
-    def _integrator(self, compiled: CompiledModel, key: object) -> Integrator:
-        if key in self._kept:
-            self._kept.move_to_end(key)
-            return self._kept[key]
-        made = Integrator(compiled, self.measurement.sample_rate_hz, tolerance=self.tolerance)
-        self._kept[key] = made
-        if len(self._kept) > _KEPT:
-            self._kept.popitem(last=False)
-        return made
+        try:
+            return [
+                (window, integrator.run(self.measurement.inputs[:, slice(*window)], initial=start))
+                for window, start in zip(self.windows, starts, strict=True)
+            ]
+        finally:
+            self._integrators.put(key, integrator)
 
     def _columns(self, compiled: CompiledModel, window: tuple[int, int]) -> Matrix:
         """``[sample, column]`` of the compiled model's u in a window."""

@@ -1,5 +1,7 @@
 """Inputs of one log as rows of steps, laid out once for all models that take them alike."""
 
+from threading import Lock
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +29,7 @@ class LaidInputs:
     def __init__(self, signals: Matrix, sample_rate_hz: float) -> None:
         self._signals, self.sample_rate_hz = signals, sample_rate_hz
         self._kept: list[tuple[object, Matrix]] = []
+        self._lock = Lock()
 
     def rows(self, compiled: CompiledModel, hold: Hold, parts: int = 1) -> Matrix:
         """Give ``[step, width]``; the same array for models that take the inputs alike.
@@ -46,12 +49,14 @@ class LaidInputs:
         key = (
             compiled.inputs, compiled.input_maps, compiled.input_delays_s, compiled.generated, hold.width, parts,
         )  # fmt: skip
-        for place, (known, rows) in enumerate(self._kept):
-            if known == key:
-                self._kept.append(self._kept.pop(place))
-                return rows
+        with self._lock:
+            for place, (known, rows) in enumerate(self._kept):
+                if known == key:
+                    self._kept.append(self._kept.pop(place))
+                    return rows
         made = _finer(input_rows(compiled, hold, self._signals, self.sample_rate_hz, extra=0), hold, parts)
-        self._kept = [*self._kept[1 - _KEPT :], (key, made)]
+        with self._lock:
+            self._kept = [*self._kept[1 - _KEPT :], (key, made)]
         return made
 
 

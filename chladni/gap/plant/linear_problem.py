@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.linear_view import LinearView, Way
 from chladni.gap.plant.neighbours import STEP, Neighbours, Scaled, Varied
 from chladni.gap.plant.places import Site, way_to
@@ -19,6 +20,8 @@ Spectrum = NDArray[np.complex128]
 _RESPONSE_STEP = 1e-4
 #: Complex numbers that slopes of some parameters at once may need beside their result: 64 MB.
 _AT_ONCE = 4_000_000
+#: Settings that are kept: one for each thread that may look at the problem.
+_VIEWS = 4
 
 
 class LinearProblem:
@@ -46,7 +49,7 @@ class LinearProblem:
         self.noise = noise
         self._neighbours = Neighbours(model, tunables) if neighbours is None else neighbours
         self._inputs: dict[tuple[float, ...], Spectrum] = {}
-        self._view: tuple[bytes, LinearView] | None = None
+        self._views: Kept[LinearView] = Kept(_VIEWS)
         compiled = model.compile()
         names = [terminal.name for terminal in compiled.outputs]
         self.rows = tuple(names.index(name) for name in measurement.output_names)
@@ -73,12 +76,11 @@ class LinearProblem:
     def view(self, z: Matrix) -> LinearView:
         """Give the linear part at parameters z."""
         # What is profiled at some parameters is linearised there next.
-        if self._view is None or self._view[0] != z.tobytes():
-            view = LinearView(
-                self._neighbours.at(z), self.lines, self.measurement.inputs, self.rows, known=self._inputs
-            )
-            self._view = z.tobytes(), view
-        return self._view[1]
+        return self._views.get(z.tobytes(), lambda: self._linear(z))
+
+    def _linear(self, z: Matrix) -> LinearView:
+        equations = self._neighbours.at(z)
+        return LinearView(equations, self.lines, self.measurement.inputs, self.rows, known=self._inputs)
 
     def way(self, view: LinearView, site: Site) -> Way:
         """How a force at a site enters the equations of a view."""
@@ -122,9 +124,7 @@ class LinearProblem:
         """Slope along a parameter that moves a dead time, which isn't in the equations."""
         here = self.response(z, transient, forces)
         moved = z + _RESPONSE_STEP * np.eye(z.size)[place]
-        there = LinearView(
-            self._neighbours.at(moved), self.lines, self.measurement.inputs, self.rows, known=self._inputs
-        )
+        there = self._linear(moved)
         ways = [(self.way(there, site), force) for site, force in forces]
         slope = (there.response(transient, ways) * self.weight - here) / _RESPONSE_STEP
         return np.asarray(slope, dtype=np.complex128)

@@ -1,16 +1,15 @@
 """Equations of a model at some parameters, and at those with one of them changed."""
 
-from collections import OrderedDict
-from collections.abc import Callable, Mapping
-from typing import Protocol, Self, TypeVar
+from collections.abc import Mapping
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.plant.kept import Kept
 from chladni.models.core.compiled_model import CompiledModel
 
 Matrix = NDArray[np.float64]
-FoundT = TypeVar("FoundT")
 #: Of a tunable's sigma: small against curvature, large against rounding of equations.
 STEP = 1e-5
 #: Settings that are kept: places are profiled one after another, each from the same start.
@@ -49,16 +48,16 @@ class Neighbours:
 
     def __init__(self, model: Varied, tunables: Scaled) -> None:
         self._model, self._tunables = model, tunables
-        self._at: OrderedDict[bytes, CompiledModel] = OrderedDict()
-        self._changed: OrderedDict[bytes, tuple[CompiledModel, ...]] = OrderedDict()
+        self._at: Kept[CompiledModel] = Kept(_KEPT)
+        self._changed: Kept[tuple[CompiledModel, ...]] = Kept(_KEPT)
 
     def at(self, z: Matrix) -> CompiledModel:
         """Give the equations at ``z [parameter]``, in units of their tolerance."""
-        return _kept(self._at, z, lambda: self._set(z).compile())
+        return self._at.get(z.tobytes(), lambda: self._set(z).compile())
 
     def changed(self, z: Matrix) -> tuple[CompiledModel, ...]:
         """``[parameter]``: equations with each parameter `STEP` further than at z."""
-        return _kept(self._changed, z, lambda: self._steps(z))
+        return self._changed.get(z.tobytes(), lambda: self._steps(z))
 
     def _set(self, z: Matrix) -> Varied:
         return self._model.with_values(self._tunables.values(z)) if z.size else self._model
@@ -67,13 +66,3 @@ class Neighbours:
         # From the model at z each takes one new number.
         base, there = self._set(z), self._tunables.values(z + STEP)
         return tuple(base.with_values({name: there[name]}).compile() for name in self._tunables.names)
-
-
-def _kept(found: OrderedDict[bytes, FoundT], z: Matrix, make: Callable[[], FoundT]) -> FoundT:
-    key = z.tobytes()
-    if key not in found:
-        found[key] = make()
-        if len(found) > _KEPT:
-            found.popitem(last=False)
-    found.move_to_end(key)
-    return found[key]
