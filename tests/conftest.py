@@ -1,6 +1,7 @@
 """Fixtures shared by all tests."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # How long an example takes depends on what else the machine does; speed is measured in benchmarks/.
 settings.register_profile("chladni", deadline=None)
 settings.load_profile("chladni")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread_a_worker(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Where tests run on all cores already, a diagnosis takes one; tests of its threads ask for them."""
+    with pytest.MonkeyPatch.context() as patch:
+        if hasattr(request.config, "workerinput"):
+            patch.setattr("chladni.gap.side_by_side.threads", lambda: 1)
+        yield
 
 
 @pytest.fixture(scope="session")
