@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 Matrix = NDArray[np.float64]
 #: Power over that of the lines around it, itself among them, of a line that stands out.
@@ -19,6 +18,9 @@ def strongest_tones(signal: Matrix, sample_rate_hz: float, count: int = 3) -> li
     count
         At most so many of either kind.
     """
+    # Slow to import, and few diagnoses look for tones.
+    from scipy.signal import find_peaks
+
     size = signal.size
     power = np.abs(np.fft.rfft(signal * np.hanning(size))) ** 2
     # Against its surroundings: a resonance that an unknown force excites is broad.

@@ -15,7 +15,10 @@ def bouc_wen(_d: float, s: float, _t: float, parameters: Any, state: Any, rates:
     """
     w = state[0]
     # A step that the integrator will throw away may leave +-1 far behind; a high power must not overflow there.
-    size = min(abs(w), 2.0) ** parameters[2]
+    size = min(abs(w), 2.0)
+    # A power takes most of the law's time, and the first one is what most hystereses have.
+    if parameters[2] != 1.0:
+        size = size ** parameters[2]
     sign = 1.0 if w >= 0.0 else -1.0
     rates[0] = (s - 0.5 * size * (abs(s) * sign + s)) / parameters[1]
     return float(parameters[0] * w)
@@ -29,7 +32,9 @@ def creeping(_d: float, s: float, _t: float, parameters: Any, state: Any, rates:
     """
     w = state[0]
     u = s - parameters[3] * w
-    size = min(abs(w), 2.0) ** parameters[2]
+    size = min(abs(w), 2.0)
+    if parameters[2] != 1.0:
+        size = size ** parameters[2]
     sign = 1.0 if w >= 0.0 else -1.0
     rates[0] = (u - size * (parameters[4] * abs(u) * sign + (1.0 - parameters[4]) * u)) / parameters[1]
     return float(parameters[0] * w)

@@ -5,7 +5,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import chirp
 
 from chladni.models.excitations.excitation import require_number
 from chladni.signals.errors import ModelError
@@ -39,6 +38,9 @@ class SweptSine:
 
     def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> NDArray[np.float64]:  # noqa: ARG002  # nothing here is random
         """Give ``[sample]``, beginning at zero and rising."""
+        # Slow to import, and most programs that know of excitations never sweep.
+        from scipy.signal import chirp
+
         if 2 * max(self.start_hz, self.end_hz) >= sample_rate_hz:
             highest = max(self.start_hz, self.end_hz)
             raise ModelError(f"SweptSine: {highest:g} Hz needs a sample rate above {2 * highest:g} Hz")
