@@ -77,7 +77,9 @@ class Projection:
         """Take the forces from ``[..., output, segment, line]``."""
         for known in self._unit:
             share = np.einsum("ol,...osl->...sl", known[:, 0].conj(), spectra)
-            spectra = spectra - known * share[..., None, :, :]
+            printed = known * share[..., None, :, :]
+            # In its memory: fresh memory takes as long as the arithmetic.
+            spectra = np.subtract(spectra, printed, out=printed)
         return spectra
 
 
@@ -110,7 +112,8 @@ class Elimination(Projection):
     def rest(self, spectra: Spectrum) -> Matrix:
         """Take forces and transients; give real numbers ``[..., number]``."""
         real = _real(self.away(spectra))
-        left = real - (real @ self._basis @ self._kept) @ self._basis.T
+        printed = (real @ self._basis @ self._kept) @ self._basis.T
+        left = np.subtract(real, printed, out=printed)
         return np.asarray(left.reshape(*spectra.shape[:-3], -1), dtype=np.float64)
 
     def unknowns(self, residual: Spectrum) -> tuple[Matrix, list[Spectrum]]:

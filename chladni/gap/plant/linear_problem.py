@@ -113,7 +113,8 @@ class LinearProblem:
             places = range(first, min(first + count, z.size))
             plain = [place for place in places if same_frame(view.compiled, changed[place])]
             slopes = view_slopes(view, [changed[place] for place in plain], STEP, transient, ways)
-            found[plain] = slopes * self.weight
+            slopes *= self.weight
+            found[plain] = slopes
             for place in set(places) - set(plain):
                 found[place] = self._difference(z, place, transient, forces)
         return found

@@ -59,7 +59,8 @@ def view_slopes(
     if moved.size:
         direct = along(through[moved].reshape(-1, rows.shape[0]), rows)
         found[moved] += direct.reshape(moved.size, len(view.rows), *rows.shape[1:])
-    return np.asarray(found * view.shift[:, None], dtype=np.complex128)
+    found *= view.shift[:, None]
+    return np.asarray(found, dtype=np.complex128)
 
 
 def _coefficients(
