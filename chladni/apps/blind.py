@@ -13,6 +13,7 @@ from chladni.apps.diagnose import diagnosis_json
 from chladni.gap.blind.make import make_cases
 from chladni.gap.blind.run import RunReport, run_cases
 from chladni.gap.blind.score import score_cases
+from chladni.gap.kept_memory import keep_memory
 from chladni.signals.errors import SetupError
 
 Progress = Callable[[float], None]
@@ -78,9 +79,7 @@ def workers(jobs: int | None) -> Iterator[Executor | None]:
         return
     others = frozenset(multiprocessing.active_children())
     # A forked child of a process with threads may wait for a lock that nobody holds any more.
-    pool = ProcessPoolExecutor(
-        count, mp_context=multiprocessing.get_context("spawn"), initializer=_leave_ctrl_c_to_the_parent
-    )
+    pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"), initializer=_begin_worker)
     try:
         yield pool
     except KeyboardInterrupt:
@@ -93,6 +92,7 @@ def workers(jobs: int | None) -> Iterator[Executor | None]:
         pool.shutdown(cancel_futures=True)
 
 
-def _leave_ctrl_c_to_the_parent() -> None:
+def _begin_worker() -> None:
+    keep_memory()
     # A terminal interrupts the whole group: each process would give its case up, begin the next, and say so.
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -60,9 +60,12 @@ def run(
 ) -> None:
     """Diagnose every case that has no result yet; the truths are never opened."""
     from chladni.apps.blind import run_campaign
+    from chladni.gap.kept_memory import keep_memory
 
     require_places(reads=(), writes={"--json": json})
     to = Output(json)
+    # With one job this process is the worker.
+    keep_memory()
     with to.progress("diagnosing") as show:
         report = run_campaign(directory, seed=seed, jobs=jobs, progress=show)
     to.line(f"diagnosed {counted(report.done)} cases; {counted(report.there)} had a result")

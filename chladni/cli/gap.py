@@ -173,7 +173,9 @@ def _diagnose(
 ) -> None:
     from chladni.apps.diagnose import diagnose_gap
     from chladni.apps.gap_document import gap_document
+    from chladni.gap.kept_memory import keep_memory
 
+    keep_memory()
     with out.progress(model.name) as progress:
         found = diagnose_gap(
             model,
