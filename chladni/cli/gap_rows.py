@@ -26,7 +26,8 @@ def print_diagnosis(out: Output, found: "Diagnosis") -> None:
     from chladni.viewers.gap_summary import naive_sentence, summary
 
     # What makes an answer mean little is read before it, or not at all.
-    warnings = [warning for one in found.used for warning in one.warnings]
+    # What is the model's, each of several logs says.
+    warnings = dict.fromkeys(warning for one in found.used for warning in one.warnings)
     for warning in warnings:
         out.line(f"Warning: {warning}", style="yellow")
     first, *rest = summary(found)

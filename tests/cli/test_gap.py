@@ -14,6 +14,24 @@ from tests.cli.conftest import Run
 from tests.gap_stand_in import StandIn, put_in_place
 from tests.viewers.rrd import Contents
 
+UNSTABLE = """
+format = "chladni.model/1"
+name = "axis"
+kind = "structure"
+body = [{ name = "carriage", mass = 10.0 }]
+joint = [{ name = "guide", between = ["ground", "carriage"], stiffness = 0.0, damping = 30.0 }]
+input = [{ name = "motor", at = "carriage" }]
+output = [{ name = "position", measures = "displacement", at = "carriage", channel = "/position.value" }]
+
+[[controller]]
+name = "loop"
+reference = "/command.value"
+feedback = "position"
+law = "pi"
+gains = { kp = 2000.0, ki = 9000.0 }
+drives = "motor"
+"""
+
 
 @pytest.fixture
 def engine(monkeypatch: pytest.MonkeyPatch) -> StandIn:
@@ -67,6 +85,22 @@ def test_several_logs_are_taken_together(run: Run, engine: StandIn, files: tuple
     write_mcap(made.log_series(), tmp_path / "loud.mcap")
     assert run("gap", *files, tmp_path / "loud.mcap").code == 0
     assert [one.log for one in engine.measurements] == ["arm.mcap", "loud.mcap"]
+
+
+def test_what_warns_of_the_model_is_said_once_before_the_answer(
+    run: Run, engine: StandIn, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    # A PI loop around a free carriage, far beyond the gain at which it still holds.
+    model = tmp_path / "axis.toml"
+    model.write_text(UNSTABLE, encoding="utf-8")
+    log = made.log_series()
+    channels = (Channel(name="/command.value", unit="m"), Channel(name="/position.value", unit="m"))
+    for name in ("quiet", "loud"):
+        write_mcap(replace(log, values=log.values[:2], channels=channels), tmp_path / f"{name}.mcap")
+    outcome = run("gap", model, tmp_path / "quiet.mcap", tmp_path / "loud.mcap")
+    assert outcome.code == 0, outcome.err
+    assert outcome.out.startswith("Warning: model 'axis' is unstable: a pole at ")
+    assert outcome.out.count("is unstable") == 1
 
 
 def test_the_explained_model_is_written(run: Run, engine: StandIn, files: tuple[Path, Path], tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.comparison.short_log import modes_of, shortness
+from chladni.gap.comparison.unstable_model import instability
 from chladni.gap.comparison.whole_stretch import Read, good_samples, whole_stretch
 from chladni.gap.records.measurement import Measurement
 from chladni.io.log_info import some_of
@@ -53,8 +54,8 @@ class MatchedLog:
         SI, without a missing sample: the longest stretch in which all channels are there, if it is at least half of
         the log.
     warnings
-        Sentences that come before any answer, which means little with them: nothing drives the model, the log is
-        very short.
+        Sentences that come before any answer, which means little with them: nothing drives the model, it's unstable,
+        the log is very short.
     losses
         Sentences on what an answer can't be read without: gaps that cost a part of the log.
     remarks
@@ -136,10 +137,10 @@ def matched_log(
         output_names=tuple(match.terminal.name for match in outputs),
         output_units=tuple(match.terminal.unit for match in outputs),
     )
-    short = shortness(compiled, measurement)
+    short, unstable = shortness(compiled, measurement), instability(model.name, compiled)
     return MatchedLog(
         measurement=measurement,
-        warnings=(*_at_rest(inputs, model.name, measurement, recording), *filter(None, [short])),
+        warnings=(*_at_rest(inputs, model.name, measurement, recording), *filter(None, [unstable, short])),
         losses=gaps,
         remarks=(*remarks, *_undriven(inputs), *_limits(compiled, measurement, short=short is not None)),
     )

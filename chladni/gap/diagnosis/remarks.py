@@ -4,10 +4,15 @@ import numpy as np
 
 from chladni.gap.comparison.distortion import Distortion
 from chladni.gap.comparison.outside_band import products_outside
+from chladni.gap.comparison.unstable_model import instability_found
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.measurement import Measurement
+from chladni.io.log_info import some_of
+
+#: Names of parameters in one sentence.
+_TOLD = 6
 
 
 def remarks_on(study: Study, causes: Causes, shown: Contestant, distortion: Distortion | None) -> tuple[str, ...]:
@@ -34,11 +39,18 @@ def remarks_on(study: Study, causes: Causes, shown: Contestant, distortion: Dist
     if causes.distorted:
         found.append(f"{', '.join(causes.distorted)}: what is left follows its own signal in a curve or in steps")
     if shown.fit.undetermined:
-        names = ", ".join(shown.fit.undetermined[:6])
-        found.append(f"this log doesn't determine {names}: only the stated tolerance holds what it can't tell")
+        found.append(
+            f"this log doesn't determine {some_of(shown.fit.undetermined, count=_TOLD)}: the stated tolerance alone "
+            "holds them near nominal, and they may have moved inside it with others that they depend on"
+        )
     if np.any(causes.noise.upper_bound):
         found.append("the noise floor of some outputs is an upper bound: distortion may be in it")
-    return (*found, *_of_distortion(study.measurement, distortion))
+    return (*found, *filter(None, [_stability(study, shown)]), *_of_distortion(study.measurement, distortion))
+
+
+def _stability(study: Study, shown: Contestant) -> str | None:
+    run = study.contest.run
+    return instability_found(run.compiled(), run.compiled(shown.fit.z, shown.fit.effects))
 
 
 def _of_distortion(measurement: Measurement, distortion: Distortion | None) -> tuple[str, ...]:
