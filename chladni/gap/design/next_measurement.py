@@ -90,8 +90,8 @@ def sentence(designs: Sequence[Design], candidates: Sequence[Contestant], tried:
         return None
     if not first.tells:
         return (
-            f"{_alternatives(tried)} tells {both} apart: the best, '{first.words}', would bring them to "
-            f"{first.sigmas:.2g} sigma (now {now}); take them as one answer."
+            f"Nothing that was tried ({_alternatives(tried)}) tells {both} apart: the best, '{first.words}', would "
+            f"bring them to {first.sigmas:.2g} sigma (now {now}). Take them as one answer."
         )
     more = [f"; or {_lowered(one.words)}: {one.sigmas:.2g} sigma" for one in designs[1:]]
     least = "at least " if len(candidates) > 2 else ""
@@ -101,19 +101,24 @@ def sentence(designs: Sequence[Design], candidates: Sequence[Contestant], tried:
 def _alternatives(tried: Collection[Change]) -> str:
     """Say what was looked at."""
     words: dict[Change, str] = {
-        "level": "level up to 4 times",
-        "repeats": "average of 16 records",
-        "band": "other band",
-        "sweep": "sweep",
-        "sensor": "further sensor",
-        "position": "other place of the input",
+        "level": "levels up to 4 times",
+        "repeats": "averages of up to 16 records",
+        "band": "other bands",
+        "sweep": "sweeps",
+        "slow": "a slow sine",
+        "sensor": "a further sensor",
+        "position": "another place of the input",
     }
-    return "No " + " or ".join(word for change, word in words.items() if change in tried)
+    return ", ".join(word for change, word in words.items() if change in tried)
 
 
 def _apart(candidates: Sequence[Contestant]) -> str:
     """Names of the candidates that are to be told apart."""
     named = [_spoken(one) for one in candidates[:3]]
+    if len(candidates[0].hypothesis.named) > 1:
+        # Beside several causes one of them needs a word, or it reads as the first half of the others.
+        words = [what if not site else f"{what} at {site} alone" for what, site in named]
+        return _listed(words)
     sites = {site for _, site in named}
     if len(sites) == 1 and "" not in sites:
         return f"{_listed([what for what, _ in named])} at {sites.pop()}"

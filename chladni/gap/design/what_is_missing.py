@@ -16,6 +16,7 @@ from chladni.gap.plant.record_lines import RecordLines
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
+from chladni.signals.errors import ModelError
 
 Matrix = NDArray[np.float64]
 #: Cycles of the lowest mode that tell its frequency within a percent or so.
@@ -46,13 +47,12 @@ def what_is_missing(
     -------
     str or None
         Sentences, or None when nothing of this is missing.
-
-    Raises
-    ------
-    ModelError
-        When the log isn't one of this model.
     """
-    found = [_length(model, measurement), _level(measurement, noise), _sensor(model, measurement, noise, sites)]
+    found = [
+        _length(model, measurement),
+        level_missing(measurement, noise),
+        sensor_missing(model, measurement, noise, sites=sites),
+    ]
     return " ".join(one for one in found if one) or None
 
 
@@ -69,8 +69,8 @@ def _length(model: Model, measurement: Measurement) -> str | None:
     )
 
 
-def _level(measurement: Measurement, noise: NoiseFloor) -> str | None:
-    """Ask for a higher level when noise drowns the outputs."""
+def level_missing(measurement: Measurement, noise: NoiseFloor) -> str | None:
+    """Ask for a higher level or averages when noise drowns the outputs, None when it doesn't."""
     share = noise.rms / np.maximum(np.std(measurement.outputs, axis=1), np.finfo(np.float64).tiny)
     middle = float(np.median(share))
     if middle <= LOUD:
@@ -78,17 +78,36 @@ def _level(measurement: Measurement, noise: NoiseFloor) -> str | None:
     # What is measured holds the noise too.
     signal = max(1.0 - middle**2, 0.01)
     factor = min(max(2.0, float(np.ceil(middle / (LOUD * signal**0.5)))), 4.0)
+    then = middle / float(np.hypot(factor * signal**0.5, middle))
     return (
         f"Noise is {middle:.0%} of what the sensors show: raise the level {factor:.0f} times, or average "
-        f"{factor**2:.0f} records of the same input."
+        f"{factor**2:.0f} records or periods of the same input; it is then {then:.0%}."
     )
 
 
-def _sensor(model: Model, measurement: Measurement, noise: NoiseFloor, names: Sequence[str]) -> str | None:
-    """Ask for the sensor that splits the likeliest sites best, when those there are don't."""
-    sensors = more_sensors(model, measurement, names)
+def sensor_missing(
+    model: Model, measurement: Measurement, noise: NoiseFloor, *, sites: Sequence[str] = ()
+) -> str | None:
+    """Ask for the sensor that splits the likeliest sites best, None when those there are do, or none would.
+
+    Parameters
+    ----------
+    model, measurement, noise, sites
+        As `what_is_missing` takes them.
+    """
+    sensors = more_sensors(model, measurement, sites)
     if not sensors or not measurement.output_names:
         return None
+    try:
+        return _best_sensor(model, measurement, noise, sensors, sites)
+    except ModelError:
+        # What a sensor would show of a model that diverges is not known.
+        return None
+
+
+def _best_sensor(
+    model: Model, measurement: Measurement, noise: NoiseFloor, sensors: Sequence[MoreSensor], names: Sequence[str]
+) -> str | None:
     patterns, sites = _patterns(model, measurement, noise, sensors, names)
     if len(sites) < 2:
         return None

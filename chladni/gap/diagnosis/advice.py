@@ -1,12 +1,13 @@
 """What to do after a diagnosis: what to check, to put right, to measure."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from chladni.gap.comparison.scale_doubt import gain_doubt, mass_doubt, scale_doubt
 from chladni.gap.design.next_measurement import next_measurement
-from chladni.gap.design.what_is_missing import what_is_missing
+from chladni.gap.design.what_is_missing import level_missing, sensor_missing, what_is_missing
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.study import Study
+from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.driven_part import driven_parts
 from chladni.signals.errors import ModelError
 
@@ -14,6 +15,8 @@ from chladni.signals.errors import ModelError
 _STILL_CLOSE = 8.0
 #: Of the tuned model's error: parameters outside their tolerance that leave less are wrong, whatever else is.
 _MOSTLY = 0.25
+#: What "nothing is missing" leaves open in loud noise.
+_HIDDEN = "What moves the outputs by less than this noise may act unseen: this log can't rule it out."
 
 
 def advice_on(study: Study, causes: Causes) -> str | None:
@@ -51,18 +54,57 @@ def _doubted_values(study: Study, causes: Causes) -> Iterator[str | None]:
 
 def measure_next(study: Study, causes: Causes, seed: int) -> str | None:
     """What to measure so that the answer gets clearer, None when it's clear or nothing would help."""
-    run = study.contest.run
     if causes.shaken is not None:
         return None
-    close = [one for one in (*causes.ranked, causes.tuned) if len(one.hypothesis.named) <= 1]
-    close = sorted(close, key=lambda one: -one.log_evidence)
-    near = [one for one in close if one.log_evidence > close[0].log_evidence - _STILL_CLOSE]
-    if causes.verdict != "unknown" and len(near) > 1 and close[0] is not causes.tuned:
-        return next_measurement(study.model, study.measurement, run.tunables, near[:4], causes.noise, seed=seed)
     if causes.verdict == "unknown":
-        sites = [located.places[0].sites[0].name for located in study.location.ranked[:3]]
-        return what_is_missing(study.model, study.measurement, causes.noise, sites=sites)
-    return None
+        return what_is_missing(study.model, study.measurement, causes.noise, sites=_likely_sites(study, ()))
+    near = _still_close(causes)
+    said = None
+    if len(near) > 1 and near[0] is not causes.tuned:
+        tunables = study.contest.run.tunables
+        said = next_measurement(study.model, study.measurement, tunables, near[:4], causes.noise, seed=seed)
+    return said or _beyond_these_sensors(study, causes)
+
+
+def _still_close(causes: Causes) -> list[Contestant]:
+    """The best answer and those with as many causes that come near it; beside several also the best with one."""
+    count = len(causes.best.hypothesis.named)
+    if count <= 1:
+        alike = [one for one in (*causes.ranked, causes.tuned) if len(one.hypothesis.named) <= 1]
+        alike.sort(key=lambda one: -one.log_evidence)
+        first = alike[0]
+    else:
+        # An experiment between others than the answer would tell nothing of it.
+        first = causes.best
+        others = [one for one in causes.ranked if len(one.hypothesis.named) == count and one is not first]
+        single = [one for one in causes.ranked if len(one.hypothesis.named) == 1][:1]
+        alike = [first, *sorted((*others, *single), key=lambda one: -one.log_evidence)]
+    return [one for one in alike if one is first or one.log_evidence > first.log_evidence - _STILL_CLOSE]
+
+
+def _likely_sites(study: Study, named: Sequence[str]) -> list[str]:
+    """Sites that were named, then those at which an unknown force explains most."""
+    first = [located.places[0].sites for located in study.location.ranked[:3]]
+    if len(study.measurement.output_names) == 1:
+        # To an only sensor all are one place: it's among them that the force may act.
+        sites = [site.name for each in first for site in each if site.kind in ("joint", "body")]
+    else:
+        sites = [each[0].name for each in first]
+    return list(dict.fromkeys((*named, *sites)))
+
+
+def _beyond_these_sensors(study: Study, causes: Causes) -> str | None:
+    """What limits an answer that nothing else is asked for: noise, or an only sensor."""
+    level = level_missing(study.measurement, causes.noise)
+    if causes.verdict == "none":
+        return None if level is None else f"{level} {_HIDDEN}"
+    sensor = None
+    if len(study.measurement.output_names) == 1:
+        # A parameter such as elbow.stiffness acts where its joint does.
+        named = [one.site.split(".")[0] for one in causes.best.hypothesis.named]
+        sites = _likely_sites(study, named)
+        sensor = sensor_missing(study.model, study.measurement, causes.noise, sites=sites)
+    return " ".join(filter(None, (level, sensor))) or None
 
 
 def _on_causes(study: Study, causes: Causes) -> str | None:

@@ -1,0 +1,118 @@
+"""What is asked for after an answer: what tells it from others that come near, or what the log lacks for any."""
+
+from dataclasses import replace
+
+from chladni.gap.diagnosis.advice import measure_next
+from chladni.gap.diagnosis.causes import Causes
+from chladni.gap.diagnosis.diagnose import diagnose
+from chladni.gap.diagnosis.study import Study, study_of
+from chladni.gap.explanation.contest import weighed
+from chladni.gap.explanation.hypotheses import hypothesis_of
+from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.gap.records.measurement import Measurement
+from chladni.models.effects.attached_effect import AttachedEffect, attached
+from chladni.models.effects.catalogue import CATALOGUE
+from tests.gap.made_log import band_noise, measured, three_bodies
+
+ONLY_GAINS = frozenset(CATALOGUE) - {"gain_error"}
+COULOMB = attached("coulomb_friction", "j1", {"force": 0.3})
+HARDENING = attached("hardening_stiffness", "j1", {"cubic": 1.2e9})
+
+
+def gain(site: str) -> AttachedEffect:
+    return attached("gain_error", site, {"gain": 1.3})
+
+
+def log_of(*effects: AttachedEffect, noise: float = 0.02, outputs: list[int] | None = None) -> Measurement:
+    log, _ = measured(three_bodies().with_effects(effects), band_noise(1536), noise=noise, outputs=outputs)
+    return log
+
+
+def answered(study: Study, entered: list[Contestant], verdict: str = "effect") -> Causes:
+    """The causes with the first of contestants as the answer."""
+    tuned = study.contest.enter(Hypothesis(start_z=study.location.tuned.z))
+    assert tuned is not None
+    ranked = weighed([tuned, *entered])
+    best = next(one for one in ranked if one.fit is (entered or [tuned])[0].fit)
+    others = tuple(one for one in ranked if one.hypothesis.named)
+    return Causes(
+        verdict=verdict,  # type: ignore[arg-type]
+        tuned=next(one for one in ranked if one.fit is tuned.fit),
+        best=best,
+        ranked=others,
+        probabilities=(1.0 / max(len(others), 1),) * len(others),
+        shaken=None, noise=study.contest.noise, distorted=(), instead=None, states=None,
+    )  # fmt: skip
+
+
+def entered(study: Study, *effects: tuple[AttachedEffect, ...]) -> list[Contestant]:
+    hypotheses = [hypothesis_of(one, study.location.tuned.z) for one in effects]
+    found = [study.contest.enter(one) for one in hypotheses]
+    return [one for one in found if one is not None]
+
+
+def studied(log: Measurement) -> Study:
+    return study_of(three_bodies(), log, leave_out=frozenset(), own={})
+
+
+def test_a_diagnosis_asks_for_what_tells_its_candidates_apart() -> None:
+    # Both scale the only channel.
+    found = diagnose(three_bodies(), [log_of(gain("hammer"), outputs=[2])], leave_out=ONLY_GAINS)
+    assert found.verdict == "effect"
+    said = found.next_measurement or ""
+    assert "gain error at hammer and gain error at a2" in said or "gain error at a2 and gain error at hammer" in said
+    assert said.startswith("Add ")
+
+
+def test_two_causes_are_compared_with_two_others() -> None:
+    study = studied(log_of(gain("a0"), HARDENING))
+    one, other, single, alone = entered(
+        study, (gain("a0"), HARDENING), (gain("a0"), COULOMB), (gain("a0"),), (HARDENING,)
+    )
+    causes = answered(study, [one, other, single, alone])
+    # As near as they may be, whatever this log says of them: what is compared is what is tested.
+    less = causes.best.log_evidence - 1.0
+    near = [replace(each, log_evidence=less) for each in causes.ranked if each is not causes.best]
+    near.sort(key=lambda each: len(each.hypothesis.named))
+    said = measure_next(study, replace(causes, ranked=(causes.best, *near)), seed=0) or ""
+    assert "gain error at a0 with hardening stiffness at j1" in said
+    assert "gain error at a0 with coulomb friction at j1" in said
+    assert "gain error at a0 alone then differ" in said
+    # None of them comes near: nothing is left to be told apart.
+    far = [replace(each, log_evidence=causes.best.log_evidence - 20.0) for each in near]
+    assert measure_next(study, replace(causes, ranked=(causes.best, *far)), seed=0) is None
+
+
+def test_nothing_missing_in_loud_noise_says_what_may_be_hidden() -> None:
+    loud, quiet = studied(log_of(noise=1.0)), studied(log_of())
+    said = measure_next(loud, answered(loud, [], "none"), seed=0) or ""
+    assert said.startswith("Noise is 7")
+    assert "average 16 records or periods of the same input" in said
+    assert said.endswith("may act unseen: this log can't rule it out.")
+    assert measure_next(quiet, answered(quiet, [], "none"), seed=0) is None
+
+
+def test_an_effect_in_loud_noise_asks_for_a_higher_level() -> None:
+    study = studied(log_of(attached("gain_error", "a0", {"gain": 3.0}), noise=1.0))
+    # So large that nothing else comes near.
+    said = measure_next(study, answered(study, entered(study, (gain("a0"),))), seed=0) or ""
+    assert "raise the level 4 times" in said
+    assert "unseen" not in said
+
+
+def test_an_only_sensor_is_asked_for_another_one() -> None:
+    study = studied(log_of(HARDENING, outputs=[2]))
+    causes = answered(study, entered(study, (HARDENING,)))
+    lone = replace(causes, tuned=replace(causes.tuned, log_evidence=causes.best.log_evidence - 100.0))
+    said = measure_next(study, lone, seed=0) or ""
+    assert said.startswith("One sensor can't tell where a force acts: add ")
+    assert measure_next(study, replace(lone, verdict="none", best=lone.tuned, ranked=()), seed=0) is None
+    several = studied(log_of(HARDENING))
+    assert measure_next(several, answered(several, entered(several, (HARDENING,))), seed=0) is None
+
+
+def test_what_an_only_sensor_leaves_unknown_asks_for_another_one() -> None:
+    one, all_three = studied(log_of(HARDENING, outputs=[2])), studied(log_of(HARDENING))
+    said = measure_next(one, answered(one, [], "unknown"), seed=0) or ""
+    assert said.startswith("One sensor can't tell where a force acts: add ")
+    assert measure_next(all_three, answered(all_three, [], "unknown"), seed=0) is None
