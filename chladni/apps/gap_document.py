@@ -8,6 +8,7 @@ from chladni.gap.records.diagnosis import (
     Candidate,
     Cause,
     Closing,
+    Correlation,
     Diagnosis,
     DistortionShare,
     FittedNumber,
@@ -27,7 +28,8 @@ def gap_document(found: Diagnosis) -> Document:
     Document
         ``format``, ``model``, ``logs``, ``verdict``, ``causes``, ``ranking``, ``where``, ``gap``,
         ``tuned_parameters`` and ``next_measurement`` always; ``naive``, ``advice``, ``remarks``, ``distortion``,
-        ``levels``, ``elsewhere`` and ``left`` when there is something in them. docs/gap.md says what each means.
+        ``levels``, ``elsewhere``, ``left`` and ``correlation`` when there is something in them. docs/gap.md says what
+        each means.
     """
     return {
         "format": GAP_FORMAT,
@@ -52,6 +54,7 @@ def gap_document(found: Diagnosis) -> Document:
                 "levels": list(found.levels),
                 "elsewhere": [closing_document(one) for one in found.elsewhere],
                 "left": None if found.left is None else where_document(found.left),
+                "correlation": None if found.correlation is None else _correlation(found.correlation),
             }
         ),
     }
@@ -122,6 +125,10 @@ def _ranked(row: Ranked) -> Document:
 
 def _number(number: FittedNumber) -> Document:
     return {"value": _known(number.value), "std": _known(number.std), "unit": number.unit}
+
+
+def _correlation(one: Correlation) -> Document:
+    return {"names": list(one.names), "matrix": [[_known(number) for number in row] for row in one.matrix]}
 
 
 def _distortion(one: DistortionShare) -> Document:

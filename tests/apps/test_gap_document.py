@@ -5,10 +5,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from chladni.apps.gap_document import gap_document
-from chladni.gap.records.diagnosis import Candidate, ChannelGap, Diagnosis, FittedNumber
+from chladni.gap.records.diagnosis import Candidate, ChannelGap, Correlation, Diagnosis, FittedNumber
 from tests import made_diagnosis as made
 
 # Of each key: what its value may be. A list holds things of one kind, a mapping of str any names.
@@ -50,7 +51,7 @@ SCHEMA: Mapping[str, Any] = {
 }
 # What may stand beside the agreed keys, by the place it stands in.
 MORE = {
-    "": {"naive", "advice", "remarks", "distortion", "levels", "elsewhere", "left"},
+    "": {"naive", "advice", "remarks", "distortion", "levels", "elsewhere", "left", "correlation"},
     ".causes": {"variant", "from", "share"},
     ".ranking": {"beside"},
     ".gap": {"by", "horizon_s"},
@@ -105,6 +106,15 @@ def test_the_numbers_are_those_of_the_diagnosis() -> None:
     assert document["naive"] == {"effect": "hysteresis", "site": "elbow"}
 
 
+def test_which_parameters_are_told_together_only_stands_there_as_a_matrix() -> None:
+    names = ("shoulder.stiffness", "elbow.stiffness")
+    known = Correlation(names=names, matrix=np.array([[1.0, -0.9], [-0.9, 1.0]]))
+    document = written(replace(made.diagnosis(), correlation=known))
+    hold(document, SCHEMA)
+    assert document["correlation"] == {"names": list(names), "matrix": [[1.0, -0.9], [-0.9, 1.0]]}
+    assert "correlation" not in written(made.diagnosis())
+
+
 def test_a_row_of_the_ranking_says_beside_what_its_numbers_are() -> None:
     found = made.diagnosis()
     half = replace(found.ranking[0], beside=(Candidate(effect="time_offset", site="acc_wrist"),))
@@ -149,7 +159,10 @@ def test_keys_beside_the_agreed_ones_are_there_only_with_content() -> None:
     bare = replace(made.diagnosis(), naive=None, remarks=(), advice=None)
     assert set(written(bare)) == set(SCHEMA)
     naive = Candidate(effect="lag", site="shaker")
-    full = written(replace(made.periodic(), advice="Measure longer.", naive=naive, left=made.unknown().left))
+    known = Correlation(names=("a",), matrix=np.eye(1))
+    full = written(
+        replace(made.periodic(), advice="Measure longer.", naive=naive, left=made.unknown().left, correlation=known)
+    )
     assert set(full) == set(SCHEMA) | MORE[""]
     assert full["distortion"][0] == {
         "output": "acc_column", "linear": 0.93, "even": 0.001, "odd": 0.068, "noise": 0.001

@@ -15,6 +15,7 @@ from chladni.gap.comparison.short_log import shortness
 from chladni.gap.diagnosis.advice import advice_on, measure_next
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
+from chladni.gap.diagnosis.correlation import correlation_of
 from chladni.gap.diagnosis.even_odds import at_even_odds
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
 from chladni.gap.diagnosis.other_logs import tried_elsewhere
@@ -120,6 +121,7 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         left=_where(study, causes, causes.tuned.fit.outputs, motion) if causes.verdict == "unknown" else None,
         gap=closing_of(_yardstick(study, causes), before, causes.tuned.fit.outputs, after, seed=seed),
         tuned_parameters=tuned_numbers(study, shown.fit),
+        correlation=correlation_of(study.contest.run.tunables, shown.fit),
         next_measurement=measure_next(study, causes, seed),
         naive=naive_of(causes),
         remarks=remarks_on(study, causes, shown, distortion),

@@ -41,7 +41,7 @@ def _trial(compiled: CompiledModel, motion: Recovered, site: Site, kind: EffectK
     effect = attached(kind, site.name, start, variant=variant)
     names = usually_fitted(effect)
     before = len(compiled.laws)
-    # Only a law can be driven along a motion; other ways to attach are left to a fit of their own.
+    # Only a law can be driven along a motion; what attaches in other ways is not screened, and so never weighed.
     if not names or len(effect.attach(compiled).laws) == before:
         return None
     parameters = [effect.parameters[name] for name in names]

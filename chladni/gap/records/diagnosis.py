@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.gap.records.log_use import LogUse
-from chladni.signals.value import Value
+from chladni.signals.value import Value, require_shape
 
 Matrix = NDArray[np.float64]
 Verdict = Literal["none", "parameters", "effect", "unknown"]
@@ -22,6 +22,21 @@ class FittedNumber:
     std: float | None
     unit: str
     nominal: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Correlation(Value):
+    """``matrix [parameter, parameter]``, -1 to 1, of the errors of fitted parameters.
+
+    Near 1 or -1 the log tells a ratio or a product of two alone, however uncertain either is.
+    """
+
+    names: tuple[str, ...]
+    matrix: Matrix
+
+    def __post_init__(self) -> None:
+        require_shape("matrix", self.matrix, (len(self.names), len(self.names)), "the parameters")
+        self._freeze()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -268,13 +283,15 @@ class Diagnosis:
     where, gap
         Where the gap lies; how far it closes.
     tuned_parameters
-        By name; `std` None for those that this log can't determine, which were held.
+        By name; `std` None for those that this log can't determine: only their tolerance keeps them near nominal, and
+        they may have moved inside it with others that they depend on. With them, and no other values, the causes'
+        parameters leave what `gap` says.
     next_measurement
         A sentence, or None.
     naive
         What the largest drop in RMS alone would have named, or None.
     remarks
-        Sentences on what limits the answer: short log, few sensors, parameters held, horizon, damage.
+        Sentences on what limits the answer: short log, few sensors, parameters not determined, horizon, damage.
     advice
         One sentence for the summary of a verdict ``unknown`` or ``none``.
     restoring_force, signals
@@ -289,6 +306,8 @@ class Diagnosis:
         How much of each log was used, and what was lost of it.
     left
         With the verdict ``unknown``: where what the best parameters leave lies, which is what isn't explained.
+    correlation
+        Of the tuned parameters' errors; None where nothing was tuned.
     """
 
     model: str
@@ -310,3 +329,4 @@ class Diagnosis:
     elsewhere: tuple[Closing, ...] = ()
     used: tuple[LogUse, ...] = ()
     left: Where | None = None
+    correlation: Correlation | None = None

@@ -76,7 +76,8 @@ class OutputErrorFit(Value):
     iterations, evaluations
         Of the fit; evaluations are free runs.
     undetermined
-        Names of the parameters that this log leaves as uncertain as they were: they stay near nominal.
+        Names of the parameters that this log leaves as uncertain as they were: nothing but their tolerance keeps them
+        near nominal, and they move with others that they depend on.
     covariance
         Of z and of the unknowns of the effects, in that order.
     """

@@ -145,7 +145,7 @@ def test_a_bad_guess_of_the_noise_changes_little(signals):
     np.testing.assert_allclose(np.diag(wrong.covariance), np.diag(right.covariance), rtol=0.2)
 
 
-def test_what_the_log_does_not_show_is_named_and_held():
+def test_what_the_log_does_not_show_is_named_and_stays_where_it_was_believed():
     # A body on a stiff joint behind the sensor's: its damping hardly moves a log of low frequencies.
     model = chain([2.0, 1e-3], [5e5, 5e8], [40.0, 1e-3])
     log, floor = measured(model, band_noise(3000), outputs=[0], noise=0.02)
