@@ -1,0 +1,80 @@
+"""``chladni gap`` from files to answer, the diagnosis itself included."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chladni.io.mcap.writer import write_mcap
+from chladni.models.effects.catalogue import CATALOGUE
+from tests import made_diagnosis as made
+from tests.cli.conftest import Outcome, Run
+
+# All words would only make it slower.
+WITHOUT = [part for word in sorted(CATALOGUE) if word != "gain_error" for part in ("--without", word)]
+SAMPLES, GAIN = 1500, 1.2
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """The two-jointed arm, and a log of it whose last sensor shows a fifth too much."""
+    folder = tmp_path_factory.mktemp("gap")
+    run = made.nominal_run()
+    rng = np.random.default_rng(2)
+    outputs = run.outputs.values[:, :SAMPLES]
+    outputs = outputs + made.NOISE * outputs.std(axis=1, keepdims=True) * rng.standard_normal(outputs.shape)
+    outputs[-1] *= GAIN
+    channels = (*run.inputs.channels, *run.outputs.channels)
+    log = replace(made.log_series(), values=np.vstack([run.inputs.values[:, :SAMPLES], outputs]), channels=channels)
+    write_mcap(log, folder / "arm.mcap")
+    return made.write_arm_model(folder), folder / "arm.mcap"
+
+
+def diagnosed(run: Run, files: tuple[Path, Path], json: object, *more: object) -> Outcome:
+    outcome = run("gap", *files, *WITHOUT, "--json", json, *more)
+    assert outcome.code == 0, outcome.err
+    return outcome
+
+
+def test_a_sensor_that_shows_too_much_is_named_and_the_model_written_with_it(
+    run: Run, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    explained = tmp_path / "explained.toml"
+    found = diagnosed(run, files, "-", "--write-model", explained)
+    (cause,) = found.document["causes"]
+    assert (found.document["verdict"], cause["effect"], cause["site"]) == ("effect", "gain_error", "acc_wrist")
+    assert cause["parameters"]["gain"]["value"] == pytest.approx(GAIN, rel=0.02)
+    assert found.document["gap"]["closed"] > 0.98
+    assert "at acc_wrist" in found.err.splitlines()[0]
+    names = found.document["correlation"]["names"]
+    assert names == list(found.document["tuned_parameters"])
+    assert [len(row) for row in found.document["correlation"]["matrix"]] == [len(names)] * len(names)
+    # Nothing is left to be found of the model that was written.
+    again = diagnosed(run, (explained, files[1]), "-").document
+    assert (again["verdict"], again["causes"]) == ("none", [])
+
+
+def test_the_same_files_give_the_same_document_to_the_byte(
+    run: Run, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    written = [tmp_path / "first.json", tmp_path / "second.json"]
+    for path in written:
+        diagnosed(run, files, path, "--seed", 3)
+    assert written[0].read_bytes() == written[1].read_bytes()
+    assert b'"gain_error"' in written[0].read_bytes()
+
+
+def test_channels_at_different_rates_are_refused_with_what_to_do(
+    run: Run, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    series, slow = made.log_series(), tmp_path / "slow.mcap"
+    driven = replace(series, values=series.values[:1], channels=series.channels[:1])
+    half = made.RATE_HZ / 2
+    seen = replace(series, values=series.values[1:, ::2], channels=series.channels[1:], sample_rate_hz=half)
+    write_mcap([driven, seen], slow)
+    outcome = run("gap", files[0], slow)
+    assert (outcome.code, outcome.out, outcome.err.count("\n")) == (2, "", 1)
+    assert "/shaker.wrench.force.x at 500 Hz" in outcome.err
+    assert "at 250 Hz; bring them to one" in outcome.err
+    assert "chladni convert slow.mcap OUT.mcap --rate 500" in outcome.err
