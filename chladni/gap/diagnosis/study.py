@@ -23,13 +23,15 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.signals.channel import Channel
-from chladni.signals.errors import ModelError
+from chladni.signals.errors import EstimateError, ModelError
 from chladni.signals.sensor_quality import sensor_quality
 from chladni.signals.time_series import TimeSeries
 
 Matrix = NDArray[np.float64]
 #: Misfit over noise with which a record is followed from its start to its end.
 _FOLLOWS = 3.0
+#: Most e-folds that an error of the model may grow by from one sample to the next: windows begin with an error always.
+_E_FOLDS = 10.0
 #: Different values that are repeated, over all samples, of a sensor that holds them.
 _HELD = 0.05
 
@@ -87,7 +89,14 @@ class Study:
 def study_of(
     model: Model, measurement: Measurement, *, leave_out: frozenset[str], own: Mapping[str, EffectKind]
 ) -> Study:
-    """Prepare the study of one log."""
+    """Prepare the study of one log.
+
+    Raises
+    ------
+    EstimateError
+        When the model runs away from one sample to the next.
+    """
+    _require_within_reach(model, measurement)
     measurement = with_period(measurement)
     noise = floor_of(measurement)
     lattices = {} if "quantization" in leave_out else _lattices(measurement, noise)
@@ -144,6 +153,16 @@ def training_of(measurement: Measurement, windows: Sequence[tuple[int, int]] | N
     if windows is None:
         return training_mask(measurement.samples, measurement.sample_rate_hz, measurement.period_samples)
     return training_in_windows(windows)
+
+
+def _require_within_reach(model: Model, measurement: Measurement) -> None:
+    growth = float(np.linalg.eigvals(model.compile().a).real.max(initial=0.0))
+    if growth > _E_FOLDS * measurement.sample_rate_hz:
+        raise EstimateError(
+            f"model {model.name!r} runs away: an error grows e-fold in {1.0 / growth:.2g} s, {_E_FOLDS:g} times and "
+            f"more between two samples of log {measurement.log!r} ({measurement.sample_rate_hz:g} Hz); check the "
+            "gains and signs of its loops, and the units of its parameters"
+        )
 
 
 def _runs_free(model: Model, location: Location) -> bool:
