@@ -30,7 +30,7 @@ from chladni.signals.time_series import TimeSeries
 Matrix = NDArray[np.float64]
 #: Misfit over noise with which a record is followed from its start to its end.
 _FOLLOWS = 3.0
-#: Most e-folds that an error of the model may grow by from one sample to the next: windows begin with an error always.
+#: Most e-folds that an error may grow by from one sample to the next: every window begins with one.
 _E_FOLDS = 10.0
 #: Different values that are repeated, over all samples, of a sensor that holds them.
 _HELD = 0.05
