@@ -1,5 +1,7 @@
 """What limits a diagnosis: sensors, parameters, noise, excitation."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from chladni.gap.comparison.distortion import Distortion
@@ -39,13 +41,17 @@ def remarks_on(study: Study, causes: Causes, shown: Contestant, distortion: Dist
     if causes.distorted:
         found.append(f"{', '.join(causes.distorted)}: what is left follows its own signal in a curve or in steps")
     if shown.fit.undetermined:
-        found.append(
-            f"this log doesn't determine {some_of(shown.fit.undetermined, count=_TOLD)}: the stated tolerance alone "
-            "holds them near nominal, and they may have moved inside it with others that they depend on"
-        )
+        found.append(_undetermined(shown.fit.undetermined))
     if np.any(causes.noise.upper_bound):
         found.append("the noise floor of some outputs is an upper bound: distortion may be in it")
     return (*found, *filter(None, [_stability(study, shown)]), *_of_distortion(study.measurement, distortion))
+
+
+def _undetermined(names: Sequence[str]) -> str:
+    return (
+        f"this log doesn't determine {some_of(names, count=_TOLD)}: only the stated tolerance holds what it can't tell, "
+        "which may have moved inside that with what it depends on"
+    )
 
 
 def _stability(study: Study, shown: Contestant) -> str | None:
