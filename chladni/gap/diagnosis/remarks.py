@@ -49,8 +49,8 @@ def remarks_on(study: Study, causes: Causes, shown: Contestant, distortion: Dist
 
 def _undetermined(names: Sequence[str]) -> str:
     return (
-        f"this log doesn't determine {some_of(names, count=_TOLD)}: only the stated tolerance holds what it can't tell, "
-        "which may have moved inside that with what it depends on"
+        f"this log doesn't determine {some_of(names, count=_TOLD)}: only the stated tolerance holds what it can't "
+        "tell, which may have moved inside that with what it depends on"
     )
 
 
