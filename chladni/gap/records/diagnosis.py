@@ -118,6 +118,15 @@ class BandShare:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TimeShare:
+    """Share of the gap's power (outputs scaled by their RMS) between two times, seconds from the first sample."""
+
+    start_s: float
+    end_s: float
+    share: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SiteShare:
     """Share of the gap beyond noise that an unknown force (error, change of input) at this site explains."""
 
