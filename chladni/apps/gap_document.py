@@ -61,7 +61,7 @@ def gap_document(found: Diagnosis) -> Document:
 
 
 def where_document(where: Where) -> Document:
-    """Give where the gap lies: by channel, band, site and regime."""
+    """Give where the gap lies: by channel, band, site, regime and time."""
     return {
         "channels": [
             {"name": one.name, "gap": _known(one.gap), "noise": _known(one.noise)} for one in where.channels
@@ -74,6 +74,10 @@ def where_document(where: Where) -> Document:
         "regimes": [
             {"variable": one.variable, "low": _known(one.low), "high": _known(one.high), "share": _known(one.share)}
             for one in where.regimes
+        ],
+        "times": [
+            {"start_s": _known(one.start_s), "end_s": _known(one.end_s), "share": _known(one.share)}
+            for one in where.times
         ],
     }
 

@@ -89,6 +89,7 @@ def _print_where(out: Output, where: "Where", error: str, *, of: str = "", all_i
         (f"Where in frequency{of}", tables.band_table(where, least=LEAST_SHARE)),
         ("What an unknown force, error or change at one site can explain", tables.site_table(where)),
         (f"While{of}", tables.regime_table(where, least=LEAST_SHARE)),
+        (f"When{of}", tables.time_table(where, least=LEAST_SHARE)),
     ):
         _print(out, title, table, all_in=all_in)
 

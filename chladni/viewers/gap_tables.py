@@ -53,6 +53,14 @@ def regime_table(where: Where, *, least: float = 0.0) -> Table:
     ]
 
 
+def time_table(where: Where, *, least: float = 0.0) -> Table:
+    """Share of the gap's power in each stretch of the record, those with `least` and more; the largest first."""
+    rows = sorted(where.times, key=lambda one: -one.share)
+    return ("Time [s]", "Share"), [
+        (f"{one.start_s:.4g} to {one.end_s:.4g}", percent(one.share)) for one in rows if one.share >= least
+    ]
+
+
 def ranking_table(found: Diagnosis, *, count: int = RANKED) -> Table:
     """Candidates by falling probability, those with hardly any by evidence; last what is left to others."""
     rows = [

@@ -54,7 +54,7 @@ def test_the_document_holds_where_and_how_far(logs: tuple[Path, Path]) -> None:
     document = json.loads(json.dumps(comparison_document(compared(*logs)), allow_nan=False))
     assert document["format"] == "chladni.gap-comparison/1"
     assert (document["simulated"], document["logs"]) == ("simulated.mcap", ["measured.mcap"])
-    assert set(document["where"]) == {"channels", "bands", "sites", "regimes"}
+    assert set(document["where"]) == {"channels", "bands", "sites", "regimes", "times"}
     assert set(document["gap"]) == {"before", "noise"}
 
 

@@ -36,6 +36,7 @@ SCHEMA: Mapping[str, Any] = {
         "bands": [{"low_hz": NUMBER, "high_hz": NUMBER, "share": NUMBER}],
         "sites": [{"name": (str,), "share": NUMBER}],
         "regimes": [{"variable": (str,), "low": NUMBER, "high": NUMBER, "share": NUMBER}],
+        "times": [{"start_s": NUMBER, "end_s": NUMBER, "share": NUMBER}],
     },
     "gap": {
         "before": NUMBER,

@@ -6,13 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.comparison.distortion import Distortion, distortion_of
+from chladni.gap.comparison.log_regimes import log_regimes
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, pooled_gap, regime_shares
+from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.records.diagnosis import Where
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
-from chladni.signals.errors import LogError
+from chladni.signals.errors import EstimateError, LogError
 from chladni.signals.value import Value
 
 Matrix = NDArray[np.float64]
@@ -34,11 +37,13 @@ class GapView(Value):
     gap
         Pooled over outputs: RMS of the residual over RMS of measured, each output scaled by its own.
     where
-        Channels, bands, regimes; no sites, since those are a model's.
+        Channels, bands, regimes, times; no sites, since those are a model's.
     noise
         Of the measured outputs.
     map_time_s, map_frequency_hz, map_density
         See `gap_map`.
+    measured_split, simulated_split
+        Linear, even, odd and noise of the outputs; None where no single input repeats, see `distortion_of`.
     remarks
         Outputs that only one side holds; inputs that differ.
     """
@@ -50,6 +55,8 @@ class GapView(Value):
     map_time_s: Matrix
     map_frequency_hz: Matrix
     map_density: Matrix
+    measured_split: Distortion | None = None
+    simulated_split: Distortion | None = None
     remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -77,7 +84,8 @@ def view_gap(
     modes_hz
         Natural frequencies that bands are cut between; see `band_shares`.
     variables
-        Motions whose regimes are looked at, ``[sample]`` each; see `regime_shares`.
+        Motions whose regimes are looked at, ``[sample]`` each, see `regime_shares`; those that the measurement itself
+        holds if None, see `log_regimes`.
     """
     residual = measured.outputs - simulated
     floor = estimate_noise(measured) if noise is None else noise
@@ -90,7 +98,12 @@ def view_gap(
             channels=channel_gaps(residual, measured.outputs, floor, output_names=measured.output_names),
             bands=band_shares(residual, measured.outputs, sample_rate_hz=rate_hz, modes_hz=modes_hz),
             sites=(),
-            regimes=regime_shares(residual, measured.outputs, variables or {}),
+            regimes=(
+                log_regimes(residual, measured)
+                if variables is None
+                else regime_shares(residual, measured.outputs, variables)
+            ),
+            times=time_shares(residual, measured.outputs, sample_rate_hz=rate_hz),
         ),
         noise=floor,
         map_time_s=map_time_s,
@@ -128,8 +141,20 @@ def compare_logs(
     ours, theirs = with_period(_cut(measured, names, samples)), _cut(simulated, names, samples)
     _require_same_units(ours, theirs)
     # Variables belong to the measurement's clock and are cut with it.
-    kept = {name: values[:samples] for name, values in (variables or {}).items()}
-    return replace(view_gap(ours, theirs.outputs, variables=kept), remarks=_remarks(measured, simulated, samples))
+    kept = None if variables is None else {name: values[:samples] for name, values in variables.items()}
+    return replace(
+        view_gap(ours, theirs.outputs, variables=kept),
+        measured_split=_split(ours),
+        simulated_split=_split(with_period(theirs)),
+        remarks=_remarks(measured, simulated, samples),
+    )
+
+
+def _split(measurement: Measurement) -> Distortion | None:
+    try:
+        return distortion_of(measurement)
+    except EstimateError:
+        return None
 
 
 def _cut(measurement: Measurement, names: Sequence[str], samples: int) -> Measurement:

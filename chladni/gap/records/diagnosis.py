@@ -150,12 +150,13 @@ class RegimeShare:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Where:
-    """Where the gap lies."""
+    """Where the gap lies, and when."""
 
     channels: tuple[ChannelGap, ...]
     bands: tuple[BandShare, ...]
     sites: tuple[SiteShare, ...]
     regimes: tuple[RegimeShare, ...]
+    times: tuple[TimeShare, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -85,3 +85,30 @@ def test_what_cannot_be_compared_is_refused() -> None:
         compare_logs(measured, replace(simulated, output_names=("a", "b")))
     with pytest.raises(LogError, match=r"'acc1' is in m/s\^2"):
         compare_logs(measured, replace(simulated, output_units=("m", "m/s^2")))
+
+
+def test_when_the_simulation_is_wrong_is_told() -> None:
+    measured, _ = pair()
+    off = measured.outputs.copy()
+    off[0, 2000:3000] *= 0.5
+    (time,) = compare_logs(measured, replace(measured, outputs=off)).where.times
+    assert (time.start_s, time.end_s) == (pytest.approx(4.0, abs=0.2), pytest.approx(6.0, abs=0.2))
+    assert time.share > 0.99
+
+
+def test_what_a_simulation_lacks_of_distortion_is_told_beside_the_measured_one() -> None:
+    rng = np.random.default_rng(3)
+    odd = np.arange(11, 300, 4)
+    force = np.tile(made.multisine(rng, 2000, odd), 6)
+    linear = made.machine(force, made.weights(1, 1))
+    linear /= linear.std()
+    # A cube is odd: on three tones of odd lines it answers with odd lines only.
+    measured = made.measurement(force, linear + 0.1 * linear**3 + 1e-3 * rng.standard_normal(linear.shape))
+    found = compare_logs(measured, made.measurement(force, linear, log="simulated.mcap"))
+    assert found.measured_split is not None
+    assert found.simulated_split is not None
+    (ours,), (theirs,) = found.measured_split.shares, found.simulated_split.shares
+    assert (ours.odd > 0.005, theirs.odd < 1e-3) == (True, True)
+    assert max(ours.even, theirs.even) < 1e-3
+    assert theirs.linear > 0.999
+    assert compare_logs(*pair()).measured_split is None

@@ -1,0 +1,80 @@
+"""The regimes of a gap between two logs: over motions that were measured, and over the amplitude of each output.
+
+No joint's motion is known without a model; what the log itself holds of displacement, velocity and amplitude is.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+from scipy.ndimage import uniform_filter1d
+
+from chladni.gap.comparison.shares import LEAST_EXCESS, regime_shares, relative_residual
+from chladni.gap.records.diagnosis import RegimeShare
+from chladni.gap.records.measurement import Measurement
+
+Matrix = NDArray[np.float64]
+
+MOTION_UNITS = frozenset({"m", "rad", "m/s", "rad/s"})
+# Cycles of an output's mean frequency that its amplitude is taken over: fewer would follow the signal itself.
+CYCLES = 4.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Variable:
+    values: Matrix
+    unit: str
+
+
+def log_regimes(residual: Matrix, measured: Measurement) -> tuple[RegimeShare, ...]:
+    """Find the regimes in which the gap is larger than elsewhere, and by more than the motion itself.
+
+    A gap that is the same share of each output at any time grows with the motion, so that large amplitudes would
+    always be told. A regime is told when it holds 1.25 times as large a share of the gap's power as of time
+    (`regime_shares`), and as it would hold of that gap of constant shares.
+
+    Parameters
+    ----------
+    residual
+        ``[output, sample]``.
+    measured
+        Its outputs in m, rad, m/s and rad/s are variables by their names; the amplitude of every output is one, as
+        ``amplitude of wrist``: RMS over four cycles of its mean frequency, times the square root of two.
+    """
+    variables = _variables(measured)
+    found = regime_shares(residual, measured.outputs, {name: one.values for name, one in variables.items()})
+    gaps = np.mean(relative_residual(residual, measured.outputs) ** 2, axis=1)
+    power = gaps @ relative_residual(measured.outputs, measured.outputs) ** 2
+    return tuple(
+        replace(one, unit="" if variables[one.variable].unit == "1" else variables[one.variable].unit)
+        for one in found
+        if one.share >= LEAST_EXCESS * _share_inside(power, variables[one.variable].values, one)
+    )
+
+
+def amplitude_of(signal: Matrix, sample_rate_hz: float) -> Matrix:
+    """Give the amplitude ``[sample]`` of a signal: of a steady sine its own."""
+    varying = signal - signal.mean()
+    power = np.abs(fft.rfft(varying)) ** 2
+    if not power.sum() > 0:
+        return np.zeros_like(varying)
+    mean_hz = float(np.sum(power * fft.rfftfreq(signal.size, 1 / sample_rate_hz)) / power.sum())
+    length = min(max(round(CYCLES / mean_hz * sample_rate_hz), 1), signal.size)
+    # Running sums leave a rounding error below zero where nothing moves.
+    return np.sqrt(2 * np.maximum(uniform_filter1d(varying**2, length, mode="nearest"), 0.0))
+
+
+def _variables(measured: Measurement) -> dict[str, _Variable]:
+    rows = list(zip(measured.output_names, measured.output_units, measured.outputs, strict=True))
+    motions = {name: _Variable(values=row, unit=unit) for name, unit, row in rows if unit in MOTION_UNITS}
+    amplitudes = {
+        f"amplitude of {name}": _Variable(values=amplitude_of(row, measured.sample_rate_hz), unit=unit)
+        for name, unit, row in rows
+    }
+    return motions | amplitudes
+
+
+def _share_inside(power: Matrix, values: Matrix, regime: RegimeShare) -> float:
+    inside = (values >= regime.low) & (values <= regime.high)
+    return float(power[inside].sum() / power.sum()) if power.sum() > 0 else 0.0
