@@ -1,26 +1,36 @@
 """A log that any simulator wrote, held against a measured one: where they disagree, without a model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from chladni.apps.findings import damage_sentences
-from chladni.apps.gap_document import Document, where_document
+from chladni.apps.gap_document import Document, distortion_document, where_document
 from chladni.apps.sources import Span
+from chladni.gap.comparison.distortion import Distortion
 from chladni.gap.comparison.log_against_log import GapView, compare_logs
-from chladni.gap.records.diagnosis import Where
+from chladni.gap.records.diagnosis import DistortionShare, Where
 from chladni.gap.records.measurement import Measurement
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import LogError
-from chladni.signals.time_series import TimeSeries
+from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.viewers.engineering import percent
 
 COMPARISON_FORMAT: Final = "chladni.gap-comparison/1"
 # What differs by less than this share of its RMS was played back, not simulated: single precision, and no more.
 PLAYED_BACK = 1e-6
 NAMES_TOLD = 8
+NO_INPUT = (
+    "no channel is the same in both logs, so none is taken for an input: linear, even and odd shares and what "
+    "changes with level aren't told"
+)
+NO_SPLIT = (
+    "linear, even and odd shares aren't told: they take one input that repeats for two periods or more, at best with "
+    "odd lines only"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,9 +44,13 @@ class GapComparison:
     gap, noise
         RMS of (measured - simulated), and of the noise, over RMS of measured, outputs pooled.
     where
-        Channels, bands; no sites, which only a model has.
+        Channels, bands, regimes, times from the log's start; no sites, which only a model has.
     inputs
         Channels that are the same in both logs: what drove them.
+    pair, view
+        Both logs as they were compared, and what came of it: evidence for levels and pictures.
+    distortion, simulated_distortion
+        Output by output of either log; empty where the input doesn't tell.
     remarks
         What limits the comparison.
     """
@@ -47,6 +61,10 @@ class GapComparison:
     noise: float
     where: Where
     inputs: tuple[str, ...]
+    pair: tuple[Measurement, Measurement]
+    view: GapView
+    distortion: tuple[DistortionShare, ...] = ()
+    simulated_distortion: tuple[DistortionShare, ...] = ()
     remarks: tuple[str, ...] = ()
 
 
@@ -83,14 +101,26 @@ def compare_with_simulated(
         measured=ours.log,
         gap=view.gap,
         noise=_pooled_noise(view),
-        where=view.where,
+        where=_later(view.where, (first.start_time_ns - measured.start_time_ns) / NS_PER_S),
         inputs=inputs,
-        remarks=(*(told for log in logs for told in damage_sentences(log.damage)), *view.remarks),
+        pair=(ours, theirs),
+        view=view,
+        distortion=_shares(view.measured_split),
+        simulated_distortion=_shares(view.simulated_split),
+        remarks=(
+            *(told for log in logs for told in damage_sentences(log.damage)),
+            *view.remarks,
+            *_split_remarks(view, inputs),
+        ),
     )
 
 
 def comparison_document(found: GapComparison) -> Document:
-    """Document of ``chladni gap --simulated``: `where` as in a diagnosis, and the gap with its noise."""
+    """Document of ``chladni gap --simulated``: `where` as in a diagnosis, and the gap with its noise.
+
+    `distortion` and `simulated_distortion` are there when the input tells them.
+    """
+    splits = {"distortion": found.distortion, "simulated_distortion": found.simulated_distortion}
     return {
         "format": COMPARISON_FORMAT,
         "simulated": found.simulated,
@@ -98,6 +128,7 @@ def comparison_document(found: GapComparison) -> Document:
         "inputs": list(found.inputs),
         "where": where_document(found.where),
         "gap": {"before": float(found.gap), "noise": float(found.noise)},
+        **{key: [distortion_document(one) for one in shares] for key, shares in splits.items() if shares},
         "remarks": list(found.remarks),
     }
 
@@ -144,6 +175,33 @@ def _measurement(series: TimeSeries, inputs: Sequence[str], outputs: Sequence[st
         output_names=tuple(outputs),
         output_units=tuple(channel.unit for channel in series.select(outputs).channels),
     )
+
+
+def _later(where: Where, offset_s: float) -> Where:
+    """Times from the log's start, as --start counts them."""
+    return replace(
+        where,
+        times=tuple(replace(one, start_s=one.start_s + offset_s, end_s=one.end_s + offset_s) for one in where.times),
+    )
+
+
+def _shares(split: Distortion | None) -> tuple[DistortionShare, ...]:
+    return () if split is None else split.shares
+
+
+def _split_remarks(view: GapView, inputs: Sequence[str]) -> tuple[str, ...]:
+    """What the input doesn't allow to be told of distortion, and what it tells all the same."""
+    ours, theirs = view.measured_split, view.simulated_split
+    if not inputs:
+        return (NO_INPUT,)
+    if ours is None or theirs is None:
+        return (NO_SPLIT,)
+    if ours.shares:
+        return ours.remarks
+    worst = int(np.argmax(ours.nonlinear))
+    one, other, noise = (percent(float(row[worst])) for row in (ours.nonlinear, theirs.nonlinear, ours.noise))
+    told = f"{one} of its power, in the simulation {other}; noise is {noise}"
+    return (*ours.remarks, f"distortion, even and odd together, is largest in {ours.output_names[worst]}: {told}")
 
 
 def _pooled_noise(view: GapView) -> float:

@@ -50,7 +50,7 @@ def gap_document(found: Diagnosis) -> Document:
                 "naive": None if found.naive is None else _candidate(found.naive),
                 "advice": found.advice,
                 "remarks": list(found.remarks),
-                "distortion": [_distortion(one) for one in found.distortion],
+                "distortion": [distortion_document(one) for one in found.distortion],
                 "levels": list(found.levels),
                 "elsewhere": [closing_document(one) for one in found.elsewhere],
                 "left": None if found.left is None else where_document(found.left),
@@ -135,7 +135,8 @@ def _correlation(one: Correlation) -> Document:
     return {"names": list(one.names), "matrix": [[_known(number) for number in row] for row in one.matrix]}
 
 
-def _distortion(one: DistortionShare) -> Document:
+def distortion_document(one: DistortionShare) -> Document:
+    """Give the split of one output's power."""
     return {
         "output": one.output,
         "linear": _known(one.linear),

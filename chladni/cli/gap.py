@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chladni.cli import options
-from chladni.cli.gap_rows import print_comparison, print_diagnosis
+from chladni.cli.gap_rows import print_by_level, print_comparison, print_diagnosis
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 
@@ -29,10 +29,10 @@ Files = Annotated[
     ),
 ]
 Simulated = Annotated[
-    Path | None,
+    list[Path] | None,
     typer.Option(
         metavar="LOG",
-        help="What a simulator of your own wrote, in place of MODEL: only tells where.",
+        help="What a simulator of your own wrote, in place of MODEL: tells where and when, not why. Once a LOG.",
         show_default=False,
     ),
 ]
@@ -88,16 +88,17 @@ def gap(
 
     wanted = _Wanted(json=json, report=report, figure=figure, figures=figures, save=save, write_model=write_model)
     # A diagnosis takes its time: it shouldn't be lost to a misspelt folder.
-    wanted.require_places([*files, simulated, setup])
+    wanted.require_places([*files, *(simulated or ()), setup])
     out = Output(json)
     with ExitStack() as opened:
 
         def opening(path: Path) -> "Log":
             return opened.enter_context(open_log(path, setup=setup, stamp=stamp))
 
-        if simulated is not None:
-            _require_one_log(files, wanted, without)
-            _compare(out, opening(files[0]), opening(simulated), start_s=start, end_s=end)
+        if simulated:
+            _require_pairs(files, simulated, wanted, without)
+            pairs = [(opening(ours), opening(theirs)) for ours, theirs in zip(files, simulated, strict=True)]
+            _compare(out, pairs, start_s=start, end_s=end)
             return
         model, logs = _model_and_logs(files)
         _diagnose(out, model, [opening(log) for log in logs], wanted, without=without or (), seed=seed,
@@ -148,12 +149,18 @@ def _model_and_logs(files: "Sequence[Path]") -> "tuple[Model, Sequence[Path]]":
     return load_model(first), logs
 
 
-def _require_one_log(files: "Sequence[Path]", wanted: _Wanted, without: "Sequence[str] | None") -> None:
-    """Refuse what takes a model."""
+def _require_pairs(
+    files: "Sequence[Path]", simulated: "Sequence[Path]", wanted: _Wanted, without: "Sequence[str] | None"
+) -> None:
+    """Refuse a log without its partner, and what takes a model."""
     from chladni.signals.errors import SetupError
+    from chladni.signals.wording import counted
 
-    if len(files) != 1:
-        raise SetupError(f"--simulated takes one measured log, {len(files)} files are given; no model belongs there")
+    if len(files) != len(simulated):
+        raise SetupError(
+            f"{counted(len(files), 'measured log')} and {counted(len(simulated), 'simulated log')}: give --simulated "
+            "once for each measured log, in their order; no model belongs there"
+        )
     # Rather refused than ignored: a picture that was asked for and never comes is looked for.
     given = [*wanted.named(), *(["--without"] if without else [])]
     if given:
@@ -197,13 +204,19 @@ def _diagnose(
     out.json(gap_document(found))
 
 
-def _compare(out: Output, measured: "Log", simulated: "Log", *, start_s: float | None, end_s: float | None) -> None:
+def _compare(out: Output, pairs: "Sequence[tuple[Log, Log]]", *, start_s: float | None, end_s: float | None) -> None:
+    from chladni.apps.gap_by_level import by_level_document, gap_by_level
     from chladni.apps.gap_comparison import compare_with_simulated, comparison_document
 
-    with out.progress(simulated.path.name):
-        found = compare_with_simulated(measured, simulated, start_s=start_s, end_s=end_s)
-    print_comparison(out, found)
-    out.json(comparison_document(found))
+    with out.progress(", ".join(simulated.path.name for _, simulated in pairs)):
+        found = [compare_with_simulated(ours, theirs, start_s=start_s, end_s=end_s) for ours, theirs in pairs]
+        several = gap_by_level(found) if len(found) > 1 else None
+    if several is None:
+        print_comparison(out, found[0])
+        out.json(comparison_document(found[0]))
+    else:
+        print_by_level(out, several)
+        out.json(by_level_document(several))
 
 
 def _draw(out: Output, found: "Diagnosis", model: "Model", wanted: _Wanted) -> None:

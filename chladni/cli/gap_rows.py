@@ -8,6 +8,7 @@ from chladni.cli.words import number
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from chladni.apps.gap_by_level import GapByLevel
     from chladni.apps.gap_comparison import GapComparison
     from chladni.gap.records.diagnosis import Diagnosis, Where
     from chladni.gap.records.log_use import LogUse
@@ -18,6 +19,8 @@ LEAST_SHARE = 0.05
 # Rows of a table of sites or regimes, as many as one reads.
 MOST_ROWS = 6
 IN_REPORT = "the report and the JSON document"
+# Of what no report is written of.
+IN_DOCUMENT = "the JSON document (--json FILE)"
 
 
 def print_diagnosis(out: Output, found: "Diagnosis") -> None:
@@ -57,8 +60,9 @@ def print_diagnosis(out: Output, found: "Diagnosis") -> None:
 
 
 def print_comparison(out: Output, found: "GapComparison") -> None:
-    """Print where two logs disagree."""
+    """Print where, when and while what two logs disagree."""
     from chladni.viewers.engineering import percent
+    from chladni.viewers.gap_tables import split_table
 
     out.line(
         f"{found.simulated} is {percent(found.gap)} from {found.measured}, noise {percent(found.noise)}.",
@@ -68,8 +72,24 @@ def print_comparison(out: Output, found: "GapComparison") -> None:
         out.line(f"The same in both, taken for inputs: {', '.join(found.inputs)}.")
     out.line()
     # Nothing is ever tuned here, and no report is written.
-    _print_where(out, found.where, "Error of the simulation", all_in="the JSON document (--json FILE)")
+    _print_where(out, found.where, "Error of the simulation", all_in=IN_DOCUMENT)
+    _print(
+        out,
+        "Linear, even, odd and noise, as shares of each output",
+        split_table(found.distortion, found.simulated_distortion),
+        all_in=IN_DOCUMENT,
+    )
     out.lines(found.remarks)
+
+
+def print_by_level(out: Output, found: "GapByLevel") -> None:
+    """Print every comparison, and last what changes from one to the next."""
+    for one in found.comparisons:
+        print_comparison(out, one)
+        out.line()
+    out.line("What changes with level", style="bold")
+    out.lines(found.levels or ("nothing that the measured logs tell",))
+    out.lines([f"in the simulation, {sentence}" for sentence in found.simulated_levels])
 
 
 def _print_use(out: Output, used: "Sequence[LogUse]") -> None:

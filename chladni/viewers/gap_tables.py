@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 
-from chladni.gap.records.diagnosis import Cause, Diagnosis, FittedNumber, Ranked, Where
+from chladni.gap.records.diagnosis import Cause, Diagnosis, DistortionShare, FittedNumber, Ranked, Where
 from chladni.viewers.effect_words import NOT_DETERMINED, effect_heading, printed_number
 from chladni.viewers.engineering import SURE, chance, engineering, percent, signed_percent, span
 
@@ -117,6 +117,15 @@ def distortion_table(found: Diagnosis) -> Table:
     return ("Output", "Linear", "Even", "Odd", "Noise"), [
         (one.output, percent(one.linear), percent(one.even), percent(one.odd), percent(one.noise))
         for one in found.distortion
+    ]
+
+
+def split_table(measured: Sequence[DistortionShare], simulated: Sequence[DistortionShare]) -> Table:
+    """Split of each output's power under a periodic input, of the measured and the simulated log."""
+    return ("Output", "Log", "Linear", "Even", "Odd", "Noise"), [
+        (one.output, log, percent(one.linear), percent(one.even), percent(one.odd), percent(one.noise))
+        for pair in zip(measured, simulated, strict=True)
+        for log, one in zip(("measured", "simulated"), pair, strict=True)
     ]
 
 

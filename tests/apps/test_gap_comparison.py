@@ -7,11 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chladni.apps.gap_by_level import by_level_document, gap_by_level
 from chladni.apps.gap_comparison import GapComparison, compare_with_simulated, comparison_document
 from chladni.io.log import open_log
 from chladni.io.mcap.writer import write_mcap
+from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
+from chladni.viewers.engineering import percent
 from tests import made_diagnosis as made
 
 
@@ -71,3 +74,77 @@ def test_rates_that_differ_are_told(logs: tuple[Path, Path], tmp_path: Path) -> 
     write_mcap(replace(simulated(), sample_rate_hz=400.0), tmp_path / "slow.mcap")
     with pytest.raises(LogError, match="500 Hz"):
         compared(logs[0], tmp_path / "slow.mcap")
+
+
+def test_when_the_gap_lies_is_told_from_the_logs_start(logs: tuple[Path, Path], tmp_path: Path) -> None:
+    series, first = made.log_series(), round(5.0 * made.RATE_HZ)
+    values = series.values.copy()
+    values[1:, first : first + 500] *= 1.5
+    write_mcap(replace(series, values=values), tmp_path / "off.mcap")
+    for span in ({}, {"start_s": 2.0}):
+        (time,) = compared(logs[0], tmp_path / "off.mcap", **span).where.times
+        assert (time.start_s, time.end_s) == (pytest.approx(5.0, abs=0.13), pytest.approx(6.0, abs=0.13))
+
+
+def test_what_the_logs_cannot_tell_of_distortion_has_its_reason(logs: tuple[Path, Path], tmp_path: Path) -> None:
+    # One period only.
+    assert any("take one input that repeats" in remark for remark in compared(*logs).remarks)
+    noisy = simulated().values + np.random.default_rng(1).standard_normal((3, 4000))
+    write_mcap(replace(simulated(), values=noisy), tmp_path / "noisy.mcap")
+    found = compared(logs[0], tmp_path / "noisy.mcap")
+    assert (found.inputs, found.distortion) == ((), ())
+    assert any("no channel is the same" in remark for remark in found.remarks)
+
+
+def periodic(level: float, *, even: bool = False) -> tuple[TimeSeries, TimeSeries]:
+    """A cubic spring behind a gain of 2, and a simulation that forgets the cube."""
+    rng, samples = np.random.default_rng(4), 2000
+    lines = np.setdiff1d(np.arange(10, 200, 1 if even else 2) + (0 if even else 1), [21, 41, 61, 81, 101, 121])
+    spectrum = np.zeros(samples // 2 + 1, dtype=complex)
+    spectrum[lines] = np.exp(2j * np.pi * rng.random(lines.size))
+    force = np.tile(np.fft.irfft(spectrum, samples), 4)
+    force *= level / force.std()
+    channels = (Channel(name="/rig/force", unit="N"), Channel(name="/rig/travel", unit="m"))
+    noise = 1e-3 * rng.standard_normal(force.size)
+    return tuple(
+        TimeSeries(values=np.array([force, travel]), sample_rate_hz=500.0, channels=channels)
+        for travel in (2 * force + 0.05 * force**3 + noise, 2 * force)
+    )  # type: ignore[return-value]
+
+
+def written(pair: tuple[TimeSeries, TimeSeries], folder: Path) -> tuple[Path, Path]:
+    folder.mkdir()
+    for series, name in zip(pair, ("ours.mcap", "theirs.mcap"), strict=True):
+        write_mcap(series, folder / name, layout="batches")
+    return folder / "ours.mcap", folder / "theirs.mcap"
+
+
+def test_a_periodic_input_splits_both_logs(tmp_path: Path) -> None:
+    found = compared(*written(periodic(1.0), tmp_path / "odd"))
+    (ours,), (theirs,) = found.distortion, found.simulated_distortion
+    # The cube of a Gaussian force is 3 parts of it and some that no linear system gives, of power 6.
+    assert ours.odd == pytest.approx(6 * 0.05**2 / (2 + 3 * 0.05) ** 2, rel=0.3)
+    assert (theirs.odd < 1e-6, ours.even < 1e-6) == (True, True)
+    document = comparison_document(found)
+    assert [one["output"] for one in document["distortion"]] == ["/rig/travel.value"]  # type: ignore[index, attr-defined]
+    assert len(document["simulated_distortion"]) == 1  # type: ignore[arg-type]
+
+
+def test_even_and_odd_together_are_told_where_they_fall_on_the_same_lines(tmp_path: Path) -> None:
+    found = compared(*written(periodic(1.0, even=True), tmp_path / "all"))
+    assert found.distortion == ()
+    assert any("even and odd together, is largest in /rig/travel" in remark for remark in found.remarks)
+
+
+def test_what_changes_with_level_is_told_of_both(tmp_path: Path) -> None:
+    pairs = [written(periodic(level), tmp_path / f"{level}") for level in (2.0, 0.5)]
+    found = gap_by_level([compared(*one) for one in pairs])
+    gaps = [one.gap for one in found.comparisons]
+    assert gaps[0] > 5 * gaps[1]
+    assert found.levels[0].startswith(f"the gap is {percent(gaps[1])} (noise")
+    assert "at 0.5 RMS of /rig/force" in found.levels[0]
+    assert any("what no linear system gives grows" in sentence for sentence in found.levels)
+    assert not any("no linear system" in sentence for sentence in found.simulated_levels)
+    document = by_level_document(found)
+    assert (document["logs"], document["levels"]) == (["ours.mcap"], list(found.levels))
+    assert len(document["further"]) == 1  # type: ignore[arg-type]

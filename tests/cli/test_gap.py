@@ -123,7 +123,7 @@ def test_the_explained_model_is_written(run: Run, engine: StandIn, files: tuple[
         (["--write-model", "none/gap.toml"], "there is no folder none"),
         (["--seed", "-1"], "--seed"),
         (["--start", "9"], "9"),
-        (["--simulated", "x.mcap"], "--simulated takes one measured log, 2 files are given"),
+        (["--simulated", "x.mcap"], "2 measured logs and 1 simulated log: give --simulated once for each"),
     ],
 )
 def test_mistakes_are_told_in_one_line_before_anything_is_diagnosed(
@@ -248,6 +248,26 @@ def test_a_simulated_log_takes_the_place_of_a_model(run: Run, files: tuple[Path,
     assert "taken for inputs: /shaker.wrench.force.x" in outcome.err
     assert "Error of the simulation, over the RMS of each output" in outcome.err
     assert "tuned" not in outcome.err
+
+
+def test_several_levels_are_compared_each_with_its_simulation(
+    run: Run, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    nominal = made.nominal_run()
+    theirs = replace(made.log_series(), values=np.vstack([nominal.inputs.values, nominal.outputs.values]))
+    ours = made.log_series()
+    # A machine of twice the input and twice the output is linear, whatever else it is.
+    for name, series, level in (("loud", ours, 2.0), ("theirs", theirs, 1.0), ("theirs_loud", theirs, 2.0)):
+        write_mcap(replace(series, values=level * series.values), tmp_path / f"{name}.mcap")
+    outcome = run(
+        "gap", files[1], tmp_path / "loud.mcap", "--simulated", tmp_path / "theirs.mcap", "--simulated",
+        tmp_path / "theirs_loud.mcap", "--json", "-",
+    )  # fmt: skip
+    assert outcome.code == 0, outcome.err
+    for words in ("theirs.mcap is 28 % from arm.mcap", "theirs_loud.mcap is 28 % from loud.mcap"):
+        assert words in outcome.err
+    assert "the gap is 28 % (noise 2.6 %) at 40 RMS of /shaker.wrench.force.x, 28 %" in outcome.err
+    assert [one["logs"] for one in outcome.document["further"]] == [["loud.mcap"]]
 
 
 def test_what_a_comparison_leaves_out_is_looked_for_where_it_is(

@@ -62,7 +62,7 @@ def amplitude_of(signal: Matrix, sample_rate_hz: float) -> Matrix:
     mean_hz = float(np.sum(power * fft.rfftfreq(signal.size, 1 / sample_rate_hz)) / power.sum())
     length = min(max(round(CYCLES / mean_hz * sample_rate_hz), 1), signal.size)
     # Running sums leave a rounding error below zero where nothing moves.
-    return np.sqrt(2 * np.maximum(uniform_filter1d(varying**2, length, mode="nearest"), 0.0))
+    return np.asarray(np.sqrt(2 * np.maximum(uniform_filter1d(varying**2, length, mode="nearest"), 0.0)))
 
 
 def _variables(measured: Measurement) -> dict[str, _Variable]:
