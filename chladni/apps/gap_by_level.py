@@ -30,6 +30,10 @@ class GapByLevel:
     levels: tuple[str, ...]
     simulated_levels: tuple[str, ...]
 
+    def sentences(self) -> tuple[str, ...]:
+        """Both, for people."""
+        return (*self.levels, *(f"in the simulation, {sentence}" for sentence in self.simulated_levels))
+
 
 def gap_by_level(comparisons: Sequence[GapComparison]) -> GapByLevel:
     """Say what changes with level, over comparisons of one machine with one sensor set in any order."""

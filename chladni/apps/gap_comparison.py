@@ -115,6 +115,12 @@ def compare_with_simulated(
     )
 
 
+def answer(found: GapComparison) -> tuple[str, ...]:
+    """Give what is said first: how far the simulation is from the log, and what was taken for inputs."""
+    first = f"{found.simulated} is {percent(found.gap)} from {found.measured}, noise {percent(found.noise)}."
+    return (first, f"The same in both, taken for inputs: {', '.join(found.inputs)}.") if found.inputs else (first,)
+
+
 def comparison_document(found: GapComparison) -> Document:
     """Document of ``chladni gap --simulated``: `where` as in a diagnosis, and the gap with its noise.
 

@@ -28,11 +28,12 @@ def gap_evidence(found: Diagnosis) -> GapEvidence:
     signals = found.signals
     if signals is None:
         return GapEvidence(found=found)
-    spectra = _spectra(signals)
-    return GapEvidence(found=found, spectra=spectra, telling_s=_telling_stretch(signals, spectra))
+    spectra = spectra_of(signals)
+    return GapEvidence(found=found, spectra=spectra, telling_s=telling_stretch(signals, spectra))
 
 
-def _spectra(signals: GapSignals) -> GapSpectra | None:
+def spectra_of(signals: GapSignals) -> GapSpectra | None:
+    """Give spectra of what was measured and of the errors; None when there are too few samples."""
     outputs, samples = signals.measured.shape
     # Too short a log for a spectrum is no reason to show nothing of it.
     if samples < SEGMENTS * SHORTEST_SEGMENT:
@@ -81,8 +82,8 @@ def _window_hz(signals: GapSignals) -> float:
     return signals.sample_rate_hz / max(shortest - 1, SHORTEST_SEGMENT) if shortest else 0.0
 
 
-def _telling_stretch(signals: GapSignals, spectra: GapSpectra | None) -> tuple[float, float]:
-    """Where the error that was found to have a cause is largest, all outputs by their own RMS."""
+def telling_stretch(signals: GapSignals, spectra: GapSpectra | None) -> tuple[float, float]:
+    """Give start and end where the error that was found to have a cause is largest, all outputs by their own RMS."""
     rms = np.sqrt(np.mean(signals.measured**2, axis=1, keepdims=True))
     errors = np.nan_to_num((signals.measured - signals.before) / np.where(rms > 0, rms, 1.0), posinf=0.0, neginf=0.0)
     samples = errors.shape[1]

@@ -15,6 +15,7 @@ from chladni.cli.places import require_places
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from chladni.apps.gap_comparison import GapComparison
     from chladni.gap.records.diagnosis import Diagnosis
     from chladni.io.log import Log
     from chladni.models.core.model import Model
@@ -98,7 +99,7 @@ def gap(
         if simulated:
             _require_pairs(files, simulated, wanted, without)
             pairs = [(opening(ours), opening(theirs)) for ours, theirs in zip(files, simulated, strict=True)]
-            _compare(out, pairs, start_s=start, end_s=end)
+            _compare(out, pairs, wanted, start_s=start, end_s=end)
             return
         model, logs = _model_and_logs(files)
         _diagnose(out, model, [opening(log) for log in logs], wanted, without=without or (), seed=seed,
@@ -122,9 +123,9 @@ class _Wanted:
             reads=reads, writes={"--json": self.json, **self._files()}, folders={"--figures": self.figures}
         )
 
-    def named(self) -> list[str]:
-        """Options that ask for a file with a picture or a model."""
-        given = {**self._files(), "--figures": self.figures}
+    def of_a_model(self) -> list[str]:
+        """Options that ask for a file which only a model gives."""
+        given = {"--figure": self.figure, "--save": self.save, "--write-model": self.write_model}
         return [name for name, path in given.items() if path is not None]
 
     def _files(self) -> dict[str, Path | None]:
@@ -162,9 +163,11 @@ def _require_pairs(
             "once for each measured log, in their order; no model belongs there"
         )
     # Rather refused than ignored: a picture that was asked for and never comes is looked for.
-    given = [*wanted.named(), *(["--without"] if without else [])]
+    given = [*wanted.of_a_model(), *(["--without"] if without else [])]
     if given:
-        raise SetupError(f"{', '.join(given)}: takes a model; --simulated only tells where two logs disagree")
+        raise SetupError(
+            f"{', '.join(given)}: takes a model; --simulated only tells where and when two logs disagree"
+        )
 
 
 def _diagnose(
@@ -204,7 +207,14 @@ def _diagnose(
     out.json(gap_document(found))
 
 
-def _compare(out: Output, pairs: "Sequence[tuple[Log, Log]]", *, start_s: float | None, end_s: float | None) -> None:
+def _compare(
+    out: Output,
+    pairs: "Sequence[tuple[Log, Log]]",
+    wanted: _Wanted,
+    *,
+    start_s: float | None,
+    end_s: float | None,
+) -> None:
     from chladni.apps.gap_by_level import by_level_document, gap_by_level
     from chladni.apps.gap_comparison import compare_with_simulated, comparison_document
 
@@ -213,10 +223,38 @@ def _compare(out: Output, pairs: "Sequence[tuple[Log, Log]]", *, start_s: float 
         several = gap_by_level(found) if len(found) > 1 else None
     if several is None:
         print_comparison(out, found[0])
-        out.json(comparison_document(found[0]))
     else:
         print_by_level(out, several)
-        out.json(by_level_document(several))
+    _draw_comparisons(out, found, () if several is None else several.sentences(), wanted)
+    out.json(comparison_document(found[0]) if several is None else by_level_document(several))
+
+
+def _draw_comparisons(
+    out: Output, found: "Sequence[GapComparison]", levels: "Sequence[str]", wanted: _Wanted
+) -> None:
+    """Write the pictures of comparisons that were asked for, and say where they are."""
+    if wanted.report is None and wanted.figures is None:
+        return
+    from chladni.apps.gap_comparison_evidence import comparison_evidence
+    from chladni.viewers.figures.log_gap import log_gap_album
+
+    evidence = [comparison_evidence(one) for one in found]
+    # Pictures of several logs would have the same names, and logs may have, too.
+    albums = [
+        log_gap_album(one, prefix="" if len(found) == 1 else f"{place} {one.signals.log} ")
+        for place, one in enumerate(evidence, 1)
+    ]
+    if wanted.figures is not None:
+        from chladni.viewers.figures.saving import save_album
+
+        for album in albums:
+            for path in save_album(album, wanted.figures):
+                out.line(f"figure: {path}")
+    if wanted.report is not None:
+        from chladni.viewers.report.log_gap import write_log_gap_report
+
+        write_log_gap_report(list(zip(evidence, albums, strict=True)), wanted.report, levels=levels)
+        out.line(f"report: {wanted.report}")
 
 
 def _draw(out: Output, found: "Diagnosis", model: "Model", wanted: _Wanted) -> None:

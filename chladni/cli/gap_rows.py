@@ -19,7 +19,7 @@ LEAST_SHARE = 0.05
 # Rows of a table of sites or regimes, as many as one reads.
 MOST_ROWS = 6
 IN_REPORT = "the report and the JSON document"
-# Of what no report is written of.
+# The report of a comparison is asked for less often.
 IN_DOCUMENT = "the JSON document (--json FILE)"
 
 
@@ -61,17 +61,15 @@ def print_diagnosis(out: Output, found: "Diagnosis") -> None:
 
 def print_comparison(out: Output, found: "GapComparison") -> None:
     """Print where, when and while what two logs disagree."""
-    from chladni.viewers.engineering import percent
+    from chladni.apps.gap_comparison import answer
     from chladni.viewers.gap_tables import split_table
 
-    out.line(
-        f"{found.simulated} is {percent(found.gap)} from {found.measured}, noise {percent(found.noise)}.",
-        style="bold",
-    )
-    if found.inputs:
-        out.line(f"The same in both, taken for inputs: {', '.join(found.inputs)}.")
+    first, *rest = answer(found)
+    out.line(first, style="bold")
+    for sentence in rest:
+        out.line(sentence)
     out.line()
-    # Nothing is ever tuned here, and no report is written.
+    # Nothing is ever tuned here.
     _print_where(out, found.where, "Error of the simulation", all_in=IN_DOCUMENT)
     _print(
         out,
@@ -88,8 +86,7 @@ def print_by_level(out: Output, found: "GapByLevel") -> None:
         print_comparison(out, one)
         out.line()
     out.line("What changes with level", style="bold")
-    out.lines(found.levels or ("nothing that the measured logs tell",))
-    out.lines([f"in the simulation, {sentence}" for sentence in found.simulated_levels])
+    out.lines(found.sentences() or ("nothing that these logs tell",))
 
 
 def _print_use(out: Output, used: "Sequence[LogUse]") -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.records.diagnosis import Diagnosis
+from chladni.gap.records.diagnosis import Diagnosis, DistortionShare, GapSignals, Where
 from chladni.signals.value import Value, require_shape
 from chladni.viewers.style import ON_DARK, ON_LIGHT, Colour
 
@@ -67,6 +67,46 @@ class GapEvidence:
     telling_s: tuple[float, float] | None = None
 
     @property
+    def signals(self) -> GapSignals | None:
+        """Those of the diagnosis."""
+        return self.found.signals
+
+    @property
     def after(self) -> str:
         """Word for the last simulation: where nothing is named, only its parameters were tuned."""
         return "after" if self.found.verdict in ("effect", "parameters") else "when tuned"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ComparisonEvidence:
+    """What pictures and the report of a simulated log against a measured one are made from.
+
+    Attributes
+    ----------
+    simulated, answer, remarks
+        Name of the simulated log, what is said first, what limits it.
+    where, distortion, simulated_distortion
+        For the tables.
+    signals
+        The simulated log is what is drawn as `before`; there is nothing after.
+    spectra, telling_s
+        As of `GapEvidence`.
+    """
+
+    simulated: str
+    answer: tuple[str, ...]
+    remarks: tuple[str, ...]
+    where: Where
+    distortion: tuple[DistortionShare, ...]
+    simulated_distortion: tuple[DistortionShare, ...]
+    signals: GapSignals
+    spectra: GapSpectra | None
+    telling_s: tuple[float, float]
+
+    @property
+    def after(self) -> None:
+        """No word: nothing is tuned and nothing is found."""
+        return None
+
+
+Evidence = GapEvidence | ComparisonEvidence

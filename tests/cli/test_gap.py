@@ -261,13 +261,17 @@ def test_several_levels_are_compared_each_with_its_simulation(
         write_mcap(replace(series, values=level * series.values), tmp_path / f"{name}.mcap")
     outcome = run(
         "gap", files[1], tmp_path / "loud.mcap", "--simulated", tmp_path / "theirs.mcap", "--simulated",
-        tmp_path / "theirs_loud.mcap", "--json", "-",
+        tmp_path / "theirs_loud.mcap", "--json", "-", "--figures", tmp_path / "drawn", "--html",
+        tmp_path / "gap.html",
     )  # fmt: skip
     assert outcome.code == 0, outcome.err
     for words in ("theirs.mcap is 28 % from arm.mcap", "theirs_loud.mcap is 28 % from loud.mcap"):
         assert words in outcome.err
     assert "the gap is 28 % (noise 2.6 %) at 40 RMS of /shaker.wrench.force.x, 28 %" in outcome.err
     assert [one["logs"] for one in outcome.document["further"]] == [["loud.mcap"]]
+    drawn = {path.name for path in (tmp_path / "drawn").iterdir()}
+    assert {"1-arm-mcap-signals.png", "2-loud-mcap-gap-map.svg"} <= drawn
+    assert "loud.mcap: Where and when it lies" in (tmp_path / "gap.html").read_text(encoding="utf-8")
 
 
 def test_what_a_comparison_leaves_out_is_looked_for_where_it_is(
@@ -280,7 +284,6 @@ def test_what_a_comparison_leaves_out_is_looked_for_where_it_is(
     write_mcap(replace(series, values=1.1 * series.values), tmp_path / "theirs.mcap", layout="batches")
     outcome = run("gap", "--simulated", tmp_path / "theirs.mcap", tmp_path / "ours.mcap")
     assert outcome.code == 0, outcome.err
-    # --html is refused here, so no report can hold it.
     assert "and 3 more; all are in the JSON document (--json FILE)" in outcome.out
 
 

@@ -10,7 +10,7 @@ from chladni.gap.records.diagnosis import GapSignals
 from chladni.viewers.drawing import Floats, block_maximum, decibels_of_power
 from chladni.viewers.figures.sheet import look, sheet
 from chladni.viewers.gap_band import band_told, shown_hz
-from chladni.viewers.gap_evidence import GapEvidence
+from chladni.viewers.gap_evidence import Evidence
 
 PIXELS = 1500
 # Less than a spectrum's usual 80 dB: what lies further below the worst of the gap doesn't matter to anyone.
@@ -18,25 +18,29 @@ DYNAMIC_RANGE_DB = 50.0
 HEIGHT_IN = 1.6
 
 
-def gap_map_figures(evidence: GapEvidence) -> dict[str, Figure]:
+def gap_map_figures(evidence: Evidence) -> dict[str, Figure]:
     """Draw the density of the gap over band and time, by name; none without a map."""
-    signals = evidence.found.signals
+    signals = evidence.signals
     if signals is None or signals.gap_map.size == 0:
         return {}
     with look():
-        return {"gap map": _figure(signals)}
+        return {"gap map": _figure(signals, alone=evidence.after is None)}
 
 
-def _figure(signals: GapSignals) -> Figure:
-    figure, stack = sheet([HEIGHT_IN] * 2, sharex=True, sharey=True)
-    levels = [decibels_of_power(_shortened(one)) for one in (signals.gap_map, signals.gap_map_after)]
+def _figure(signals: GapSignals, *, alone: bool) -> Figure:
+    maps = [("Gap", signals.gap_map)]
+    if not alone:
+        maps = [("Gap before", signals.gap_map), ("Gap after", signals.gap_map_after)]
+    figure, stack = sheet([HEIGHT_IN] * len(maps), sharex=True, sharey=True)
+    levels = [decibels_of_power(_shortened(one)) for _, one in maps]
     # One scale, so that the colours of both can be compared.
     known = np.concatenate([level[np.isfinite(level)] for level in levels])
     high = float(known.max()) if known.size else 0.0
     image = None
     # In one title: two on the same line would run into each other.
-    before = " · ".join(filter(None, ("Gap before", band_told(signals))))
-    for axes, level, title in zip(stack, levels, (before, "Gap after"), strict=True):
+    titles = [title for title, _ in maps]
+    titles[0] = " · ".join(filter(None, (titles[0], band_told(signals))))
+    for axes, level, title in zip(stack, levels, titles, strict=True):
         image = _draw(axes, signals, level, high)
         axes.set_title(title, loc="left", pad=2)
         axes.set_ylabel("Frequency [Hz]")

@@ -12,7 +12,7 @@ from chladni.viewers.drawing import thin, with_breaks
 from chladni.viewers.engineering import engineering
 from chladni.viewers.figures.panes import pages
 from chladni.viewers.figures.sheet import look, paint, plain, sheet
-from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, BEFORE_ON_LIGHT, MEASURED_ON_LIGHT, GapEvidence
+from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, BEFORE_ON_LIGHT, MEASURED_ON_LIGHT, Evidence, GapEvidence
 from chladni.viewers.labels import printed_unit
 
 # Two a pixel at 300 dots an inch: what is left out can't be seen.
@@ -24,9 +24,9 @@ LEGEND: dict[str, Any] = {"ncols": 4, "frameon": False, "handlelength": 1.4, "co
 MEASURED, BEFORE, AFTER = paint(MEASURED_ON_LIGHT), paint(BEFORE_ON_LIGHT), paint(AFTER_ON_LIGHT)
 
 
-def signal_figures(evidence: GapEvidence) -> dict[str, Figure]:
+def signal_figures(evidence: Evidence) -> dict[str, Figure]:
     """Draw signals in the stretch where the model errs most, by name; none without signals."""
-    signals, telling_s = evidence.found.signals, evidence.telling_s
+    signals, telling_s = evidence.signals, evidence.telling_s
     if signals is None or telling_s is None:
         return {}
     with look():
@@ -42,9 +42,9 @@ def signal_figures(evidence: GapEvidence) -> dict[str, Figure]:
         }
 
 
-def error_figures(evidence: GapEvidence) -> dict[str, Figure]:
+def error_figures(evidence: Evidence) -> dict[str, Figure]:
     """Draw the errors of the whole log, by name; none without signals."""
-    signals = evidence.found.signals
+    signals = evidence.signals
     if signals is None:
         return {}
     with look():
@@ -61,7 +61,7 @@ def error_figures(evidence: GapEvidence) -> dict[str, Figure]:
 
 
 def stacked(
-    evidence: GapEvidence,
+    evidence: Evidence,
     signals: GapSignals,
     rows: Sequence[int],
     draw: Callable[[Axes, int], None],
@@ -74,7 +74,8 @@ def stacked(
     for axes, row in zip(stack, rows, strict=True):
         draw(axes, row)
         axes.set_title(plain(signals.output_names[row]), loc="left", pad=4)
-    stack[0].set_title(windows_told(evidence.found), loc="right", pad=4)
+    if isinstance(evidence, GapEvidence):
+        stack[0].set_title(windows_told(evidence.found), loc="right", pad=4)
     # Above all of them, where it covers neither data nor names.
     figure.legend(*stack[0].get_legend_handles_labels(), loc="outside upper left", **LEGEND)
     stack[-1].set_xlabel(x_label)
@@ -89,17 +90,17 @@ def windows_told(found: Diagnosis) -> str:
     )
 
 
-def draw_zoom(axes: Axes, signals: GapSignals, row: int, span_s: tuple[float, float], *, after: str) -> None:
-    """Draw one output as measured and as simulated, before and after, between two times."""
+def draw_zoom(axes: Axes, signals: GapSignals, row: int, span_s: tuple[float, float], *, after: str | None) -> None:
+    """Draw one output as measured and as simulated, before and after (alone if None), between two times."""
     first, last = (round(end * signals.sample_rate_hz) for end in span_s)
     time_s = np.arange(first, last) / signals.sample_rate_hz
     starts = np.array([start - first for start in signals.window_starts if first < start < last], dtype=np.intp)
     axes.plot(time_s, signals.measured[row, first:last], color=MEASURED, linewidth=2.6, label="measured")
-    for values, colour, width, label in (
-        # Each wider than what is drawn over it, so that none is hidden by one that follows it.
-        (signals.before, BEFORE, 1.4, "simulated before"),
-        (signals.after, AFTER, 0.8, after),
-    ):
+    # Each wider than what is drawn over it, so that none is hidden by one that follows it.
+    lines = [(signals.before, BEFORE, 1.4, "simulated" if after is None else "simulated before")]
+    if after is not None:
+        lines.append((signals.after, AFTER, 0.8, after))
+    for values, colour, width, label in lines:
         # A window begins at a state of its own: no line joins it to the one before.
         x, y = with_breaks(time_s, values[row, first:last], starts)
         axes.plot(x, y, color=colour, linewidth=width, label=label)
@@ -107,14 +108,14 @@ def draw_zoom(axes: Axes, signals: GapSignals, row: int, span_s: tuple[float, fl
     axes.set_ylabel(f"[{plain(printed_unit(signals.output_units[row]))}]")
 
 
-def _draw_errors(axes: Axes, signals: GapSignals, row: int, *, after: str) -> None:
+def _draw_errors(axes: Axes, signals: GapSignals, row: int, *, after: str | None) -> None:
     """Errors of the whole log; the noise as a band."""
     starts = np.array(signals.window_starts[1:], dtype=np.intp)
     time_s = np.arange(signals.measured.shape[1]) / signals.sample_rate_hz
-    for simulated, colour, width, label in (
-        (signals.before, BEFORE, 0.9, "error before"),
-        (signals.after, AFTER, 0.5, f"error {after}"),
-    ):
+    lines = [(signals.before, BEFORE, 0.9, "error" if after is None else "error before")]
+    if after is not None:
+        lines.append((signals.after, AFTER, 0.5, f"error {after}"))
+    for simulated, colour, width, label in lines:
         x, y = with_breaks(time_s, signals.measured[row] - simulated[row], starts)
         chosen, _ = thin(y, limit=POINTS)
         axes.plot(x[chosen], y[chosen], color=colour, linewidth=width, label=label)

@@ -12,7 +12,7 @@ from chladni.viewers.figures.gap_signals import AFTER, BEFORE, MEASURED, OUTPUTS
 from chladni.viewers.figures.log_axis import logarithmic, logarithmic_frequency
 from chladni.viewers.figures.panes import pages
 from chladni.viewers.figures.sheet import look, plain
-from chladni.viewers.gap_evidence import GapEvidence, GapSpectra
+from chladni.viewers.gap_evidence import Evidence, GapSpectra
 from chladni.viewers.labels import amplitude_density_unit
 
 Paint = tuple[float, float, float]
@@ -25,9 +25,9 @@ HELD, ABOVE = 0.999, 4.0
 NUMBERS = 5
 
 
-def spectrum_figures(evidence: GapEvidence) -> dict[str, Figure]:
+def spectrum_figures(evidence: Evidence) -> dict[str, Figure]:
     """Draw the spectra of the errors of every output, by name; none without spectra."""
-    signals, spectra = evidence.found.signals, evidence.spectra
+    signals, spectra = evidence.signals, evidence.spectra
     if signals is None or spectra is None:
         return {}
     with look():
@@ -43,7 +43,7 @@ def spectrum_figures(evidence: GapEvidence) -> dict[str, Figure]:
         }
 
 
-def draw_spectrum(axes: Axes, signals: GapSignals, spectra: GapSpectra, row: int, *, after: str) -> None:
+def draw_spectrum(axes: Axes, signals: GapSignals, spectra: GapSpectra, row: int, *, after: str | None) -> None:
     """Draw one output's amplitude densities: measured, error before and after, noise."""
     # What stands still has no place on a logarithmic axis of frequency.
     shown = slice(1, _last_line(spectra) + 1)
@@ -75,7 +75,8 @@ def _last_line(spectra: GapSpectra) -> int:
     return min(round(ABOVE * (max(held, default=most) + 1)), most)
 
 
-def _lines(spectra: GapSpectra, row: int, after: str) -> Iterator[tuple[Floats, Paint, float, str]]:
+def _lines(spectra: GapSpectra, row: int, after: str | None) -> Iterator[tuple[Floats, Paint, float, str]]:
     yield np.sqrt(spectra.measured[row]), MEASURED, 2.2, "measured"
-    yield np.sqrt(spectra.before[row]), BEFORE, 1.4, "error before"
-    yield np.sqrt(spectra.after[row]), AFTER, 0.8, f"error {after}"
+    yield np.sqrt(spectra.before[row]), BEFORE, 1.4, "error" if after is None else "error before"
+    if after is not None:
+        yield np.sqrt(spectra.after[row]), AFTER, 0.8, f"error {after}"
