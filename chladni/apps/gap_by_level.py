@@ -31,8 +31,9 @@ class GapByLevel:
     simulated_levels: tuple[str, ...]
 
     def sentences(self) -> tuple[str, ...]:
-        """Both, for people."""
-        return (*self.levels, *(f"in the simulation, {sentence}" for sentence in self.simulated_levels))
+        """Both, for people; what holds for both logs is said once."""
+        simulated = (f"in the simulation, {one}" for one in self.simulated_levels if one not in self.levels)
+        return (*self.levels, *simulated)
 
 
 def gap_by_level(comparisons: Sequence[GapComparison]) -> GapByLevel:

@@ -10,6 +10,7 @@ from chladni.apps.findings import damage_sentences
 from chladni.apps.gap_document import Document, distortion_document, where_document
 from chladni.apps.sources import Span
 from chladni.gap.comparison.distortion import Distortion
+from chladni.gap.comparison.linear_approximation import moving_inputs
 from chladni.gap.comparison.log_against_log import GapView, compare_logs
 from chladni.gap.records.diagnosis import DistortionShare, Where
 from chladni.gap.records.measurement import Measurement
@@ -17,6 +18,7 @@ from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.wording import counted
 from chladni.viewers.engineering import percent
 
 COMPARISON_FORMAT: Final = "chladni.gap-comparison/1"
@@ -24,8 +26,8 @@ COMPARISON_FORMAT: Final = "chladni.gap-comparison/1"
 PLAYED_BACK = 1e-6
 NAMES_TOLD = 8
 NO_INPUT = (
-    "no channel is the same in both logs, so none is taken for an input: linear, even and odd shares and what "
-    "changes with level aren't told"
+    "no channel that moves is the same in both logs, so none is taken for an input: linear, even and odd shares and "
+    "what changes with level aren't told"
 )
 NO_SPLIT = (
     "linear, even and odd shares aren't told: they take one input that repeats for two periods or more, at best with "
@@ -110,7 +112,7 @@ def compare_with_simulated(
         remarks=(
             *(told for log in logs for told in damage_sentences(log.damage)),
             *view.remarks,
-            *_split_remarks(view, inputs),
+            *_split_remarks(view, moving_inputs(ours)),
         ),
     )
 
@@ -118,7 +120,13 @@ def compare_with_simulated(
 def answer(found: GapComparison) -> tuple[str, ...]:
     """Give what is said first: how far the simulation is from the log, and what was taken for inputs."""
     first = f"{found.simulated} is {percent(found.gap)} from {found.measured}, noise {percent(found.noise)}."
-    return (first, f"The same in both, taken for inputs: {', '.join(found.inputs)}.") if found.inputs else (first,)
+    moving = moving_inputs(found.pair[0])
+    still = len(found.inputs) - len(moving)
+    if not moving:
+        return (first,)
+    # Messages hold axes that nothing drives; their names would hide the one that counts.
+    beside = f" ({counted(still, 'other channel')} that stand{'s' if still == 1 else ''} still)" if still else ""
+    return (first, f"The same in both, taken for inputs: {', '.join(moving)}{beside}.")
 
 
 def comparison_document(found: GapComparison) -> Document:
@@ -195,10 +203,10 @@ def _shares(split: Distortion | None) -> tuple[DistortionShare, ...]:
     return () if split is None else split.shares
 
 
-def _split_remarks(view: GapView, inputs: Sequence[str]) -> tuple[str, ...]:
+def _split_remarks(view: GapView, moving: Sequence[str]) -> tuple[str, ...]:
     """What the input doesn't allow to be told of distortion, and what it tells all the same."""
     ours, theirs = view.measured_split, view.simulated_split
-    if not inputs:
+    if not moving:
         return (NO_INPUT,)
     if ours is None or theirs is None:
         return (NO_SPLIT,)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from chladni.apps.gap_by_level import by_level_document, gap_by_level
-from chladni.apps.gap_comparison import GapComparison, compare_with_simulated, comparison_document
+from chladni.apps.gap_comparison import GapComparison, answer, compare_with_simulated, comparison_document
 from chladni.io.log import open_log
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
@@ -93,7 +93,16 @@ def test_what_the_logs_cannot_tell_of_distortion_has_its_reason(logs: tuple[Path
     write_mcap(replace(simulated(), values=noisy), tmp_path / "noisy.mcap")
     found = compared(logs[0], tmp_path / "noisy.mcap")
     assert (found.inputs, found.distortion) == ((), ())
-    assert any("no channel is the same" in remark for remark in found.remarks)
+    assert any("no channel that moves is the same" in remark for remark in found.remarks)
+
+
+def test_channels_that_stand_still_are_no_inputs_to_tell_of(logs: tuple[Path, Path], tmp_path: Path) -> None:
+    still = Channel(name="/shaker.wrench.force.y", unit="N")
+    for series, name in ((made.log_series(), "ours"), (simulated(), "theirs")):
+        values = np.vstack([series.values, np.zeros(series.samples)])
+        write_mcap(replace(series, values=values, channels=(*series.channels, still)), tmp_path / f"{name}.mcap")
+    told = answer(compared(tmp_path / "ours.mcap", tmp_path / "theirs.mcap"))[1]
+    assert told == "The same in both, taken for inputs: /shaker.wrench.force.x (1 other channel that stands still)."
 
 
 def periodic(level: float, *, even: bool = False) -> tuple[TimeSeries, TimeSeries]:
