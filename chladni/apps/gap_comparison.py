@@ -22,8 +22,8 @@ from chladni.signals.wording import counted
 from chladni.viewers.engineering import percent
 
 COMPARISON_FORMAT: Final = "chladni.gap-comparison/1"
-# What differs by less than this share of its RMS was played back, not simulated: single precision, and no more.
-PLAYED_BACK = 1e-6
+# What differs by less than this share of its RMS was played back, not simulated: digits of a CSV, single precision.
+PLAYED_BACK = 1e-4
 NAMES_TOLD = 8
 NO_INPUT = (
     "no channel that moves is the same in both logs, so none is taken for an input: linear, even and odd shares and "

@@ -45,6 +45,13 @@ def test_the_gap_is_what_the_simulation_leaves(logs: tuple[Path, Path]) -> None:
     assert found.where.sites == ()
 
 
+def test_an_input_that_was_written_with_four_digits_is_one(logs: tuple[Path, Path], tmp_path: Path) -> None:
+    theirs = simulated()
+    # A CSV between the simulator and the log.
+    write_mcap(replace(theirs, values=np.round(theirs.values, 2)), tmp_path / "rounded.mcap")
+    assert compared(logs[0], tmp_path / "rounded.mcap").inputs == ("/shaker.wrench.force.x",)
+
+
 def test_a_part_is_compared_alone(logs: tuple[Path, Path]) -> None:
     found = compared(*logs, start_s=2.0, end_s=6.0)
     part = slice(round(2 * made.RATE_HZ), round(6 * made.RATE_HZ))
