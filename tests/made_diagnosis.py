@@ -23,6 +23,7 @@ from chladni.gap.records.diagnosis import (
     RegimeShare,
     RestoringForce,
     SiteShare,
+    TimeShare,
     Where,
 )
 from chladni.gap.records.log_use import LogUse
@@ -201,7 +202,7 @@ def diagnosis() -> Diagnosis:
     """The elbow rubs, and that is found."""
     run, nominal = rubbing_run().outputs.values, nominal_run().outputs.values
     channels = [
-        ChannelGap(name=name, gap=float(np.std(error) / np.std(seen)), noise=NOISE)
+        ChannelGap(name=name, gap=float(np.std(error) / np.std(seen)), noise=NOISE, noise_from="periods")
         for name, error, seen in zip(("acc_column", "acc_wrist"), measured() - nominal, measured(), strict=True)
     ]
     return Diagnosis(
@@ -213,13 +214,14 @@ def diagnosis() -> Diagnosis:
         where=Where(
             channels=tuple(channels),
             bands=(
-                BandShare(low_hz=0.5, high_hz=8.0, share=0.12),
-                BandShare(low_hz=8.0, high_hz=16.0, share=0.71),
+                BandShare(low_hz=0.5, high_hz=8.0, share=0.12, noise=0.4),
+                BandShare(low_hz=8.0, high_hz=16.0, share=0.71, noise=0.003),
                 BandShare(low_hz=16.0, high_hz=30.0, share=0.17),
             ),
             sites=(SiteShare(name="elbow", share=0.93), SiteShare(name="shoulder", share=0.31),
                    SiteShare(name="shaker", share=0.28), SiteShare(name="acc_wrist", share=0.12)),
-            regimes=(RegimeShare(variable="elbow.velocity", low=-0.01, high=0.01, share=0.6, unit="m/s"),),
+            regimes=(RegimeShare(variable="elbow.velocity", low=-0.01, high=0.01, share=0.6, unit="m/s", time=0.2),),
+            times=(TimeShare(start_s=2.0, end_s=2.5, share=0.31), TimeShare(start_s=0.25, end_s=1.0, share=0.27)),
         ),
         gap=Closing(
             before=pooled(measured() - nominal),
@@ -327,8 +329,8 @@ def periodic() -> Diagnosis:
     return replace(
         plain,
         distortion=(
-            DistortionShare(output="acc_column", linear=0.93, even=0.001, odd=0.068, noise=0.001),
-            DistortionShare(output="acc_wrist", linear=0.88, even=0.002, odd=0.117, noise=0.001),
+            DistortionShare(output="acc_column", linear=0.93, even=0.001, odd=0.068, noise=0.001, nonlinear=0.069),
+            DistortionShare(output="acc_wrist", linear=0.88, even=0.002, odd=0.117, noise=0.001, nonlinear=0.119),
         ),
         levels=("From 10 N to 40 N the resonance at 13 Hz falls by 4 %.",),
         elsewhere=(replace(plain.gap, after=0.031, held_out=louder),),

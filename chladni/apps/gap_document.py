@@ -12,6 +12,7 @@ from chladni.gap.records.diagnosis import (
     Diagnosis,
     DistortionShare,
     FittedNumber,
+    PairShare,
     Ranked,
     Where,
 )
@@ -64,22 +65,47 @@ def where_document(where: Where) -> Document:
     """Give where the gap lies: by channel, band, site, regime and time."""
     return {
         "channels": [
-            {"name": one.name, "gap": _known(one.gap), "noise": _known(one.noise)} for one in where.channels
+            {
+                "name": one.name,
+                "gap": _known(one.gap),
+                "noise": _known(one.noise),
+                **_when_there({"noise_from": one.noise_from or None}),
+            }
+            for one in where.channels
         ],
         "bands": [
-            {"low_hz": _known(one.low_hz), "high_hz": _known(one.high_hz), "share": _known(one.share)}
+            {
+                "low_hz": _known(one.low_hz),
+                "high_hz": _known(one.high_hz),
+                "share": _known(one.share),
+                **_when_there({"noise": _known(one.noise)}),
+            }
             for one in where.bands
         ],
-        "sites": [{"name": one.name, "share": _known(one.share)} for one in where.sites],
+        "sites": [
+            {"name": one.name, "share": _known(one.share), **_when_there({"group": list(one.group)})}
+            for one in where.sites
+        ],
         "regimes": [
-            {"variable": one.variable, "low": _known(one.low), "high": _known(one.high), "share": _known(one.share)}
+            {
+                "variable": one.variable,
+                "low": _known(one.low),
+                "high": _known(one.high),
+                "share": _known(one.share),
+                **_when_there({"time": _known(one.time)}),
+            }
             for one in where.regimes
         ],
         "times": [
             {"start_s": _known(one.start_s), "end_s": _known(one.end_s), "share": _known(one.share)}
             for one in where.times
         ],
+        **_when_there({"pair": None if where.pair is None else _pair(where.pair)}),
     }
+
+
+def _pair(pair: PairShare) -> Document:
+    return {"groups": [list(names) for names in pair.groups], "share": _known(pair.share)}
 
 
 def closing_document(gap: Closing) -> Document:
@@ -143,6 +169,7 @@ def distortion_document(one: DistortionShare) -> Document:
         "even": _known(one.even),
         "odd": _known(one.odd),
         "noise": _known(one.noise),
+        "nonlinear": _known(one.nonlinear),
     }
 
 

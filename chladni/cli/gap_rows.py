@@ -45,7 +45,7 @@ def print_diagnosis(out: Output, found: "Diagnosis") -> None:
         "Error before anything is tuned, whole log",
         of="" if found.left is None else ", of what the best parameters leave",
     )
-    _print(out, "Linear, even, odd and noise, as shares of each output", tables.distortion_table(found))
+    _print(out, f"{tables.distortion_title(found)}, as shares of each output", tables.distortion_table(found))
     _print(out, "Parameters of the causes", tables.cause_table(found))
     _print(out, "What was weighed", tables.ranking_table(found))
     if (naive := naive_sentence(found)) is not None:
@@ -101,8 +101,14 @@ def _print_use(out: Output, used: "Sequence[LogUse]") -> None:
 def _print_where(out: Output, where: "Where", error: str, *, of: str = "", all_in: str = IN_REPORT) -> None:
     from chladni.viewers import gap_tables as tables
 
+    _print(
+        out,
+        f"{error}, over the RMS of each output",
+        tables.channel_table(where),
+        all_in=all_in,
+        note=tables.noise_told(where),
+    )
     for title, table in (
-        (f"{error}, over the RMS of each output", tables.channel_table(where)),
         (f"Where in frequency{of}", tables.band_table(where, least=LEAST_SHARE)),
         ("What an unknown force, error or change at one site can explain", tables.site_table(where)),
         (f"While{of}", tables.regime_table(where, least=LEAST_SHARE)),
@@ -111,7 +117,7 @@ def _print_where(out: Output, where: "Where", error: str, *, of: str = "", all_i
         _print(out, title, table, all_in=all_in)
 
 
-def _print(out: Output, title: str, table: "Table", *, all_in: str = IN_REPORT) -> None:
+def _print(out: Output, title: str, table: "Table", *, all_in: str = IN_REPORT, note: str | None = None) -> None:
     headings, rows = table
     # A heading over nothing asks what is missing.
     if not rows:
@@ -119,4 +125,6 @@ def _print(out: Output, title: str, table: "Table", *, all_in: str = IN_REPORT) 
     out.table(title, headings, rows[:MOST_ROWS])
     if len(rows) > MOST_ROWS:
         out.line(f"and {len(rows) - MOST_ROWS} more; all are in {all_in}")
+    if note is not None:
+        out.line(note)
     out.line()

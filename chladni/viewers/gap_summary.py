@@ -206,7 +206,8 @@ def _unknown(found: Diagnosis) -> Iterator[str]:
     told = []
     if where.sites:
         site = max(where.sites, key=lambda one: one.share)
-        told.append(f"{percent(site.share)} of what they leave can come from {site.name}")
+        names = _listed((site.name, *site.group), word="or")
+        told.append(f"{percent(site.share)} of what they leave can come from {names}")
     if where.bands:
         band = max(where.bands, key=lambda one: one.share)
         # With one sensor there is no site to begin with.

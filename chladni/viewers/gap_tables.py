@@ -16,6 +16,16 @@ RANKED = 5
 MOVED = 1e-3
 # What has a chance of less than this is printed as one that has none.
 UNLIKELY = 1.0 - SURE
+# Noise of less than this share of a gap needs no digits.
+LITTLE = 0.01
+# What a noise floor was estimated from, by its `NoiseFloor.method`.
+NOISE_FROM = {
+    "periods": "what differs between periods of the input",
+    "quiet band": "the quietest part of the band",
+    "fit residual": "what no linear response to the inputs explains",
+    "incoherent residual": "what no linear response to the inputs explains and no other output shares",
+    "explained residual": "what the best explanation leaves",
+}
 
 
 def channel_table(where: Where) -> Table:
@@ -24,32 +34,67 @@ def channel_table(where: Where) -> Table:
     return ("Output", "Gap", "Noise"), [(one.name, percent(one.gap), percent(one.noise)) for one in rows]
 
 
+def noise_told(where: Where) -> str | None:
+    """Say what the noise of the outputs was estimated from; None when that isn't known."""
+    outputs: dict[str, list[str]] = {}
+    for one in where.channels:
+        if one.noise_from:
+            outputs.setdefault(NOISE_FROM.get(one.noise_from, one.noise_from), []).append(one.name)
+    if not outputs:
+        return None
+    told = [way if len(outputs) == 1 else f"{way} ({', '.join(names)})" for way, names in outputs.items()]
+    return f"Noise is estimated from {'; from '.join(told)}."
+
+
 def where_told(found: Diagnosis) -> Where:
     """Give where the gap lies; of one that nothing explains, bands and regimes of what the best parameters leave."""
     return found.where if found.left is None else replace(found.left, channels=found.where.channels)
 
 
 def band_table(where: Where, *, least: float = 0.0) -> Table:
-    """Share of the gap's power in each band, those with `least` and more, by frequency."""
+    """Share of the gap's power in each band and how much of it noise can be, those with `least` and more."""
     rows = [
-        (f"{one.low_hz:.4g} to {one.high_hz:.4g}", percent(one.share))
+        (
+            f"{one.low_hz:.4g} to {one.high_hz:.4g}",
+            percent(one.share),
+            _noise_share(one.noise),
+        )
         for one in sorted(where.bands, key=lambda one: one.low_hz)
         if one.share >= least
     ]
-    return ("Band [Hz]", "Share"), rows
+    return ("Band [Hz]", "Share", "of it noise"), rows
 
 
 def site_table(where: Where, *, count: int | None = None) -> Table:
     """Share of the gap that an unknown force at each site explains; the largest first, at most `count`."""
-    rows = sorted(where.sites, key=lambda one: -one.share)[:count]
-    return ("Site", "Explains"), [(one.name, percent(one.share)) for one in rows]
+    rows = [(", ".join(names), percent(share)) for names, share in places_of(where)[:count]]
+    if where.pair is not None:
+        # Above those that explain less alone.
+        rows.insert(0, (" and ".join(", ".join(names) for names in where.pair.groups), percent(where.pair.share)))
+    return ("Site", "Explains"), rows
+
+
+def places_of(where: Where) -> list[tuple[tuple[str, ...], float]]:
+    """Sites that these sensors can't tell apart, put together, with their share; the largest first."""
+    found: dict[frozenset[str], tuple[tuple[str, ...], float]] = {}
+    for one in sorted(where.sites, key=lambda one: -one.share):
+        names = (one.name, *one.group)
+        found.setdefault(frozenset(names), (names, one.share))
+    return list(found.values())
 
 
 def regime_table(where: Where, *, least: float = 0.0) -> Table:
-    """Share of the gap's power in each regime, those with `least` and more; the largest first."""
+    """Share of the gap's power in each regime and of time, those with `least` and more; largest first."""
     rows = sorted(where.regimes, key=lambda one: -one.share)
-    return ("While", "is between", "Share"), [
-        (one.variable, span(one.low, one.high, one.unit), percent(one.share)) for one in rows if one.share >= least
+    return ("While", "is between", "Share", "of time"), [
+        (
+            one.variable,
+            span(one.low, one.high, one.unit),
+            percent(one.share),
+            _share(one.time),
+        )
+        for one in rows
+        if one.share >= least
     ]
 
 
@@ -113,20 +158,42 @@ def cause_table(found: Diagnosis) -> Table:
 
 
 def distortion_table(found: Diagnosis) -> Table:
-    """Split of each output's power under a periodic input."""
+    """Split of each output's power under a periodic input; even and odd together where they can't be told apart."""
+    if not _even_told(found):
+        return ("Output", "Linear", "Nonlinear", "Noise"), [
+            (one.output, percent(one.linear), percent(one.nonlinear), percent(one.noise)) for one in found.distortion
+        ]
     return ("Output", "Linear", "Even", "Odd", "Noise"), [
-        (one.output, percent(one.linear), percent(one.even), percent(one.odd), percent(one.noise))
+        (one.output, percent(one.linear), _share(one.even), _share(one.odd), percent(one.noise))
         for one in found.distortion
     ]
+
+
+def distortion_title(found: Diagnosis) -> str:
+    """What the table of distortion tells."""
+    return "Linear, even, odd and noise" if _even_told(found) else "Linear, nonlinear and noise"
 
 
 def split_table(measured: Sequence[DistortionShare], simulated: Sequence[DistortionShare]) -> Table:
     """Split of each output's power under a periodic input, of the measured and the simulated log."""
     return ("Output", "Log", "Linear", "Even", "Odd", "Noise"), [
-        (one.output, log, percent(one.linear), percent(one.even), percent(one.odd), percent(one.noise))
+        (one.output, log, percent(one.linear), _share(one.even), _share(one.odd), percent(one.noise))
         for pair in zip(measured, simulated, strict=True)
         for log, one in zip(("measured", "simulated"), pair, strict=True)
     ]
+
+
+def _even_told(found: Diagnosis) -> bool:
+    return all(one.even is not None for one in found.distortion)
+
+
+def _noise_share(share: float | None) -> str:
+    # Digits of next to nothing only hide those that count.
+    return f"under {100 * LITTLE:.0f} %" if share is not None and share < LITTLE else _share(share)
+
+
+def _share(share: float | None) -> str:
+    return "–" if share is None else percent(share)
 
 
 def _value(cause: Cause, name: str, number: FittedNumber) -> str:

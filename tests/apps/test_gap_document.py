@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from chladni.apps.gap_document import gap_document
-from chladni.gap.records.diagnosis import Candidate, ChannelGap, Correlation, Diagnosis, FittedNumber
+from chladni.gap.records.diagnosis import Candidate, ChannelGap, Correlation, Diagnosis, FittedNumber, PairShare
 from tests import made_diagnosis as made
 
 # Of each key: what its value may be. A list holds things of one kind, a mapping of str any names.
@@ -55,6 +55,11 @@ MORE = {
     "": {"naive", "advice", "remarks", "distortion", "levels", "elsewhere", "left", "correlation"},
     ".causes": {"variant", "from", "share"},
     ".ranking": {"beside"},
+    ".where.channels": {"noise_from"},
+    ".where.bands": {"noise"},
+    ".where": {"pair"},
+    ".where.sites": {"group"},
+    ".where.regimes": {"time"},
     ".gap": {"by", "horizon_s"},
 }
 KINDS = made.every_kind()
@@ -98,7 +103,14 @@ def test_the_numbers_are_those_of_the_diagnosis() -> None:
     assert document["ranking"][1] == {
         "effect": "hysteresis", "site": "elbow", "probability": 0.02, "gap": 0.031, "log_evidence": -130.2
     }  # fmt: skip
-    assert document["where"]["regimes"] == [{"variable": "elbow.velocity", "low": -0.01, "high": 0.01, "share": 0.6}]
+    assert document["where"]["regimes"] == [
+        {"variable": "elbow.velocity", "low": -0.01, "high": 0.01, "share": 0.6, "time": 0.2}
+    ]
+    assert "group" not in document["where"]["sites"][0]
+    assert document["where"]["channels"][0]["noise_from"] == "periods"
+    assert document["where"]["bands"][0] == {"low_hz": 0.5, "high_hz": 8.0, "share": 0.12, "noise": 0.4}
+    assert "noise" not in document["where"]["bands"][2]
+    assert document["where"]["times"][0] == {"start_s": 2.0, "end_s": 2.5, "share": 0.31}
     assert document["gap"]["interval"] == [0.99, 0.998]
     assert document["gap"]["held_out"][0] == {"log": "arm.mcap", "start_s": 2.0, "end_s": 4.0}
     assert document["tuned_parameters"]["elbow.stiffness"] == {
@@ -114,6 +126,18 @@ def test_which_parameters_are_told_together_only_stands_there_as_a_matrix() -> N
     hold(document, SCHEMA)
     assert document["correlation"] == {"names": list(names), "matrix": [[1.0, -0.9], [-0.9, 1.0]]}
     assert "correlation" not in written(made.diagnosis())
+
+
+def test_a_pair_of_sites_is_there_where_two_forces_explain_more_than_one() -> None:
+    found = made.diagnosis()
+    pair = PairShare(groups=(("elbow", "wrist"), ("shaker",)), share=0.99)
+    first, *others = found.where.sites
+    where = replace(found.where, pair=pair, sites=(replace(first, group=("wrist",)), *others))
+    document = written(replace(found, where=where))
+    hold(document, SCHEMA)
+    assert document["where"]["pair"] == {"groups": [["elbow", "wrist"], ["shaker"]], "share": 0.99}
+    assert document["where"]["sites"][0] == {"name": "elbow", "share": 0.93, "group": ["wrist"]}
+    assert "pair" not in written(found)["where"]
 
 
 def test_a_row_of_the_ranking_says_beside_what_its_numbers_are() -> None:
@@ -166,5 +190,5 @@ def test_keys_beside_the_agreed_ones_are_there_only_with_content() -> None:
     )
     assert set(full) == set(SCHEMA) | MORE[""]
     assert full["distortion"][0] == {
-        "output": "acc_column", "linear": 0.93, "even": 0.001, "odd": 0.068, "noise": 0.001
+        "output": "acc_column", "linear": 0.93, "even": 0.001, "odd": 0.068, "noise": 0.001, "nonlinear": 0.069
     }  # fmt: skip

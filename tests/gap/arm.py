@@ -70,7 +70,7 @@ def measured(
     )
     real = nominal.with_values({name: nominal.parameters[name].value * factor for name, factor in factors.items()})
     count = round(seconds * RATE_HZ)
-    force = _low_passed(200.0 * rng.standard_normal(count)) if force is None else force
+    force = low_passed(200.0 * rng.standard_normal(count)) if force is None else force
     series = TimeSeries(
         values=force[None], sample_rate_hz=RATE_HZ, channels=(Channel(name="shaker", unit="N", role="reference"),)
     )
@@ -98,7 +98,7 @@ def with_outputs(measurement: Measurement, names: Sequence[str]) -> Measurement:
     )
 
 
-def _low_passed(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+def low_passed(signal: NDArray[np.float64]) -> NDArray[np.float64]:
     spectrum = np.fft.rfft(signal)
     frequency_hz = np.fft.rfftfreq(signal.size, 1 / RATE_HZ)
     return np.asarray(np.fft.irfft(spectrum / (1 + (frequency_hz / 200.0) ** 4), signal.size))

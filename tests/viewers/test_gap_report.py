@@ -53,6 +53,9 @@ def test_the_report_has_every_figure_with_its_caption(arm: str) -> None:
 
 def test_numbers_stand_in_a_picture_or_in_a_table_not_in_both(arm: str) -> None:
     assert not {"8 to 16", "elbow.velocity"} & set(Page(arm).texts)
+    assert "Noise is estimated from what differs between periods of the input." in Page(arm).texts
+    # Stretches of time are in no bars.
+    assert "0.25 to 1" in Page(arm).texts
     bare = replace(made.periodic(), where=replace(made.periodic().where, sites=()))
     shown = Page(gap_report_html(gap_evidence(replace(bare, signals=None)))).texts
     assert {"8 to 16", "elbow.velocity", "-10 to 10 mm/s"} <= set(shown)

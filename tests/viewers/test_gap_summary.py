@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from chladni.gap.records.diagnosis import Candidate, Cause, FittedNumber
+from chladni.gap.records.diagnosis import Candidate, Cause, FittedNumber, PairShare
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.viewers import effect_words
 from chladni.viewers import gap_tables as tables
@@ -295,9 +295,52 @@ def test_candidates_without_a_chance_stand_by_their_evidence() -> None:
 
 def test_regimes_have_their_unit() -> None:
     where = made.diagnosis().where
-    assert tables.regime_table(where)[1] == [("elbow.velocity", "-10 to 10 mm/s", "60 %")]
-    bare = replace(where, regimes=(replace(where.regimes[0], unit=""),))
-    assert tables.regime_table(bare)[1][0][1] == "-0.01 to 0.01"
+    assert tables.regime_table(where)[1] == [("elbow.velocity", "-10 to 10 mm/s", "60 %", "20 %")]
+    bare = replace(where, regimes=(replace(where.regimes[0], unit="", time=None),))
+    assert tables.regime_table(bare)[1][0] == ("elbow.velocity", "-0.01 to 0.01", "60 %", "–")
+
+
+def test_sites_that_look_the_same_share_a_row() -> None:
+    first, second, *others = made.diagnosis().where.sites
+    alike = (replace(first, group=("wrist",)), second, replace(first, name="wrist", group=("elbow",)), *others)
+    where = replace(made.diagnosis().where, sites=alike)
+    assert tables.site_table(where)[1][:2] == [("elbow, wrist", "93 %"), ("shoulder", "31 %")]
+    assert len(tables.site_table(where)[1]) == 2 + len(others)
+    pair = PairShare(groups=(("elbow", "wrist"), ("shaker",)), share=0.99)
+    assert tables.site_table(replace(where, pair=pair))[1][0] == ("elbow, wrist and shaker", "99.0 %")
+    left = replace(made.unknown(), left=where)
+    assert any("can come from elbow or wrist" in sentence for sentence in summary(left))
+
+
+def test_where_even_lines_are_excited_too_the_sum_is_told() -> None:
+    found = made.periodic()
+    assert tables.distortion_title(found) == "Linear, even, odd and noise"
+    assert tables.distortion_table(found)[0][2:4] == ("Even", "Odd")
+    summed = replace(found, distortion=tuple(replace(one, even=None, odd=None) for one in found.distortion))
+    assert tables.distortion_title(summed) == "Linear, nonlinear and noise"
+    assert tables.distortion_table(summed) == (
+        ("Output", "Linear", "Nonlinear", "Noise"),
+        [("acc_column", "93 %", "6.9 %", "0.10 %"), ("acc_wrist", "88 %", "12 %", "0.10 %")],
+    )
+
+
+def test_it_is_told_once_what_the_noise_was_estimated_from() -> None:
+    where = made.diagnosis().where
+    assert tables.noise_told(where) == "Noise is estimated from what differs between periods of the input."
+    first, second = where.channels
+    mixed = replace(where, channels=(first, replace(second, noise_from="quiet band")))
+    assert tables.noise_told(mixed) == (
+        "Noise is estimated from what differs between periods of the input (acc_column); from the quietest part "
+        "of the band (acc_wrist)."
+    )
+    assert tables.noise_told(replace(where, channels=(replace(first, noise_from=""),))) is None
+    assert [row[2] for row in tables.band_table(where)[1]] == ["40 %", "under 1 %", "–"]
+
+
+def test_the_stretch_of_the_log_with_most_of_the_gap_comes_first() -> None:
+    where = made.diagnosis().where
+    assert tables.time_table(where)[1] == [("2 to 2.5", "31 %"), ("0.25 to 1", "27 %")]
+    assert tables.time_table(where, least=0.3)[1] == [("2 to 2.5", "31 %")]
 
 
 def test_of_an_unknown_gap_the_tables_tell_where_the_rest_lies() -> None:

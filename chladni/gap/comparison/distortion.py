@@ -36,20 +36,35 @@ class Distortion(Value):
         Output by output, adding up to 1. Empty when even and odd can't be told apart.
     output_names
         Names of the rows below.
-    nonlinear, noise
-        ``[output]`` shares of the power: distortion of any kind, and what doesn't repeat.
+    linear, nonlinear, noise
+        ``[output]`` shares of the power: what a linear system gives, distortion of any kind, and what doesn't repeat.
     remarks
         What the excitation doesn't allow to be told.
     """
 
     shares: tuple[DistortionShare, ...]
     output_names: tuple[str, ...]
+    linear: Matrix
     nonlinear: Matrix
     noise: Matrix
     remarks: tuple[str, ...]
 
     def __post_init__(self) -> None:
         self._freeze()
+
+    @property
+    def told(self) -> tuple[DistortionShare, ...]:
+        """`shares`; where even and odd can't be told apart, the split without them."""
+        if self.shares:
+            return self.shares
+        return tuple(
+            DistortionShare(
+                output=name, linear=float(linear), even=None, odd=None, noise=float(noise), nonlinear=float(nonlinear)
+            )
+            for name, linear, nonlinear, noise in zip(
+                self.output_names, self.linear, self.nonlinear, self.noise, strict=True
+            )
+        )
 
 
 def distortion_of(measurement: Measurement) -> Distortion | None:
@@ -187,13 +202,15 @@ def _told(splits: list[_Split], names: tuple[str, ...], *, odd_only: bool) -> Di
             even=split.share(split.even),
             odd=split.share(split.odd),
             noise=split.share(split.noise),
+            nonlinear=split.share(split.even + split.odd),
         )
         for name, split in zip(names, splits, strict=True)
     ]
     return Distortion(
         shares=tuple(shares) if odd_only else (),
         output_names=names,
-        nonlinear=np.array([one.even + one.odd for one in shares]),
+        linear=np.array([one.linear for one in shares]),
+        nonlinear=np.array([one.nonlinear for one in shares]),
         noise=np.array([one.noise for one in shares]),
         remarks=tuple(remarks),
     )

@@ -96,7 +96,7 @@ def view_gap(
         gap=pooled_gap(residual, measured.outputs),
         where=Where(
             channels=channel_gaps(residual, measured.outputs, floor, output_names=measured.output_names),
-            bands=band_shares(residual, measured.outputs, sample_rate_hz=rate_hz, modes_hz=modes_hz),
+            bands=band_shares(residual, measured.outputs, sample_rate_hz=rate_hz, modes_hz=modes_hz, noise=floor),
             sites=(),
             regimes=(
                 log_regimes(residual, measured)

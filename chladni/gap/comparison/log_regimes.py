@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.ndimage import uniform_filter1d
 
-from chladni.gap.comparison.shares import LEAST_EXCESS, regime_shares, relative_residual
+from chladni.gap.comparison.shares import regime_shares
 from chladni.gap.records.diagnosis import RegimeShare
 from chladni.gap.records.measurement import Measurement
 
@@ -32,7 +32,7 @@ def log_regimes(residual: Matrix, measured: Measurement) -> tuple[RegimeShare, .
 
     A gap that is the same share of each output at any time grows with the motion, so that large amplitudes would
     always be told. A regime is told when it holds 1.25 times as large a share of the gap's power as of time
-    (`regime_shares`), and as it would hold of that gap of constant shares.
+    (`regime_shares`), and 1.5 times what it would hold of that gap of constant shares.
 
     Parameters
     ----------
@@ -43,13 +43,10 @@ def log_regimes(residual: Matrix, measured: Measurement) -> tuple[RegimeShare, .
         ``amplitude of wrist``: RMS over four cycles of its mean frequency, times the square root of two.
     """
     variables = _variables(measured)
-    found = regime_shares(residual, measured.outputs, {name: one.values for name, one in variables.items()})
-    gaps = np.mean(relative_residual(residual, measured.outputs) ** 2, axis=1)
-    power = gaps @ relative_residual(measured.outputs, measured.outputs) ** 2
+    signals = {name: one.values for name, one in variables.items()}
     return tuple(
         replace(one, unit="" if variables[one.variable].unit == "1" else variables[one.variable].unit)
-        for one in found
-        if one.share >= LEAST_EXCESS * _share_inside(power, variables[one.variable].values, one)
+        for one in regime_shares(residual, measured.outputs, signals, beyond_motion=True)
     )
 
 
@@ -73,8 +70,3 @@ def _variables(measured: Measurement) -> dict[str, _Variable]:
         for name, unit, row in rows
     }
     return motions | amplitudes
-
-
-def _share_inside(power: Matrix, values: Matrix, regime: RegimeShare) -> float:
-    inside = (values >= regime.low) & (values <= regime.high)
-    return float(power[inside].sum() / power.sum()) if power.sum() > 0 else 0.0

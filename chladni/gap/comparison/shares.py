@@ -31,7 +31,10 @@ MOST_REGIMES = 6
 # A regime is told when its share exceeds its share of time by this factor, and by so many standard errors.
 LEAST_EXCESS = 1.25
 LEAST_SIGMAS = 3.0
-BLOCKS = 16
+# What a gap that grows with the motion would hold is a guess: wrong parameters alone exceed it by less than this, but
+# for one log in five.
+BEYOND_MOTION = 1.5
+BLOCKS = 64
 # Slices of the map over time; twice the square root of the samples balances them with lines.
 LONGEST_SLICE = 1024
 SHORTEST_SLICE = 16
@@ -52,8 +55,13 @@ def relative_residual(residual: Matrix, measured: Matrix) -> Matrix:
         raise EstimateError(
             f"residual has shape {residual.shape}, measured {measured.shape}; both are [output, sample]"
         )
+    return np.asarray(residual / _scale(measured))
+
+
+def _scale(measured: Matrix) -> Matrix:
+    """``[output, 1]`` RMS of what was measured; 1 for an output of zero."""
     rms = np.sqrt(np.mean(measured**2, axis=1, keepdims=True))
-    return np.asarray(residual / np.where(rms > 0, rms, 1.0))
+    return np.asarray(np.where(rms > 0, rms, 1.0))
 
 
 def pooled_gap(residual: Matrix, measured: Matrix) -> float:
@@ -69,13 +77,18 @@ def channel_gaps(
     # The same scale for both, so that gap and noise can be held against each other.
     floors = relative_residual(np.broadcast_to(noise.rms[:, None], measured.shape), measured)[:, 0]
     return tuple(
-        ChannelGap(name=name, gap=float(gap), noise=float(floor))
-        for name, gap, floor in zip(output_names, gaps, floors, strict=True)
+        ChannelGap(name=name, gap=float(gap), noise=float(floor), noise_from=method)
+        for name, gap, floor, method in zip(output_names, gaps, floors, noise.method, strict=True)
     )
 
 
 def band_shares(
-    residual: Matrix, measured: Matrix, *, sample_rate_hz: float, modes_hz: Sequence[float] = ()
+    residual: Matrix,
+    measured: Matrix,
+    *,
+    sample_rate_hz: float,
+    modes_hz: Sequence[float] = (),
+    noise: NoiseFloor | None = None,
 ) -> tuple[BandShare, ...]:
     """Split the gap's power over frequency.
 
@@ -88,6 +101,8 @@ def band_shares(
     modes_hz
         Natural frequencies: bands end halfway between neighbours (geometric mean). Without any, ten bands of equal
         ratio between the frequencies that hold all but 0.1 % of what was measured and of the gap.
+    noise
+        Floor of the outputs: how much of the gap in each band it can be is told too.
 
     Returns
     -------
@@ -100,20 +115,25 @@ def band_shares(
     gap, whole = (_line_power(relative_residual(one, measured)) for one in (residual, measured))
     edges_hz = _mode_edges_hz(modes_hz, frequency_hz) if len(modes_hz) else _log_edges_hz(gap, whole, frequency_hz)
     band = np.clip(np.searchsorted(edges_hz, frequency_hz, side="right") - 1, 0, edges_hz.size - 2)
-    power = np.bincount(band, weights=gap, minlength=edges_hz.size - 1)
+    power = np.bincount(band, weights=gap, minlength=edges_hz.size - 1).astype(np.float64)
     shares = power / power.sum() if power.sum() > 0 else power
+    of_noise: list[float | None] = [None] * power.size
+    if noise is not None:
+        of_noise = _noise_shares(power, noise, measured, edges_hz, sample_rate_hz)
     return tuple(
-        BandShare(low_hz=float(low), high_hz=float(high), share=float(share))
-        for low, high, share in zip(edges_hz[:-1], edges_hz[1:], shares, strict=True)
+        BandShare(low_hz=float(low), high_hz=float(high), share=float(share), noise=one)
+        for low, high, share, one in zip(edges_hz[:-1], edges_hz[1:], shares, of_noise, strict=True)
     )
 
 
-def regime_shares(residual: Matrix, measured: Matrix, variables: Mapping[str, Matrix]) -> tuple[RegimeShare, ...]:
+def regime_shares(
+    residual: Matrix, measured: Matrix, variables: Mapping[str, Matrix], *, beyond_motion: bool = False
+) -> tuple[RegimeShare, ...]:
     """Find the regimes of motion in which the gap is larger than elsewhere.
 
     Each variable is cut at its quantiles (0, 10, 25, 50, 75, 90, 100 %), and around zero at the 20 % of smallest
     magnitude. A regime counts when it holds at least 1.25 times as large a share of the gap's power as of time, by
-    three standard errors over 16 stretches of the record.
+    three standard errors, from the differences between neighbours of 64 stretches of the record.
 
     Parameters
     ----------
@@ -121,6 +141,9 @@ def regime_shares(residual: Matrix, measured: Matrix, variables: Mapping[str, Ma
         ``[output, sample]``.
     variables
         Name, such as ``elbow.velocity``, to ``[sample]``, SI.
+    beyond_motion
+        Whether a regime must hold 1.5 times as much, too, as it would of a gap that is the same share of each output
+        at any time. Such a gap grows with the motion, so that large amplitudes would always be told.
 
     Returns
     -------
@@ -131,11 +154,12 @@ def regime_shares(residual: Matrix, measured: Matrix, variables: Mapping[str, Ma
     power = np.mean(relative_residual(residual, measured) ** 2, axis=0)
     if not power.sum() > 0:
         return ()
+    expected = _power_of_motion(residual, measured) if beyond_motion else np.zeros_like(power)
     found = []
     for name, values in variables.items():
         if values.shape != power.shape:
             raise EstimateError(f"variable {name!r} has {values.size} samples, the residual {power.size}")
-        found += _apart([_regime(name, values, power, edges) for edges in _regimes(values)])
+        found += _apart([_regime(name, values, power, expected, edges) for edges in _regimes(values)])
     # Each variable has its say first; the strongest of all are told.
     found.sort(key=lambda regime: -regime.excess)
     return tuple(regime.told for regime in found[:MOST_REGIMES])
@@ -178,6 +202,20 @@ def _line_power(scaled: Matrix) -> Matrix:
     return np.asarray(power)
 
 
+def _noise_shares(
+    power: Matrix, noise: NoiseFloor, measured: Matrix, edges_hz: Matrix, sample_rate_hz: float
+) -> list[float | None]:
+    """How much of a gap's ``power [band]``, of `_line_power`, noise can be; None where there is no gap."""
+    samples = measured.shape[1]
+    scaled = np.sum(noise.one_sided(sample_rate_hz) / _scale(measured) ** 2, axis=0)
+    # Bands may be narrower than the lines of the density.
+    line_hz = np.linspace(0.0, sample_rate_hz / 2, scaled.size)
+    below = np.concatenate([[0.0], np.cumsum((scaled[1:] + scaled[:-1]) / 2) * line_hz[1]])
+    inside = samples**2 * np.diff(np.interp(edges_hz, line_hz, below))
+    # An estimate that lies above what is there says that all of it can be noise.
+    return [min(float(ours / whole), 1.0) if whole > 0 else None for ours, whole in zip(inside, power, strict=True)]
+
+
 def _mode_edges_hz(modes_hz: Sequence[float], frequency_hz: Matrix) -> Matrix:
     modes = np.sort(np.asarray(modes_hz, dtype=np.float64))
     inner = np.sqrt(modes[:-1] * modes[1:])
@@ -215,17 +253,27 @@ def _regimes(values: Matrix) -> list[tuple[float, float]]:
     return [*bins, (-near, near)] if near > 0 and values.min() < 0 < values.max() else bins
 
 
-def _regime(name: str, values: Matrix, power: Matrix, edges: tuple[float, float]) -> _Regime:
+def _power_of_motion(residual: Matrix, measured: Matrix) -> Matrix:
+    """``[sample]`` power of a gap that is the same share of each output at any time, over its sum."""
+    gaps = np.mean(relative_residual(residual, measured) ** 2, axis=1)
+    power = gaps @ relative_residual(measured, measured) ** 2
+    return np.asarray(power / power.sum() if power.sum() > 0 else power)
+
+
+def _regime(name: str, values: Matrix, power: Matrix, expected: Matrix, edges: tuple[float, float]) -> _Regime:
+    """Weigh one regime; `power` of the gap, and the one that it must exceed too."""
     low, high = edges
     inside = (values >= low) & (values <= high)
     share, time = float(power[inside].sum() / power.sum()), float(inside.mean())
     excess = share - time
-    # Over stretches of the record, since neighbouring samples tell the same.
+    # Over stretches of the record, since neighbouring samples tell the same; from one stretch to the next, since an
+    # amplitude that rises and falls over the record isn't what scatters.
     parts = np.array_split(power * (inside - time), BLOCKS)
     sums = np.array([part.sum() for part in parts]) / power.sum()
-    error = float(np.sqrt(BLOCKS) * np.std(sums, ddof=1))
-    told = RegimeShare(variable=name, low=low, high=high, share=share)
-    counts = share >= LEAST_EXCESS * time and excess > LEAST_SIGMAS * error
+    error = float(np.sqrt(BLOCKS * np.mean(np.diff(sums) ** 2) / 2))
+    told = RegimeShare(variable=name, low=low, high=high, share=share, time=time)
+    least = max(LEAST_EXCESS * time, BEYOND_MOTION * float(expected[inside].sum()))
+    counts = share >= least and excess > LEAST_SIGMAS * error
     return _Regime(told=told, excess=excess if counts else 0.0, inside=edges)
 
 

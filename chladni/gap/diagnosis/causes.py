@@ -32,6 +32,7 @@ from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.contest import distinct, lowest, weighed
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.explanation.known_states import KnownStates
+from chladni.gap.location.locate import Located
 from chladni.gap.records.diagnosis import Candidate, Verdict
 from chladni.gap.records.noise_floor import NoiseFloor
 
@@ -77,6 +78,8 @@ class Causes:
     states
         That the machine went through, when all runs were lost and a law, or two, follow the log from these over short
         windows; else None.
+    forces
+        Unknown forces at two places that explain much more than one anywhere, when pairs were looked for; else None.
     """
 
     verdict: Verdict
@@ -89,6 +92,7 @@ class Causes:
     distorted: tuple[str, ...]
     instead: Instead | None
     states: KnownStates | None
+    forces: Located | None = None
 
 
 def causes_of(study: Study, progress: Step) -> Causes:
@@ -96,7 +100,7 @@ def causes_of(study: Study, progress: Step) -> Causes:
     nothing = without_cause(study)
     progress(0.1)
     singles = single_causes(study, progress)
-    entered, instead, states = _searched(study, nothing, singles, progress)
+    entered, instead, states, forces = _searched(study, nothing, singles, progress)
     added = added_nats(study.location)
     entered += twin_causes(study, _best(weighed([nothing, *entered]), nothing, added))
     progress(1.0)
@@ -132,12 +136,13 @@ def causes_of(study: Study, progress: Step) -> Causes:
         distorted=distorted,
         instead=instead,
         states=states,
+        forces=forces,
     )
 
 
 def _searched(
     study: Study, nothing: Contestant, singles: Entered, progress: Step
-) -> tuple[list[Contestant], Instead | None, KnownStates | None]:
+) -> tuple[list[Contestant], Instead | None, KnownStates | None, Located | None]:
     """Every contestant with a cause: single ones, and two where one leaves something that nothing else explains."""
     added = added_nats(study.location)
     found = list(singles.ranked)
@@ -150,7 +155,7 @@ def _searched(
 
     instead = explained_instead(study, best())
     if instead is not None or not leaves_another():
-        return found, instead, singles.states
+        return found, instead, singles.states, None
     # Where runs were lost, those of one of two laws are lost again: both at once come first.
     pairs = paired_causes(study, best()) if study.contest.states is not None else Entered()
     found += pairs.ranked
@@ -176,7 +181,7 @@ def _searched(
         found += _detailed(study, weighed(found), best())
         found += sibling_causes(study, [best()])
         found += [detailed(study, best()), *without_one(study, best())]
-    return [one for one in found if _is_plausible(study, nothing, one)], None, states
+    return [one for one in found if _is_plausible(study, nothing, one)], None, states, pairs.forces
 
 
 def _detailed(study: Study, ranked: Sequence[Contestant], best: Contestant) -> list[Contestant]:

@@ -12,17 +12,20 @@ from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, regime_shares
 from chladni.gap.comparison.short_log import shortness
+from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.diagnosis.advice import advice_on, measure_next
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.correlation import correlation_of
 from chladni.gap.diagnosis.even_odds import at_even_odds
+from chladni.gap.diagnosis.joint_motions import JointMotions, joint_motions
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
 from chladni.gap.diagnosis.other_logs import tried_elsewhere
 from chladni.gap.diagnosis.remarks import remarks_on
 from chladni.gap.diagnosis.rounds import causes_found
 from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.linear_algebra import in_one_thread
+from chladni.gap.location.locate import Located, Location, explained_share
 from chladni.gap.location.profile import profile_at
 from chladni.gap.location.recovered import Recovered, recovered
 from chladni.gap.plant.places import Site
@@ -30,6 +33,7 @@ from chladni.gap.records.diagnosis import (
     Cause,
     Diagnosis,
     GapSignals,
+    PairShare,
     RegimeShare,
     RestoringForce,
     SiteShare,
@@ -110,15 +114,16 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         after = causes.shaken.predicted
     motion = _evidence(study, causes, said)
     distortion = _distortion(study.measurement)
+    motions = joint_motions(study, shown.fit, motion)
     return Diagnosis(
         model=study.model.name,
         logs=tuple(logs),
         verdict=causes.verdict,
         causes=said,
         ranking=ranking_of(causes, said),
-        where=_where(study, causes, before, motion),
+        where=_where(study, causes, before, motions),
         # What the parameters close isn't what nothing explains, and may lie elsewhere.
-        left=_where(study, causes, causes.tuned.fit.outputs, motion) if causes.verdict == "unknown" else None,
+        left=_where(study, causes, causes.tuned.fit.outputs, motions) if causes.verdict == "unknown" else None,
         gap=closing_of(_yardstick(study, causes), before, causes.tuned.fit.outputs, after, seed=seed),
         tuned_parameters=tuned_numbers(study, shown.fit),
         correlation=correlation_of(study.contest.run.tunables, shown.fit),
@@ -128,7 +133,7 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         advice=advice_on(study, causes),
         restoring_force=_restoring(study, causes, motion),
         signals=_signals(study, causes, before, after),
-        distortion=() if distortion is None else distortion.shares,
+        distortion=() if distortion is None else distortion.told,
     )
 
 
@@ -154,28 +159,40 @@ def _nominal(study: Study) -> Matrix:
         return run.outputs()
 
 
-def _where(study: Study, causes: Causes, simulated: Matrix, motion: Recovered | None) -> Where:
+def _where(study: Study, causes: Causes, simulated: Matrix, motions: JointMotions) -> Where:
     measurement = study.measurement
     residual = measurement.outputs - simulated
-    shares = sorted(study.location.shares.items(), key=lambda one: -one[1])
     return Where(
         channels=channel_gaps(residual, measurement.outputs, causes.noise, output_names=measurement.output_names),
-        bands=band_shares(residual, measurement.outputs, sample_rate_hz=measurement.sample_rate_hz),
-        sites=tuple(SiteShare(name=name, share=share) for name, share in shares),
-        regimes=_regimes(study, residual, motion),
+        bands=band_shares(
+            residual, measurement.outputs, sample_rate_hz=measurement.sample_rate_hz, noise=causes.noise
+        ),
+        sites=_sites(study.location),
+        regimes=_regimes(residual, measurement.outputs, motions),
+        times=time_shares(residual, measurement.outputs, sample_rate_hz=measurement.sample_rate_hz),
+        pair=_pair(study.location, causes.forces),
     )
 
 
-def _regimes(study: Study, residual: Matrix, motion: Recovered | None) -> tuple[RegimeShare, ...]:
-    """Regimes of a joint's motion; of what acts elsewhere there are none."""
-    if motion is None or motion.site.kind != "joint":
-        return ()
-    unit = _port(study, motion.site)[1]
-    name = motion.site.name
-    variables = {f"{name}.displacement": motion.displacement, f"{name}.velocity": motion.velocity}
-    units = {f"{name}.displacement": unit, f"{name}.velocity": f"{unit}/s"}
-    found = regime_shares(residual, study.measurement.outputs, variables)
-    return tuple(replace(one, unit=units[one.variable]) for one in found)
+def _sites(location: Location) -> tuple[SiteShare, ...]:
+    """Sites by falling share, each with the others of its place."""
+    alike = {name: place.names for place in location.places for name in place.names}
+    return tuple(
+        SiteShare(name=name, share=share, group=tuple(one for one in alike[name] if one != name))
+        for name, share in sorted(location.shares.items(), key=lambda one: -one[1])
+    )
+
+
+def _pair(location: Location, forces: Located | None) -> PairShare | None:
+    if forces is None:
+        return None
+    first, second = forces.places
+    return PairShare(groups=(first.names, second.names), share=explained_share(location.tuned, forces.profile))
+
+
+def _regimes(residual: Matrix, measured: Matrix, motions: JointMotions) -> tuple[RegimeShare, ...]:
+    found = regime_shares(residual, measured, motions.signals, beyond_motion=True)
+    return tuple(replace(one, unit=motions.units[one.variable]) for one in found)
 
 
 def _evidence(study: Study, causes: Causes, said: Sequence[Cause]) -> Recovered | None:

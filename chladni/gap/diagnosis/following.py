@@ -27,10 +27,13 @@ class Entered:
     states
         That the machine went through, when all runs were lost and a law follows the log from these over short windows
         nearly as far as unknown forces do; else None.
+    forces
+        Unknown forces at two places that explain much more than one anywhere, when they were looked for; else None.
     """
 
     ranked: Sequence[Contestant] = ()
     states: KnownStates | None = None
+    forces: Located | None = None
 
 
 def least_force(located: Located | None) -> float:

@@ -134,23 +134,30 @@ def paired_causes(study: Study, best: Contestant) -> Entered:
     best
         The best one so far: where any two forces explain everything, two laws must promise much more than it does.
     """
-    weighed = _weighed_pairs(study, best)
+    pairs = located_pairs(study.location)
+    weighed = _weighed_pairs(study, best, pairs)
+    forces = _two_forces(study.location, pairs)
     both = [_of_pair(study, pair, forms) for pair, forms in weighed]
     found = sound(study, study.contest.enter_all([one for each in both for one in each]))
     if not weighed or not is_lost_beside(weighed[0][0], min(best.chi, least_left(found))):
-        return Entered(ranked=found)
+        return Entered(ranked=found, forces=forces)
     shots = followed(study, weighed[0][0], both[0])
-    return Entered(ranked=found) if shots is None else Entered(
-        ranked=[*found, *sound(study, shots.ranked)], states=shots.states
+    return Entered(ranked=found, forces=forces) if shots is None else Entered(
+        ranked=[*found, *sound(study, shots.ranked)], states=shots.states, forces=forces
     )  # fmt: skip
 
 
-def _weighed_pairs(study: Study, best: Contestant) -> list[tuple[Located, list[Form]]]:
+def _two_forces(location: Location, pairs: Sequence[Located]) -> Located | None:
+    """Give the pair that explains much more than one force does; any two explain two sensors."""
+    near = _near_pairs(location, pairs) if len(location.problem.measured) > _EXPLAINED else []
+    return near[0] if near else None
+
+
+def _weighed_pairs(study: Study, best: Contestant, pairs: Sequence[Located]) -> list[tuple[Located, list[Form]]]:
     """Give the pairs whose laws promise most while the other's force is free, with what was screened there."""
     location = study.location
-    pairs = located_pairs(location)
     tell = len(location.problem.measured) > _EXPLAINED
-    near = _near_pairs(location, pairs) if tell else pairs
+    near = _near_pairs(location, pairs) if tell else list(pairs)
     weighed = [(pair, forms_at(location, [pair], study.leave_out, study.own)) for pair in near]
     if not tell:
         most = _PAIR_GAIN * best.chi * location.problem.scale

@@ -241,7 +241,7 @@ class SimulatorFindings:
         }
         return Where(
             channels=channel_gaps(residual, log.outputs, self.noise, output_names=log.output_names),
-            bands=band_shares(residual, log.outputs, sample_rate_hz=log.sample_rate_hz),
+            bands=band_shares(residual, log.outputs, sample_rate_hz=log.sample_rate_hz, noise=self.noise),
             sites=self.sites(),
             regimes=regime_shares(residual, log.outputs, variables),
         )

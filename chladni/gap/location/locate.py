@@ -157,7 +157,7 @@ def _tuned_on_segments(
     model: Model, whole: LinearProblem, start: Matrix
 ) -> tuple[tuple[LinearProblem, ...], Profile]:
     measurement = whole.measurement
-    period = measurement.sample_rate_hz / _lowest_hz(model, measurement)
+    period = measurement.sample_rate_hz / lowest_hz(model, measurement)
     problems = []
     for periods in _SEGMENTS:
         length = int(np.clip(periods * period, 64, measurement.samples // 2))
@@ -176,7 +176,7 @@ def tuned_stepwise(problems: Sequence[LinearProblem], z: Matrix, limit: float | 
     return found
 
 
-def _lowest_hz(model: Model, measurement: Measurement) -> float:
+def lowest_hz(model: Model, measurement: Measurement) -> float:
     """Lowest frequency of an oscillation that the record holds several times."""
     values = np.linalg.eigvals(model.compile().a)
     turning = np.abs(values[np.abs(values.imag) > 1e-3 * np.abs(values)]) / (2 * np.pi)
@@ -235,14 +235,25 @@ def _pays(plain: Profile, found: Profile) -> bool:
 
 
 def _shares(tuned: Profile, rough: Sequence[_Rough]) -> dict[str, float]:
-    gap = max(tuned.chi - 1.0, 1e-12)
     return {
-        site.name: float(np.clip((tuned.chi - max(profile.chi, 1.0)) / gap, 0.0, 1.0))
+        site.name: explained_share(tuned, profile)
         for profile, place in rough
         # With one sensor no force was fitted anywhere: any would explain all, and none more than another.
         if profile.forces
         for site in place.sites
     }
+
+
+def explained_share(tuned: Profile, profile: Profile) -> float:
+    """Give the share of the misfit beyond noise that the forces of a profile explain, 0 to 1.
+
+    Parameters
+    ----------
+    tuned
+        Without any force.
+    """
+    gap = max(tuned.chi - 1.0, 1e-12)
+    return float(np.clip((tuned.chi - max(profile.chi, 1.0)) / gap, 0.0, 1.0))
 
 
 def sites_at(located: Located) -> Sequence[tuple[Site, tuple[Site, ...]]]:

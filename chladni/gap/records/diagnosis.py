@@ -101,20 +101,28 @@ class Ranked:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChannelGap:
-    """Gap of the nominal model and noise of one output, both over the RMS of what was measured."""
+    """Gap of the nominal model and noise of one output, both over the RMS of what was measured.
+
+    `noise_from` says where the noise was estimated from, see `NoiseFloor.method`.
+    """
 
     name: str
     gap: float
     noise: float
+    noise_from: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BandShare:
-    """Share of the gap's power (outputs scaled by their RMS) between two frequencies."""
+    """Share of the gap's power (outputs scaled by their RMS) between two frequencies.
+
+    `noise` is how much of the gap in this band noise can be, 0 to 1.
+    """
 
     low_hz: float
     high_hz: float
     share: float
+    noise: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,9 +136,24 @@ class TimeShare:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SiteShare:
-    """Share of the gap beyond noise that an unknown force (error, change of input) at this site explains."""
+    """Share of the gap beyond noise that an unknown force (error, change of input) at this site explains.
+
+    `group` are the other sites at which it would print the same pattern on these sensors, so that they share it.
+    """
 
     name: str
+    share: float
+    group: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairShare:
+    """Share of the gap beyond noise that unknown forces at two sites together explain.
+
+    `groups` are the sites, each with those at which a force would print the same pattern on these sensors.
+    """
+
+    groups: tuple[tuple[str, ...], tuple[str, ...]]
     share: float
 
 
@@ -138,7 +161,8 @@ class SiteShare:
 class RegimeShare:
     """Share of the gap's power while a variable, such as ``elbow.velocity``, lies between two values.
 
-    Values are SI; `unit` is empty where it isn't known.
+    Values are SI; `unit` is empty where it isn't known. `time` is the share of the record that the variable spends
+    there, with which `share` is compared.
     """
 
     variable: str
@@ -146,17 +170,23 @@ class RegimeShare:
     high: float
     share: float
     unit: str = ""
+    time: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Where:
-    """Where the gap lies, and when."""
+    """Where the gap lies, and when.
+
+    `pair` is the best pair of sites, where two unknown forces explain much more than one anywhere, as far as pairs
+    were looked for: they are only where one cause leaves something.
+    """
 
     channels: tuple[ChannelGap, ...]
     bands: tuple[BandShare, ...]
     sites: tuple[SiteShare, ...]
     regimes: tuple[RegimeShare, ...]
     times: tuple[TimeShare, ...] = ()
+    pair: PairShare | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -269,13 +299,18 @@ class GapSignals(Value):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DistortionShare:
-    """Split of one output's power at the excited and detection lines of a periodic input, shares of the whole."""
+    """Split of one output's power at the excited and detection lines of a periodic input, shares of the whole.
+
+    `nonlinear` is even and odd distortion together. Each of those is None when even lines are excited too, since both
+    fall on the same lines then.
+    """
 
     output: str
     linear: float
-    even: float
-    odd: float
+    even: float | None
+    odd: float | None
     noise: float
+    nonlinear: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,7 +9,7 @@ from chladni.gap.records.diagnosis import BandShare, Diagnosis
 from chladni.viewers.engineering import percent, span
 from chladni.viewers.figures.sheet import WIDTH_IN, look, paint, plain
 from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, GapEvidence
-from chladni.viewers.gap_tables import where_told
+from chladni.viewers.gap_tables import places_of, where_told
 
 Bar = tuple[str, float]
 
@@ -43,14 +43,14 @@ def share_label(found: Diagnosis) -> str:
 
 def site_bars(found: Diagnosis, *, count: int | None = BARS) -> Sequence[Bar]:
     """Shares that an unknown force at each site explains, the largest first."""
-    rows = sorted(found.where.sites, key=lambda one: -one.share)[:count]
-    return [(one.name, one.share) for one in rows]
+    return [(", ".join(names), share) for names, share in places_of(found.where)[:count]]
 
 
 def draw_shares(axes: Axes, bars: Sequence[Bar], *, named: set[str]) -> None:
     """Draw bars from top to bottom, those that are named in colour."""
     places = range(len(bars))
-    colours = [NAMED if name in named else OTHERS for name, _ in bars]
+    # Sites that can't be told apart share a bar.
+    colours = [OTHERS if named.isdisjoint(name.split(", ")) else NAMED for name, _ in bars]
     axes.barh(places, [100 * share for _, share in bars], height=0.7, color=colours)
     for place, (_, share) in enumerate(bars):
         axes.text(100 * share, place, f" {percent(share)}", va="center", fontsize=6.5)

@@ -65,7 +65,8 @@ def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
     drawn = bool(found.where.sites and album.sections.get("shares"))
     places = ("shares", "map") if drawn else ("map",)
     yield _section(
-        "Where it lies", _flow(_where(found, drawn=drawn), _pictures(found, album, *places)) + _left(found)
+        "Where it lies",
+        _flow(_where(found, drawn=drawn), _pictures(found, album, *places)) + _left(found) + _noise(found),
     )
     yield _section(
         "What was weighed", _tables((tables.ranking_table(found, count=RANKED), (2, 3, 4))) + _naive(found)
@@ -74,7 +75,7 @@ def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
         "Parameters that moved, or that this log doesn't determine",
         _tables((tables.parameter_table(found), (1, 2, 3))),
     )
-    yield _section("Linear, even, odd and noise", _tables((tables.distortion_table(found), (1, 2, 3, 4))))
+    yield _section(tables.distortion_title(found), _tables((tables.distortion_table(found), (1, 2, 3, 4))))
     yield _section("Limits", _list((*found.levels, *found.remarks, *_held_out(found))))
 
 
@@ -97,11 +98,12 @@ def _where(found: Diagnosis, *, drawn: bool) -> str:
     channels = (tables.channel_table(where), (1, 2))
     shares = (
         (tables.site_table(where), (1,)),
-        (tables.band_table(where), (1,)),
-        (tables.regime_table(where), (2,)),
+        (tables.band_table(where), (1, 2)),
+        (tables.regime_table(where), (2, 3)),
     )
-    # The picture of shares has their numbers.
-    return _tables(channels) if drawn else _tables(channels, *shares)
+    times = (tables.time_table(where), (1,))
+    # The picture of shares has the numbers of the others.
+    return _tables(channels, times) if drawn else _tables(channels, *shares, times)
 
 
 def _left(found: Diagnosis) -> str:
@@ -109,6 +111,11 @@ def _left(found: Diagnosis) -> str:
         return ""
     told = "The gap of each output is that before anything is tuned; shares are of what the best parameters leave."
     return element("p", told, class_="note")
+
+
+def _noise(found: Diagnosis) -> str:
+    told = tables.noise_told(found.where)
+    return "" if told is None else element("p", escaped(told), class_="note")
 
 
 def _flow(*shown: str) -> str:

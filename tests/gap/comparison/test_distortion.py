@@ -65,6 +65,7 @@ def test_a_linear_machine_shows_no_distortion(kind: str) -> None:
     assert max(share.even, share.odd) < 0.1 * share.noise
     assert share.noise == pytest.approx(NOISE**2, rel=0.1)
     assert found.remarks == ()
+    assert found.told is found.shares
 
 
 def test_with_all_lines_excited_only_the_sum_is_told() -> None:
@@ -74,6 +75,10 @@ def test_with_all_lines_excited_only_the_sum_is_told() -> None:
     # One realisation: three sigma of 18 %.
     assert found.nonlinear[0] == pytest.approx(expected[1] + expected[2], rel=0.55)
     assert found.noise[0] == pytest.approx(expected[3], rel=0.1)
+    (told,) = found.told
+    assert (told.even, told.odd) == (None, None)
+    assert (told.nonlinear, told.noise) == (found.nonlinear[0], found.noise[0])
+    assert told.linear + told.nonlinear + told.noise == pytest.approx(1.0)
     assert any("odd lines only" in remark for remark in found.remarks)
     assert run("full").nonlinear[0] < 0.1 * NOISE**2
 

@@ -79,6 +79,33 @@ def test_no_gap_has_no_shares() -> None:
     assert regime_shares(np.zeros_like(measured), measured, {"elbow.velocity": measured[0]}) == ()
 
 
+@pytest.mark.parametrize("samples", [SAMPLES, SAMPLES + 1])
+def test_in_each_band_it_is_told_how_much_of_the_gap_noise_can_be(samples: int) -> None:
+    rng = np.random.default_rng(11)
+    measured = np.array([[1e3], [1e-3]]) * np.array([tone(20.0, samples), tone(20.0, samples)])
+    # White noise, and a tone at 10 Hz of the same power.
+    white = 0.1 * np.array([[1e3], [1e-3]]) * rng.standard_normal((2, samples))
+    noise = noise_of_residual(white, sample_rate_hz=RATE_HZ)
+    residual = white + 0.1 * np.array([1e3 * tone(10.0, samples), 1e-3 * tone(10.0, samples)])
+    bands = band_shares(residual, measured, sample_rate_hz=RATE_HZ, modes_hz=(10.0, 20.0, 40.0), noise=noise)
+    part = np.sqrt(200.0) / 100.0
+    # Powers of a band, of a thousand lines at least, scatter by 3 %.
+    assert bands[0].noise == pytest.approx(part / (1 + part), rel=0.1)
+    assert [one.noise for one in bands[1:]] == pytest.approx([1.0] * 3, abs=0.1)
+
+
+def test_without_a_floor_or_without_a_gap_no_noise_is_told() -> None:
+    rng = np.random.default_rng(12)
+    measured = rng.standard_normal((1, 400))
+    assert {one.noise for one in band_shares(measured, measured, sample_rate_hz=RATE_HZ)} == {None}
+    noise = noise_of_residual(measured, sample_rate_hz=RATE_HZ)
+    gone = band_shares(np.zeros_like(measured), measured, sample_rate_hz=RATE_HZ, noise=noise)
+    assert {one.noise for one in gone} == {None}
+    # Ten times less than the floor says: all of it can be noise.
+    less = band_shares(0.1 * measured, measured, sample_rate_hz=RATE_HZ, noise=noise)
+    assert {one.noise for one in less} == {1.0}
+
+
 def test_outputs_without_motion_have_one_band() -> None:
     (band,) = band_shares(np.zeros((1, 50)), np.full((1, 50), 3.0), sample_rate_hz=RATE_HZ)
     assert (band.low_hz, band.high_hz, band.share) == (0.0, 100.0, 0.0)
@@ -125,6 +152,22 @@ def test_a_gap_that_does_not_depend_on_the_motion_has_no_regime() -> None:
         for seed in range(20)
     ]
     assert found == [()] * 20
+
+
+def test_a_gap_that_only_grows_with_the_motion_is_told_by_no_amplitude() -> None:
+    rng = np.random.default_rng(8)
+    envelope = 1.5 + np.sin(2 * np.pi * np.arange(SAMPLES) / 800)
+    measured = envelope * rng.standard_normal((1, SAMPLES))
+    alike = 0.1 * envelope * rng.standard_normal((1, SAMPLES))
+    amplitude = {"hand.amplitude": envelope}
+    assert regime_shares(alike, measured, amplitude)[0].low > 1.5
+    assert regime_shares(alike, measured, amplitude, beyond_motion=True) == ()
+    # A cubic spring's is larger than that, and what rubs is so where little moves.
+    (grown, *_) = regime_shares(alike * envelope**2, measured, amplitude, beyond_motion=True)
+    assert grown.low > 2.0
+    assert grown.time == pytest.approx(np.mean((envelope >= grown.low) & (envelope <= grown.high)))
+    (faded, *_) = regime_shares(alike / envelope**2, measured, amplitude, beyond_motion=True)
+    assert faded.high < 1.0
 
 
 def test_at_most_six_regimes_are_told_and_none_overlap() -> None:

@@ -14,7 +14,7 @@ from chladni.gap.diagnosis.search import single_causes
 from chladni.gap.diagnosis.study import recovered_states, study_of
 from chladni.gap.explanation.contest import weighed
 from chladni.gap.explanation.hypotheses import hypothesis_of
-from chladni.gap.location.locate import locate
+from chladni.gap.location.locate import Location, explained_share, locate, located_pairs
 from chladni.gap.plant.tunable import Tunables
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.effects.catalogue import CATALOGUE
@@ -85,12 +85,13 @@ def test_of_two_sensors_laws_tell_where_two_effects_are(first) -> None:
     effects = chladni.attached(first[0], "j0", first[1]), chladni.attached("coulomb_friction", "j1", {"force": 6.0})
     study = two_sensors(*effects, words=frozenset({"coulomb_friction", "hardening_stiffness", "gain_error"}))
     nothing = search.without_cause(study)
-    pair, forms = pairs._weighed_pairs(study, nothing)[0]
+    forces = located_pairs(study.location)
+    pair, forms = pairs._weighed_pairs(study, nothing, forces)[0]
     assert {name for place in pair.places for name in place.names} == {"j0", "b0", "hammer", "j1"}
     at_j1 = [one for one, _ in forms if one.trial.site.name == "j1"]
     assert min(at_j1, key=lambda one: one.cost).trial.effect == "coulomb_friction"
     # Beside a fit that leaves no more than they promise they aren't worth any.
-    assert pairs._weighed_pairs(study, replace(nothing, held=np.ones_like(nothing.held))) == []
+    assert pairs._weighed_pairs(study, replace(nothing, held=np.ones_like(nothing.held)), forces) == []
 
 
 @pytest.mark.slow
@@ -109,4 +110,18 @@ def test_two_laws_whose_runs_are_lost_are_followed_from_the_states_that_two_forc
 def test_one_sensor_is_explained_by_any_force() -> None:
     log = with_outputs(measured((SPRING,), seconds=4.0), ["acc_wrist"])
     study = study_of(arm(), log, leave_out=frozenset(), own={})
-    assert pairs._weighed_pairs(study, search.without_cause(study)) == []
+    assert pairs._weighed_pairs(study, search.without_cause(study), located_pairs(study.location)) == []
+
+
+def test_two_forces_are_told_where_they_explain_much_more_than_one() -> None:
+    def location(*effects: AttachedEffect) -> Location:
+        log = measured(effects, seconds=3.0, seed=4)
+        return locate(arm(), log, estimate_noise(log), Tunables.of(arm()))
+
+    both = location(SPRING, LATE)
+    found = pairs._two_forces(both, located_pairs(both))
+    assert found is not None
+    assert {name for place in found.places for name in place.names} >= {"hand", "acc_column"}
+    assert explained_share(both.tuned, found.profile) > max(both.shares.values())
+    one = location(SPRING)
+    assert pairs._two_forces(one, located_pairs(one)) is None
