@@ -229,6 +229,7 @@ def diagnosis() -> Diagnosis:
             after=1.02 * pooled(measured() - run),
             noise=pooled(measured() - run),
             closed=0.995,
+            explained=0.93,
             interval=(0.990, 0.998),
             held_out=(HeldOut(log=LOG, start_s=2.0, end_s=4.0), HeldOut(log=LOG, start_s=6.0, end_s=8.0)),
         ),
@@ -263,7 +264,7 @@ def ranking() -> tuple[Ranked, ...]:
 
 def unknown() -> Diagnosis:
     found = diagnosis()
-    gap = replace(found.gap, tuned=0.21, after=0.21, closed=0.2, interval=(0.1, 0.3))
+    gap = replace(found.gap, tuned=0.21, after=0.21, closed=0.2, interval=(0.1, 0.3), explained=None)
     bands = tuple(replace(one, share=share) for one, share in zip(found.where.bands, (0.05, 0.1, 0.85), strict=True))
     return replace(
         found, verdict="unknown", causes=(), gap=gap, advice="Measure the wrist's rotation, too.",
@@ -275,6 +276,7 @@ def unknown() -> Diagnosis:
 def agreeing() -> Diagnosis:
     found = diagnosis()
     gap = replace(found.gap, before=0.012, tuned=0.0103, after=0.0103, noise=0.0101, closed=None, interval=None)
+    gap = replace(gap, explained=None)
     return replace(
         found, verdict="none", causes=(), gap=gap, next_measurement=None, naive=None, restoring_force=None, ranking=()
     )
@@ -287,7 +289,7 @@ def wrong_values() -> Diagnosis:
         parameters={"elbow.stiffness": FittedNumber(value=31000.0, std=90.0, unit="N/m")},
     )  # fmt: skip
     tuned = {"elbow.stiffness": FittedNumber(value=31000.0, std=90.0, unit="N/m", nominal=2e4)}
-    gap = replace(found.gap, tuned=found.gap.after)
+    gap = replace(found.gap, tuned=found.gap.after, explained=None)
     return replace(found, verdict="parameters", causes=(cause,), tuned_parameters=tuned, gap=gap)
 
 
@@ -296,7 +298,8 @@ def two_causes() -> Diagnosis:
         effect="gain_error", site="acc_wrist", probability=0.88, group=("acc_wrist",), alternatives=(),
         parameters={"gain": FittedNumber(value=0.924, std=0.011, unit="1")}, share=0.2,
     )  # fmt: skip
-    return replace(diagnosis(), causes=(friction(share=0.7), gain))
+    found = diagnosis()
+    return replace(found, causes=(friction(share=0.7), gain), gap=replace(found.gap, explained=0.95))
 
 
 def hidden_floor() -> Diagnosis:
@@ -304,8 +307,9 @@ def hidden_floor() -> Diagnosis:
     floor = Cause(
         effect="base_vibration", site="ground", probability=0.9, group=("ground",), alternatives=(),
         parameters={
-            "level": FittedNumber(value=0.31, std=0.02, unit="m/s^2"),
-            "high": FittedNumber(value=40.0, std=3.0, unit="Hz"),
+            "level": FittedNumber(value=0.31, std=None, unit="m/s^2"),
+            "band": FittedNumber(value=40.0, std=None, unit="Hz"),
+            "band_start": FittedNumber(value=2.0, std=None, unit="Hz"),
         },
     )  # fmt: skip
     return replace(found, causes=(floor,), gap=replace(found.gap, by="cross_sensor"))

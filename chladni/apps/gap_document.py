@@ -122,7 +122,7 @@ def closing_document(gap: Closing) -> Document:
     }
     if gap.by != "free_run":
         document["by"] = gap.by
-    return document | _when_there({"horizon_s": _known(gap.horizon_s)})
+    return document | _when_there({"horizon_s": _known(gap.horizon_s), "explained": _known(gap.explained)})
 
 
 def _cause(cause: Cause) -> Document:

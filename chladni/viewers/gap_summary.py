@@ -15,6 +15,7 @@ FAINT = 3.0
 NEAREST = 3
 # Of what closes on the first log, the share below which little carries over to another.
 CARRIED = 0.5
+_LEFT_BY_TUNING = "of the error's power that tuning alone leaves above the noise"
 
 
 def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -94,6 +95,7 @@ def _effects(found: Diagnosis) -> Iterator[str]:
         told = _listed([f"{cause_phrase(cause)} ({chance(cause.probability)})" for cause in causes])
         yield f"{_certainty(least)} {_COUNT.get(len(causes), 'several')} causes at once: {told}."
     yield _closing(found)
+    yield from _shares(found)
     yield from _faint(found)
     for cause in causes:
         yield from _reservations(cause)
@@ -114,15 +116,26 @@ def _certainty(cause: Cause) -> str:
 
 
 def _closing(found: Diagnosis) -> str:
-    gap, shares = found.gap, [cause.share for cause in found.causes if cause.share is not None]
+    gap = found.gap
     subject = "It explains" if len(found.causes) == 1 else "Together they explain"
-    # Shares of causes that explain some of the gap twice may add up to more than all of it.
-    explained = f"{subject} {percent(min(sum(shares), 1.0))} of the gap; " if shares else ""
+    explained = "" if gap.explained is None else f"{subject} {percent(gap.explained)} {_LEFT_BY_TUNING}; "
     adding = "adding it brings" if len(found.causes) == 1 else "adding them brings"
     # Tables of the whole log show other numbers.
     brings = f"{adding} the error from {percent(gap.before)} to {percent(gap.after)} on stretches that no fit saw"
     text = f"{explained}{brings}, noise {percent(gap.noise)}."
     return text if explained else text[0].upper() + text[1:]
+
+
+def _shares(found: Diagnosis) -> Iterator[str]:
+    """What each of several causes is worth beside the others."""
+    told = [
+        f"without {effect_at(cause.effect, cause.site)} {percent(cause.share)}"
+        for cause in found.causes
+        if cause.share is not None
+    ]
+    if len(found.causes) > 1 and told:
+        sentence = f"{_listed(told)} of that power comes back."
+        yield sentence[0].upper() + sentence[1:]
 
 
 def _elsewhere(found: Diagnosis) -> Iterator[str]:

@@ -60,7 +60,7 @@ MORE = {
     ".where": {"pair"},
     ".where.sites": {"group"},
     ".where.regimes": {"time"},
-    ".gap": {"by", "horizon_s"},
+    ".gap": {"by", "horizon_s", "explained"},
 }
 KINDS = made.every_kind()
 

@@ -57,6 +57,28 @@ class Yardstick:
             return None
         return float(np.clip((before - after) / (before - self.floor), 0.0, 1.0))
 
+    def explained(self, tuned: float, after: float) -> float | None:
+        """Share of the power that tuning leaves beyond the noise, see `Closing`."""
+        # With nothing added there is no share of it to tell; nor where tuning leaves hardly more than the noise.
+        if after == tuned or self.closed(tuned, after) is None:
+            return None
+        return explained_power(tuned, tuned, after, noise=self.floor)
+
+
+def explained_power(left: float, tuned: float, after: float, *, noise: float) -> float:
+    """Give the share of the power that tuning leaves beyond the noise that a cause explains, 0 to 1.
+
+    Parameters
+    ----------
+    left
+        Gap with all causes but this one.
+    tuned, after, noise
+        Gap with none of them, more than `noise`; with all; the floor.
+    """
+    # A cause is never worth more than all of them: without it the others may be left out, too.
+    whole, back = tuned**2 - noise**2, min(left, tuned) ** 2 - after**2
+    return float(np.clip(back / whole, 0.0, 1.0))
+
 
 def closing_of(yardstick: Yardstick, before: Matrix, tuned: Matrix, after: Matrix, *, seed: int) -> Closing:
     """Compare three simulations with the measurement on held-out samples.
@@ -76,6 +98,7 @@ def closing_of(yardstick: Yardstick, before: Matrix, tuned: Matrix, after: Matri
         after=gaps[2],
         noise=yardstick.floor,
         closed=yardstick.closed(gaps[0], gaps[2]),
+        explained=yardstick.explained(gaps[1], gaps[2]),
         interval=_interval(yardstick, before, after, seed),
         held_out=tuple(_stretches(yardstick)),
         by=yardstick.by,

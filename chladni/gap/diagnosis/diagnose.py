@@ -18,6 +18,7 @@ from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.correlation import correlation_of
 from chladni.gap.diagnosis.even_odds import at_even_odds
+from chladni.gap.diagnosis.explained_share import with_shares
 from chladni.gap.diagnosis.joint_motions import JointMotions, joint_motions
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
 from chladni.gap.diagnosis.other_logs import tried_elsewhere
@@ -115,16 +116,17 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
     motion = _evidence(study, causes, said)
     distortion = _distortion(study.measurement)
     motions = joint_motions(study, shown.fit, motion)
+    gap = closing_of(_yardstick(study, causes), before, causes.tuned.fit.outputs, after, seed=seed)
     return Diagnosis(
         model=study.model.name,
         logs=tuple(logs),
         verdict=causes.verdict,
-        causes=said,
+        causes=with_shares(causes, said, gap),
         ranking=ranking_of(causes, said),
         where=_where(study, causes, before, motions),
         # What the parameters close isn't what nothing explains, and may lie elsewhere.
         left=_where(study, causes, causes.tuned.fit.outputs, motions) if causes.verdict == "unknown" else None,
-        gap=closing_of(_yardstick(study, causes), before, causes.tuned.fit.outputs, after, seed=seed),
+        gap=gap,
         tuned_parameters=tuned_numbers(study, shown.fit),
         correlation=correlation_of(study.contest.run.tunables, shown.fit),
         next_measurement=measure_next(study, causes, seed),

@@ -15,6 +15,7 @@ from chladni.gap.comparison.shares import (
     regime_shares,
     relative_residual,
 )
+from chladni.gap.diagnosis.closing import explained_power
 from chladni.gap.diagnosis.simulator_fit import HARD_BOUND, SimulatorFit
 from chladni.gap.diagnosis.simulator_runs import EFFECTIVE_SAMPLES
 from chladni.gap.diagnosis.simulator_search import SimulatorSearch
@@ -160,10 +161,12 @@ class SimulatorFindings:
         verdict, found = self.verdict, self.search
         if verdict == "parameters":
             moved = [place for place, z in enumerate(found.loose.z) if abs(z) > HARD_BOUND]
-            numbers = self.parameters(found.loose)
+            numbers, share = self.parameters(found.loose), self.explained
             names = [found.runs.tunables.names[place] for place in moved]
             probability = float(1 / (1 + np.exp(found.best.log_evidence - found.loose.log_evidence)))
-            return tuple(_wrong_value(name, numbers[name], probability) for name in names)
+            # Of several values that move together no fit tells what each is worth.
+            share = share if len(names) == 1 else None
+            return tuple(_wrong_value(name, numbers[name], probability, share) for name in names)
         if verdict != "effect":
             return ()
         return tuple(self.cause(place, effect) for place, effect in enumerate(found.best.effects))
@@ -188,7 +191,34 @@ class SimulatorFindings:
             },
             variant=effect.variant,
             source=effect.source,
+            share=self.share(effect),
         )
+
+    @property
+    def explained(self) -> float | None:
+        """Share of the power that tuning leaves beyond the noise, see `Closing`."""
+        runs, tuned, chosen = self.search.runs, self.search.tuned, self.chosen
+        if chosen is tuned or not self._is_certain(runs.gap(tuned.outputs)):
+            return None
+        gaps = [runs.gap(one.outputs) for one in (tuned, tuned, chosen)]
+        return explained_power(*gaps, noise=self.floor)
+
+    def share(self, effect: AttachedEffect) -> float | None:
+        """Share of the gap that one effect of the best hypothesis explains, see `Cause`."""
+        runs, best, explained = self.search.runs, self.search.best, self.explained
+        others = tuple(each for each in best.names if each != (effect.effect, effect.site))
+        if explained is None or not others:
+            return explained
+        beside = [fit for fit in self.search.fits if fit.names == others]
+        if not beside:
+            return None
+        left = max(beside, key=lambda fit: fit.log_evidence)
+        gaps = [runs.gap(one.outputs) for one in (left, self.search.tuned, best)]
+        return explained_power(*gaps, noise=self.floor)
+
+    def _is_certain(self, gap: float) -> bool:
+        """Whether a gap lies above its own uncertainty; below it closes by chance."""
+        return gap - self.floor > 2 * self.floor * float(np.max(self.noise.std))
 
     def close_to(self, effect: AttachedEffect) -> list[Candidate]:
         """Other causes that explain the log about as well in this one's place."""
@@ -262,8 +292,7 @@ class SimulatorFindings:
         found, runs = self.search, self.search.runs
         stages = [runs.gap(one) for one in (found.nominal, found.tuned.outputs, self.chosen.outputs)]
         before, tuned, after = stages
-        # Below its own uncertainty a gap closes by chance.
-        certain = before - self.floor > 2 * self.floor * float(np.max(self.noise.std))
+        certain = self._is_certain(before)
         return Closing(
             before=before,
             tuned=tuned,
@@ -272,6 +301,7 @@ class SimulatorFindings:
             closed=float(np.clip((before - after) / (before - self.floor), 0, 1)) if certain else None,
             interval=self.interval() if certain else None,
             held_out=self.held_out(),
+            explained=self.explained,
         )
 
     def interval(self) -> tuple[float, float]:
@@ -386,7 +416,7 @@ class SimulatorFindings:
         )
 
 
-def _wrong_value(name: str, number: FittedNumber, probability: float) -> Cause:
+def _wrong_value(name: str, number: FittedNumber, probability: float, share: float | None) -> Cause:
     return Cause(
         effect="parameter",
         site=name,
@@ -394,4 +424,5 @@ def _wrong_value(name: str, number: FittedNumber, probability: float) -> Cause:
         group=(name,),
         alternatives=(),
         parameters={name.rpartition(".")[2]: number},
+        share=share,
     )

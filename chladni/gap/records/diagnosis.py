@@ -70,7 +70,8 @@ class Cause:
     variant, source
         Form of the law, and the output that it listens to, as `chladni.attached` takes them.
     share
-        Share of the gap's power that this cause explains, 0 to 1.
+        Share of the gap's power that this cause explains, 0 to 1: of what the best parameters alone leave beyond the
+        noise on held-out samples. Beside other causes what comes back without it; None when no fit tells.
     """
 
     effect: str
@@ -217,6 +218,9 @@ class Closing:
         ``free_run``, ``windows`` (each from an estimated state, see `horizon_s`) or ``cross_sensor``.
     horizon_s
         Length of a window, None in free run.
+    explained
+        (tuned^2 - after^2)/(tuned^2 - noise^2), clipped to 0..1: share of the power that the best parameters leave;
+        None when nothing was added to them or tuned - noise is within its own uncertainty.
     """
 
     before: float
@@ -228,6 +232,7 @@ class Closing:
     held_out: tuple[HeldOut, ...]
     by: Literal["free_run", "windows", "cross_sensor"] = "free_run"
     horizon_s: float | None = None
+    explained: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

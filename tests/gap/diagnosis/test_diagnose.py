@@ -50,6 +50,10 @@ def test_the_gap_closes_to_the_noise(friction: Diagnosis) -> None:
     assert friction.gap.closed > 0.98
     low, high = friction.gap.interval or (0.0, 0.0)
     assert low <= friction.gap.closed <= high
+    # The only cause, so that all is its share: of power, which is more than of the error itself.
+    assert friction.causes[0].share == friction.gap.explained
+    assert friction.gap.explained is not None
+    assert 0.999 < friction.gap.explained <= 1.0
 
 
 @pytest.mark.slow
@@ -117,6 +121,7 @@ def test_noise_alone_names_nothing(colour: float) -> None:
     found = diagnose(arm(), [measured(seed=5, colour=colour)])
     assert found.verdict == "none"
     assert not found.causes
+    assert found.gap.explained is None
     assert found.gap.tuned == pytest.approx(found.gap.noise, rel=0.1)
 
 
@@ -136,6 +141,11 @@ def test_two_causes_at_once_are_both_named() -> None:
     assert {(one.effect, one.site) for one in found.causes} == {
         ("hardening_stiffness", "hand"), ("gain_error", "acc_column")
     }  # fmt: skip
+    shares = {one.site: one.share for one in found.causes}
+    assert found.gap.explained == pytest.approx(1.0, abs=1e-3)
+    assert shares["hand"] == pytest.approx(1.0, abs=1e-3)
+    # A sensor's error of 30 % is little where another is off by half of what it measures, but it isn't nothing.
+    assert shares["acc_column"] == pytest.approx(0.03, abs=0.01)
 
 
 @pytest.mark.slow
@@ -164,6 +174,9 @@ def test_a_floor_that_shakes_is_told_and_its_sensors_foretell_each_other() -> No
     # Where a sensor is still and the others hardly feel the floor, a tenth of the gap stays their noise.
     assert found.gap.closed is not None
     assert found.gap.closed > 0.9
+    assert cause.share == found.gap.explained
+    assert found.gap.explained is not None
+    assert found.gap.explained > 0.9
 
 
 @pytest.mark.slow

@@ -105,6 +105,8 @@ def test_friction_by_another_law_is_named():
     assert (cause.site, cause.group) == ("guide", ("guide",))
     assert cause.probability > 0.5
     assert found.gap.closed > 0.9
+    assert cause.share == found.gap.explained
+    assert 0.95 < cause.share <= 1.0
     assert found.gap.before > found.gap.tuned > 5 * found.gap.after
     # Tuning alone would have taken the friction for damping.
     assert found.tuned_parameters["guide.stiffness"].value == pytest.approx(830.0, rel=0.01)
@@ -175,6 +177,8 @@ def test_a_parameter_far_beyond_its_tolerance_is_named():
     found = diagnose_simulator(slide(), log_of([], {"guide.stiffness": 1200.0}))
     assert found.verdict == "parameters"
     assert [(cause.effect, cause.site) for cause in found.causes] == [("parameter", "guide.stiffness")]
+    assert found.causes[0].share == found.gap.explained
+    assert found.gap.explained > 0.9
     assert found.tuned_parameters["guide.stiffness"].value == pytest.approx(1200.0, rel=0.01)
 
 
