@@ -196,15 +196,24 @@ def _diagnose(
             end_s=end_s,
             progress=lambda step, share: progress(share, step),
         )
+    # First: what took so long to find isn't lost to a picture or a model that can't be written.
+    out.json(gap_document(found))
     print_diagnosis(out, found)
     _draw(out, found, model, wanted)
     if wanted.write_model is not None:
-        from chladni.apps.explained_model import explained_model
-        from chladni.models.files.model_file import write_model
+        _write_model(out, found, model, wanted.write_model)
 
-        write_model(explained_model(model, found), wanted.write_model)
-        out.line(f"model: {wanted.write_model}")
-    out.json(gap_document(found))
+
+def _write_model(out: Output, found: "Diagnosis", model: "Model", path: Path) -> None:
+    from chladni.apps.explained_model import explained_model
+    from chladni.models.files.model_file import write_model
+    from chladni.signals.errors import ModelError
+
+    try:
+        write_model(explained_model(model, found), path)
+    except ModelError as error:
+        raise ModelError(f"{path}: not written, a model file can't hold what was found; {error}") from error
+    out.line(f"model: {path}")
 
 
 def _compare(

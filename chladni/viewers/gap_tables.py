@@ -14,6 +14,8 @@ Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 RANKED = 5
 # A parameter that moved by less than its own sigma, and by less than this, didn't move.
 MOVED = 1e-3
+# Their numbers are read off signals and not fitted: that no spread is known doesn't mean that they were held.
+_READ = frozenset({"base_vibration", "quantization"})
 # What has a chance of less than this is printed as one that has none.
 UNLIKELY = 1.0 - SURE
 # Noise of less than this share of a gap needs no digits.
@@ -197,7 +199,8 @@ def _share(share: float | None) -> str:
 
 
 def _value(cause: Cause, name: str, number: FittedNumber) -> str:
-    return printed_number(cause, name) + (" (held)" if number.std is None else "")
+    held = number.std is None and cause.effect not in _READ
+    return printed_number(cause, name) + (" (held)" if held else "")
 
 
 def _nominal(number: FittedNumber) -> str:

@@ -41,6 +41,32 @@ def test_tuned_values_and_effects_go_into_the_file_and_come_back(tmp_path: Path)
     np.testing.assert_array_equal(first, second)
 
 
+#: Where each kind of site is in the model of the tests.
+SITES = {"joint": "elbow", "body": "wrist", "input": "shaker", "output": "acc_wrist", "ground": "ground"}
+
+
+@pytest.mark.parametrize("word", CATALOGUE)
+def test_every_word_goes_into_the_file_and_comes_back(tmp_path: Path, word: str) -> None:
+    kind = CATALOGUE[word]
+    for variant in kind.variants:
+        typical = kind.parameters_of(variant.name)
+        cause = made.friction(
+            effect=word, site=SITES[kind.sites[0]], variant=variant.name,
+            source="acc_column" if word == "cross_axis" else None,
+            parameters={
+                name: FittedNumber(value=one.value, std=None, unit=one.unit) for name, one in typical.items()
+            },
+        )  # fmt: skip
+        model = explained_model(made.arm_model(), replace(made.diagnosis(), causes=(cause,)))
+        write_model(model, tmp_path / "explained.toml")
+        (again,) = load_model(tmp_path / "explained.toml").effects
+        assert (again.effect, again.site, again.variant, again.source) == (
+            word, cause.site, variant.name, cause.source
+        )  # fmt: skip
+        assert again.values == model.effects[0].values
+        load_model(tmp_path / "explained.toml").compile()
+
+
 def test_a_wrong_value_is_set_and_no_effect_is_added() -> None:
     model = explained_model(made.arm_model(), made.wrong_values())
     assert model.parameters["elbow.stiffness"].value == 31000.0

@@ -1,5 +1,6 @@
 """``chladni gap``: its answer, its files, its refusals."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -109,6 +110,28 @@ def test_the_explained_model_is_written(run: Run, engine: StandIn, files: tuple[
     outcome = run("gap", *files, "--write-model", target)
     assert (outcome.code, f"model: {target}" in outcome.out) == (0, True)
     assert [one.effect for one in load_model(target).effects] == ["coulomb_friction"]
+
+
+def test_a_floor_that_shakes_is_written_too(
+    run: Run, monkeypatch: pytest.MonkeyPatch, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    put_in_place(monkeypatch, made.every_kind()["floor"])
+    outcome = run("gap", *files, "--write-model", tmp_path / "explained.toml")
+    assert outcome.code == 0, outcome.err
+    (floor,) = load_model(tmp_path / "explained.toml").effects
+    assert (floor.effect, floor.values["level"], floor.values["band"]) == ("base_vibration", 0.31, 40.0)
+
+
+def test_a_diagnosis_is_not_lost_where_its_model_cannot_be_written(
+    run: Run, monkeypatch: pytest.MonkeyPatch, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    put_in_place(monkeypatch, replace(made.diagnosis(), causes=(made.friction(parameters={}),)))
+    target, document = tmp_path / "explained.toml", tmp_path / "found.json"
+    outcome = run("gap", *files, "--write-model", target, "--json", document)
+    assert (outcome.code, outcome.err.count("\n"), target.exists()) == (2, 1, False)
+    assert "explained.toml: not written, a model file can't hold what was found; coulomb_friction" in outcome.err
+    assert json.loads(document.read_text(encoding="utf-8"))["verdict"] == "effect"
+    assert "Most likely Coulomb friction" in outcome.out
 
 
 @pytest.mark.parametrize(

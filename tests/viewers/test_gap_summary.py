@@ -85,6 +85,11 @@ def test_two_causes_are_told_together_with_the_less_certain_ones_word() -> None:
     )
 
 
+def test_what_was_read_off_a_signal_was_not_held() -> None:
+    rows = tables.cause_table(made.hidden_floor())[1]
+    assert [row[2:] for row in rows] == [("level", "0.31 m/s²"), ("band", "40 Hz"), ("band start", "2 Hz")]
+
+
 def test_no_share_is_told_where_none_is_known() -> None:
     found = made.two_causes()
     untold = replace(

@@ -1,6 +1,6 @@
 """From contestants to named causes: groups, alternatives, probabilities, fitted numbers."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +20,8 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
     if causes.verdict not in ("effect", "parameters"):
         return ()
     if causes.shaken is not None:
-        return (_plain("base_vibration", "ground", _SHAKEN, group=causes.shaken.group),)
+        shaken = causes.shaken
+        return (_plain("base_vibration", "ground", _SHAKEN, group=shaken.group, numbers=shaken.parameters),)
     found: list[Cause] = []
     if causes.best is not causes.tuned:
         places = range(len(causes.best.hypothesis.named))
@@ -28,7 +29,7 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
     if causes.verdict == "effect":
         taken = {(one.effect, one.site) for one in found}
         found += [
-            _plain("quantization", name, _LATTICE, step=lattice.step, unit=_unit(study, name))
+            _plain("quantization", name, _LATTICE, numbers=_step(lattice.step, _unit(study, name)))
             for name, lattice in study.lattices.items()
             if ("quantization", name) not in taken
         ]
@@ -142,11 +143,9 @@ def _plain(
     site: str,
     probability: float,
     *,
+    numbers: Mapping[str, FittedNumber],
     group: tuple[str, ...] = (),
-    step: float | None = None,
-    unit: str = "1",
 ) -> Cause:
-    numbers = {} if step is None else {"step": FittedNumber(value=step, std=None, unit=unit)}
     return Cause(
         effect=effect,
         site=site,
@@ -155,6 +154,10 @@ def _plain(
         alternatives=(),
         parameters=numbers,
     )
+
+
+def _step(step: float, unit: str) -> dict[str, FittedNumber]:
+    return {"step": FittedNumber(value=step, std=None, unit=unit)}
 
 
 def _unit(study: Study, name: str) -> str:

@@ -1,5 +1,6 @@
 """When only a floor that shakes explains a gap."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,9 +10,12 @@ from chladni.gap.diagnosis.search import near_places
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.any_law import left_by_any_law
 from chladni.gap.explanation.contest import held_gap
+from chladni.gap.explanation.floor_motion import floor_motion
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.explanation.shaken_ground import predicted_by_others
 from chladni.gap.location.locate import Located
+from chladni.gap.plant.places import Site
+from chladni.gap.records.diagnosis import FittedNumber
 
 Matrix = NDArray[np.float64]
 #: How well the ground must explain, how nearly as well as the best place; and where another can't be told from it.
@@ -29,11 +33,13 @@ _LEFT = {"joint": 0.15, "input": 0.2, "ground": 0.5}
 class ShakenGround:
     """The names of sites that can't be told from the ground, itself first, and what follows from its motion.
 
-    `predicted` is ``[output, sample]``: each sensor by what the others tell of the floor.
+    `predicted` is ``[output, sample]``: each sensor by what the others tell of the floor. `parameters` are what all
+    of them tell of its level and band.
     """
 
     group: tuple[str, ...]
     predicted: Matrix
+    parameters: Mapping[str, FittedNumber]
 
 
 def shaken_by(study: Study, tuned: Contestant) -> ShakenGround | None:
@@ -65,11 +71,19 @@ def shaken_by(study: Study, tuned: Contestant) -> ShakenGround | None:
     if any(_follows(study, one) for one in near_places(study.location, _TIED)):
         return None
     names = ["ground", *(name for one in (ground, *tied) for name in one.places[0].names)]
-    return ShakenGround(group=tuple(dict.fromkeys(names)), predicted=predicted)
+    return ShakenGround(
+        group=tuple(dict.fromkeys(names)),
+        predicted=predicted,
+        parameters=floor_motion(study.location.problem, _grounds(ground)[0], ground.profile.z),
+    )
 
 
 def _has_ground(located: Located) -> bool:
-    return any(site.kind == "ground" for site in located.places[0].sites)
+    return bool(_grounds(located))
+
+
+def _grounds(located: Located) -> list[Site]:
+    return [site for site in located.places[0].sites if site.kind == "ground"]
 
 
 def _follows(study: Study, located: Located) -> bool:

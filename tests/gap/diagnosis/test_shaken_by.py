@@ -35,6 +35,9 @@ def test_a_floor_that_shakes_is_told_with_the_joint_that_it_acts_through(shaken)
     assert found.group == ("ground", "j0", "b0")
     left, before = (np.std(study.measurement.outputs - one) for one in (found.predicted, tuned.fit.outputs))
     assert left < 0.3 * before
+    # As the floor was made.
+    assert found.parameters["level"].value == pytest.approx(5.0, rel=0.1)
+    assert found.parameters["band"].value == pytest.approx(150.0, rel=0.1)
 
 
 def test_what_the_model_alone_tells_better_than_other_sensors_is_no_floor(shaken) -> None:
