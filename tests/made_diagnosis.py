@@ -241,7 +241,7 @@ def diagnosis() -> Diagnosis:
         next_measurement="Repeat at half the level: hysteresis would then close 12 % less than friction.",
         naive=Candidate(effect="hysteresis", site="elbow"),
         remarks=("shoulder.damping is not determined by this log and was held.",),
-        restoring_force=restoring_force(),
+        restoring_forces=(restoring_force(),),
         signals=signals(),
         used=(LogUse(log=LOG, used_s=SECONDS, recorded_s=SECONDS, sample_rate_hz=RATE_HZ),),
     )  # fmt: skip
@@ -269,7 +269,7 @@ def unknown() -> Diagnosis:
     return replace(
         found, verdict="unknown", causes=(), gap=gap, advice="Measure the wrist's rotation, too.",
         left=replace(found.where, channels=(), bands=bands),
-        restoring_force=replace(restoring_force(), law_force=None),
+        restoring_forces=(replace(restoring_force(), law_force=None),),
     )  # fmt: skip
 
 
@@ -278,7 +278,7 @@ def agreeing() -> Diagnosis:
     gap = replace(found.gap, before=0.012, tuned=0.0103, after=0.0103, noise=0.0101, closed=None, interval=None)
     gap = replace(gap, explained=None)
     return replace(
-        found, verdict="none", causes=(), gap=gap, next_measurement=None, naive=None, restoring_force=None, ranking=()
+        found, verdict="none", causes=(), gap=gap, next_measurement=None, naive=None, restoring_forces=(), ranking=()
     )
 
 

@@ -254,7 +254,7 @@ def test_the_sheet_alone_does_not_look_like_success() -> None:
 
 
 def test_a_diagnosis_without_signals_still_has_its_bars() -> None:
-    bare = replace(made.diagnosis(), signals=None, restoring_force=None)
+    bare = replace(made.diagnosis(), signals=None, restoring_forces=())
     assert set(gap_album(gap_evidence(bare)).figures) == {"where"}
     assert len(gap_sheet(gap_evidence(bare)).axes) == 1
 
@@ -269,7 +269,7 @@ def test_without_shares_of_sites_the_other_bars_are_drawn() -> None:
 
 def test_nothing_at_all_is_drawn_as_nothing() -> None:
     where = replace(made.diagnosis().where, sites=(), bands=(), regimes=())
-    bare = replace(made.diagnosis(), signals=None, restoring_force=None, where=where)
+    bare = replace(made.diagnosis(), signals=None, restoring_forces=(), where=where)
     assert gap_album(gap_evidence(bare)).figures == {}
 
 
@@ -330,3 +330,12 @@ def test_the_confusion_matrix_is_blue_where_it_is_right_and_orange_where_not() -
     np.testing.assert_array_equal(white, 1.0)
     with pytest.raises(EstimateError, match="counts of shape"):
         confusion_figure(np.zeros((2, 2), dtype=np.int64), truths=words, answers=["delay"])
+
+
+def test_of_two_forces_both_are_drawn() -> None:
+    first = made.restoring_force()
+    both = gap_evidence(replace(made.two_causes(), restoring_forces=(first, replace(first, site="shoulder"))))
+    drawn = gap_album(both).figures
+    assert {"restoring force at elbow", "restoring force at shoulder"} < set(drawn)
+    labels = {axes.get_ylabel() for axes in gap_sheet(both).axes}
+    assert {"Force at elbow [N]", "Force at shoulder [N]"} < labels

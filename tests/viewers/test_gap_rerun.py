@@ -111,7 +111,7 @@ def wild(tmp_path_factory: pytest.TempPathFactory) -> Contents:
     surface = made.restoring_force()
     force = surface.force.copy()
     force[[0, 1, -1]] = 100 * np.abs(force).max() * np.array([1.0, -0.5, -1.0])
-    found = replace(made.diagnosis(), restoring_force=replace(surface, force=force))
+    found = replace(made.diagnosis(), restoring_forces=(replace(surface, force=force),))
     return Contents(written(found, tmp_path_factory.mktemp("wild")))
 
 
@@ -200,3 +200,12 @@ def test_no_view_of_any_page_complains(file: Path) -> None:
             viewer.show(page)
             viewer.picture(max_size=400)
             assert viewer.complaints() == []
+
+
+def test_of_two_forces_each_has_a_page(tmp_path: Path) -> None:
+    first = made.restoring_force()
+    found = replace(made.two_causes(), restoring_forces=(first, replace(first, site="shoulder")))
+    contents = Contents(written(found, tmp_path))
+    for site in ("elbow", "shoulder"):
+        assert f"/restoring_force_at_{site}/velocity/force" in contents.entities()
+        assert any(name.startswith(f"Force lacking at {site} over velocity") for name in contents.view_names())

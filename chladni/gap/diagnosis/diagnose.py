@@ -18,6 +18,7 @@ from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.correlation import correlation_of
 from chladni.gap.diagnosis.even_odds import at_even_odds
+from chladni.gap.diagnosis.evidence import evidence
 from chladni.gap.diagnosis.explained_share import with_shares
 from chladni.gap.diagnosis.joint_motions import JointMotions, joint_motions
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
@@ -27,11 +28,9 @@ from chladni.gap.diagnosis.rounds import causes_found
 from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.linear_algebra import in_one_thread
 from chladni.gap.location.locate import Located, Location, explained_share
-from chladni.gap.location.profile import profile_at
-from chladni.gap.location.recovered import Recovered, recovered
+from chladni.gap.location.recovered import Recovered
 from chladni.gap.plant.places import Site
 from chladni.gap.records.diagnosis import (
-    Cause,
     Diagnosis,
     GapSignals,
     PairShare,
@@ -113,7 +112,8 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
     after = shown.fit.outputs
     if causes.shaken is not None:
         after = causes.shaken.predicted
-    motion = _evidence(study, causes, said)
+    recoveries = evidence(study, causes, said)
+    motion = recoveries[0] if recoveries else None
     distortion = _distortion(study.measurement)
     motions = joint_motions(study, shown.fit, motion)
     gap = closing_of(_yardstick(study, causes), before, causes.tuned.fit.outputs, after, seed=seed)
@@ -133,7 +133,7 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         naive=naive_of(causes),
         remarks=remarks_on(study, causes, shown, distortion),
         advice=advice_on(study, causes),
-        restoring_force=_restoring(study, causes, motion),
+        restoring_forces=tuple(_restoring(study, causes, one) for one in recoveries),
         signals=_signals(study, causes, before, after),
         distortion=() if distortion is None else distortion.told,
     )
@@ -197,21 +197,7 @@ def _regimes(residual: Matrix, measured: Matrix, motions: JointMotions) -> tuple
     return tuple(replace(one, unit=motions.units[one.variable]) for one in found)
 
 
-def _evidence(study: Study, causes: Causes, said: Sequence[Cause]) -> Recovered | None:
-    """Force and motion at the named site, else at the best place, with the parameters that are believed."""
-    problem = study.location.problem
-    for located in study.location.ranked:
-        for site in located.places[0].sites:
-            if said and site.name != said[0].site:
-                continue
-            z = located.profile.z if causes.best is causes.tuned else causes.best.fit.z
-            return recovered(problem, profile_at(problem, (site,), z), site)
-    return None
-
-
-def _restoring(study: Study, causes: Causes, motion: Recovered | None) -> RestoringForce | None:
-    if motion is None:
-        return None
+def _restoring(study: Study, causes: Causes, motion: Recovered) -> RestoringForce:
     port = _port(study, motion.site)
     law = None
     if causes.best.fit.effects and causes.verdict == "effect" and motion.site.kind == "joint":

@@ -344,7 +344,7 @@ class Diagnosis:
         Sentences on what limits the answer: short log, few sensors, parameters not determined, horizon, damage.
     advice
         One sentence for the summary of a verdict ``unknown`` or ``none``.
-    restoring_force, signals
+    restoring_forces, signals
         Evidence for pictures; None when there is none.
     distortion
         With a periodic input, output by output.
@@ -372,7 +372,7 @@ class Diagnosis:
     naive: Candidate | None = None
     remarks: tuple[str, ...] = ()
     advice: str | None = None
-    restoring_force: RestoringForce | None = None
+    restoring_forces: tuple[RestoringForce, ...] = ()
     signals: GapSignals | None = None
     distortion: tuple[DistortionShare, ...] = ()
     levels: tuple[str, ...] = ()
@@ -380,3 +380,8 @@ class Diagnosis:
     used: tuple[LogUse, ...] = ()
     left: Where | None = None
     correlation: Correlation | None = None
+
+    @property
+    def restoring_force(self) -> RestoringForce | None:
+        """The force at the first named site, else at the best place; None where none was recovered."""
+        return self.restoring_forces[0] if self.restoring_forces else None

@@ -3,6 +3,7 @@
 import re
 import textwrap
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -79,15 +80,14 @@ def _wrapped(sentence: str, letters: int) -> list[str]:
 
 def _parts(evidence: GapEvidence) -> list[Part]:
     found = evidence.found
-    surface, bars = found.restoring_force, site_bars(found)
+    bars = site_bars(found)
     # Heights in inches; what isn't there takes none.
     parts: list[Part] = []
     if found.signals is not None:
         parts += [(1.4, lambda figure, place: _zoom(figure, place, evidence))]
     if evidence.spectra is not None:
         parts += [(1.4, lambda figure, place: _spectrum(figure, place, evidence))]
-    if surface is not None and surface.force.size:
-        parts += [(2.6, lambda figure, place: _force(figure, place, surface))]
+    parts += [(2.6, partial(_force, surface=one)) for one in found.restoring_forces if one.force.size]
     if bars:
         parts += [(0.4 + BAR_HEIGHT_IN * len(bars), lambda figure, place: _sites(figure, place, found))]
     return parts

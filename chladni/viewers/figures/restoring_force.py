@@ -28,10 +28,14 @@ _COLOURS = LinearSegmentedColormap.from_list("signed", SIGNED / 255)
 
 
 def restoring_force_figures(evidence: GapEvidence) -> dict[str, Figure]:
-    """Draw the recovered force over displacement, velocity and time, by name; none where none was recovered."""
-    surface = evidence.found.restoring_force
-    if surface is None or surface.force.size == 0:
-        return {}
+    """Draw each recovered force over displacement, velocity and time, by name; none where none was recovered."""
+    surfaces = [one for one in evidence.found.restoring_forces if one.force.size]
+    # With one force alone, its site is told in the picture.
+    names = ["restoring force"] if len(surfaces) == 1 else [f"restoring force at {one.site}" for one in surfaces]
+    return {name: _figure(evidence, one) for name, one in zip(names, surfaces, strict=True)}
+
+
+def _figure(evidence: GapEvidence, surface: RestoringForce) -> Figure:
     with look():
         figure = Figure(figsize=(WIDTH_IN, HEIGHT_IN + TIME_IN), layout="constrained")
         grid = figure.add_gridspec(2, 2, height_ratios=(HEIGHT_IN, TIME_IN))
@@ -40,7 +44,7 @@ def restoring_force_figures(evidence: GapEvidence) -> dict[str, Figure]:
         draw_surfaces(figure, over_displacement, over_velocity, surface)
         _draw_over_time(figure.add_subplot(grid[1, :]), surface, evidence.telling_s)
         figure.suptitle(plain(f"Force that the model lacks at {surface.site}"), fontsize=8.5, x=0.02, ha="left")
-        return {"restoring force": figure}
+        return figure
 
 
 def draw_surfaces(figure: Figure, over_displacement: Axes, over_velocity: Axes, surface: RestoringForce) -> None:
@@ -74,7 +78,7 @@ def _draw(figure: Figure, axes: Axes, surface: RestoringForce, over: Over) -> No
         axes.plot(x, law, ".", color="black", markersize=1.6, markeredgewidth=0, label="law", rasterized=True)
     axes.set_ylim(*(end / up for end in force_range(surface)))
     axes.set_xlabel(f"{motion_name(surface, over)} [{x_unit}]")
-    axes.set_ylabel(f"Force [{force_unit}]")
+    axes.set_ylabel(plain(f"Force at {surface.site} [{force_unit}]"))
     _colour_bar(figure, axes, surface, other(over))
 
 

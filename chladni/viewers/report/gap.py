@@ -167,7 +167,7 @@ def _captions(found: Diagnosis) -> Mapping[str, str]:
     named = found.verdict in ("effect", "parameters")
     after = "after with what was found" if named else "with the best parameters"
     sites = {cause.site for cause in found.causes}
-    drawn = found.restoring_force is not None and found.restoring_force.law_force is not None
+    drawn = any(one.law_force is not None for one in found.restoring_forces)
     coloured = any(one.name in sites for one in found.where.sites)
     return {
         "signals": f"Where the model errs most: measured, simulated before, and {after}.{each}",

@@ -1,14 +1,17 @@
 """A diagnosis written to a rerun file: the answer, signals before and after, gap map, force, structure."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import rerun as rr
 import rerun.blueprint as rrb
 
+from chladni.gap.records.diagnosis import RestoringForce
 from chladni.io.atomic import atomic_write
 from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.rerun.drawing import new_recording
+from chladni.viewers.rerun.entities import folder
 from chladni.viewers.rerun.gap_map import draw_gap_maps
 from chladni.viewers.rerun.gap_signals import draw_errors, draw_signals
 from chladni.viewers.rerun.gap_structure import draw_structure
@@ -62,17 +65,25 @@ def draw_gap(recording: rr.RecordingStream, evidence: GapEvidence, sketch: Struc
     pages = [_overview(recording, evidence, answer)]
     if maps := draw_gap_maps(recording, found.signals):
         pages.append(rrb.Vertical(*maps, name="Gap map"))
-    surface = found.restoring_force
-    if surface is not None and surface.force.size:
-        shown = rrb.Horizontal(*draw_surfaces(recording, surface))
-        over_time = draw_force_over_time(recording, surface)
-        pages.append(rrb.Vertical(shown, over_time, row_shares=[3, 2], name="Restoring force"))
+    pages += _forces(recording, [one for one in found.restoring_forces if one.force.size])
     if sketch is not None:
         pages.append(rrb.Horizontal(draw_structure(recording, sketch), name="Structure"))
     # The blueprint goes last: rerun 0.41 has lost rows that followed one in a file (rerun issue 12769).
     recording.flush()
     recording.send_blueprint(_arranged(pages), make_active=True, make_default=True)
     recording.flush()
+
+
+def _forces(recording: rr.RecordingStream, surfaces: Sequence[RestoringForce]) -> list[rrb.Container]:
+    """A page for each force, with its site where there are several."""
+    pages: list[rrb.Container] = []
+    for surface in surfaces:
+        name = "Restoring force" if len(surfaces) == 1 else f"Restoring force at {surface.site}"
+        path = folder(name.lower())
+        shown = rrb.Horizontal(*draw_surfaces(recording, surface, path))
+        over_time = draw_force_over_time(recording, surface, path)
+        pages.append(rrb.Vertical(shown, over_time, row_shares=[3, 2], name=name))
+    return pages
 
 
 def _overview(recording: rr.RecordingStream, evidence: GapEvidence, answer: rrb.View) -> rrb.Container:

@@ -12,7 +12,6 @@ from chladni.viewers.engineering import axis_scale, engineering
 from chladni.viewers.gap_evidence import AFTER_ON_DARK, MEASURED_ON_DARK
 from chladni.viewers.labels import printed_unit
 from chladni.viewers.rerun.canvas import Canvas
-from chladni.viewers.rerun.entities import folder
 from chladni.viewers.rerun.timelines import send_scalars, time_axis, time_index
 from chladni.viewers.restoring_force import (
     Over,
@@ -26,7 +25,6 @@ from chladni.viewers.restoring_force import (
 )
 from chladni.viewers.style import Colour
 
-PATH = folder("restoring force")
 WIDTH, HEIGHT, MARGIN = 800.0, 560.0, 0.05
 # For the force's name over its axis.
 ABOVE = 100.0
@@ -35,13 +33,16 @@ LAW_COLOUR = (255, 255, 255)
 ROWS = 500_000
 
 
-def draw_surfaces(recording: rr.RecordingStream, surface: RestoringForce) -> list[rrb.View]:
-    """Write the force over displacement and over velocity, each coloured by the other, and give a view of each."""
-    return [_draw(recording, surface, "displacement"), _draw(recording, surface, "velocity")]
+def draw_surfaces(recording: rr.RecordingStream, surface: RestoringForce, path: str) -> list[rrb.View]:
+    """Write the force over displacement and over velocity, each coloured by the other, under `path`."""
+    return [
+        _draw(recording, surface, f"{path}/displacement", "displacement"),
+        _draw(recording, surface, f"{path}/velocity", "velocity"),
+    ]
 
 
-def _draw(recording: rr.RecordingStream, surface: RestoringForce, over: Over) -> rrb.View:
-    rows, path = spread_out(surface), f"{PATH}/{over}"
+def _draw(recording: rr.RecordingStream, surface: RestoringForce, path: str, over: Over) -> rrb.View:
+    rows = spread_out(surface)
     across, x_unit = axis_scale(motion(surface, over), motion_unit(surface, over))
     up, force_unit = axis_scale(surface.force, surface.force_unit)
     low, high = force_range(surface)
@@ -78,18 +79,18 @@ def _padded(x: Floats) -> tuple[float, float]:
     return low - room, high + room
 
 
-def draw_force_over_time(recording: rr.RecordingStream, surface: RestoringForce) -> rrb.View:
+def draw_force_over_time(recording: rr.RecordingStream, surface: RestoringForce, path: str) -> rrb.View:
     """Write the recovered force and the law's over time and give their view."""
     # Numbered: the viewer draws lines in the order of their paths, and the law belongs in front.
-    _line(recording, f"{PATH}/time/0", surface.time_s, surface.force, "recovered", MEASURED_ON_DARK)
+    _line(recording, f"{path}/time/0", surface.time_s, surface.force, "recovered", MEASURED_ON_DARK)
     if surface.law_force is not None:
-        _line(recording, f"{PATH}/time/1", surface.time_s, surface.law_force, "law", AFTER_ON_DARK)
+        _line(recording, f"{path}/time/1", surface.time_s, surface.law_force, "law", AFTER_ON_DARK)
     unit, furthest, reach = surface.force_unit, float(np.abs(surface.force).max()), force_range(surface)[1]
     # A recovered force swings wildly at the ends of a record, which would make a flat line of all between them.
     beyond = f" · reaches {engineering(furthest, None, unit)}, beyond the axis" if furthest > reach else ""
     start_ns, end_ns = (round(float(end) * NS_PER_S) for end in surface.time_s[[0, -1]])
     return rrb.TimeSeriesView(
-        origin=f"{PATH}/time",
+        origin=f"{path}/time",
         # The viewer labels powers of ten alone where there is little room.
         name=f"Force lacking at {surface.site} [{printed_unit(unit)}], ±{engineering(reach, None, unit)}{beyond}",
         axis_x=time_axis(end_ns, start_ns=start_ns),

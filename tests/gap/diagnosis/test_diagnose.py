@@ -131,6 +131,10 @@ def test_a_stiffness_far_outside_its_tolerance_is_a_parameter() -> None:
     assert found.verdict == "parameters"
     assert [(one.effect, one.site) for one in found.causes] == [("parameter", "elbow.stiffness")]
     assert found.tuned_parameters["elbow.stiffness"].value == pytest.approx(3e5, rel=0.02)
+    # Its picture is the spring that the nominal joint lacks.
+    assert found.restoring_force is not None
+    assert found.restoring_force.site == "elbow"
+    assert found.restoring_force.law_force is None
 
 
 @pytest.mark.slow
