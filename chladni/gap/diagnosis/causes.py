@@ -273,7 +273,7 @@ def _probabilities(contestants: Sequence[Contestant], tuned: Contestant, floor: 
     price = price_among(contestants, added)
     evidence = np.array([price.paid(one) for one in contestants])
     weight = np.exp(evidence - evidence.max())
-    known = known_share(tuned, floor)
+    known = known_share(tuned.held, floor)
     complete = [
         1.0 if one is tuned else known * completeness_among(tuned, one, contestants, floor) for one in contestants
     ]

@@ -36,10 +36,14 @@ def completeness(tuned: Contestant, found: Contestant, floor: Matrix) -> float:
     floor
         ``[output]`` mean square of the noise, over that of its estimate.
     """
-    named = found.hypothesis.named
-    exact = int(bool(named) and all(one.effect in _EXACT for one in named))
-    gap = _beyond(tuned.held / floor)
-    left = _beyond(found.held / floor - _UNCOUNTED)
+    return completeness_of(tuned.held, found.held, [one.effect for one in found.hypothesis.named], floor)
+
+
+def completeness_of(tuned: Matrix, found: Matrix, words: Sequence[str], floor: Matrix) -> float:
+    """Give the completeness of some words from ``[output]`` mean squares over noise, without and with them."""
+    exact = int(bool(words) and all(word in _EXACT for word in words))
+    gap = _beyond(tuned / floor)
+    left = _beyond(found / floor - _UNCOUNTED)
     share = left / gap if gap > 0 else float(left > 0)
     return float(expit((1.0 - share / _LEFT[exact]) / _SHARPNESS))
 
@@ -61,7 +65,7 @@ def _has_more_modes(other: Contestant, found: Contestant) -> bool:
     return alone and effects[0].site in sites
 
 
-def known_share(tuned: Contestant, floor: Matrix) -> float:
+def known_share(tuned: Matrix, floor: Matrix) -> float:
     """Probability that a cause is one of those that took part, not one that they imitate.
 
     Of the names that were given with confidence to made machines, a tenth of which hid something else, about nineteen
@@ -70,9 +74,9 @@ def known_share(tuned: Contestant, floor: Matrix) -> float:
     Parameters
     ----------
     tuned, floor
-        As of `completeness`.
+        ``[output]`` as of `completeness_of`.
     """
-    above = np.maximum(np.sqrt(tuned.held / floor) - 1.0, 0.0)
+    above = np.maximum(np.sqrt(tuned / floor) - 1.0, 0.0)
     return _KNOWN * (1.0 - _FAINT * float(np.exp(-np.linalg.norm(above))))
 
 

@@ -16,6 +16,7 @@ from chladni.gap.comparison.shares import (
     relative_residual,
 )
 from chladni.gap.diagnosis.closing import explained_power
+from chladni.gap.diagnosis.completeness import completeness_of, known_share
 from chladni.gap.diagnosis.simulator_fit import HARD_BOUND, SimulatorFit
 from chladni.gap.diagnosis.simulator_runs import EFFECTIVE_SAMPLES
 from chladni.gap.diagnosis.simulator_search import SimulatorSearch
@@ -48,6 +49,7 @@ _CLOSE = 3.0
 _UNDETERMINED = 0.9
 _RESAMPLED = 500
 _LISTED = 20
+PARAMETER = "parameter"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,16 +146,26 @@ class SimulatorFindings:
         return (runs.gap(tuned.outputs) - runs.gap(fit.outputs)) / whole if whole > 0 else 0.0
 
     def probabilities(self) -> list[tuple[SimulatorFit, float]]:
-        """Each hypothesis with its share of the evidence."""
+        """Each hypothesis with its share of the evidence, less what speaks for a cause that isn't among them."""
         # Further effects that weren't worth it say nothing about those that were.
         most = max(len(self.search.best.effects), 1)
         fits = [self.search.tuned, *(fit for fit in self.search.fits if len(fit.effects) <= most)]
         evidence = np.array([fit.log_evidence for fit in fits])
         odds = np.exp(evidence - evidence.max())
-        return list(zip(fits, (odds / odds.sum()).tolist(), strict=True))
+        complete = [self.complete(fit, [word for word, _ in fit.names]) for fit in fits]
+        return list(zip(fits, (odds / odds.sum() * np.array(complete)).tolist(), strict=True))
+
+    def complete(self, fit: SimulatorFit, words: list[str]) -> float:
+        """Probability that a hypothesis with these words is all of the cause; without words there is none."""
+        search = self.search
+        if not words:
+            return 1.0
+        lowest = np.min([one.powers for one in (search.tuned, search.loose, *search.fits)], axis=0)
+        floor, tuned = np.minimum(lowest, 1.0), search.tuned.powers
+        return known_share(tuned, floor) * completeness_of(tuned, fit.powers, words, floor)
 
     def probability(self, effect: str, site: str) -> float:
-        """Give the share of the evidence that lies on hypotheses with this cause."""
+        """Give the probability of all hypotheses with this cause together."""
         return float(sum(share for fit, share in self.probabilities() if (effect, site) in fit.names))
 
     def causes(self) -> tuple[Cause, ...]:
@@ -163,7 +175,8 @@ class SimulatorFindings:
             moved = [place for place, z in enumerate(found.loose.z) if abs(z) > HARD_BOUND]
             numbers, share = self.parameters(found.loose), self.explained
             names = [found.runs.tunables.names[place] for place in moved]
-            probability = float(1 / (1 + np.exp(found.best.log_evidence - found.loose.log_evidence)))
+            odds = float(1 / (1 + np.exp(found.best.log_evidence - found.loose.log_evidence)))
+            probability = odds * self.complete(found.loose, [PARAMETER])
             # Of several values that move together no fit tells what each is worth.
             share = share if len(names) == 1 else None
             return tuple(_wrong_value(name, numbers[name], probability, share) for name in names)
@@ -418,7 +431,7 @@ class SimulatorFindings:
 
 def _wrong_value(name: str, number: FittedNumber, probability: float, share: float | None) -> Cause:
     return Cause(
-        effect="parameter",
+        effect=PARAMETER,
         site=name,
         probability=probability,
         group=(name,),

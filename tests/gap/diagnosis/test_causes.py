@@ -78,7 +78,7 @@ def test_one_sensor_that_is_not_explained_is_not_hidden_by_many_that_are() -> No
 
 
 def test_a_name_for_a_faint_gap_is_less_sure() -> None:
-    sure = [known_share(left(chi), np.ones(2)) for chi in (1.0, 1.5, 4.0, 1e4)]
+    sure = [known_share(left(chi).held, np.ones(2)) for chi in (1.0, 1.5, 4.0, 1e4)]
     assert np.all(np.diff(sure) > 0)
     assert sure[0] < 0.78 < 0.94 < sure[-1] < 0.96
 

@@ -103,7 +103,9 @@ def test_friction_by_another_law_is_named():
     (cause,) = found.causes
     assert cause.effect in FAMILIES["friction"]
     assert (cause.site, cause.group) == ("guide", ("guide",))
-    assert cause.probability > 0.5
+    # Never sure: something that isn't in the catalogue may act the same.
+    assert 0.5 < cause.probability <= 0.95
+    assert sum(row.probability for row in found.ranking if not row.beside) <= 0.95
     assert found.gap.closed > 0.9
     assert cause.share == found.gap.explained
     assert 0.95 < cause.share <= 1.0
@@ -177,6 +179,7 @@ def test_a_parameter_far_beyond_its_tolerance_is_named():
     found = diagnose_simulator(slide(), log_of([], {"guide.stiffness": 1200.0}))
     assert found.verdict == "parameters"
     assert [(cause.effect, cause.site) for cause in found.causes] == [("parameter", "guide.stiffness")]
+    assert 0.9 < found.causes[0].probability <= 0.95
     assert found.causes[0].share == found.gap.explained
     assert found.gap.explained > 0.9
     assert found.tuned_parameters["guide.stiffness"].value == pytest.approx(1200.0, rel=0.01)
