@@ -101,10 +101,20 @@ def cause_law(cause: Cause) -> str:
     # Of effects that aren't ours the record isn't here; their word must do.
     if kind is None:
         return ""
-    form = kind.variant(cause.variant)
     heard = f", heard from {cause.source}" if cause.source else ""
-    named = f" ({form.name})" if len(kind.variants) > 1 else ""
-    return f"{kind.meaning}{heard}: {form.formula}{named}"
+    return f"{kind.meaning}{heard}: {kind.variant(cause.variant).formula}{_variant(cause)}"
+
+
+def cause_heading(cause: Cause) -> str:
+    """Give a cause's word for a table, with the form of its law where there are several."""
+    return f"{effect_heading(cause.effect)}{_variant(cause)}"
+
+
+def _variant(cause: Cause) -> str:
+    kind = CATALOGUE.get(cause.effect)
+    if kind is None or cause.variant is None or len(kind.variants) < 2:
+        return ""
+    return f" ({cause.variant.replace('_', ' ')})"
 
 
 def _telling(cause: Cause) -> Mapping[str, FittedNumber]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from math import inf
 
 from chladni.gap.records.diagnosis import Cause, Diagnosis, DistortionShare, FittedNumber, Ranked, Where
-from chladni.viewers.effect_words import NOT_DETERMINED, effect_heading, printed_number
+from chladni.viewers.effect_words import NOT_DETERMINED, cause_heading, effect_heading, printed_number
 from chladni.viewers.engineering import SURE, chance, engineering, percent, signed_percent, span
 
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
@@ -150,9 +150,9 @@ def parameter_table(found: Diagnosis) -> Table:
 
 
 def cause_table(found: Diagnosis) -> Table:
-    """Every parameter of every cause."""
+    """Every parameter of every cause, with the form of its law."""
     rows = [
-        (effect_heading(cause.effect), cause.site, name.replace("_", " "), _value(cause, name, number))
+        (cause_heading(cause), cause.site, name.replace("_", " "), _value(cause, name, number))
         for cause in found.causes
         for name, number in cause.parameters.items()
     ]

@@ -90,6 +90,22 @@ def test_what_was_read_off_a_signal_was_not_held() -> None:
     assert [row[2:] for row in rows] == [("level", "0.31 m/s²"), ("band", "40 Hz"), ("band start", "2 Hz")]
 
 
+def test_the_form_of_a_law_stands_in_the_table_where_there_are_several() -> None:
+    lag = made.friction(
+        effect="lag", site="shaker", variant="second_order",
+        parameters={"time_constant": FittedNumber(value=1e-3, std=None, unit="s")},
+    )  # fmt: skip
+    for cause, told in (
+        (made.friction(variant="bristle"), "Coulomb friction (bristle)"),
+        (lag, "lag (second order)"),
+        (replace(lag, effect="delay", variant="dead_time"), "delay"),
+        (made.friction(variant=None), "Coulomb friction"),
+        (made.friction(effect="magnetic_brake", variant="own"), "magnetic brake"),
+    ):
+        rows = tables.cause_table(replace(made.diagnosis(), causes=(cause,)))[1]
+        assert {row[0] for row in rows} == {told}
+
+
 def test_no_share_is_told_where_none_is_known() -> None:
     found = made.two_causes()
     untold = replace(
