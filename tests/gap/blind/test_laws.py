@@ -8,6 +8,9 @@ from numpy.testing import assert_allclose
 
 from chladni.gap.blind.assembly import Assembly
 from chladni.gap.blind.integration import integrate
+from chladni.models.effects.hardening_stiffness import progressive
+from chladni.models.effects.one_sided_stop import stop
+from chladni.models.effects.saturation import clipped, smooth
 
 X, OMEGA, CYCLES, PER_CYCLE = 0.01, 2 * pi, 6, 4000
 
@@ -151,3 +154,22 @@ def test_stiffness_changes_in_time():
 def test_gain_depends_on_position():
     signal, position, value = cycled("position_gain", 0.2, 0.05)
     assert_allclose(value, signal * (1 + 0.2 * np.tanh(position / 0.05)), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("word", "numbers", "law", "parameters"),
+    [
+        ("cubic_quintic", (1e7, 4e11), progressive, (1e7, 5e-3)),
+        ("contact", (1e5, 0.004, -1.0, 0.8, 1.0), stop, (1e5, 0.004, -1.0, 1.0, 1.0, 0.8)),
+        ("hard_limit", (0.006,), clipped, (0.006,)),
+        ("hyperbolic_limit", (0.006,), smooth, (0.006,)),
+    ],
+)
+def test_laws_that_the_page_says_are_the_catalogues_are(word, numbers, law, parameters):
+    d, s, force = cycled(word, *numbers)
+    ours = np.array([law(*each, 0.0, parameters, None, None) for each in zip(d, s, strict=True)])
+    # At an actuator the catalogue's law is what it takes from the signal.
+    ours += d if word.endswith("limit") else 0.0
+    # One formula in two ways of writing: rounding alone differs.
+    assert_allclose(force, ours, rtol=1e-12, atol=1e-12 * np.abs(force).max())
+    assert np.ptp(force) > 0
