@@ -15,7 +15,8 @@ FAINT = 3.0
 NEAREST = 3
 # Of what closes on the first log, the share below which little carries over to another.
 CARRIED = 0.5
-_LEFT_BY_TUNING = "of the error's power that tuning alone leaves above the noise"
+#: A share of power beyond the noise, as docs/gap.md says; the sentence that it stands in must stay an answer.
+_LEFT_BY_TUNING = "of the gap that tuning leaves"
 
 
 def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -129,12 +130,12 @@ def _closing(found: Diagnosis) -> str:
 def _shares(found: Diagnosis) -> Iterator[str]:
     """What each of several causes is worth beside the others."""
     told = [
-        f"without {effect_at(cause.effect, cause.site)} {percent(cause.share)}"
+        f"without {effect_at(cause.effect, cause.site)} {percent(cause.share)} of it"
         for cause in found.causes
         if cause.share is not None
     ]
     if len(found.causes) > 1 and told:
-        sentence = f"{_listed(told)} of that power comes back."
+        sentence = f"{_listed(told)} comes back."
         yield sentence[0].upper() + sentence[1:]
 
 

@@ -53,8 +53,8 @@ def test_the_summary_reads_as_an_answer(run: Run, engine: StandIn, files: tuple[
     assert lines[0] == "Most likely Coulomb friction of 8.10 ± 0.20 N at elbow (97 %)."
     # The terminal breaks it.
     assert " ".join(one.strip() for one in lines[1:3]).startswith(
-        "It explains 93 % of the error's power that tuning alone leaves above the noise; adding it brings the error "
-        "from 28 % to 1.0 % on stretches that no fit saw, noise 1.0 %."
+        "It explains 93 % of the gap that tuning leaves; adding it brings the error from 28 % to 1.0 % on stretches "
+        "that no fit saw, noise 1.0 %."
     )
     for words in (
         "acc_wrist", "8 to 16", "elbow.velocity", "hysteresis", "-130.2", "not determined", "Measure next",

@@ -62,8 +62,8 @@ def test_an_effect_is_the_answer_with_how_far_it_goes() -> None:
     assert said == (
         "Most likely Coulomb friction of 8.10 ± 0.20 N at elbow (97 %).",
         (
-            "It explains 93 % of the error's power that tuning alone leaves above the noise; adding it brings the "
-            "error from 28 % to 1.0 % on stretches that no fit saw, noise 1.0 %."
+            "It explains 93 % of the gap that tuning leaves; adding it brings the error from 28 % to 1.0 % on "
+            "stretches that no fit saw, noise 1.0 %."
         ),
         "Closed: 99.5 % of what noise leaves to close, 95 % interval 99.0 to 99.8 %.",
     )
@@ -79,9 +79,9 @@ def test_two_causes_are_told_together_with_the_less_certain_ones_word() -> None:
     said = summary(made.two_causes())
     assert said[0].startswith("Probably two causes at once: Coulomb friction")
     assert "(97 %) and a gain error at acc_wrist" in said[0]
-    assert said[1].startswith("Together they explain 95 % of the error's power that tuning alone leaves above the ")
+    assert said[1].startswith("Together they explain 95 % of the gap that tuning leaves; ")
     assert said[2] == (
-        "Without Coulomb friction at elbow 70 % and without a gain error at acc_wrist 20 % of that power comes back."
+        "Without Coulomb friction at elbow 70 % of it and without a gain error at acc_wrist 20 % of it comes back."
     )
 
 
