@@ -21,6 +21,7 @@ from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.linear_words import linear_hypotheses
 from chladni.gap.explanation.sticking import sticking_hypotheses
 from chladni.gap.location.locate import Located, Location
+from chladni.gap.side_by_side import side_by_side
 from chladni.signals.errors import EstimateError
 
 Step = Callable[[float], None]
@@ -178,7 +179,11 @@ def detailed(study: Study, found: Contestant) -> Contestant:
 
 def sound(study: Study, entered: Sequence[Contestant]) -> list[Contestant]:
     """Leave out what is its law in name only, and what steps larger than a sensor's signal make of it."""
-    return [one for one in entered if not is_degenerate(study.contest.run, one) and not _is_rounding(study, one)]
+
+    def is_sound(one: Contestant) -> bool:
+        return not is_degenerate(study.contest.run, one) and not _is_rounding(study, one)
+
+    return [one for one, kept in zip(entered, side_by_side(is_sound, entered), strict=True) if kept]
 
 
 def _is_rounding(study: Study, one: Contestant) -> bool:

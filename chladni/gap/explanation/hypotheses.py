@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.screen import Screened
 from chladni.gap.location.locate import Location, tuned_stepwise
+from chladni.gap.location.profile import Profile
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.places import Place
+from chladni.gap.side_by_side import side_by_side
 from chladni.gap.tuning.effect_scale import usually_fitted
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.core.parameter import Parameter
@@ -202,18 +204,21 @@ def wrong_parameters(location: Location, *, most: int = 2) -> Hypothesis | None:
     outside = [place for place in outside if not (_is_inertia(names[place]) and far.z[place] > 0)]
     if not outside:
         return None
-    best = None
-    for count in range(1, min(most, len(outside)) + 1):
+
+    def held(count: int) -> Profile:
         limit = np.full(len(names), OUTSIDE)
         limit[outside[:count]] = _FAR
-        start = np.clip(far.z, -limit, limit)
-        found = tuned_stepwise(steps, start, limit)
+        return tuned_stepwise(steps, np.clip(far.z, -limit, limit), limit)
+
+    counts = range(1, min(most, len(outside)) + 1)
+    best: tuple[int, Profile] | None = None
+    for count, found in zip(counts, side_by_side(held, counts), strict=True):
         if best is None or found.cost < 0.8 * best[1].cost:
-            best = ([names[place] for place in outside[:count]], found)
+            best = count, found
     if best is None or best[1].chi > 0.5 * location.tuned.chi:
         return None
-    chosen, found = best
-    return Hypothesis(wide=dict.fromkeys(chosen, _FAR), start_z=found.z, screened=found.chi)
+    chosen = [names[place] for place in outside[: best[0]]]
+    return Hypothesis(wide=dict.fromkeys(chosen, _FAR), start_z=best[1].z, screened=best[1].chi)
 
 
 def _is_inertia(name: str) -> bool:

@@ -13,6 +13,7 @@ from chladni.gap.explanation.trial import Numbers, Shape, Trial
 from chladni.gap.location.profile import Profile, bounded_minimum
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
+from chladni.gap.side_by_side import side_by_side
 
 Matrix = NDArray[np.float64]
 #: Beyond this, whitened, a force is no force but a law that left the numbers; its square still is one.
@@ -94,12 +95,12 @@ class Screen:
 
     def run(self, trials: Iterable[Trial]) -> list[Screened]:
         """Weigh trials on their grids; those whose amplitudes make no such effect are left out."""
-        found = []
-        for trial in trials:
-            tried = [one for one in (self.weigh(trial, shape) for shape in trial.grid) if one is not None]
-            if tried:
-                found.append(min(tried, key=lambda one: one.cost))
-        return found
+
+        def best(trial: Trial) -> Screened | None:
+            tried = (self.weigh(trial, shape) for shape in trial.grid)
+            return min((one for one in tried if one is not None), key=lambda one: one.cost, default=None)
+
+        return [one for one in side_by_side(best, [*trials]) if one is not None]
 
     def refined(self, start: Screened) -> Screened:
         """Search what enters nonlinearly from the best point of the grid (Nelder and Mead 1965)."""
