@@ -24,6 +24,7 @@ ul { margin: 0; padding-left: 1.2rem; }
 li { margin: .2rem 0; overflow-wrap: anywhere; }
 .scroll { overflow-x: auto; }
 .scroll + ul { margin-top: .6rem; }
+.scroll + .scroll { margin-top: 1rem; }
 table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .3rem .9rem .3rem .5rem; text-align: left; vertical-align: top;
   border-bottom: 1px solid var(--line); }
