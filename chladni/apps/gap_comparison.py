@@ -30,8 +30,8 @@ NO_INPUT = (
     "what changes with level aren't told"
 )
 NO_SPLIT = (
-    "linear, even and odd shares aren't told: they take one input that repeats for two periods or more, at best with "
-    "odd lines only"
+    "linear, even and odd shares aren't told: they take one input that repeats, two periods of it or more behind the "
+    "transient, at best with odd lines only"
 )
 
 
@@ -200,22 +200,17 @@ def _later(where: Where, offset_s: float) -> Where:
 
 
 def _shares(split: Distortion | None) -> tuple[DistortionShare, ...]:
-    return () if split is None else split.shares
+    return () if split is None else split.told
 
 
 def _split_remarks(view: GapView, moving: Sequence[str]) -> tuple[str, ...]:
-    """What the input doesn't allow to be told of distortion, and what it tells all the same."""
+    """What the input doesn't allow to be told of distortion."""
     ours, theirs = view.measured_split, view.simulated_split
     if not moving:
         return (NO_INPUT,)
     if ours is None or theirs is None:
         return (NO_SPLIT,)
-    if ours.shares:
-        return ours.remarks
-    worst = int(np.argmax(ours.nonlinear))
-    one, other, noise = (percent(float(row[worst])) for row in (ours.nonlinear, theirs.nonlinear, ours.noise))
-    told = f"{one} of its power, in the simulation {other}; noise is {noise}"
-    return (*ours.remarks, f"distortion, even and odd together, is largest in {ours.output_names[worst]}: {told}")
+    return ours.remarks
 
 
 def _pooled_noise(view: GapView) -> float:

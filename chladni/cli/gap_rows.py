@@ -45,7 +45,9 @@ def print_diagnosis(out: Output, found: "Diagnosis") -> None:
         "Error before anything is tuned, whole log",
         of="" if found.left is None else ", of what the best parameters leave",
     )
-    _print(out, f"{tables.distortion_title(found)}, as shares of each output", tables.distortion_table(found))
+    _print(
+        out, f"{tables.distortion_title(found.distortion)}, as shares of each output", tables.distortion_table(found)
+    )
     _print(out, "Parameters of the causes", tables.cause_table(found))
     _print(out, "What was weighed", tables.ranking_table(found))
     if (naive := naive_sentence(found)) is not None:
@@ -62,7 +64,7 @@ def print_diagnosis(out: Output, found: "Diagnosis") -> None:
 def print_comparison(out: Output, found: "GapComparison") -> None:
     """Print where, when and while what two logs disagree."""
     from chladni.apps.gap_comparison import answer
-    from chladni.viewers.gap_tables import split_table
+    from chladni.viewers.gap_tables import distortion_title, split_table
 
     first, *rest = answer(found)
     out.line(first, style="bold")
@@ -73,7 +75,7 @@ def print_comparison(out: Output, found: "GapComparison") -> None:
     _print_where(out, found.where, "Error of the simulation", all_in=IN_DOCUMENT)
     _print(
         out,
-        "Linear, even, odd and noise, as shares of each output",
+        f"{distortion_title(found.distortion)}, as shares of each output",
         split_table(found.distortion, found.simulated_distortion),
         all_in=IN_DOCUMENT,
     )

@@ -161,32 +161,36 @@ def cause_table(found: Diagnosis) -> Table:
 
 def distortion_table(found: Diagnosis) -> Table:
     """Split of each output's power under a periodic input; even and odd together where they can't be told apart."""
-    if not _even_told(found):
-        return ("Output", "Linear", "Nonlinear", "Noise"), [
-            (one.output, percent(one.linear), percent(one.nonlinear), percent(one.noise)) for one in found.distortion
-        ]
-    return ("Output", "Linear", "Even", "Odd", "Noise"), [
-        (one.output, percent(one.linear), _share(one.even), _share(one.odd), percent(one.noise))
-        for one in found.distortion
-    ]
+    even = _even_told(found.distortion)
+    return ("Output", *_parts_named(even)), [(one.output, *_parts(one, even=even)) for one in found.distortion]
 
 
-def distortion_title(found: Diagnosis) -> str:
+def distortion_title(shares: Sequence[DistortionShare]) -> str:
     """What the table of distortion tells."""
-    return "Linear, even, odd and noise" if _even_told(found) else "Linear, nonlinear and noise"
+    return "Linear, even, odd and noise" if _even_told(shares) else "Linear, nonlinear and noise"
 
 
 def split_table(measured: Sequence[DistortionShare], simulated: Sequence[DistortionShare]) -> Table:
     """Split of each output's power under a periodic input, of the measured and the simulated log."""
-    return ("Output", "Log", "Linear", "Even", "Odd", "Noise"), [
-        (one.output, log, percent(one.linear), _share(one.even), _share(one.odd), percent(one.noise))
+    even = _even_told(measured)
+    return ("Output", "Log", *_parts_named(even)), [
+        (one.output, log, *_parts(one, even=even))
         for pair in zip(measured, simulated, strict=True)
         for log, one in zip(("measured", "simulated"), pair, strict=True)
     ]
 
 
-def _even_told(found: Diagnosis) -> bool:
-    return all(one.even is not None for one in found.distortion)
+def _even_told(shares: Sequence[DistortionShare]) -> bool:
+    return all(one.even is not None for one in shares)
+
+
+def _parts_named(even: bool) -> tuple[str, ...]:
+    return ("Linear", "Even", "Odd", "Noise") if even else ("Linear", "Nonlinear", "Noise")
+
+
+def _parts(one: DistortionShare, *, even: bool) -> tuple[str, ...]:
+    between = (_share(one.even), _share(one.odd)) if even else (percent(one.nonlinear),)
+    return percent(one.linear), *between, percent(one.noise)
 
 
 def _noise_share(share: float | None) -> str:

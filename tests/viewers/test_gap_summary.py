@@ -350,10 +350,10 @@ def test_sites_that_look_the_same_share_a_row() -> None:
 
 def test_where_even_lines_are_excited_too_the_sum_is_told() -> None:
     found = made.periodic()
-    assert tables.distortion_title(found) == "Linear, even, odd and noise"
+    assert tables.distortion_title(found.distortion) == "Linear, even, odd and noise"
     assert tables.distortion_table(found)[0][2:4] == ("Even", "Odd")
     summed = replace(found, distortion=tuple(replace(one, even=None, odd=None) for one in found.distortion))
-    assert tables.distortion_title(summed) == "Linear, nonlinear and noise"
+    assert tables.distortion_title(summed.distortion) == "Linear, nonlinear and noise"
     assert tables.distortion_table(summed) == (
         ("Output", "Linear", "Nonlinear", "Noise"),
         [("acc_column", "93 %", "6.9 %", "0.10 %"), ("acc_wrist", "88 %", "12 %", "0.10 %")],

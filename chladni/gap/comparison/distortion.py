@@ -11,6 +11,7 @@ from chladni.gap.comparison.local_rational import POLES, TERMS, output_error
 from chladni.gap.comparison.periodicity import periods_of
 from chladni.gap.records.diagnosis import DistortionShare
 from chladni.gap.records.measurement import Measurement
+from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value
 from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
 
@@ -95,6 +96,14 @@ def distortion_of(measurement: Measurement) -> Distortion | None:
     u = _spectra(_steady(measurement.inputs[[measurement.input_names.index(names[0])]], measurement).mean(axis=1))[0]
     splits = [_split(u, periods, excited, odd_only=odd_only) for periods in steady]
     return _told(splits, measurement.output_names, odd_only=odd_only)
+
+
+def distortion_where_told(measurement: Measurement) -> Distortion | None:
+    """Give `distortion_of`; None, too, where the record is too short for its spectra."""
+    try:
+        return distortion_of(measurement)
+    except EstimateError:
+        return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

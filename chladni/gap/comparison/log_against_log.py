@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.comparison.distortion import Distortion, distortion_of
+from chladni.gap.comparison.distortion import Distortion, distortion_where_told
 from chladni.gap.comparison.log_regimes import log_regimes
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
@@ -15,7 +15,7 @@ from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.records.diagnosis import Where
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
-from chladni.signals.errors import EstimateError, LogError
+from chladni.signals.errors import LogError
 from chladni.signals.value import Value
 
 Matrix = NDArray[np.float64]
@@ -144,17 +144,10 @@ def compare_logs(
     kept = None if variables is None else {name: values[:samples] for name, values in variables.items()}
     return replace(
         view_gap(ours, theirs.outputs, variables=kept),
-        measured_split=_split(ours),
-        simulated_split=_split(with_period(theirs)),
+        measured_split=distortion_where_told(ours),
+        simulated_split=distortion_where_told(with_period(theirs)),
         remarks=_remarks(measured, simulated, samples),
     )
-
-
-def _split(measurement: Measurement) -> Distortion | None:
-    try:
-        return distortion_of(measurement)
-    except EstimateError:
-        return None
 
 
 def _cut(measurement: Measurement, names: Sequence[str], samples: int) -> Measurement:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.ndimage import uniform_filter1d
 
+from chladni.gap.comparison.amplitude import amplitude
 from chladni.gap.comparison.shares import regime_shares
 from chladni.gap.records.diagnosis import RegimeShare
 from chladni.gap.records.measurement import Measurement
@@ -40,7 +40,7 @@ def log_regimes(residual: Matrix, measured: Measurement) -> tuple[RegimeShare, .
         ``[output, sample]``.
     measured
         Its outputs in m, rad, m/s and rad/s are variables by their names; the amplitude of every output is one, as
-        ``amplitude of wrist``: RMS over four cycles of its mean frequency, times the square root of two.
+        ``amplitude of wrist``, see `amplitude`, over four cycles of its mean frequency.
     """
     variables = _variables(measured)
     signals = {name: one.values for name, one in variables.items()}
@@ -50,23 +50,20 @@ def log_regimes(residual: Matrix, measured: Measurement) -> tuple[RegimeShare, .
     )
 
 
-def amplitude_of(signal: Matrix, sample_rate_hz: float) -> Matrix:
-    """Give the amplitude ``[sample]`` of a signal: of a steady sine its own."""
-    varying = signal - signal.mean()
-    power = np.abs(fft.rfft(varying)) ** 2
+def cycles_of(signal: Matrix, sample_rate_hz: float) -> int:
+    """Give the samples of `CYCLES` cycles of a signal's mean frequency; all of one that stands still."""
+    power = np.abs(fft.rfft(signal - signal.mean())) ** 2
     if not power.sum() > 0:
-        return np.zeros_like(varying)
+        return signal.size
     mean_hz = float(np.sum(power * fft.rfftfreq(signal.size, 1 / sample_rate_hz)) / power.sum())
-    length = min(max(round(CYCLES / mean_hz * sample_rate_hz), 1), signal.size)
-    # Running sums leave a rounding error below zero where nothing moves.
-    return np.asarray(np.sqrt(2 * np.maximum(uniform_filter1d(varying**2, length, mode="nearest"), 0.0)))
+    return round(CYCLES / mean_hz * sample_rate_hz)
 
 
 def _variables(measured: Measurement) -> dict[str, _Variable]:
     rows = list(zip(measured.output_names, measured.output_units, measured.outputs, strict=True))
     motions = {name: _Variable(values=row, unit=unit) for name, unit, row in rows if unit in MOTION_UNITS}
     amplitudes = {
-        f"amplitude of {name}": _Variable(values=amplitude_of(row, measured.sample_rate_hz), unit=unit)
+        f"amplitude of {name}": _Variable(values=amplitude(row, cycles_of(row, measured.sample_rate_hz)), unit=unit)
         for name, unit, row in rows
     }
     return motions | amplitudes

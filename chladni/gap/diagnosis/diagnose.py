@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.comparison.distortion import Distortion, distortion_of
+from chladni.gap.comparison.distortion import distortion_where_told
 from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, regime_shares
@@ -114,7 +114,7 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         after = causes.shaken.predicted
     recoveries = evidence(study, causes, said)
     motion = recoveries[0] if recoveries else None
-    distortion = _distortion(study.measurement)
+    distortion = distortion_where_told(study.measurement)
     motions = joint_motions(study, shown.fit, motion)
     gap = closing_of(_yardstick(study, causes), before, causes.tuned.fit.outputs, after, seed=seed)
     return Diagnosis(
@@ -255,10 +255,3 @@ def _signals(study: Study, causes: Causes, before: Matrix, after: Matrix) -> Gap
         # Each sensor predicted from the others knows of no windows.
         window_starts=() if causes.shaken is not None else tuple(start for start, _ in study.windows or ()),
     )
-
-
-def _distortion(measurement: Measurement) -> Distortion | None:
-    try:
-        return distortion_of(measurement)
-    except EstimateError:
-        return None

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.comparison.amplitude import amplitude
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.location.locate import lowest_hz
 from chladni.gap.location.recovered import Recovered
@@ -63,27 +64,6 @@ def joint_motions(study: Study, fit: OutputErrorFit, known: Recovered | None) ->
             signals[f"{port.name}.{word}"] = signal
             units[f"{port.name}.{word}"] = its_unit
     return JointMotions(signals=signals, units=units)
-
-
-def amplitude(displacement: Matrix, period: int) -> Matrix:
-    """``[sample]`` amplitude of an oscillation ``[sample]``: of a sine that is as large over `period` samples.
-
-    The mean over the same samples is left out, since a load or a travel is no oscillation. At the ends of the record
-    the first and the last whole period stand in.
-    """
-    length = min(max(period, 2), displacement.size)
-    # Squares of a small oscillation about a large mean would lose it to rounding.
-    centred = displacement - displacement.mean()
-    mean, square = (_running_mean(one, length) for one in (centred, centred**2))
-    found = np.sqrt(2 * np.maximum(square - mean**2, 0.0))
-    before = length // 2
-    return np.pad(found, (before, displacement.size - found.size - before), mode="edge")
-
-
-def _running_mean(signal: Matrix, length: int) -> Matrix:
-    """``[sample]`` means over each whole stretch of a length."""
-    sums = np.concatenate([[0.0], np.cumsum(signal)])
-    return np.asarray((sums[length:] - sums[:-length]) / length, dtype=np.float64)
 
 
 def _of_run(study: Study, fit: OutputErrorFit) -> dict[str, tuple[Matrix, Matrix]]:

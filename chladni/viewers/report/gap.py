@@ -75,7 +75,7 @@ def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
         "Parameters that moved, or that this log doesn't determine",
         _tables((tables.parameter_table(found), (1, 2, 3))),
     )
-    yield _section(tables.distortion_title(found), _tables((tables.distortion_table(found), (1, 2, 3, 4))))
+    yield _section(tables.distortion_title(found.distortion), _tables((tables.distortion_table(found), (1, 2, 3, 4))))
     yield _section("Limits", _list((*found.levels, *found.remarks, *_held_out(found))))
 
 

@@ -62,9 +62,11 @@ def _comparison(evidence: ComparisonEvidence, album: Album, *, heading: str) -> 
         tables.regime_table(where),
         tables.time_table(where),
     )
-    yield _section(f"{heading}Where and when it lies", "".join(table(*one) for one in told))
+    noise = tables.noise_told(where)
+    note = "" if noise is None else element("p", escaped(noise), class_="note")
+    yield _section(f"{heading}Where and when it lies", "".join(table(*one) for one in told) + note)
     split = tables.split_table(evidence.distortion, evidence.simulated_distortion)
-    yield _section(f"{heading}Linear, even, odd and noise", table(*split))
+    yield _section(f"{heading}{tables.distortion_title(evidence.distortion)}", table(*split))
     yield _section(f"{heading}Limits", _list(evidence.remarks))
 
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.gap.comparison.log_regimes import amplitude_of, log_regimes
+from chladni.gap.comparison.amplitude import amplitude
+from chladni.gap.comparison.log_regimes import cycles_of, log_regimes
 from chladni.gap.records.measurement import Measurement
 from tests.gap.comparison import made_measurements as made
 
@@ -21,10 +22,12 @@ def swelling() -> Measurement:
 
 
 def test_the_amplitude_of_a_sine_is_its_own() -> None:
-    amplitude = amplitude_of(3.0 + 2.0 * np.sin(2 * np.pi * 20.0 * np.arange(SAMPLES) / 500.0), 500.0)
+    sine = 3.0 + 2.0 * np.sin(2 * np.pi * 20.0 * np.arange(SAMPLES) / 500.0)
+    assert cycles_of(sine, 500.0) == 100
+    found = amplitude(sine, 100)
     # Four cycles are a whole number of samples here.
-    np.testing.assert_allclose(amplitude[100:-100], 2.0, rtol=1e-9)
-    assert not amplitude_of(np.full(100, 5.0), 500.0).any()
+    np.testing.assert_allclose(found[100:-100], 2.0, rtol=1e-9)
+    assert not amplitude(np.full(100, 5.0), cycles_of(np.full(100, 5.0), 500.0)).any()
 
 
 def test_a_gap_that_grows_faster_than_the_motion_is_told_with_its_amplitude() -> None:

@@ -9,6 +9,7 @@ from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.explanation.contest import weighed
 from chladni.gap.explanation.hypotheses import hypothesis_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.gap.records.diagnosis import Verdict
 from chladni.gap.records.measurement import Measurement
 from chladni.models.effects.attached_effect import AttachedEffect, attached
 from chladni.models.effects.catalogue import CATALOGUE
@@ -28,7 +29,7 @@ def log_of(*effects: AttachedEffect, noise: float = 0.02, outputs: list[int] | N
     return log
 
 
-def answered(study: Study, entered: list[Contestant], verdict: str = "effect") -> Causes:
+def answered(study: Study, entered: list[Contestant], verdict: Verdict = "effect") -> Causes:
     """The causes with the first of contestants as the answer."""
     tuned = study.contest.enter(Hypothesis(start_z=study.location.tuned.z))
     assert tuned is not None
@@ -36,7 +37,7 @@ def answered(study: Study, entered: list[Contestant], verdict: str = "effect") -
     best = next(one for one in ranked if one.fit is (entered or [tuned])[0].fit)
     others = tuple(one for one in ranked if one.hypothesis.named)
     return Causes(
-        verdict=verdict,  # type: ignore[arg-type]
+        verdict=verdict,
         tuned=next(one for one in ranked if one.fit is tuned.fit),
         best=best,
         ranked=others,

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from chladni.gap.comparison.amplitude import amplitude
 from chladni.gap.comparison.shares import regime_shares
-from chladni.gap.diagnosis.joint_motions import amplitude, joint_motions
+from chladni.gap.diagnosis.joint_motions import joint_motions
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.places import Site
 from chladni.models.effects.attached_effect import attached
