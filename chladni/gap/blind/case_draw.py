@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import permutations
 from typing import Literal
 
 import numpy as np
@@ -22,12 +21,14 @@ from chladni.gap.blind.structure_draw import Footing, draw_structure
 from chladni.signals.errors import EstimateError
 
 Matrix = NDArray[np.float64]
-Kind = Literal["effect", "none", "parameters", "two", "faint", "leave_out", "outside"]
+Kind = Literal["effect", "none", "parameters", "two", "three", "faint", "leave_out", "outside"]
 _MOST_DRAWS = 200
 #: Effect over noise, pooled: of effects that must be found, and of faint ones.
 CLEAR, FAINT = (3.3, 60.0), (0.33, 2.8)
 #: Share of the outputs' RMS above which a change isn't moderate any more; a wrong sign alone makes two of it.
 _LARGEST_CHANGE, _LARGEST_OF_GAIN = 1.0, 2.3
+#: How much further several effects may move the outputs together.
+_TOGETHER: Mapping[str, float] = {"two": 1.5, "three": 1.8}
 _DRIVES = 0.15
 _FOOTINGS: Sequence[Footing] = ("grounded", "free", "loop")
 _FOOTING_SHARES = (0.64, 0.12, 0.24)
@@ -76,7 +77,7 @@ class Case:
     ratios
         Like `ratio`, of each effect alone.
     ratios_tuned
-        Like `ratio_tuned`, of each of two effects when the other is known but for its size.
+        Like `ratio_tuned`, of each of several effects when the others are known but for their size.
     off
         Parameter that left its tolerance, and by how many sigma; empty when none did.
     steps
@@ -153,15 +154,17 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case | None:
     tuned = _left(bench, numbers, drive, effects, off, clean, after, noise)
     if tuned is not None and order.kind != "faint" and tuned < LEAST_LEFT:
         return None
-    # Beside the other one, too, nobody could find what a little more stiffness, or a larger other effect, imitates.
-    beside = tuple(_left_beside(bench, numbers, drive, *pair, noise, steps) for pair in permutations(effects, 2))
-    if beside and min(beside) < LEAST_LEFT:
-        return None
+    beside: list[float] = []
+    for place in range(len(effects) if len(effects) > 1 else 0):
+        beside.append(_left_beside(bench, numbers, drive, effects, place, noise, steps))
+        # Beside the others, too, nobody could find what a little more stiffness, or a larger other effect, imitates.
+        if beside[-1] < LEAST_LEFT:
+            return None
     return Case(
         order=order, bench=bench, numbers=numbers, drive=drive, effects=effects, clean=after,
         recorded=_recorded(moved, effects, noise, rng), noise=noise, steps=steps, change=change,
         ratio=None if change is None else change / share, ratio_tuned=tuned,
-        ratios=tuple(one / share for one in changes), ratios_tuned=beside, off=off,
+        ratios=tuple(one / share for one in changes), ratios_tuned=tuple(beside), off=off,
     )  # fmt: skip
 
 
@@ -181,15 +184,16 @@ def _left(bench: Bench, numbers: Mapping[str, float], drive: Drive, effects: tup
     return left_after_tuning(kept, about, drive, change, before, noise)
 
 
-def _left_beside(bench: Bench, numbers: Mapping[str, float], drive: Drive, one: Hidden, other: Hidden,
+def _left_beside(bench: Bench, numbers: Mapping[str, float], drive: Drive, effects: tuple[Hidden, ...], place: int,
                  noise: Mapping[str, SensorNoise], steps: int) -> float:  # fmt: skip
-    """What tuning leaves of one of two effects when the other is known but for its size, RMS in units of noise."""
-    without, both = (
-        converted(perform(bench, numbers, drive, effects, steps=steps), effects, list(noise))
-        for effects in ((other,), (one, other))
+    """What tuning leaves of one of several effects when the others are known but for their size, in units of noise."""
+    others = (*effects[:place], *effects[place + 1 :])
+    without, together = (
+        converted(perform(bench, numbers, drive, acting, steps=steps), acting, list(noise))
+        for acting in (others, effects)
     )
-    change = {name: both[name] - without[name] for name in noise}
-    return left_after_tuning(bench, numbers, drive, change, without, noise, beside=other)
+    change = {name: together[name] - without[name] for name in noise}
+    return left_after_tuning(bench, numbers, drive, change, without, noise, beside=others)
 
 
 def _draw_bench(rng: np.random.Generator) -> Bench:
@@ -202,7 +206,7 @@ def _fits(order: Order, change: float, share: float) -> bool:
     least, most = (0.3, 3.0) if order.kind == "faint" else (3.0, np.inf)
     gains = any(word == "gain_error" for word in order.words)
     largest = _LARGEST_OF_GAIN if gains else _LARGEST_CHANGE
-    return least <= change / share <= most and change <= largest * (1.5 if order.kind == "two" else 1.0)
+    return least <= change / share <= most and change <= largest * _TOGETHER.get(order.kind, 1.0)
 
 
 def _effects(order: Order, scene: Scene, drive: Drive, clean: Mapping[str, Matrix], share: float,

@@ -57,6 +57,8 @@ def _words(kind: Kind, number: int, rng: np.random.Generator) -> list[tuple[str,
         return [()] * number
     if kind == "two":
         return [_pair(place, rng) for place in range(number)]
+    if kind == "three":
+        return [_triple(rng) for _ in range(number)]
     words = tuple(OUTSIDE) if kind == "outside" else WORDS
     # A new order for each round, so that a short campaign doesn't always hold the same words.
     rounds = (str(word) for _ in cycle([0]) for word in rng.permutation(words))
@@ -65,12 +67,21 @@ def _words(kind: Kind, number: int, rng: np.random.Generator) -> list[tuple[str,
 
 def _pair(place: int, rng: np.random.Generator) -> tuple[str, ...]:
     """Two joints, or a joint, body or input and a sensor."""
-    joints = list(JOINT_DRAFTS)
     if place % 3 == 0:
+        joints = list(JOINT_DRAFTS)
         return str(rng.choice(joints)), str(rng.choice(joints))
-    acting = [*joints, *BODY_DRAFTS, *(word for word in INPUT_DRAFTS if word not in ("ripple", "gain_error"))]
+    return _acting_and_sensor(rng)
+
+
+def _acting_and_sensor(rng: np.random.Generator) -> tuple[str, str]:
+    acting = [*JOINT_DRAFTS, *BODY_DRAFTS, *(word for word in INPUT_DRAFTS if word not in ("ripple", "gain_error"))]
     acting.remove("tonal_disturbance")
     return str(rng.choice(acting)), str(rng.choice([word for word in OUTPUT_DRAFTS if word != "tonal_disturbance"]))
+
+
+def _triple(rng: np.random.Generator) -> tuple[str, ...]:
+    """A joint, body or input, and a sensor, with another joint."""
+    return (*_acting_and_sensor(rng), str(rng.choice(list(JOINT_DRAFTS))))
 
 
 def _left_out(kind: Kind, words: tuple[str, ...], rng: np.random.Generator) -> tuple[str, ...]:

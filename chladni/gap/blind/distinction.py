@@ -32,7 +32,7 @@ _SIZE, _FAR = 0.1, 10.0
 
 def left_after_tuning(bench: Bench, numbers: Mapping[str, float], drive: Drive, change: Mapping[str, Matrix],
                       clean: Mapping[str, Matrix], noise: Mapping[str, SensorNoise], *,
-                      beside: Hidden | None = None) -> float:  # fmt: skip
+                      beside: tuple[Hidden, ...] = ()) -> float:  # fmt: skip
     """RMS over all outputs of what is left of a change, in units of each one's noise.
 
     Output error with the tolerances as prior and three sigma as bound, from the true numbers on; a resonance that has
@@ -47,7 +47,7 @@ def left_after_tuning(bench: Bench, numbers: Mapping[str, float], drive: Drive, 
     clean
         Outputs at `numbers` without the effect.
     beside
-        Another effect that is known, but for how large its numbers are; it's in `clean`.
+        Other effects that are known, but for how large their numbers are; they are in `clean`.
     """
     names = measured(bench)
     # Every fourth sample says enough of what is smooth, and of what is left besides it.
@@ -58,15 +58,18 @@ def left_after_tuning(bench: Bench, numbers: Mapping[str, float], drive: Drive, 
     begun = np.array([numbers[name] - bench.plan.numbers[name] for name in tuned]) / sigma
 
     # A law at a joint may be sharp; what is linear needs no more steps than the machine.
-    sharp = beside is not None and beside.site in [joint.name for joint in bench.plan.joints]
-    steps = SEARCH_STEPS if sharp else None
-    free = [] if beside is None or beside.law in ON_SAMPLES else [
-        name for name, value in beside.numbers.items() if value and name not in _SHAPES
+    joints = {joint.name for joint in bench.plan.joints}
+    steps = SEARCH_STEPS if any(one.site in joints for one in beside) else None
+    free = [
+        (place, name) for place, one in enumerate(beside) if one.law not in ON_SAMPLES
+        for name, value in one.numbers.items() if value and name not in _SHAPES
     ]  # fmt: skip
 
     def shown_by(z: Matrix, sizes: Matrix) -> Mapping[str, Matrix]:
         values = {name: bench.plan.numbers[name] + each for name, each in zip(tuned, z * sigma, strict=True)}
-        known = () if beside is None else (_resized(beside, dict(zip(free, sizes, strict=True))),)
+        larger = dict(zip(free, sizes, strict=True))
+        known = tuple(_resized(one, {name: size for (at, name), size in larger.items() if at == place})
+                      for place, one in enumerate(beside))  # fmt: skip
         moved = perform(bench, {**numbers, **values}, drive, known, steps=steps)
         return converted(moved, known, names)
 

@@ -84,7 +84,10 @@ def scored(marks: Sequence[Mark]) -> dict[str, Any]:
         "unknown_in_catalogue": _told(clear, lambda one: one.verdict == "unknown"),
         "closed": _closed(clear),
         "calibration": _calibration(marks),
-        "two": _two([one for one in marks if one.kind == "two"]),
+        "two": _several([one for one in marks if one.kind == "two"], {"both": 2, "at_least_one": 1}),
+        "three": _several(
+            [one for one in marks if one.kind == "three"], {"all": 3, "at_least_two": 2, "at_least_one": 1}
+        ),
         "faint": _faint([one for one in marks if one.kind == "faint"]),
         "confusion": _confusion(clear, word=lambda effect: effect),
         "confusion_family": _confusion(clear, word=lambda effect: FAMILY_OF.get(effect, "parameter")),
@@ -133,11 +136,9 @@ def _calibration(marks: Sequence[Mark]) -> dict[str, Any]:
     }
 
 
-def _two(marks: Sequence[Mark]) -> dict[str, Any]:
-    return {
-        "both": share_of([one.found() == len(one.hidden) for one in marks]).told(),
-        "at_least_one": share_of([one.found() > 0 for one in marks]).told(),
-    }
+def _several(marks: Sequence[Mark], least: Mapping[str, int]) -> dict[str, Any]:
+    """How often at least so many of the effects of machines that have several were named."""
+    return {title: share_of([one.found() >= count for one in marks]).told() for title, count in least.items()}
 
 
 def _faint(marks: Sequence[Mark]) -> dict[str, Any]:
@@ -183,4 +184,4 @@ def _is_right(one: Mark) -> bool:
         return one.verdict == "none"
     if one.kind == "parameters":
         return one.verdict == "parameters"
-    return one.found() == len(one.hidden) if one.kind == "two" else one.is_right
+    return one.found() == len(one.hidden) if one.kind in ("two", "three") else one.is_right

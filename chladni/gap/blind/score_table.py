@@ -15,7 +15,7 @@ def score_rows(score: Mapping[str, Any]) -> list[Row]:
     or a mean of so few is, either way.
     """
     faint, two, closed = score["faint"], score["two"], score["closed"]
-    return [
+    rows = [
         _share("right effect, first place", score["effect"], at_least=0.92),
         _share("right effect, or told to be like the named one", score["effect_or_alternative"]),
         _share("right family", score["family"], at_least=0.96),
@@ -38,6 +38,13 @@ def score_rows(score: Mapping[str, Any]) -> list[Row]:
         _share("faint: wrong name with probability over 0.8", faint["confidently_wrong"], at_most=0.05),
         _share("faint: named rightly", faint["named"]),
     ]  # fmt: skip
+    return rows + _three_rows(score["three"])
+
+
+def _three_rows(three: Mapping[str, Any]) -> list[Row]:
+    """Only campaigns that were asked for machines with three effects have them."""
+    titles = {"all": "all named", "at_least_two": "at least two", "at_least_one": "at least one"}
+    return [_share(f"three effects: {title}", three[key]) for key, title in titles.items() if three[key]["count"]]
 
 
 def _share(what: str, told: Mapping[str, Any], *, at_least: float | None = None, at_most: float | None = None) -> Row:

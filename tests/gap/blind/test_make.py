@@ -208,6 +208,17 @@ def test_a_case_with_two_effects_has_both_at_different_sites():
     assert min(case.ratios_tuned) >= 1.0
 
 
+def test_a_case_with_three_effects_has_each_at_its_own_site():
+    made = orders(30, np.random.default_rng(1), {"three": 1})
+    assert all(len(order.words) == 3 for order in made)
+    case = draw_case(Order(kind="three", words=("delay", "gain_error", "added_mass")),
+                     np.random.default_rng(7))  # fmt: skip
+    assert [one.effect for one in case.effects] == ["delay", "gain_error", "added_mass"]
+    assert len({one.site for one in case.effects}) == 3
+    assert len(case.ratios_tuned) == 3
+    assert min(case.ratios_tuned) >= 1.0
+
+
 @pytest.mark.parametrize(
     ("rule", "refused", "accepted"),
     [("_left_beside", 0.9, 1.1), ("all_act", False, True)],

@@ -107,6 +107,26 @@ def test_two_effects_are_found_in_any_order_at_their_sites():
     assert (two["both"]["right"], two["at_least_one"]["right"]) == (1, 2)
 
 
+def test_of_three_effects_it_is_told_how_many_are_found():
+    hidden = "delay@m clipping@y backlash@j"
+    marks = [
+        answered("three", hidden, "backlash@j clipping@y delay@m"),
+        answered("three", hidden, "clipping@y backlash@j"),
+        answered("three", hidden, "clipping@z delay@m lag@m"),
+    ]
+    score = scored(marks)
+    three = score["three"]
+    assert [three[key]["right"] for key in ("all", "at_least_two", "at_least_one")] == [1, 2, 3]
+    # Only where there are such machines: a campaign in the default composition has none.
+    assert [row[:2] for row in score_rows(score)[-3:]] == [
+        ["three effects: all named", "33.3 % (1)"],
+        ["three effects: at least two", "66.7 % (2)"],
+        ["three effects: at least one", "100.0 % (3)"],
+    ]
+    assert not any("three" in row[0] for row in score_rows(scored([answered("two", hidden, "lag@m")])))
+    assert [one["right"] for one in score["marks"]] == [True, False, False]
+
+
 def test_faint_effects_make_a_detection_curve():
     marks = [
         answered("faint", "delay@m", "", verdict="none", ratio=0.4),
