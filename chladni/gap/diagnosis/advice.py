@@ -67,7 +67,7 @@ def measure_next(study: Study, causes: Causes, seed: int) -> str | None:
 
 
 def _still_close(causes: Causes) -> list[Contestant]:
-    """The best answer and those with as many causes that come near it; beside several also the best with one."""
+    """The best answer and those with as many causes that come near it; beside several also the best with one fewer."""
     count = len(causes.best.hypothesis.named)
     if count <= 1:
         alike = [one for one in (*causes.ranked, causes.tuned) if len(one.hypothesis.named) <= 1]
@@ -77,8 +77,8 @@ def _still_close(causes: Causes) -> list[Contestant]:
         # An experiment between others than the answer would tell nothing of it.
         first = causes.best
         others = [one for one in causes.ranked if len(one.hypothesis.named) == count and one is not first]
-        single = [one for one in causes.ranked if len(one.hypothesis.named) == 1][:1]
-        alike = [first, *sorted((*others, *single), key=lambda one: -one.log_evidence)]
+        fewer = [one for one in causes.ranked if len(one.hypothesis.named) == count - 1][:1]
+        alike = [first, *sorted((*others, *fewer), key=lambda one: -one.log_evidence)]
     return [one for one in alike if one is first or one.log_evidence > first.log_evidence - _STILL_CLOSE]
 
 

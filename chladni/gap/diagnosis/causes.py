@@ -29,6 +29,7 @@ from chladni.gap.diagnosis.search import (
 )
 from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
 from chladni.gap.diagnosis.study import Study
+from chladni.gap.diagnosis.thirds import leaves_a_third, third_causes
 from chladni.gap.explanation.contest import distinct, lowest, weighed
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.explanation.known_states import KnownStates
@@ -181,7 +182,10 @@ def _searched(
         found += _detailed(study, weighed(found), best())
         found += sibling_causes(study, [best()])
         found += [detailed(study, best()), *without_one(study, best())]
-    return [one for one in found if _is_plausible(study, nothing, one)], None, states, pairs.forces
+    found = [one for one in found if _is_plausible(study, nothing, one)]
+    if leaves_a_third(best()):
+        found += [one for one in third_causes(study, best()) if _is_plausible(study, nothing, one)]
+    return found, None, states, pairs.forces
 
 
 def _detailed(study: Study, ranked: Sequence[Contestant], best: Contestant) -> list[Contestant]:

@@ -27,7 +27,7 @@ class Price:
     Attributes
     ----------
     further
-        Nats of every effect beside a first one.
+        Nats of a second effect beside a first one.
     sure
         A first one beside which another certainly acts, None when nothing tells.
     """
@@ -40,7 +40,8 @@ class Price:
         effects = len(one.hypothesis.effects)
         first = NAMED if effects else WRONG * bool(one.hypothesis.wide)
         further = min(_ADDED_FOR_SURE, self.further) if self.sure in one.hypothesis.named else self.further
-        return one.log_evidence - first - further * max(effects - 1, 0)
+        second, others = min(effects, 2) - 1, effects - 2
+        return one.log_evidence - first - further * max(second, 0) - _ADDED * max(others, 0)
 
 
 def added_nats(location: Location) -> float:
