@@ -3,13 +3,14 @@
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from chladni.apps.diagnose import diagnosis_json
+from chladni.gap.blind.composition import composition_of
 from chladni.gap.blind.make import make_cases
 from chladni.gap.blind.run import RunReport, run_cases
 from chladni.gap.blind.score import score_cases
@@ -20,9 +21,15 @@ Progress = Callable[[float], None]
 
 
 def make_campaign(
-    directory: Path, *, count: int, seed: int, jobs: int | None = None, progress: Progress = lambda _share: None
+    directory: Path,
+    *,
+    count: int,
+    seed: int,
+    kinds: Sequence[str] = (),
+    jobs: int | None = None,
+    progress: Progress = lambda _share: None,
 ) -> int:
-    """Make a campaign in the default composition, or what is missing of it; give the number of cases made.
+    """Make a campaign, or what is missing of it; give the number of cases made.
 
     Parameters
     ----------
@@ -30,13 +37,18 @@ def make_campaign(
         Where cases and truths go, see `chladni.gap.blind.make.make_cases`.
     count, seed
         Number of cases, and where everything random in them comes from.
+    kinds
+        How many of which kind in proportion, see `chladni.gap.blind.composition.composition_of`.
     jobs
         Processes; as many as the machine has cores if None.
     progress
         Gets the share done.
     """
+    composition = composition_of(kinds)
     with workers(jobs) as executor:
-        return make_cases(directory, count=count, seed=seed, executor=executor, progress=progress)
+        return make_cases(
+            directory, count=count, seed=seed, composition=composition, executor=executor, progress=progress
+        )
 
 
 def run_campaign(

@@ -25,6 +25,15 @@ Jobs = Annotated[
     int | None,
     typer.Option(metavar="N", min=1, help="Processes; one a core if not given.", show_default=False),
 ]
+Kinds = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="KIND=N",
+        help="Share of a kind of cases, and of no others: effect, none, parameters, two, three, faint, leave_out, "
+        "outside; may be repeated. All but three if not given.",
+        show_default=False,
+    ),
+]
 
 
 @blind.command()
@@ -33,6 +42,7 @@ def make(
     *,
     count: Annotated[int, typer.Option(metavar="N", min=1, help="Number of cases.")] = 200,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of everything random in them.")] = 0,
+    kind: Kinds = None,
     jobs: Jobs = None,
     json: options.Json = None,
 ) -> None:
@@ -42,7 +52,7 @@ def make(
     require_places(reads=(), writes={"--json": json})
     to = Output(json)
     with to.progress("making cases") as show:
-        made = make_campaign(directory, count=count, seed=seed, jobs=jobs, progress=show)
+        made = make_campaign(directory, count=count, seed=seed, kinds=kind or (), jobs=jobs, progress=show)
     there = f"; {counted(count - made)} of {counted(count)} were there" if made < count else ""
     to.line(f"made {cases(made, 'case')} in {directory / 'cases'}{there}")
     to.line(f"their truths are in {directory / 'truth'}: move it away before the run, and back for the score")

@@ -74,6 +74,14 @@ def test_nothing_to_run_is_one_line(run: Run, tmp_path: Path) -> None:
     assert done.err.strip().endswith(f"holds no case; make some with chladni blind make {tmp_path}")
 
 
+def test_a_kind_that_there_is_not_is_one_line(run: Run, tmp_path: Path) -> None:
+    done = run("blind", "make", tmp_path / "campaign", "--kind", "four=2")
+    assert done.code == 2
+    assert "'four=2' names no kind of case; there are effect, none, parameters, two, three" in done.err
+    assert done.err.count("\n") == 1
+    assert not (tmp_path / "campaign").exists()
+
+
 @pytest.mark.slow
 def test_make_writes_cases_and_truths(run: Run, tmp_path: Path) -> None:
     done = run("blind", "make", tmp_path, "--count", 1, "--seed", 2, "--jobs", 1, "--json", "-")

@@ -186,7 +186,7 @@ def _left(bench: Bench, numbers: Mapping[str, float], drive: Drive, effects: tup
 
 def _left_beside(bench: Bench, numbers: Mapping[str, float], drive: Drive, effects: tuple[Hidden, ...], place: int,
                  noise: Mapping[str, SensorNoise], steps: int) -> float:  # fmt: skip
-    """What tuning leaves of one of several effects when the others are known but for their size, in units of noise."""
+    """What tuning leaves of one effect when the others are known but for their size, RMS in units of noise."""
     others = (*effects[:place], *effects[place + 1 :])
     without, together = (
         converted(perform(bench, numbers, drive, acting, steps=steps), acting, list(noise))

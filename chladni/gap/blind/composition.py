@@ -1,7 +1,9 @@
 """How many cases of which kind a campaign has, and which effects they hide."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from itertools import cycle, islice
+from typing import get_args
 
 import numpy as np
 
@@ -20,6 +22,26 @@ DEFAULT: Mapping[Kind, int] = {
 _COLOURED = 0.4
 #: Share of ordinary cases that leave words out too, so that the list tells nothing.
 _DECOYS = 0.25
+
+
+def composition_of(texts: Sequence[str]) -> dict[Kind, int]:
+    """Read a composition from ``KIND=N`` each, such as ``two=20``; `DEFAULT` of none.
+
+    Raises
+    ------
+    SetupError
+        When one isn't of that form, names no kind, or asks for none of a kind.
+    """
+    asked: dict[Kind, int] = {}
+    for text in texts:
+        name, _, number = text.partition("=")
+        kind = next((one for one in get_args(Kind) if one == name.strip()), None)
+        if kind is None:
+            raise SetupError(f"{text!r:.60} names no kind of case; there are {', '.join(get_args(Kind))}")
+        if not re.fullmatch("[1-9][0-9]{0,5}", number.strip()):
+            raise SetupError(f"{text!r:.60} must be of the form {kind}=N, with N from 1 to 999999")
+        asked[kind] = int(number)
+    return asked or dict(DEFAULT)
 
 
 def counts(count: int, composition: Mapping[Kind, int] = DEFAULT) -> dict[Kind, int]:

@@ -67,7 +67,7 @@ def measure_next(study: Study, causes: Causes, seed: int) -> str | None:
 
 
 def _still_close(causes: Causes) -> list[Contestant]:
-    """The best answer and those with as many causes that come near it; beside several also the best with one fewer."""
+    """The best answer and those with as many causes that come near it; of several also the best with one fewer."""
     count = len(causes.best.hypothesis.named)
     if count <= 1:
         alike = [one for one in (*causes.ranked, causes.tuned) if len(one.hypothesis.named) <= 1]

@@ -1,4 +1,5 @@
 import json
+import re
 from collections import Counter
 from dataclasses import replace
 
@@ -10,7 +11,7 @@ import chladni
 from chladni.gap.blind import case_draw
 from chladni.gap.blind.case_draw import Order, draw_case
 from chladni.gap.blind.case_folder import case_folders, truth_of_case
-from chladni.gap.blind.composition import DEFAULT, counts, orders
+from chladni.gap.blind.composition import DEFAULT, composition_of, counts, orders
 from chladni.gap.blind.draft import Scene
 from chladni.gap.blind.drive_draw import draw_drive_bench
 from chladni.gap.blind.excitation_draw import BEYOND, draw_drive
@@ -132,6 +133,21 @@ def test_the_default_campaign_asks_for_everything():
     # Words are left out in ordinary cases too, so that a list says nothing.
     assert sum(bool(order.leave_out) for order in made if order.kind == "none") > 5
     assert len([order for order in made if order.kind == "two" and len(order.words) == 2]) == DEFAULT["two"]
+
+
+def test_a_composition_is_read_from_words():
+    assert composition_of([]) == DEFAULT
+    assert composition_of(["three=2", " two = 1"]) == {"three": 2, "two": 1}
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [("four=4", "'four=4' names no kind of case; there are effect, none"), ("two", "of the form two=N"),
+     ("two=0", "with N from 1"), ("two=-1", "of the form two=N"), ("two=x", "of the form two=N")],
+)  # fmt: skip
+def test_what_is_no_composition_is_one_line(text, told):
+    with pytest.raises(SetupError, match=re.escape(told)):
+        composition_of([text])
 
 
 @pytest.mark.parametrize("count", [1, 7, 80, 199])

@@ -60,4 +60,5 @@ def test_three_causes_at_once_are_all_named() -> None:
     }  # fmt: skip
     assert found.verdict == "effect"
     assert found.gap.explained == pytest.approx(1.0, abs=1e-3)
-    assert {one.site: one.parameters for one in found.causes}["acc_wrist"]["gain"].value == pytest.approx(1.3, rel=0.01)
+    numbers = {one.site: one.parameters for one in found.causes}
+    assert numbers["acc_wrist"]["gain"].value == pytest.approx(1.3, rel=0.01)
