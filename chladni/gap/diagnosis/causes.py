@@ -9,6 +9,7 @@ from scipy.special import logsumexp
 
 from chladni.gap.diagnosis.completeness import completeness, completeness_among, known_share
 from chladni.gap.diagnosis.following import Entered
+from chladni.gap.diagnosis.further_causes import further_causes, leaves_a_further
 from chladni.gap.diagnosis.grown import Grown
 from chladni.gap.diagnosis.instead import Instead, explained_elsewhere, explained_instead
 from chladni.gap.diagnosis.own_signal import FOLLOWS, share_of_own_signal
@@ -29,7 +30,6 @@ from chladni.gap.diagnosis.search import (
 )
 from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
 from chladni.gap.diagnosis.study import Study
-from chladni.gap.diagnosis.thirds import leaves_a_third, third_causes
 from chladni.gap.explanation.contest import distinct, lowest, weighed
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.explanation.known_states import KnownStates
@@ -183,8 +183,11 @@ def _searched(
         found += sibling_causes(study, [best()])
         found += [detailed(study, best()), *without_one(study, best())]
     found = [one for one in found if _is_plausible(study, nothing, one)]
-    if leaves_a_third(best()):
-        found += [one for one in third_causes(study, best()) if _is_plausible(study, nothing, one)]
+    named = 0
+    # Ends where one more doesn't pay: each is at a site of its own.
+    while leaves_a_further(best()) and len(best().hypothesis.effects) > named:
+        named = len(best().hypothesis.effects)
+        found += [one for one in further_causes(study, best()) if _is_plausible(study, nothing, one)]
     return found, None, states, pairs.forces
 
 

@@ -5,7 +5,7 @@ import pytest
 
 import chladni
 from chladni.gap.diagnosis.diagnose import diagnose
-from chladni.gap.diagnosis.thirds import explains_the_rest, leaves_a_third
+from chladni.gap.diagnosis.further_causes import explains_the_rest, leaves_a_further
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.models.effects.attached_effect import AttachedEffect, attached
 from tests.gap.arm import arm, measured
@@ -22,11 +22,11 @@ def leaving(*held: float, effects: tuple[AttachedEffect, ...]) -> Contestant:
     return Contestant(hypothesis=hypothesis, fit=None, held=np.array(held), gap=0.0, prior=0.0)
 
 
-def test_a_third_is_looked_for_beside_two_that_leave_more_than_noise_at_any_sensor() -> None:
-    assert leaves_a_third(leaving(1.0, 1.5, 1.0, effects=(DRAG, GAIN)))
-    assert not leaves_a_third(leaving(1.0, 1.2, 1.0, effects=(DRAG, GAIN)))
-    assert not leaves_a_third(leaving(1.0, 5.0, 1.0, effects=(DRAG,)))
-    assert not leaves_a_third(leaving(1.0, 5.0, 1.0, effects=(DRAG, GAIN, LATE)))
+def test_one_more_is_looked_for_beside_several_that_leave_more_than_noise_at_any_sensor() -> None:
+    assert leaves_a_further(leaving(1.0, 1.5, 1.0, effects=(DRAG, GAIN)))
+    assert not leaves_a_further(leaving(1.0, 1.2, 1.0, effects=(DRAG, GAIN)))
+    assert not leaves_a_further(leaving(1.0, 5.0, 1.0, effects=(DRAG,)))
+    assert leaves_a_further(leaving(1.0, 5.0, 1.0, effects=(DRAG, GAIN, LATE)))
 
 
 @pytest.mark.parametrize(
