@@ -5,6 +5,7 @@ from math import isfinite
 from typing import Final
 
 from chladni.gap.records.diagnosis import (
+    AnyLaw,
     Candidate,
     Cause,
     Closing,
@@ -29,8 +30,8 @@ def gap_document(found: Diagnosis) -> Document:
     Document
         ``format``, ``model``, ``logs``, ``verdict``, ``causes``, ``ranking``, ``where``, ``gap``,
         ``tuned_parameters`` and ``next_measurement`` always; ``naive``, ``advice``, ``remarks``, ``distortion``,
-        ``levels``, ``elsewhere``, ``left`` and ``correlation`` when there is something in them. docs/gap.md says what
-        each means.
+        ``levels``, ``elsewhere``, ``left``, ``correlation`` and ``any_law`` when there is something in them.
+        docs/gap.md says what each means.
     """
     return {
         "format": GAP_FORMAT,
@@ -56,6 +57,7 @@ def gap_document(found: Diagnosis) -> Document:
                 "elsewhere": [closing_document(one) for one in found.elsewhere],
                 "left": None if found.left is None else where_document(found.left),
                 "correlation": None if found.correlation is None else _correlation(found.correlation),
+                "any_law": None if found.any_law is None else _any_law(found.any_law),
             }
         ),
     }
@@ -159,6 +161,16 @@ def _number(number: FittedNumber) -> Document:
 
 def _correlation(one: Correlation) -> Document:
     return {"names": list(one.names), "matrix": [[_known(number) for number in row] for row in one.matrix]}
+
+
+def _any_law(one: AnyLaw) -> Document:
+    return {
+        "site": one.site,
+        "group": list(one.group),
+        "force": _known(one.force),
+        "law": _known(one.law),
+        "named": None if one.named is None else _known(one.named),
+    }
 
 
 def distortion_document(one: DistortionShare) -> Document:

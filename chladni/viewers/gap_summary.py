@@ -15,6 +15,8 @@ FAINT = 3.0
 NEAREST = 3
 # Of what closes on the first log, the share below which little carries over to another.
 CARRIED = 0.5
+# Of what any force at a place explains, the share above which a law that follows the motion there does it.
+_FOLLOWED = 0.95
 #: A share of power beyond the noise, as docs/gap.md says; the sentence that it stands in must stay an answer.
 _LEFT_BY_TUNING = "of the gap that tuning leaves"
 
@@ -97,9 +99,30 @@ def _effects(found: Diagnosis) -> Iterator[str]:
         yield f"{_certainty(least)} {_COUNT.get(len(causes), 'several')} causes at once: {told}."
     yield _closing(found)
     yield from _shares(found)
+    yield from _any_law(found)
     yield from _faint(found)
     for cause in causes:
         yield from _reservations(cause)
+
+
+def _any_law(found: Diagnosis) -> Iterator[str]:
+    """What a law of the motion at one place explains, whatever its name."""
+    law = found.any_law
+    if law is None:
+        return
+    site = _listed((law.site, *law.group), word="or")
+    if law.named is not None:
+        yield (
+            f"Any smooth law of what moves at {site} explains {percent(law.law)} of what the best parameters leave, "
+            f"the named one {percent(law.named)}."
+        )
+    elif law.law > _FOLLOWED * law.force:
+        yield f"A smooth law of what moves at {site} explains {percent(law.law)} of it: none that took part does."
+    else:
+        yield (
+            f"Any smooth law of what moves at {site} explains {percent(law.law)} of it, any force there "
+            f"{percent(law.force)}: what acts has a memory, follows something else, or acts elsewhere, too."
+        )
 
 
 def _faint(found: Diagnosis) -> Iterator[str]:
@@ -229,6 +252,7 @@ def _unknown(found: Diagnosis) -> Iterator[str]:
         told.append(f"{percent(band.share)}{of_it} lies between {band.low_hz:.4g} and {band.high_hz:.4g} Hz")
     if told:
         yield f"{', and '.join(told)}."
+    yield from _any_law(found)
     nearest = [effect_at(one.effect, one.site) for one in found.ranking[:NEAREST]]
     if nearest:
         yield f"Nearest, but not good enough: {', '.join(nearest)}."

@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from chladni.apps.gap_document import gap_document
-from chladni.gap.records.diagnosis import Candidate, ChannelGap, Correlation, Diagnosis, FittedNumber, PairShare
+from chladni.gap.records.diagnosis import (
+    AnyLaw,
+    Candidate,
+    ChannelGap,
+    Correlation,
+    Diagnosis,
+    FittedNumber,
+    PairShare,
+)
 from tests import made_diagnosis as made
 
 # Of each key: what its value may be. A list holds things of one kind, a mapping of str any names.
@@ -52,7 +60,7 @@ SCHEMA: Mapping[str, Any] = {
 }
 # What may stand beside the agreed keys, by the place it stands in.
 MORE = {
-    "": {"naive", "advice", "remarks", "distortion", "levels", "elsewhere", "left", "correlation"},
+    "": {"naive", "advice", "remarks", "distortion", "levels", "elsewhere", "left", "correlation", "any_law"},
     ".causes": {"variant", "from", "share"},
     ".ranking": {"beside"},
     ".where.channels": {"noise_from"},
@@ -126,6 +134,14 @@ def test_which_parameters_are_told_together_only_stands_there_as_a_matrix() -> N
     assert "correlation" not in written(made.diagnosis())
 
 
+def test_what_any_law_explains_is_there_where_it_was_asked_for() -> None:
+    law = AnyLaw(site="elbow", group=("wrist",), force=0.98, law=0.4, named=None)
+    document = written(replace(made.unknown(), any_law=law))
+    assert strays(document, SCHEMA) == []
+    assert document["any_law"] == {"site": "elbow", "group": ["wrist"], "force": 0.98, "law": 0.4, "named": None}
+    assert "any_law" not in written(made.unknown())
+
+
 def test_a_pair_of_sites_is_there_where_two_forces_explain_more_than_one() -> None:
     found = made.diagnosis()
     pair = PairShare(groups=(("elbow", "wrist"), ("shaker",)), share=0.99)
@@ -184,7 +200,14 @@ def test_keys_beside_the_agreed_ones_are_there_only_with_content() -> None:
     naive = Candidate(effect="lag", site="shaker")
     known = Correlation(names=("a",), matrix=np.eye(1))
     full = written(
-        replace(made.periodic(), advice="Measure longer.", naive=naive, left=made.unknown().left, correlation=known)
+        replace(
+            made.periodic(),
+            advice="Measure longer.",
+            naive=naive,
+            left=made.unknown().left,
+            correlation=known,
+            any_law=AnyLaw(site="elbow", group=(), force=0.99, law=0.98, named=0.93),
+        )
     )
     assert set(full) == set(SCHEMA) | MORE[""]
     assert full["distortion"][0] == {

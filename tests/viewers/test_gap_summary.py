@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from chladni.gap.records.diagnosis import Candidate, Cause, FittedNumber, PairShare
+from chladni.gap.records.diagnosis import AnyLaw, Candidate, Cause, FittedNumber, PairShare
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.viewers import effect_words
 from chladni.viewers import gap_tables as tables
@@ -137,6 +137,28 @@ def test_wrong_values_are_told_against_the_nominal_ones() -> None:
     assert "on stretches that no fit saw" in said[1]
     alone = summary(replace(made.wrong_values(), tuned_parameters={}))
     assert "elbow.stiffness is 31.000 ± 0.090 kN/m (96 %)" in alone[0]
+
+
+def test_what_any_law_explains_is_told_beside_the_named_one() -> None:
+    law = AnyLaw(site="elbow", group=(), force=0.999, law=0.994, named=0.93)
+    told = summary(replace(made.diagnosis(), any_law=law))
+    assert (
+        "Any smooth law of what moves at elbow explains 99.4 % of what the best parameters leave, the named one 93 %."
+    ) in told
+    assert not any("smooth law" in one for one in summary(made.diagnosis()))
+
+
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [
+        (0.97, "A smooth law of what moves at elbow or wrist explains 97 % of it: none that took part does."),
+        (0.41, ("Any smooth law of what moves at elbow or wrist explains 41 % of it, any force there 98 %: what acts "
+                "has a memory, follows something else, or acts elsewhere, too.")),
+    ],
+)  # fmt: skip
+def test_an_unknown_gap_is_told_with_whether_a_law_of_the_motion_explains_it(share: float, words: str) -> None:
+    law = AnyLaw(site="elbow", group=("wrist",), force=0.98, law=share, named=None)
+    assert words in summary(replace(made.unknown(), any_law=law))
 
 
 def test_an_unknown_gap_is_told_with_where_it_lies_and_what_is_nearest() -> None:

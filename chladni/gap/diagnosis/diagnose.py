@@ -14,6 +14,7 @@ from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, re
 from chladni.gap.comparison.short_log import shortness
 from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.diagnosis.advice import advice_on, measure_next
+from chladni.gap.diagnosis.any_law_beside import any_law
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.correlation import correlation_of
@@ -129,6 +130,7 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         gap=gap,
         tuned_parameters=tuned_numbers(study, shown.fit),
         correlation=correlation_of(study.contest.run.tunables, shown.fit),
+        any_law=any_law(study, causes, said),
         next_measurement=measure_next(study, causes, seed),
         naive=naive_of(causes),
         remarks=remarks_on(study, causes, shown, distortion),

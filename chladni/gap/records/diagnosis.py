@@ -319,6 +319,32 @@ class DistortionShare:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class AnyLaw:
+    """What a force at one place explains, by any law of what moves there.
+
+    Shares are of the power that the best parameters leave beyond noise, 0 to 1.
+
+    Attributes
+    ----------
+    site, group
+        A joint or an input, and the other sites that these sensors can't tell from it.
+    force
+        Share that an unknown force there explains.
+    law
+        Share that one explains that is a function of displacement and velocity there, or the displacement times a
+        tone; at an input a function or a filter of the command.
+    named
+        Share that the named cause explains, None where nothing is named.
+    """
+
+    site: str
+    group: tuple[str, ...]
+    force: float
+    law: float
+    named: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis:
     """Result of `chladni.diagnose_gap`.
 
@@ -358,6 +384,8 @@ class Diagnosis:
         With the verdict ``unknown``: where what the best parameters leave lies, which is what isn't explained.
     correlation
         Of the tuned parameters' errors; None where nothing was tuned.
+    any_law
+        Where something is left: what a law of the motion at one place would explain, whatever its name.
     """
 
     model: str
@@ -380,6 +408,7 @@ class Diagnosis:
     used: tuple[LogUse, ...] = ()
     left: Where | None = None
     correlation: Correlation | None = None
+    any_law: AnyLaw | None = None
 
     @property
     def restoring_force(self) -> RestoringForce | None:

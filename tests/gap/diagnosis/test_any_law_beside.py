@@ -1,0 +1,51 @@
+"""Any law of what moves at a place, held beside an answer that leaves something."""
+
+import pytest
+
+import chladni
+from chladni.gap.diagnosis.any_law_beside import any_law
+from chladni.gap.diagnosis.causes import causes_of
+from chladni.gap.diagnosis.naming import causes_named
+from chladni.gap.diagnosis.study import study_of
+from chladni.gap.records.diagnosis import AnyLaw
+from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.models.effects.catalogue import CATALOGUE
+from tests.gap.arm import arm, measured
+
+
+def beside(effect: AttachedEffect, *, words: set[str]) -> tuple[str, AnyLaw | None]:
+    """Verdict, and what any law explains, where these words take part alone."""
+    log = measured((effect,), seed=7, seconds=5.0)
+    study = study_of(arm(), log, leave_out=frozenset(CATALOGUE) - words, own={})
+    causes = causes_of(study, lambda _: None)
+    return causes.verdict, any_law(study, causes, causes_named(study, causes))
+
+
+@pytest.mark.slow
+def test_a_law_that_took_no_part_is_seen_to_follow_the_motion() -> None:
+    spring = chladni.attached("hardening_stiffness", "hand", {"cubic": 3e10})
+    verdict, law = beside(spring, words={"gain_error", "delay"})
+    assert verdict == "unknown"
+    assert law is not None
+    assert law.site == "hand" or "hand" in law.group
+    assert law.force > 0.99
+    assert law.law > 0.97 * law.force
+    assert law.named is None
+
+
+@pytest.mark.slow
+def test_what_remembers_is_seen_not_to_follow_it() -> None:
+    loop = chladni.attached("hysteresis", "hand", {"force": 8.0, "yield": 3e-4, "shape": 1.0})
+    verdict, law = beside(loop, words={"gain_error", "delay"})
+    assert verdict == "unknown"
+    assert law is not None
+    assert law.force > 0.9
+    assert law.law < 0.9 * law.force
+
+
+@pytest.mark.slow
+def test_nothing_is_held_beside_an_answer_that_leaves_noise_alone() -> None:
+    spring = chladni.attached("hardening_stiffness", "hand", {"cubic": 3e10})
+    verdict, law = beside(spring, words={"hardening_stiffness", "gain_error"})
+    assert verdict == "effect"
+    assert law is None
