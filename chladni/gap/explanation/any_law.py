@@ -70,7 +70,9 @@ def _tones(motion: Recovered) -> list[Matrix]:
     count = motion.force.size
     product = motion.force * motion.displacement
     power = np.abs(np.fft.rfft((product - product.mean()) * np.hanning(count))) ** 2
-    above = power / np.maximum(uniform_filter1d(power, _NEIGHBOURS, mode="reflect"), np.finfo(np.float64).tiny)
+    # A running sum forgets what is far below the largest line, and leaves its rounding there.
+    least = np.finfo(np.float64).eps * power.max() + np.finfo(np.float64).tiny
+    above = power / np.maximum(uniform_filter1d(power, _NEIGHBOURS, mode="reflect"), least)
     line = int(np.argmax(above[_FIRST:-1])) + _FIRST
     # Between lines by a parabola through the logarithms: over hundreds of turns a line's width is too much.
     below, at, beyond = np.log(np.maximum(power[line - 1 : line + 2], np.finfo(np.float64).tiny))

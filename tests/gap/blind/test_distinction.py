@@ -24,7 +24,7 @@ def scene():
     return bench, numbers, drive, clean, noise
 
 
-def left(scene, change, beside=None):
+def left(scene, change, *beside):
     bench, numbers, drive, clean, noise = scene
     return left_after_tuning(bench, numbers, drive, change, clean, noise, beside=beside)
 
@@ -83,4 +83,4 @@ def test_what_more_of_another_effect_does_is_imitated_by_it(scene):
     change = {name: more[name] - there[name] for name in noise}
     scene = bench, numbers, drive, there, noise
     assert size(scene, change) > 1
-    assert left(scene, change, beside=drag) < 0.02 * size(scene, change)
+    assert left(scene, change, drag) < 0.02 * size(scene, change)

@@ -1,13 +1,14 @@
 """What tells a law of a joint's motion from a floor that shakes under it."""
 
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 import chladni
 from chladni.gap.comparison.noise_estimate import estimate_noise
-from chladni.gap.explanation.any_law import left_by_any_law
+from chladni.gap.explanation.any_law import _tones, left_by_any_law
 from chladni.gap.location.locate import locate
 from chladni.gap.plant.tunable import Tunables
 from chladni.models.core.parameter import Parameter, Parameters
@@ -20,6 +21,14 @@ LAWS = [
     ("hardening_stiffness", {"cubic": 4e12}),
     ("ripple", {"amplitude": 6.0, "period": 2e-5, "phase": 0.4}),
 ]
+
+
+@pytest.mark.parametrize("line", [40, 400])
+def test_a_tone_stands_out_however_far_the_rest_lies_below(line: int) -> None:
+    # Windowed it has three lines; the others are rounding, and so is their running sum.
+    turns = np.cos(2.0 * np.pi * line * np.arange(3000) / 3000)
+    motion = SimpleNamespace(force=1e20 * turns, displacement=np.ones(3000))
+    np.testing.assert_allclose(_tones(cast("Any", motion))[0], turns, atol=1e-3)
 
 
 def left_at(effect, name: str) -> float:
