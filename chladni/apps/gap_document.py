@@ -169,7 +169,7 @@ def _any_law(one: AnyLaw) -> Document:
         "group": list(one.group),
         "force": _known(one.force),
         "law": _known(one.law),
-        "named": None if one.named is None else _known(one.named),
+        "named": _known(one.named),
     }
 
 

@@ -17,6 +17,7 @@ NEAREST = 3
 CARRIED = 0.5
 # Of what any force at a place explains, the share above which a law that follows the motion there does it.
 _FOLLOWED = 0.95
+_LEFT = "what the best parameters leave"
 #: A share of power beyond the noise, as docs/gap.md says; the sentence that it stands in must stay an answer.
 _LEFT_BY_TUNING = "of the gap that tuning leaves"
 
@@ -113,14 +114,16 @@ def _any_law(found: Diagnosis) -> Iterator[str]:
     site = _listed((law.site, *law.group), word="or")
     if law.named is not None:
         yield (
-            f"Any smooth law of what moves at {site} explains {percent(law.law)} of what the best parameters leave, "
+            f"Any smooth law of what moves at {site} explains {percent(law.law)} of {_LEFT}, "
             f"the named one {percent(law.named)}."
         )
     elif law.law > _FOLLOWED * law.force:
-        yield f"A smooth law of what moves at {site} explains {percent(law.law)} of it: none that took part does."
+        yield (
+            f"A smooth law of what moves at {site} explains {percent(law.law)} of {_LEFT}: none that took part does."
+        )
     else:
         yield (
-            f"Any smooth law of what moves at {site} explains {percent(law.law)} of it, any force there "
+            f"Any smooth law of what moves at {site} explains {percent(law.law)} of {_LEFT}, any force there "
             f"{percent(law.force)}: what acts has a memory, follows something else, or acts elsewhere, too."
         )
 

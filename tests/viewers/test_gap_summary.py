@@ -151,9 +151,10 @@ def test_what_any_law_explains_is_told_beside_the_named_one() -> None:
 @pytest.mark.parametrize(
     ("share", "words"),
     [
-        (0.97, "A smooth law of what moves at elbow or wrist explains 97 % of it: none that took part does."),
-        (0.41, ("Any smooth law of what moves at elbow or wrist explains 41 % of it, any force there 98 %: what acts "
-                "has a memory, follows something else, or acts elsewhere, too.")),
+        (0.97, ("A smooth law of what moves at elbow or wrist explains 97 % of what the best parameters leave: none "
+                "that took part does.")),
+        (0.41, ("Any smooth law of what moves at elbow or wrist explains 41 % of what the best parameters leave, any "
+                "force there 98 %: what acts has a memory, follows something else, or acts elsewhere, too.")),
     ],
 )  # fmt: skip
 def test_an_unknown_gap_is_told_with_whether_a_law_of_the_motion_explains_it(share: float, words: str) -> None:

@@ -155,7 +155,7 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case | None:
     if tuned is not None and order.kind != "faint" and tuned < LEAST_LEFT:
         return None
     beside: list[float] = []
-    for place in range(len(effects) if len(effects) > 1 else 0):
+    for place in range(len(effects)) if len(effects) > 1 else ():
         beside.append(_left_beside(bench, numbers, drive, effects, place, noise, steps))
         # Beside the others, too, nobody could find what a little more stiffness, or a larger other effect, imitates.
         if beside[-1] < LEAST_LEFT:

@@ -25,7 +25,7 @@ _DECOYS = 0.25
 
 
 def composition_of(texts: Sequence[str]) -> dict[Kind, int]:
-    """Read a composition from ``KIND=N`` each, such as ``two=20``; `DEFAULT` of none.
+    """Read a composition from ``KIND=N`` each, such as ``two=20``, in any order; `DEFAULT` of none.
 
     Raises
     ------
@@ -41,7 +41,8 @@ def composition_of(texts: Sequence[str]) -> dict[Kind, int]:
         if not re.fullmatch("[1-9][0-9]{0,5}", number.strip()):
             raise SetupError(f"{text!r:.60} must be of the form {kind}=N, with N from 1 to 999999")
         asked[kind] = int(number)
-    return asked or dict(DEFAULT)
+    # What is drawn follows the order of kinds: that of the words must not make another campaign.
+    return {kind: asked[kind] for kind in get_args(Kind) if kind in asked} or dict(DEFAULT)
 
 
 def counts(count: int, composition: Mapping[Kind, int] = DEFAULT) -> dict[Kind, int]:

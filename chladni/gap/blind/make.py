@@ -93,8 +93,12 @@ def _keep_to_one(path: Path, told: dict[str, Any]) -> None:
     if path.is_file():
         found = read_json(path, CAMPAIGN_FORMAT)
         if any(found.get(key) != value for key, value in told.items()):
-            raise SetupError(f"{path.parents[1]}: was begun with count {found.get('count')} and seed "
-                             f"{found.get('seed')}; go on with those, or take another folder")  # fmt: skip
+            kinds = found.get("composition")
+            of = ", ".join(f"{kind}={share}" for kind, share in kinds.items()) if isinstance(kinds, dict) else "?"
+            raise SetupError(
+                f"{path.parents[1]}: was begun with count {found.get('count')}, seed {found.get('seed')} and kinds "
+                f"{of:.200}; go on with those, or take another folder"
+            )
     else:
         write_json(path, {"format": CAMPAIGN_FORMAT, **told})
 

@@ -2,13 +2,11 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.search import ALONE
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.any_law import left_by_any_law
-from chladni.gap.location.locate import Located
+from chladni.gap.location.locate import Located, explained_share
 from chladni.gap.plant.places import Site
 from chladni.gap.records.diagnosis import AnyLaw, Cause
 
@@ -26,19 +24,15 @@ def any_law(study: Study, causes: Causes, said: Sequence[Cause]) -> AnyLaw | Non
         found = _at(study, said[0].site)
     else:
         return None
-    if found is None:
+    if found is None or study.location.tuned.chi <= 1.0:
         return None
     located, site = found
-    gap = study.location.tuned.chi - 1.0
-    if gap <= 0:
-        return None
-    named = None if not said else _share(causes.best.chi - 1.0, causes.tuned.chi - 1.0)
     return AnyLaw(
         site=site.name,
         group=tuple(name for name in located.places[0].names if name != site.name),
-        force=_share(located.profile.chi - 1.0, gap),
+        force=explained_share(study.location.tuned, located.profile),
         law=1.0 - left_by_any_law(study.location, located, site),
-        named=named,
+        named=explained_share(causes.tuned, causes.best) if said else None,
     )
 
 
@@ -61,8 +55,3 @@ def _at(study: Study, name: str) -> tuple[Located, Site] | None:
     """Give a joint or an input by its name, where its force was followed."""
     there = ((located, site) for located in study.location.ranked for site in located.places[0].sites)
     return next((pair for pair in there if pair[1].name == name and pair[1].kind in ("joint", "input")), None)
-
-
-def _share(left: float, gap: float) -> float:
-    """Share of a power beyond noise that is explained, 0 to 1."""
-    return float(np.clip(1.0 - max(left, 0.0) / gap, 0.0, 1.0)) if gap > 0 else 0.0

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from chladni.gap.diagnosis.completeness import completeness, completeness_among, known_share
+from chladni.gap.diagnosis.completeness import COMPLETE, completeness, completeness_among, known_share
 from chladni.gap.diagnosis.following import Entered
 from chladni.gap.diagnosis.further_causes import further_causes, leaves_a_further
 from chladni.gap.diagnosis.grown import Grown
@@ -48,8 +48,6 @@ _LEADS, _BESIDE = 2, (0.80, 0.84, 0.88, 0.92, 0.96)
 _CLEAN = 1.6
 #: Share of the gap's power with which two causes come near to what one force explains.
 _NEAR = 0.03
-#: Probability that a cause is all of it, with which it's named.
-_COMPLETE = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,12 +181,18 @@ def _searched(
         found += sibling_causes(study, [best()])
         found += [detailed(study, best()), *without_one(study, best())]
     found = [one for one in found if _is_plausible(study, nothing, one)]
-    named = 0
-    # Ends where one more doesn't pay: each is at a site of its own.
-    while leaves_a_further(best()) and len(best().hypothesis.effects) > named:
-        named = len(best().hypothesis.effects)
-        found += [one for one in further_causes(study, best()) if _is_plausible(study, nothing, one)]
-    return found, None, states, pairs.forces
+    return _with_further(study, nothing, found, added), None, states, pairs.forces
+
+
+def _with_further(study: Study, nothing: Contestant, found: Sequence[Contestant], added: float) -> list[Contestant]:
+    """Give contestants with those that have a third effect and more, while one more pays."""
+    found, named = list(found), 0
+    best = _best(weighed([nothing, *found]), nothing, added)
+    while leaves_a_further(best) and len(best.hypothesis.effects) > named:
+        named = len(best.hypothesis.effects)
+        found += [one for one in further_causes(study, best) if _is_plausible(study, nothing, one)]
+        best = _best(weighed([nothing, *found]), nothing, added)
+    return found
 
 
 def _detailed(study: Study, ranked: Sequence[Contestant], best: Contestant) -> list[Contestant]:
@@ -201,7 +205,7 @@ def _leaves_another(study: Study, best: Contestant, nothing: Contestant, floor: 
     """Whether what the best cause leaves may be another one."""
     # Sensors that hear only noise, or whose floor is too high, must not hide the one that hears more.
     if best.most_left < ALONE:
-        return best is not nothing and completeness(nothing, best, floor) < _COMPLETE
+        return best is not nothing and completeness(nothing, best, floor) < COMPLETE
     # One force may do what two do, elsewhere; but then no law follows it.
     return leaves_for_sure(best) or not is_one_force(study.location) or is_lost(study.location, best.chi)
 
@@ -268,7 +272,7 @@ def _verdict(together: Sequence[Contestant], tuned: Contestant, best: Contestant
     if best is tuned:
         # With no candidate that pays: is there anything to explain?
         return "none" if tuned.chi < _CLEAN else "unknown"
-    if completeness_among(tuned, best, together, floor) < _COMPLETE:
+    if completeness_among(tuned, best, together, floor) < COMPLETE:
         return "unknown"
     if best.hypothesis.effects:
         return "effect"

@@ -17,6 +17,8 @@ _EXACT = frozenset(
 #: Share of the gap's RMS beyond the noise that a cause may leave at even odds, of laws with details and of those
 #: without; what it may leave over the noise's power without that being counted.
 _LEFT, _UNCOUNTED = (0.38, 0.16), 0.05
+#: Completeness with which a hypothesis is named.
+COMPLETE = 0.5
 #: How sharply more speaks against it.
 _SHARPNESS = 0.2
 #: Probability that the cause of a large gap is one of those that took part, and how much smaller a faint gap's is.

@@ -1,19 +1,14 @@
 """The search for a third cause, and more: beside two that leave what no detail of their laws does."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from chladni.gap.diagnosis.completeness import completeness_of
+from chladni.gap.diagnosis.completeness import COMPLETE, completeness_of
 from chladni.gap.diagnosis.pairs import second_causes, without_one
 from chladni.gap.diagnosis.search import ALONE, detailed
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.contest import weighed
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.models.effects.attached_effect import AttachedEffect
-
-Matrix = NDArray[np.float64]
-#: Probability that a further effect explains all of what the others leave, from which on it's named.
-_ALL = 0.5
 
 
 def leaves_a_further(best: Contestant) -> bool:
@@ -53,4 +48,4 @@ def explains_the_rest(several: Contestant, more: Contestant) -> bool:
     before = set(several.hypothesis.named)
     added = [one.effect for one in more.hypothesis.named if one not in before]
     floor = np.minimum(np.minimum(several.held, more.held), 1.0)
-    return completeness_of(several.held, more.held, added, floor) > _ALL
+    return completeness_of(several.held, more.held, added, floor) > COMPLETE

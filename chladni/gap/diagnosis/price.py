@@ -40,8 +40,8 @@ class Price:
         effects = len(one.hypothesis.effects)
         first = NAMED if effects else WRONG * bool(one.hypothesis.wide)
         further = min(_ADDED_FOR_SURE, self.further) if self.sure in one.hypothesis.named else self.further
-        second, others = min(effects, 2) - 1, effects - 2
-        return one.log_evidence - first - further * max(second, 0) - _ADDED * max(others, 0)
+        beside = max(effects - 1, 0)
+        return one.log_evidence - first - further * min(beside, 1) - _ADDED * max(beside - 1, 0)
 
 
 def added_nats(location: Location) -> float:

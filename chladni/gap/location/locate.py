@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -244,13 +245,21 @@ def _shares(tuned: Profile, rough: Sequence[_Rough]) -> dict[str, float]:
     }
 
 
-def explained_share(tuned: Profile, profile: Profile) -> float:
-    """Give the share of the misfit beyond noise that the forces of a profile explain, 0 to 1.
+class Left(Protocol):
+    """A fit that knows what it leaves: a profile, or a contestant."""
+
+    @property
+    def chi(self) -> float:
+        """Mean square over what noise alone leaves."""
+
+
+def explained_share(tuned: Left, profile: Left) -> float:
+    """Give the share of the misfit beyond noise that a fit with forces, or causes, explains, 0 to 1.
 
     Parameters
     ----------
     tuned
-        Without any force.
+        Without any.
     """
     gap = max(tuned.chi - 1.0, 1e-12)
     return float(np.clip((tuned.chi - max(profile.chi, 1.0)) / gap, 0.0, 1.0))

@@ -1,23 +1,30 @@
 """Any law of what moves at a place, held beside an answer that leaves something."""
 
+from dataclasses import replace
+
 import pytest
 
 import chladni
 from chladni.gap.diagnosis.any_law_beside import any_law
-from chladni.gap.diagnosis.causes import causes_of
+from chladni.gap.diagnosis.causes import Causes, causes_of
 from chladni.gap.diagnosis.naming import causes_named
-from chladni.gap.diagnosis.study import study_of
+from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.records.diagnosis import AnyLaw
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.effects.catalogue import CATALOGUE
 from tests.gap.arm import arm, measured
 
 
-def beside(effect: AttachedEffect, *, words: set[str]) -> tuple[str, AnyLaw | None]:
-    """Verdict, and what any law explains, where these words take part alone."""
+def judged(effect: AttachedEffect, *, words: set[str]) -> tuple[Study, Causes]:
+    """What is said where these words take part alone."""
     log = measured((effect,), seed=7, seconds=5.0)
     study = study_of(arm(), log, leave_out=frozenset(CATALOGUE) - words, own={})
-    causes = causes_of(study, lambda _: None)
+    return study, causes_of(study, lambda _: None)
+
+
+def beside(effect: AttachedEffect, *, words: set[str]) -> tuple[str, AnyLaw | None]:
+    """Verdict, and what any law explains."""
+    study, causes = judged(effect, words=words)
     return causes.verdict, any_law(study, causes, causes_named(study, causes))
 
 
@@ -44,8 +51,15 @@ def test_what_remembers_is_seen_not_to_follow_it() -> None:
 
 
 @pytest.mark.slow
-def test_nothing_is_held_beside_an_answer_that_leaves_noise_alone() -> None:
+def test_beside_a_name_it_is_asked_only_where_that_leaves_more_than_noise() -> None:
     spring = chladni.attached("hardening_stiffness", "hand", {"cubic": 3e10})
-    verdict, law = beside(spring, words={"hardening_stiffness", "gain_error"})
-    assert verdict == "effect"
-    assert law is None
+    study, causes = judged(spring, words={"hardening_stiffness", "gain_error"})
+    said = causes_named(study, causes)
+    assert causes.verdict == "effect"
+    assert any_law(study, causes, said) is None
+    more = replace(causes, best=replace(causes.best, held=1.0 + 0.1 * (causes.tuned.held - 1.0)))
+    law = any_law(study, more, said)
+    assert law is not None
+    assert law.site == "hand"
+    assert law.named == pytest.approx(0.9)
+    assert law.law > 0.97

@@ -31,6 +31,11 @@ def test_beside_a_number_that_leaves_more_than_noise_a_second_effect_needs_less(
     assert price.paid(both) == pytest.approx(-6.0 - asked)
 
 
+def test_a_third_effect_needs_as_much_as_a_second_beside_a_law_however_little_the_second_does() -> None:
+    three = contestant(GAIN, DRAG, attached("delay", "c", {"delay": 1e-3}))
+    assert price_among([three], 12.0).paid(three) == pytest.approx(-6.0 - 12.0 - 100.0)
+
+
 def test_a_number_that_is_not_the_best_single_cause_makes_nothing_sure() -> None:
     number, law = contestant(GAIN, held=2.0, log_evidence=-50.0), contestant(DRAG, log_evidence=-10.0)
     assert price_among([number, law], 100.0).sure is None
