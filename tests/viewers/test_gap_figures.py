@@ -10,10 +10,12 @@ from matplotlib.figure import Figure
 from chladni.apps.gap_evidence import gap_evidence
 from chladni.gap.records.diagnosis import FittedNumber
 from chladni.signals.errors import EstimateError
+from chladni.viewers.engineering import axis_scale
 from chladni.viewers.figures.campaign import ReliabilityBin, calibration_figure, confusion_figure
 from chladni.viewers.figures.gap import gap_album
 from chladni.viewers.figures.gap_sheet import LETTERS, LIMIT_LETTERS, SENTENCES, gap_sheet
 from chladni.viewers.figures.rendering import rendered
+from chladni.viewers.figures.restoring_force import _draw_over_time
 from chladni.viewers.gap_band import band_told, shown_hz
 from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.gap_summary import caveats, summary
@@ -92,6 +94,21 @@ def test_both_maps_have_one_scale_of_colours(figures: dict[str, Figure]) -> None
     assert before.get_array().max() == pytest.approx(10 * np.log10(made.signals().gap_map.max()))
 
 
+def test_where_an_estimate_rings_at_the_end_of_a_record_the_rest_is_still_seen() -> None:
+    surface = made.restoring_force()
+    high = force_range(surface)[1]
+    force = surface.force.copy()
+    force[-1] = 1e3 * high
+    axes = Figure().add_subplot()
+    _draw_over_time(axes, replace(surface, force=force), None)
+    scale, unit = axis_scale(force, surface.force_unit)
+    np.testing.assert_allclose(np.array(axes.get_ylim()) * scale, force_range(replace(surface, force=force)))
+    assert max(axes.get_ylim()) * scale < 5 * high
+    assert [one.get_text() for one in axes.texts] == [
+        f"recovered: up to {force[-1] / scale:.2g} {unit} beyond the axis"
+    ]
+
+
 def test_the_force_is_drawn_over_both_motions_with_the_law(figures: dict[str, Figure]) -> None:
     surface = made.restoring_force()
     rows = spread_out(surface)
@@ -99,6 +116,7 @@ def test_the_force_is_drawn_over_both_motions_with_the_law(figures: dict[str, Fi
     over_displacement, over_velocity, over_time = (named[name] for name in ("Displacement", "Velocity", "Time"))
     # In the telling stretch nothing is cut.
     low, high = over_time.get_ylim()
+    assert not over_time.texts
     assert low < min(line.get_ydata().min() for line in over_time.lines)
     assert high > max(line.get_ydata().max() for line in over_time.lines)
     dots = np.asarray(over_velocity.collections[0].get_offsets())

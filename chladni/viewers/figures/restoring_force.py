@@ -1,5 +1,6 @@
 """The restoring-force surface: the force that the model lacks, over displacement and over velocity."""
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
@@ -82,6 +83,10 @@ def _draw(figure: Figure, axes: Axes, surface: RestoringForce, over: Over) -> No
     _colour_bar(figure, axes, surface, other(over))
 
 
+#: A force over time that is so many times larger than the surface's axis rings.
+_RINGS = 5.0
+
+
 def _draw_over_time(axes: Axes, surface: RestoringForce, telling_s: tuple[float, float] | None) -> None:
     """Draw force and law where the model errs most; a whole log would be one dark band."""
     start_s, end_s = telling_s or (float(surface.time_s[0]), float(surface.time_s[-1]))
@@ -91,7 +96,13 @@ def _draw_over_time(axes: Axes, surface: RestoringForce, telling_s: tuple[float,
               label="recovered")  # fmt: skip
     if surface.law_force is not None:
         axes.plot(surface.time_s[rows], surface.law_force[rows] / up, color="black", linewidth=0.8, label="law")
-    # All of it: in so short a stretch a force is followed sample by sample, and none may be cut.
+    # All of it: in so short a stretch a force is followed sample by sample; but where the estimate rings at the ends
+    # of a record nothing else would be seen.
+    reach, shown = float(np.max(np.abs(surface.force[rows]), initial=0.0)), force_range(surface)
+    if reach > _RINGS * max(abs(end) for end in shown):
+        axes.set_ylim(*(end / up for end in shown))
+        told = f"recovered: up to {reach / up:.2g} {force_unit} beyond the axis"
+        axes.text(0.98, 0.94, told, transform=axes.transAxes, ha="right", va="top", fontsize=7)
     axes.set_xlim(start_s, end_s)
     axes.set_xlabel("Time [s]")
     axes.set_ylabel(f"Force [{force_unit}]")
