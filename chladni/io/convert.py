@@ -1,19 +1,17 @@
 """Convert between MCAP logs and the files of other tools."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from chladni.io.files.contents import FileContents
-from chladni.io.mcap.log_file import DATA_SUFFIXES
+from chladni.io.files.formats import FILE_SUFFIXES, WRITTEN_SUFFIXES, call_with_options, read_file, writer_of
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
 
 LOG_SUFFIX = ".mcap"
-FILE_SUFFIXES: Final = DATA_SUFFIXES
-"""Suffixes of data files that are read and written, besides that of logs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,11 +101,10 @@ def convert(
 
 
 def _require_paths(source: Path, target: Path, *, overwrite: bool) -> None:
-    for path in (source, target):
-        if path.suffix.lower() not in (LOG_SUFFIX, *FILE_SUFFIXES):
+    for path, verb, known in ((source, "read", FILE_SUFFIXES), (target, "written", WRITTEN_SUFFIXES)):
+        if path.suffix.lower() not in (LOG_SUFFIX, *known):
             raise SetupError(
-                f"{path}: the suffix {path.suffix!r} isn't known; supported are "
-                f"{', '.join((LOG_SUFFIX, *FILE_SUFFIXES))}"
+                f"{path}: the suffix {path.suffix!r} isn't {verb}; supported are {', '.join((LOG_SUFFIX, *known))}"
             )
     if not source.is_file():
         raise LogError(f"{source}: no such file")
@@ -130,8 +127,8 @@ def _read(
         return _read_log(source, channels, start_s, end_s, sample_rate_hz, options)
     if sample_rate_hz is not None:
         options["sample_rate_hz"] = sample_rate_hz
-    contents: FileContents = _call(_reader(source), source, options)
-    return FileContents(series=_cut(source, contents.series, channels, start_s, end_s), notes=contents.notes)
+    contents = read_file(source, **options)
+    return replace(contents, series=_cut(source, contents.series, channels, start_s, end_s))
 
 
 def _read_log(
@@ -144,7 +141,7 @@ def _read_log(
 ) -> FileContents:
     from chladni.io.log import open_log
 
-    with _call(open_log, source, options) as log:
+    with call_with_options(open_log, source, options) as log:
         series = tuple(log.read_groups(channels, start_s=start_s, end_s=end_s))
         notes = tuple(f"{source}: {loss.what}" for loss in log.damage)
         if sample_rate_hz is None:
@@ -217,10 +214,12 @@ def _write(
         series, shifted = _since_1970(series)
         # Message paths come from a log and fit messages; other names only fit the columns of a batch.
         options.setdefault("layout", "messages" if all(name.startswith("/") for name in names) else "batches")
-        written = _call(write_mcap, series, {"path": target, "overwrite": overwrite} | options)
+        written = call_with_options(write_mcap, series, {"path": target, "overwrite": overwrite} | options)
         renamed = tuple(f"{old}: called {new} in the log." for old, new in written.names.items() if old != new)
         return tuple(written.names[name] for name in names), shifted + renamed
-    losses: tuple[str, ...] = _call(_writer(target), series, {"path": target, "overwrite": overwrite} | options)
+    losses: tuple[str, ...] = call_with_options(
+        writer_of(target), series, {"path": target, "overwrite": overwrite} | options
+    )
     return names, losses
 
 
@@ -231,46 +230,6 @@ def _since_1970(series: tuple[TimeSeries, ...]) -> tuple[tuple[TimeSeries, ...],
         return series, ()
     shifted = tuple(replace(part, start_time_ns=part.start_time_ns - first_ns) for part in series)
     return shifted, (f"All times are {-first_ns / 1e9:g} s later in the log, which holds none before 0.",)
-
-
-def _call(function: Callable[..., Any], first: object, options: dict[str, Any]) -> Any:
-    """Call a reader or writer, with an option it doesn't have turned into one line."""
-    # Options come from the command line by name: a wrong one is an input error, not a defect of chladni.
-    from inspect import signature
-
-    known = [name for name in signature(function).parameters if name not in ("path", "series")]
-    for name in options:
-        if name not in signature(function).parameters:
-            raise SetupError(f"{function.__name__} has no option {name!r}; it has {', '.join(known)}")
-    return function(first, **options)
-
-
-def _reader(path: Path) -> Callable[..., FileContents]:
-    from chladni.io.files import csv, mat, npz, uff, wav
-
-    suffix = path.suffix.lower()
-    readers: dict[str, Callable[..., FileContents]] = {
-        ".wav": wav.read_wav,
-        ".mat": mat.read_mat,
-        ".npz": npz.read_npz,
-        ".uff": uff.read_uff,
-        ".unv": uff.read_uff,
-    }
-    return readers.get(suffix, csv.read_csv)
-
-
-def _writer(path: Path) -> Callable[..., tuple[str, ...]]:
-    from chladni.io.files import csv, mat, npz, uff, wav
-
-    suffix = path.suffix.lower()
-    writers: dict[str, Callable[..., tuple[str, ...]]] = {
-        ".wav": wav.write_wav,
-        ".mat": mat.write_mat,
-        ".npz": npz.write_npz,
-        ".uff": uff.write_uff,
-        ".unv": uff.write_uff,
-    }
-    return writers.get(suffix, csv.write_csv)
 
 
 def _duration_s(series: tuple[TimeSeries, ...]) -> float:

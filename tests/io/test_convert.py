@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chladni.io.convert import FILE_SUFFIXES, convert
+from chladni.io.convert import convert
+from chladni.io.files.formats import WRITTEN_SUFFIXES
 from chladni.io.files.npz import read_npz, write_npz
 from chladni.io.log import open_log
 from chladni.io.mcap.writer import write_mcap
@@ -41,7 +42,7 @@ def read_log(path: Path) -> TimeSeries:
 EXACT_START = {".csv", ".txt", ".mat", ".npz", ".uff", ".unv"}
 
 
-@pytest.mark.parametrize("suffix", FILE_SUFFIXES)
+@pytest.mark.parametrize("suffix", WRITTEN_SUFFIXES)
 def test_log_to_file_and_back(tmp_path: Path, suffix: str) -> None:
     series = series_of()
     source = log_of(tmp_path, series)
@@ -154,9 +155,9 @@ def test_several_rates_need_one_for_a_table(tmp_path: Path) -> None:
             "a.xlsx",
             {},
             SetupError,
-            r"'.xlsx' isn't known; supported are .mcap, .csv, .txt, .wav, .mat, .npz, .uff, .unv",
+            r"'.xlsx' isn't written; supported are .mcap, .csv, .txt, .wav, .mat, .npz, .uff, .unv",
         ),
-        ("a", {}, SetupError, "the suffix '' isn't known"),
+        ("a", {}, SetupError, "the suffix '' isn't written"),
         ("there.csv", {}, LogError, "exists already"),
         ("in.npz", {"overwrite": True}, SetupError, "is the source itself"),
         ("a.csv", {"channels": ["/x.y"]}, LogError, "no channel '/x.y'; channels: /wrist"),

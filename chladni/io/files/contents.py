@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, LogError, SetupError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+
+if TYPE_CHECKING:
+    from chladni.signals.time_base import TimeBase
 
 MAX_BYTES = 8 * 2**30
 """Most memory that the arrays of one file may take unless the caller allows more."""
@@ -25,10 +28,17 @@ class FileContents:
         One for each sample rate, start and length.
     notes
         Sentences on what was inferred or left out.
+    unread
+        (name, reason) of each part that was left out: a column of text, an object of MATLAB.
+    time_bases
+        What the file's own times say about the clock of each series, None where it states a rate instead; one for
+        each series, or empty when the file has no times at all.
     """
 
     series: tuple[TimeSeries, ...]
     notes: tuple[str, ...] = ()
+    unread: tuple[tuple[str, str], ...] = ()
+    time_bases: tuple["TimeBase | None", ...] = ()
 
 
 def in_si(values: NDArray[np.floating[Any]], unit: str) -> tuple[NDArray[np.floating[Any]], str]:
@@ -112,7 +122,7 @@ def placed_rows(
     lost = int(np.isfinite(rows).any(axis=0).sum() - np.isfinite(grid.values).any(axis=0).sum())
     if lost:
         notes.append(f"{where}: {lost} samples came at the same time as another one and are left out.")
-    return FileContents(series=(series,), notes=tuple(notes))
+    return FileContents(series=(series,), notes=tuple(notes), time_bases=(base,))
 
 
 def one_series(series: Iterable[TimeSeries], kind: str) -> TimeSeries:

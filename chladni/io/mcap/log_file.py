@@ -5,6 +5,7 @@ import stat
 import threading
 from pathlib import Path
 
+from chladni.io.files.formats import is_data_file
 from chladni.io.mcap.records import MAGIC
 from chladni.signals.errors import LogError
 
@@ -19,8 +20,6 @@ _OTHER_FORMATS = (
     (b"PK\x03\x04", "a zip archive; unpack it first"),
     (b"\x89MCAP", "another version of MCAP, of which only version 0 is known"),
 )
-DATA_SUFFIXES = (".csv", ".txt", ".wav", ".mat", ".npz", ".uff", ".unv")
-"""Data files that can be converted to a log."""
 
 
 class LogFile:
@@ -60,7 +59,7 @@ class LogFile:
         start = self.read(0, 16)
         if start.startswith(MAGIC):
             return
-        if self.path.suffix.lower() in DATA_SUFFIXES:
+        if is_data_file(self.path):
             log = self.path.with_suffix(".mcap")
             raise LogError(f"{self.path}: not an MCAP log; chladni convert {self.path} {log} makes a log of it")
         looks_like = [f"; it looks like {hint}" for magic, hint in _OTHER_FORMATS if start.startswith(magic)]
