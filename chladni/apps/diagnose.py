@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from chladni.apps.findings import damage_sentences
+from chladni.apps.findings import damage_sentences, reading_sentences, require_channels
 from chladni.apps.gap_document import Document, gap_document
 from chladni.apps.sources import Span
 from chladni.gap.comparison.measuring import MatchedLog, matched_log
@@ -46,7 +46,8 @@ def diagnose_gap(
     model
         What the simulation believes, or its file.
     logs
-        A log, or several: files, opened logs or series. Channels are those that the model's inputs and outputs name.
+        A log or data file, or several: their paths, opened, or series. Channels are those that the model's inputs and
+        outputs name.
     leave_out
         Words of effects that don't take part.
     own_effects
@@ -149,10 +150,7 @@ def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
     # Only those: a log may hold a hundred other channels, at rates of their own.
     held = [channel.name for channel in log.channels]
     wanted = _listened_to(model)
-    if not held:
-        # The damage is known when all has been read, and nothing is left to read that would take long.
-        told = " ".join(damage_sentences(log.info().damage)) or "record at least one message with a number in it"
-        raise LogError(f"{name}: holds no channel that can be read; {told}")
+    require_channels(log, name)
     chosen = [channel for channel in held if channel in wanted]
     if not chosen:
         raise LogError(
@@ -163,15 +161,15 @@ def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
     damage = damage_sentences(log.damage)
     begins_s = (series.start_time_ns - log.start_time_ns) / NS_PER_S
     found = matched_log(model, series, log=name, held=held, begins_s=begins_s, damage=damage)
-    return _with_use(found, series, damage)
+    return _with_use(found, series, reading_sentences(log))
 
 
 def _of_series(model: Model, series: TimeSeries, name: str) -> _Read:
     return _with_use(matched_log(model, series, log=name), series)
 
 
-def _with_use(found: MatchedLog, series: TimeSeries, damage: tuple[str, ...] = ()) -> _Read:
-    seen, losses = found.measurement, (*damage, *found.losses)
+def _with_use(found: MatchedLog, series: TimeSeries, told: tuple[str, ...] = ()) -> _Read:
+    seen, losses = found.measurement, (*told, *found.losses)
     use = LogUse(
         log=seen.log,
         used_s=seen.duration_s,

@@ -3,8 +3,11 @@
 from collections.abc import Sequence
 
 from chladni.apps.unit_peaks import UnitPeaks
+from chladni.io.log import Log
+from chladni.io.log_findings import unread_findings
 from chladni.io.log_info import LogInfo, some_of
 from chladni.io.loss import Loss
+from chladni.signals.errors import LogError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
 from chladni.signals.unit_text import with_unit
@@ -18,6 +21,25 @@ def damage_sentences(losses: Sequence[Loss]) -> tuple[str, ...]:
     return tuple(_damage_sentence(loss) for loss in losses)
 
 
+def reading_sentences(log: Log) -> tuple[str, ...]:
+    """Say what was lost of what has been read, what was inferred, and what isn't read."""
+    return (*damage_sentences(log.damage), *log.notes, *unread_findings(log.unread))
+
+
+def require_channels(log: Log, name: str) -> None:
+    """Raise `LogError` when a log, known to people by `name`, has no channel; it says what there is instead."""
+    if log.channels:
+        return
+    if log.functions is not None or log.modes is not None:
+        # The file's own error says what it holds, and what shows it.
+        log.grids()
+    # The damage is known when all has been read, and nothing is left to read that would take long.
+    told = " ".join((*damage_sentences(log.info().damage), *log.notes, *unread_findings(log.unread)))
+    raise LogError(
+        f"{name}: holds no channel that can be read; {told or 'record at least one message with a number in it'}"
+    )
+
+
 def _damage_sentence(loss: Loss) -> str:
     where = "" if loss.offset is None else f" at byte {loss.offset} ({loss.record})"
     lost = "an unknown number of messages" if loss.lost_messages is None else counted(loss.lost_messages, "message")
@@ -29,6 +51,9 @@ def soundness_sentences(info: LogInfo) -> tuple[str, ...]:
     rates = sorted({one["rate_hz"] for one in info.to_json()["channels"] if one["rate_hz"]}, reverse=True)
     told = some_of([f"{rate:.6g} Hz" for rate in rates])
     summary = f"{info.duration_s:.6g} s, {counted(len(info.channels), 'channel')}" + (f" at {told}" if told else "")
+    if (functions := info.functions) is not None:
+        held = counted(len(functions.responses) * len(functions.references), "frequency response")
+        summary = f"{summary}, {held}" if info.channels else held
     return (f"{summary}. {'No trouble found.' if not info.findings else ''}".rstrip(), *info.findings)
 
 

@@ -6,7 +6,8 @@ from typing import Self
 
 import numpy as np
 
-from chladni.apps.modal_channels import excitation_names, motions_of_one_unit, responses_alone
+from chladni.apps.excitation import excitation_names, stored_functions
+from chladni.apps.modal_channels import motions_of_one_unit, responses_alone
 from chladni.apps.sources import Progress, Span, Watched, no_progress
 from chladni.apps.spectra import Averaging, transfer
 from chladni.io.log import Log
@@ -47,6 +48,7 @@ SAMPLES_FOR_MACHINES = 1 << 20
 # A hammer drives modes as far as its force stays within 20 dB (ISO 7626-5); beyond, side lobes of its pulse still
 # make coherent peaks, of which only who asks for them knows what they are worth.
 HAMMER_DRIVES = 1e-2
+ALONE = ", or ask for modes from responses alone (--operational)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +91,8 @@ def identify_modes(
     ----------
     source
         A log or a series, whose frequency responses are estimated first (or, with `operational`, whose responses
-        alone are used), frequency responses, or averaged cross-spectra of responses.
+        alone are used), frequency responses, or averaged cross-spectra of responses. Of a universal file without
+        time records the frequency responses are taken that it holds, else its modes.
     reference
         Channel of the excitation, or several; None takes those whose role is reference, else the first force.
     operational
@@ -135,6 +138,8 @@ def identify_modes(
         return modes_of_response(source, method=method, wanted=wanted)
     if isinstance(source, CrossSpectra):
         return modes_of_spectra(source, method=method, wanted=wanted)
+    if isinstance(source, Log) and not source.channels and source.functions is None and source.modes is not None:
+        return source.modes
     if operational or isinstance(method, FromResponses):
         return modes_of_responses(
             source, channels=channels, method=method, wanted=wanted, averaging=averaging, span=span
@@ -218,10 +223,12 @@ def functions_and_modes(
     EstimateError
         When no excitation is named and none can be told.
     """
-    if reference is None:
-        references = excitation_names(source, span)
-    else:
-        references = (reference,) if isinstance(reference, str) else tuple(reference)
+    named = (reference,) if isinstance(reference, str) else reference
+    stored = stored_functions(source, named, channels)
+    if stored is not None:
+        response = transfer(source, named, channels, estimator="H1", averaging=averaging, span=span)
+        return response, modes_of_response(response, method=method, wanted=wanted)
+    references = excitation_names(source, span, otherwise=ALONE) if named is None else tuple(named)
     coarse = _functions(source, references, channels, wanted, averaging, span, progress)
     finer = _modal_averaging(coarse, averaging)
     if finer == averaging:

@@ -26,8 +26,8 @@ class Span:
 
 
 def is_small(log: Log) -> bool:
-    """Whether all samples of a log may be held in memory at once."""
-    return log.path.stat().st_size <= IN_MEMORY_BYTES
+    """Whether all samples of a log may be held in memory at once, once more where they are in memory already."""
+    return log.size_bytes <= IN_MEMORY_BYTES
 
 
 def no_progress(share: float) -> None:

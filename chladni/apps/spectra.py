@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.apps.excitation import excitation_names, stored_functions
 from chladni.apps.sources import Progress, Span, Watched, no_progress, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
@@ -139,7 +140,7 @@ def densities(
 def frf(
     source: Log | TimeSeries,
     *,
-    reference: str | Sequence[str],
+    reference: str | Sequence[str] | None = None,
     response: str | Sequence[str] | None = None,
     estimator: Estimator = "H1",
     resolution_hz: float | None = None,
@@ -151,14 +152,15 @@ def frf(
     """Estimate transfer functions and coherence.
 
     A hammer test is recognised: its hits are cut out, overloads and double hits rejected with a note each. So is
-    periodic excitation, which is averaged over whole periods. Everything else is averaged after Welch.
+    periodic excitation, which is averaged over whole periods. Everything else is averaged after Welch. Of a universal
+    file without time records the functions that it holds are given.
 
     Parameters
     ----------
     source
         A log (read block by block when it's large) or a series.
     reference
-        Message path of the excitation, or several.
+        Message path of the excitation, or several; None takes those whose role is reference, else the first force.
     response
         Message paths of the responses; None for all other channels that share the reference's sampling grid and
         change at all.
@@ -193,7 +195,7 @@ def frf(
     >>> response.unit(0, 0), float(abs(response.values[0, 0, 10]).round(12))
     ('(m/s^2)/N', 0.5)
     """
-    references = (reference,) if isinstance(reference, str) else tuple(reference)
+    references = (reference,) if isinstance(reference, str) else reference
     responses = (response,) if isinstance(response, str) else response
     averaging = Averaging(resolution_hz=resolution_hz, window=window, overlap=overlap)
     return transfer(
@@ -208,7 +210,7 @@ def frf(
 
 def transfer(
     source: Log | TimeSeries,
-    references: Sequence[str],
+    references: Sequence[str] | None,
     responses: Sequence[str] | None,
     *,
     estimator: Estimator,
@@ -218,8 +220,14 @@ def transfer(
     progress: Progress = no_progress,
 ) -> FrequencyResponse:
     """Do the work of `frf`, with progress; see `excited_lines` for `hammer_range`."""
-    if not references:
+    if references is not None and not references:
         raise EstimateError("no reference is given; name the channel of the excitation")
+    stored = stored_functions(source, references, responses)
+    if stored is not None:
+        _require_nothing_to_average(source, averaging, span)
+        return stored
+    if references is None:
+        references = _told_excitations(source, span)
     names = None if responses is None else tuple(dict.fromkeys((*references, *responses)))
     if isinstance(source, TimeSeries):
         spectra = averaging.spectra(_of_series(source, names, span), references)
@@ -243,6 +251,21 @@ def transfer(
         )
     except EstimateError as error:
         raise EstimateError(f"{source.path.name}: {error}") from error
+
+
+def _told_excitations(source: Log | TimeSeries, span: Span) -> tuple[str, ...]:
+    try:
+        return excitation_names(source, span)
+    except EstimateError as error:
+        raise EstimateError(f"{source.path.name}: {error}" if isinstance(source, Log) else str(error)) from error
+
+
+def _require_nothing_to_average(source: Log | TimeSeries, averaging: Averaging, span: Span) -> None:
+    if averaging != Averaging() or span != Span():
+        name = source.path.name if isinstance(source, Log) else "these functions"
+        raise EstimateError(
+            f"{name}: holds averaged functions already; leave out resolution, window, overlap, start and end"
+        )
 
 
 def _require_moving(watched: Watched, references: Sequence[str]) -> None:

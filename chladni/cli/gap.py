@@ -9,6 +9,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.gap_rows import print_by_level, print_comparison, print_diagnosis
+from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 
@@ -25,7 +26,7 @@ Files = Annotated[
     list[Path],
     typer.Argument(
         metavar="MODEL LOG...",
-        help="A model file, then logs of the machine; several levels tell more.",
+        help="A model file, then logs or data files of the machine; several levels tell more.",
         show_default=False,
     ),
 ]
@@ -67,6 +68,7 @@ ExplainedModel = Annotated[
 ]
 
 
+@opens_files
 def gap(
     files: Files,
     *,
@@ -75,8 +77,7 @@ def gap(
     seed: Seed = 0,
     start: options.Start = None,
     end: options.End = None,
-    setup: options.Setup = None,
-    stamp: options.Stamp = "auto",
+    opener: Opener,
     json: options.Json = None,
     report: Report = None,
     figure: Sheet = None,
@@ -85,16 +86,14 @@ def gap(
     write_model: ExplainedModel = None,
 ) -> None:
     """Where a model and a log disagree, which effect was left out, and how far the gap closes with it."""
-    from chladni.io.log import open_log
-
     wanted = _Wanted(json=json, report=report, figure=figure, figures=figures, save=save, write_model=write_model)
     # A diagnosis takes its time: it shouldn't be lost to a misspelt folder.
-    wanted.require_places([*files, *(simulated or ()), setup])
+    wanted.require_places([*files, *(simulated or ()), opener.setup])
     out = Output(json)
     with ExitStack() as opened:
 
         def opening(path: Path) -> "Log":
-            return opened.enter_context(open_log(path, setup=setup, stamp=stamp))
+            return opened.enter_context(opener(path))
 
         if simulated:
             _require_pairs(files, simulated, wanted, without)
@@ -139,11 +138,12 @@ class _Wanted:
 
 def _model_and_logs(files: "Sequence[Path]") -> "tuple[Model, Sequence[Path]]":
     """Read the model; `SetupError` when there's no log beside it, or a log in its place."""
+    from chladni.io.files.formats import FILE_SUFFIXES, MCAP
     from chladni.models.files.model_file import load_model
     from chladni.signals.errors import SetupError
 
     first, *logs = files
-    if first.suffix.lower() == ".mcap":
+    if first.suffix.lower() in (MCAP, *FILE_SUFFIXES):
         raise SetupError(f"{first}: is a log; give a model file first, or --simulated {first} for a comparison alone")
     if not logs:
         raise SetupError(f"{first}: no log to hold against the model; give one behind it")

@@ -4,33 +4,51 @@ from typing import Any
 
 from chladni.cli import options
 from chladni.cli.channel_rows import grouped_rows
+from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.words import NOTHING, count, number, unit
+from chladni.signals.wording import counted
 
 
+@opens_files
 def info(
     log: options.Log,
     *,
-    setup: options.Setup = None,
-    stamp: options.Stamp = "auto",
+    opener: Opener,
     json: options.Json = None,
 ) -> None:
     """Channels, rates, duration, time base and damage of a log."""
-    from chladni.io.log import open_log
-
-    require_places(reads=[log, setup], writes={"--json": json})
+    require_places(reads=[log, opener.setup], writes={"--json": json})
     out = Output(json)
-    with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name):
+    with opener(log) as opened, out.progress(log.name):
         found = opened.info()
     content = found.to_json()
-    out.table(
-        f"{log.name}: {number(found.duration_s)} s",
-        ["channel", "unit", "rate [Hz]", "samples", "jitter [s]", "stamp", "trouble"],
-        grouped_rows([_row(channel) for channel in content["channels"]]),
-    )
+    if content["channels"] or not content["functions"]:
+        out.table(
+            f"{log.name}: {number(found.duration_s)} s",
+            ["channel", "unit", "rate [Hz]", "samples", "jitter [s]", "stamp", "trouble"],
+            grouped_rows([_row(channel) for channel in content["channels"]]),
+        )
+    if content["functions"]:
+        out.table(
+            f"{log.name}: {counted(len(content['functions']), 'frequency response')}",
+            ["response", "reference", "unit", "lines", "from [Hz]", "to [Hz]"],
+            grouped_rows([_function_row(function) for function in content["functions"]]),
+        )
     out.lines(found.findings)
     out.json(content)
+
+
+def _function_row(function: dict[str, Any]) -> list[str]:
+    return [
+        function["response"],
+        function["reference"],
+        unit(function["unit"]),
+        count(function["lines"]),
+        number(function["low_hz"], digits=6),
+        number(function["high_hz"], digits=6),
+    ]
 
 
 def _row(channel: dict[str, Any]) -> list[str]:

@@ -1,18 +1,13 @@
 """Arguments and options that several commands share."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
-Log = Annotated[Path, typer.Argument(metavar="LOG", help="An MCAP log.", show_default=False)]
-Setup = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE", help="Setup file: points, directions, units, sensitivities.", show_default=False),
-]
-Stamp = Annotated[
-    Literal["auto", "header", "publish", "log"],
-    typer.Option(help="Which time of a message is its sample time: its own stamp, when published, when logged."),
+Log = Annotated[
+    Path,
+    typer.Argument(metavar="LOG", help="An MCAP log, or a data file of any kind that is read.", show_default=False),
 ]
 Json = Annotated[
     str | None,

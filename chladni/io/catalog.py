@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from chladni.io.channel_source import ChannelSource
 from chladni.io.mcap.container import McapContainer
 from chladni.io.message_path import near_matches, parse_message_path
-from chladni.io.setup import ChannelSetup, Setup
+from chladni.io.setup import ChannelSetup, Setup, refined
 from chladni.io.stamps import (
     StampChoice,
     StampRequest,
@@ -20,7 +20,6 @@ from chladni.io.stream import Stream
 from chladni.io.topic import Topic, read_heads, topics_of
 from chladni.io.topic_channels import TopicChannels, topic_channels
 from chladni.signals.errors import LogError, SetupError
-from chladni.signals.unit_text import in_unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -233,24 +232,5 @@ def with_setup(source: ChannelSource, setup: ChannelSetup | None) -> ChannelSour
     """
     if setup is None:
         return source
-    factor, unit = setup.si_unit(source.factor, source.channel.unit)
-    channel = source.channel
-    overload = channel.overload
-    if setup.overload is not None:
-        overload, overload_unit = setup.overload
-        if overload_unit != unit:
-            raise SetupError(
-                f"{setup.place}: {setup.path} range: it is {in_unit(overload_unit)}, the channel {in_unit(unit)}; "
-                "give the range in the channel's unit, or the channel's unit"
-            )
-    refined = replace(
-        channel,
-        unit=unit,
-        point=setup.point or channel.point,
-        direction=setup.direction or channel.direction,
-        role=setup.role or channel.role,
-        overload=overload,
-        # What is stated for this very channel goes before what its type is documented to hold.
-        units_possible=() if setup.unit or setup.sensitivity else channel.units_possible,
-    )
-    return replace(source, channel=refined, factor=factor)
+    channel, factor = refined(source.channel, source.factor, setup)
+    return replace(source, channel=channel, factor=factor)

@@ -6,12 +6,10 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from chladni.io.files.contents import FileContents
-from chladni.io.files.formats import FILE_SUFFIXES, WRITTEN_SUFFIXES, call_with_options, read_file, writer_of
+from chladni.io.files.formats import MCAP, WRITTEN_SUFFIXES, call_with_options, writer_of
+from chladni.io.log import Log, open_log
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
-
-LOG_SUFFIX = ".mcap"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +30,8 @@ class Conversion:
         Sentences on what the target doesn't hold or calls otherwise.
     notes
         Sentences on what was inferred from the source or left out of it.
+    unread
+        (name, reason) of each part of the source that isn't read.
     """
 
     source: Path
@@ -41,6 +41,7 @@ class Conversion:
     duration_s: float
     losses: tuple[str, ...]
     notes: tuple[str, ...]
+    unread: tuple[tuple[str, str], ...] = ()
 
 
 def convert(
@@ -51,6 +52,7 @@ def convert(
     start_s: float | None = None,
     end_s: float | None = None,
     sample_rate_hz: float | None = None,
+    resample_hz: float | None = None,
     layout: str | None = None,
     overwrite: bool = False,
     reading: Mapping[str, Any] | None = None,
@@ -67,7 +69,9 @@ def convert(
     start_s, end_s
         Time window, seconds from the first sample.
     sample_rate_hz
-        From a log: rate to bring all channels to. From a file without time base: the rate of its rows.
+        True rate of the samples, where the source doesn't say it; nothing is resampled.
+    resample_hz
+        Bring all channels to this rate, band-limited.
     layout
         Of a log: ``messages`` or ``batches``, see `chladni.io.mcap.writer.write_mcap`. By default messages, when all
         names are message paths, else batches, which keep any name.
@@ -86,26 +90,28 @@ def convert(
     """
     source, target = Path(source), Path(target)
     _require_paths(source, target, overwrite=overwrite)
-    contents = _read(source, channels, start_s, end_s, sample_rate_hz, dict(reading or {}))
+    rate = {} if sample_rate_hz is None else {"sample_rate_hz": sample_rate_hz}
+    with open_log(source, **{**(reading or {}), **rate}) as log:
+        series, notes = _read(log, channels, start_s, end_s, resample_hz)
+        unread = log.unread
     options = dict(writing or {}) | ({} if layout is None else {"layout": layout})
-    names, losses = _write(contents.series, target, overwrite=overwrite, options=options)
+    names, losses = _write(series, target, overwrite=overwrite, options=options)
     return Conversion(
         source=source,
         target=target,
         channels=names,
-        samples=sum(part.values.size for part in contents.series),
-        duration_s=_duration_s(contents.series),
+        samples=sum(part.values.size for part in series),
+        duration_s=_duration_s(series),
         losses=losses,
-        notes=contents.notes,
+        notes=tuple(f"{source}: {note}" for note in notes),
+        unread=unread,
     )
 
 
 def _require_paths(source: Path, target: Path, *, overwrite: bool) -> None:
-    for path, verb, known in ((source, "read", FILE_SUFFIXES), (target, "written", WRITTEN_SUFFIXES)):
-        if path.suffix.lower() not in (LOG_SUFFIX, *known):
-            raise SetupError(
-                f"{path}: the suffix {path.suffix!r} isn't {verb}; supported are {', '.join((LOG_SUFFIX, *known))}"
-            )
+    written = (MCAP, *WRITTEN_SUFFIXES)
+    if target.suffix.lower() not in written:
+        raise SetupError(f"{target}: the suffix {target.suffix!r} isn't written; supported are {', '.join(written)}")
     if not source.is_file():
         raise LogError(f"{source}: no such file")
     # Said before the question of overwriting, whose answer would destroy the source.
@@ -116,40 +122,19 @@ def _require_paths(source: Path, target: Path, *, overwrite: bool) -> None:
 
 
 def _read(
-    source: Path,
+    log: Log,
     channels: Sequence[str] | None,
     start_s: float | None,
     end_s: float | None,
-    sample_rate_hz: float | None,
-    options: dict[str, Any],
-) -> FileContents:
-    if source.suffix.lower() == LOG_SUFFIX:
-        return _read_log(source, channels, start_s, end_s, sample_rate_hz, options)
-    if sample_rate_hz is not None:
-        options["sample_rate_hz"] = sample_rate_hz
-    contents = read_file(source, **options)
-    return replace(contents, series=_cut(source, contents.series, channels, start_s, end_s))
-
-
-def _read_log(
-    source: Path,
-    channels: Sequence[str] | None,
-    start_s: float | None,
-    end_s: float | None,
-    sample_rate_hz: float | None,
-    options: dict[str, Any],
-) -> FileContents:
-    from chladni.io.log import open_log
-
-    with call_with_options(open_log, source, options) as log:
-        series = tuple(log.read_groups(channels, start_s=start_s, end_s=end_s))
-        notes = tuple(f"{source}: {loss.what}" for loss in log.damage)
-        if sample_rate_hz is None:
-            return FileContents(series=series, notes=notes)
-        joined, note = _on_one_grid(series, sample_rate_hz)
-        return FileContents(
-            series=(joined if channels is None else joined.select(log.names(channels)),), notes=(*notes, note)
-        )
+    resample_hz: float | None,
+) -> tuple[tuple[TimeSeries, ...], tuple[str, ...]]:
+    """Give the series, and sentences on what was inferred or lost."""
+    series = log.read_groups(channels, start_s=start_s, end_s=end_s)
+    notes = (*(loss.what for loss in log.damage), *log.notes)
+    if resample_hz is None:
+        return series, notes
+    joined, note = _on_one_grid(series, resample_hz)
+    return (joined if channels is None else joined.select(log.names(channels)),), (*notes, note)
 
 
 def _on_one_grid(series: tuple[TimeSeries, ...], sample_rate_hz: float) -> tuple[TimeSeries, str]:
@@ -175,40 +160,12 @@ def _valid_s(part: TimeSeries) -> list[float]:
     return [int(count) / part.sample_rate_hz for count in part.valid.sum(axis=1)]
 
 
-def _cut(
-    source: Path,
-    series: tuple[TimeSeries, ...],
-    channels: Sequence[str] | None,
-    start_s: float | None,
-    end_s: float | None,
-) -> tuple[TimeSeries, ...]:
-    known = [channel.name for part in series for channel in part.channels]
-    unknown = [name for name in channels or () if name not in known]
-    if unknown:
-        raise LogError(f"{source}: no channel {unknown[0]!r}; channels: {', '.join(known)}")
-    if channels is not None:
-        wanted = [[name for name in channels if name in {c.name for c in part.channels}] for part in series]
-        series = tuple(part.select(names) for part, names in zip(series, wanted, strict=True) if names)
-    if start_s is None and end_s is None:
-        return series
-    # One clock for all series of a file: seconds count from the earliest sample, as in a log.
-    origin_ns = min(part.start_time_ns for part in series)
-    return tuple(_window(part, origin_ns, start_s, end_s) for part in series)
-
-
-def _window(part: TimeSeries, origin_ns: int, start_s: float | None, end_s: float | None) -> TimeSeries:
-    offset_s = (part.start_time_ns - origin_ns) / 1e9
-    return part.window(
-        start_s=None if start_s is None else start_s - offset_s, end_s=None if end_s is None else end_s - offset_s
-    )
-
-
 def _write(
     series: tuple[TimeSeries, ...], target: Path, *, overwrite: bool, options: dict[str, Any]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Write, and give the names in the target and the losses."""
     names = tuple(channel.name for part in series for channel in part.channels)
-    if target.suffix.lower() == LOG_SUFFIX:
+    if target.suffix.lower() == MCAP:
         from chladni.io.mcap.writer import write_mcap
 
         series, shifted = _since_1970(series)

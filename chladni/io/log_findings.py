@@ -8,6 +8,7 @@ from chladni.io.log_info import some_of
 from chladni.io.loss import Loss
 from chladni.io.placement import Placement
 from chladni.io.sample_monitor import SampleMonitor
+from chladni.signals.channel import Channel
 from chladni.signals.sensor_quality import SensorFault
 from chladni.signals.wording import counted
 
@@ -30,16 +31,20 @@ def log_findings(
     """
     if damage:
         yield damage_finding(damage)
-    yield from _together(_stamp_findings(placements))
-    yield from _together(finding for placement in placements for finding in _clock_findings(placement))
-    yield from _together(finding for monitor in monitors for finding in _missing_samples(monitor))
-    faults = [fault for monitor in monitors for fault in monitor.faults.values()]
-    yield from _faults_together([fault for fault in faults if fault.kind != "dead"])
-    yield from _together(_constant([fault for fault in faults if fault.kind == "dead"]))
+    yield from together(_stamp_findings(placements))
+    yield from together(finding for placement in placements for finding in _clock_findings(placement))
+    yield from together(finding for monitor in monitors for finding in _missing_samples(monitor))
+    yield from fault_findings([fault for monitor in monitors for fault in monitor.faults.values()])
     yield from _content_findings(content)
 
 
-def _together(findings: Iterable[tuple[str, str]]) -> Iterator[str]:
+def fault_findings(faults: Sequence[SensorFault]) -> Iterator[str]:
+    """Say what is wrong with sensors, by what their samples show."""
+    yield from _faults_together([fault for fault in faults if fault.kind != "dead"])
+    yield from together(_constant([fault for fault in faults if fault.kind == "dead"]))
+
+
+def together(findings: Iterable[tuple[str, str]]) -> Iterator[str]:
     """Join subjects that share a sentence; sentences in the order they first come."""
     subjects: dict[str, list[str]] = {}
     for subject, sentence in findings:
@@ -93,10 +98,15 @@ def _clock_findings(placement: Placement) -> Iterator[tuple[str, str]]:
 
 def _missing_samples(monitor: SampleMonitor) -> Iterator[tuple[str, str]]:
     for channel, count in zip(monitor.gathering.stream.channels, monitor.missing.tolist(), strict=False):
-        if count and count == monitor.samples:
-            yield channel.name, "not one sample is a number (all are NaN); nobody fills this field"
-        elif count:
-            yield channel.name, f"{count} of {counted(monitor.samples, 'sample')} not a number; they count as missing"
+        if count:
+            yield channel.name, missing_sentence(count, monitor.samples)
+
+
+def missing_sentence(count: int, samples: int) -> str:
+    """Say how many samples of a channel are no numbers."""
+    if count == samples:
+        return "not one sample is a number (all are NaN); nobody fills this field"
+    return f"{count} of {counted(samples, 'sample')} not a number; they count as missing"
 
 
 def _faults_together(faults: Sequence[SensorFault]) -> Iterator[str]:
@@ -130,12 +140,22 @@ def _constant(dead: Sequence[SensorFault]) -> Iterator[tuple[str, str]]:
 
 
 def _content_findings(content: Catalog) -> Iterator[str]:
-    yield from _together((topic, f"can't be decoded: {reason}") for topic, reason in content.refused.items())
-    yield from _together(
+    yield from together((topic, f"can't be decoded: {reason}") for topic, reason in content.refused.items())
+    yield from together(
         (f"{name}.{leaf}", "an array this long isn't listed; single elements can be read by path")
         for name, channels in content.topics.items()
         for leaf in channels.skipped_arrays()
     )
-    unknown = [source.channel.name for source in content.channels if source.channel.unit == UNKNOWN_UNIT]
+    yield from unit_findings([source.channel for source in content.channels])
+
+
+def unread_findings(unread: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """Say which parts of a file aren't read, and why."""
+    yield from together((name, f"not read: {reason}") for name, reason in unread)
+
+
+def unit_findings(channels: Sequence[Channel]) -> Iterator[str]:
+    """Say which channels have no unit."""
+    unknown = [channel.name for channel in channels if channel.unit == UNKNOWN_UNIT]
     if unknown:
         yield f"the log gives no unit for {some_of(unknown)}; a setup file can"

@@ -3,14 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from chladni.io.loss import Loss
 from chladni.io.stamps import StampKind
 from chladni.signals.channel import Channel
+from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.time_base import TimeBase
 
 INFO_FORMAT: Final = "chladni.info/1"
+SampleTime = StampKind | Literal["column", "rate"]
+"""Time of a message; or, in a data file, a column of times, or a rate and nothing else."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -22,7 +25,7 @@ class ChannelInfo:
     channel
         The channel.
     encoding
-        How its messages are encoded.
+        How its messages are encoded; of a data file its kind, such as ``csv``.
     samples
         Samples in the log.
     stamp, stamp_reason
@@ -38,7 +41,7 @@ class ChannelInfo:
     channel: Channel
     encoding: str
     samples: int
-    stamp: StampKind
+    stamp: SampleTime
     stamp_reason: str
     time_base: TimeBase
     gaps: tuple[tuple[float, float], ...]
@@ -79,6 +82,10 @@ class LogInfo:
         What was lost.
     findings
         Sentences about the log's soundness, the worst first.
+    unread
+        (name, reason) of each part that isn't read.
+    functions
+        Frequency responses that the file holds ready-made, or None.
     """
 
     file: str
@@ -87,6 +94,8 @@ class LogInfo:
     channels: tuple[ChannelInfo, ...]
     damage: tuple[Loss, ...]
     findings: tuple[str, ...]
+    unread: tuple[tuple[str, str], ...] = ()
+    functions: FrequencyResponse | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Give the content of ``chladni info --json``."""
@@ -96,6 +105,8 @@ class LogInfo:
             "duration_s": self.duration_s,
             "channels": [one.to_json() for one in self.channels],
             "damage": [_loss_json(one) for one in self.damage],
+            "unread": [{"name": name, "reason": reason} for name, reason in self.unread],
+            "functions": [] if self.functions is None else _functions_json(self.functions),
             "findings": list(self.findings),
         }
 
@@ -106,6 +117,21 @@ def _loss_json(loss: Loss) -> dict[str, Any]:
         "where": {"offset": loss.offset, "record": loss.record},
         "lost_messages": loss.lost_messages,
     }
+
+
+def _functions_json(functions: FrequencyResponse) -> list[dict[str, Any]]:
+    return [
+        {
+            "response": response.name,
+            "reference": reference.name,
+            "unit": functions.unit(row, column),
+            "lines": functions.frequency_hz.size,
+            "low_hz": float(functions.frequency_hz[0]),
+            "high_hz": float(functions.frequency_hz[-1]),
+        }
+        for row, response in enumerate(functions.responses)
+        for column, reference in enumerate(functions.references)
+    ]
 
 
 def _positive(number: float) -> float | None:

@@ -296,7 +296,7 @@ def several_grids(file: str, told: Sequence[tuple[Sequence[Channel], float, int]
     highest_hz = f"{max(rate_hz for _, rate_hz, _ in told):.6g}"
     return (
         f"{file}: channels have {len(grids)} different sampling grids: {'; '.join(grids)}; bring them to one by "
-        f"band-limited resampling: chladni convert {file} OUT.mcap --rate {highest_hz}, in Python "
+        f"band-limited resampling: chladni convert {file} OUT.mcap --resample {highest_hz}, in Python "
         f"sample_rate_hz={highest_hz}"
     )
 

@@ -1,17 +1,30 @@
 """One pass over a whole log, to learn whether it is sound."""
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
 
 from chladni.io.catalog import Catalog
+from chladni.io.files.contents import FileContents
 from chladni.io.gathering import Gathering, LostMessages, windowed
-from chladni.io.log_findings import log_findings
+from chladni.io.log_findings import (
+    fault_findings,
+    log_findings,
+    missing_sentence,
+    together,
+    unit_findings,
+    unread_findings,
+)
 from chladni.io.log_info import ChannelInfo, LogInfo
 from chladni.io.loss import losses
 from chladni.io.mcap.container import McapContainer
 from chladni.io.placement import Placement
-from chladni.io.sample_monitor import SampleMonitor
+from chladni.io.sample_monitor import STRETCH_VALUES, Faults, SampleMonitor, clipped_samples, judge_samples
 from chladni.io.stream import read_pieces
-from chladni.signals.time_series import NS_PER_S
+from chladni.signals.time_base import TimeBase
+from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 
 def survey(container: McapContainer, content: Catalog, lost: LostMessages) -> LogInfo:
@@ -72,3 +85,119 @@ def _duration_s(content: Catalog, monitors: Sequence[SampleMonitor], placements:
         if monitor.samples
     ]
     return max(0, max(ends, default=content.start_ns) - content.start_ns) / NS_PER_S
+
+
+# --- data files --------------------------------------------------------------------------------------------------
+
+
+def survey_file(file: str, kind: str, contents: FileContents, notes: Sequence[str]) -> LogInfo:
+    """Look at the samples of a data file once.
+
+    Parameters
+    ----------
+    file, kind
+        Its name, and what it is.
+    contents
+        What was read of it.
+    notes
+        Sentences about that.
+    """
+    faults: Faults = {}
+    begin_ns = min((part.start_time_ns for part in contents.series), default=0)
+    end_ns = max((_end_ns(part) for part in contents.series), default=0)
+    bases = contents.time_bases or (None,) * len(contents.series)
+    channels, missing = [], []
+    for part, base in zip(contents.series, bases, strict=True):
+        lost = _judged(part, faults)
+        offset_s = (part.start_time_ns - begin_ns) / NS_PER_S
+        channels += _file_channels(part, base, kind, lost, faults, offset_s)
+        missing += [
+            (channel.name, missing_sentence(count, part.samples))
+            for channel, count in zip(part.channels, _beyond_gaps(part).tolist(), strict=True)
+            if count
+        ]
+    told = (
+        notes,
+        unread_findings(contents.unread),
+        together(missing),
+        fault_findings(list(faults.values())),
+        unit_findings([one.channel for one in channels]),
+    )
+    return LogInfo(
+        file=file,
+        start_time_ns=begin_ns,
+        duration_s=(end_ns - begin_ns) / NS_PER_S,
+        channels=tuple(channels),
+        damage=(),
+        findings=tuple(chain.from_iterable(told)),
+        unread=contents.unread,
+        functions=contents.functions,
+    )
+
+
+def _end_ns(series: TimeSeries) -> int:
+    return series.start_time_ns + round(series.duration_s * NS_PER_S)
+
+
+def _judged(series: TimeSeries, faults: Faults) -> NDArray[np.int64]:
+    """Judge the samples in stretches, and count those of each channel that are missing."""
+    lost = np.zeros(len(series.channels), np.int64)
+    length = max(1, STRETCH_VALUES // max(1, len(series.channels)))
+    for first in range(0, series.samples, length):
+        values, valid = series.values[:, first : first + length], None
+        if series.valid is not None:
+            valid = series.valid[:, first : first + length]
+            values = np.where(valid, values, np.nan)
+        lost += judge_samples(series.channels, values, faults)
+    return lost
+
+
+def _file_channels(
+    series: TimeSeries, base: TimeBase | None, kind: str, lost: NDArray[np.int64], faults: Faults, offset_s: float
+) -> list[ChannelInfo]:
+    clock = base or _stated_rate(series)
+    reason = "the file's own times" if base else f"no times in the file; its rate is {series.sample_rate_hz:.9g} Hz"
+    return [
+        ChannelInfo(
+            channel=channel,
+            encoding=kind,
+            samples=series.samples - count,
+            stamp="column" if base else "rate",
+            stamp_reason=reason,
+            time_base=clock,
+            gaps=tuple((start + offset_s, end + offset_s) for start, end in clock.gaps),
+            clipped=clipped_samples(faults, channel.name),
+        )
+        for channel, count in zip(series.channels, lost.tolist(), strict=True)
+    ]
+
+
+def _beyond_gaps(series: TimeSeries) -> NDArray[np.int64]:
+    """Samples of each channel that are missing where another channel has one."""
+    if series.valid is None:
+        return np.zeros(len(series.channels), np.int64)
+    beyond: NDArray[np.int64] = np.count_nonzero(~series.valid & series.valid.any(axis=0), axis=1)
+    return beyond
+
+
+def _stated_rate(series: TimeSeries) -> TimeBase:
+    """Give the clock of samples without times: exact, with a gap wherever all channels lack samples."""
+    gaps: list[tuple[float, float]] = []
+    there = None if series.valid is None else np.flatnonzero(series.valid.any(axis=0))
+    if there is not None and there.size:
+        before = np.flatnonzero(np.diff(there) > 1)
+        ends = np.stack((there[before], there[before + 1]), axis=1) / series.sample_rate_hz
+        gaps = [(float(start), float(end)) for start, end in ends]
+    return TimeBase(
+        rate_hz=series.sample_rate_hz,
+        rate_std_hz=0.0,
+        start_ns=series.start_time_ns,
+        samples=series.samples,
+        verdict="regular",
+        advice="",
+        jitter_s=float("nan"),
+        gaps=tuple(gaps),
+        gap_count=len(gaps),
+        knots_ns=np.empty(0, np.int64),
+        knots_index=np.empty(0),
+    )

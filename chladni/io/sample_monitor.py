@@ -1,5 +1,6 @@
 """Watching the samples of a stream as they are read, in bounded memory."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -8,11 +9,15 @@ from numpy.typing import NDArray
 
 from chladni.io.gathering import Gathering
 from chladni.io.stream import Piece
+from chladni.signals.channel import Channel
 from chladni.signals.sensor_quality import SensorFault, sensor_quality
 from chladni.signals.time_series import TimeSeries
 
 STRETCH_VALUES: Final = 1 << 24
 """Values of a stream that are judged together: 128 MiB in double precision. A longer log is judged in stretches."""
+
+Faults = dict[tuple[str, str], SensorFault]
+"""By channel and kind."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -34,7 +39,7 @@ class SampleMonitor:
     gathering: Gathering
     samples: int = 0
     missing: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
-    faults: dict[tuple[str, str], SensorFault] = field(default_factory=dict)
+    faults: Faults = field(default_factory=dict)
     _waiting: list[Piece] = field(default_factory=list)
     _waiting_values: int = 0
 
@@ -52,26 +57,39 @@ class SampleMonitor:
             return
         values = _in_order(self._waiting)
         self._waiting, self._waiting_values = [], 0
-        nan = np.isnan(values)
+        missing = judge_samples(self.gathering.stream.channels, values, self.faults)
         self.samples += values.shape[1]
-        missing = np.count_nonzero(nan, axis=1)
         self.missing = self.missing + missing if self.missing.size else missing
-        series = TimeSeries(
-            values=values,
-            # Rules look at neighbouring samples; where they lie in time doesn't matter.
-            sample_rate_hz=1.0,
-            channels=self.gathering.stream.channels,
-            valid=~nan if missing.any() else None,
-        )
-        for fault in sensor_quality(series):
-            key = (fault.channel, fault.kind)
-            known = self.faults.get(key)
-            self.faults[key] = fault if known is None else replace(known, count=known.count + fault.count)
 
     def clipped(self, channel: str) -> int:
         """Samples of a channel at the sensor's limit."""
-        fault = self.faults.get((channel, "clipped"))
-        return 0 if fault is None else fault.count
+        return clipped_samples(self.faults, channel)
+
+
+def judge_samples(
+    channels: Sequence[Channel], values: NDArray[np.floating[Any]], faults: Faults
+) -> NDArray[np.int64]:
+    """Add what the samples ``[channel, sample]`` of one stretch show to `faults`; count those that are no numbers."""
+    nan = np.isnan(values)
+    missing: NDArray[np.int64] = np.count_nonzero(nan, axis=1)
+    series = TimeSeries(
+        values=values,
+        # Rules look at neighbouring samples; where they lie in time doesn't matter.
+        sample_rate_hz=1.0,
+        channels=tuple(channels),
+        valid=~nan if missing.any() else None,
+    )
+    for fault in sensor_quality(series):
+        key = (fault.channel, fault.kind)
+        known = faults.get(key)
+        faults[key] = fault if known is None else replace(known, count=known.count + fault.count)
+    return missing
+
+
+def clipped_samples(faults: Faults, channel: str) -> int:
+    """Samples of a channel at the sensor's limit."""
+    fault = faults.get((channel, "clipped"))
+    return 0 if fault is None else fault.count
 
 
 def _in_order(pieces: list[Piece]) -> NDArray[np.floating[Any]]:

@@ -1,16 +1,17 @@
 """Setup file: where the sensors sit, what they measure, and how unusual messages are to be read."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from chladni.io.batch_messages import BatchLayout
 from chladni.io.message_path import near_matches
 from chladni.io.toml_reader import read_toml, tables
-from chladni.signals.channel import Role, Vector, unit_direction
+from chladni.signals.channel import Channel, Role, Vector, unit_direction
 from chladni.signals.errors import SetupError
 from chladni.signals.geometry import Geometry, Point
+from chladni.signals.unit_text import in_unit
 from chladni.signals.units import parse_quantity, quotient, si_factor
 
 if TYPE_CHECKING:
@@ -96,6 +97,36 @@ class Setup:
     geometry: Geometry = field(default_factory=Geometry)
     channels: tuple[ChannelSetup, ...] = ()
     batches: Mapping[str, BatchLayout] = field(default_factory=dict)
+
+
+def refined(channel: Channel, factor: float, setup: ChannelSetup) -> tuple[Channel, float]:
+    """Refine a channel, and the factor from its numbers to SI, by what the setup file says of it.
+
+    Raises
+    ------
+    SetupError
+        When sensitivity or range don't fit the channel's unit.
+    """
+    factor, unit = setup.si_unit(factor, channel.unit)
+    overload = channel.overload
+    if setup.overload is not None:
+        overload, overload_unit = setup.overload
+        if overload_unit != unit:
+            raise SetupError(
+                f"{setup.place}: {setup.path} range: it is {in_unit(overload_unit)}, the channel {in_unit(unit)}; "
+                "give the range in the channel's unit, or the channel's unit"
+            )
+    told = replace(
+        channel,
+        unit=unit,
+        point=setup.point or channel.point,
+        direction=setup.direction or channel.direction,
+        role=setup.role or channel.role,
+        overload=overload,
+        # What is stated for this very channel goes before what its type is documented to hold.
+        units_possible=() if setup.unit or setup.sensitivity else channel.units_possible,
+    )
+    return told, factor
 
 
 def load_setup(path: Path | str) -> Setup:

@@ -1,6 +1,7 @@
 """Named peaks of spectra and frequency responses: where, how high, how sure, on which channels."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.ndimage
@@ -19,6 +20,7 @@ from chladni.spectral.windows import noise_bandwidth_bins
 # The floor around a line is the median of a tenth of the spectrum, of this many lines at least.
 FLOOR_SHARE = 0.1
 FLOOR_LINES = 51
+FEWEST_LINES = 5
 # Interpolation between lines is never better than this share of a line: windows and resonances are not parabolas.
 INTERPOLATION_LINES = 0.02
 # Estimates said to be exact still scatter by rounding and by the slow change of any machine; one that is as uncertain
@@ -36,7 +38,11 @@ MOST_PEAKS = 10
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Curve:
-    """Power over frequency, of one function, with what is needed to judge a maximum of it."""
+    """Power over frequency, of one function, with what is needed to judge a maximum of it.
+
+    `sampled`: whether the lines are points of the function itself, as of those that a file holds ready-made; nothing
+    is known of a window that would have smeared them.
+    """
 
     frequency_hz: Floats
     power: Floats
@@ -47,6 +53,7 @@ class _Curve:
     line_sampled: bool
     window: Floats
     tonal: bool
+    sampled: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,7 +159,8 @@ def find_response_peaks(
     -------
     tuple of Peak
         The highest first; ``channels`` are the response and its reference. Heights are magnitudes. Lines whose
-        coherence unrelated channels would show with a chance of 0.1 % or more hold no peak.
+        coherence unrelated channels would show with a chance of 0.1 % or more hold no peak. Of functions without
+        error bars, as files of other programs hold them, the scatter is what lines differ from their neighbours by.
 
     Raises
     ------
@@ -189,7 +197,10 @@ def _density_curve(density: PowerSpectralDensity, row: int) -> _Curve:
 
 
 def _response_curve(response: FrequencyResponse, row: int, column: int) -> _Curve:
-    magnitude, std = np.abs(response.values[row, column]), response.std[row, column]
+    values, std = response.values[row, column], response.std[row, column]
+    magnitude, sampled = np.abs(values), response.provenance.averages == 0
+    if sampled and not np.isfinite(std).any():
+        std = _scatter_along(values)
     usable = response.excited & np.isfinite(magnitude) & (magnitude > 0)
     spacing_hz = _spacing(response.frequency_hz)
     # A magnitude wrong by 1 % is a power wrong by 2 %.
@@ -197,11 +208,26 @@ def _response_curve(response: FrequencyResponse, row: int, column: int) -> _Curv
         response.frequency_hz[usable],
         magnitude[usable] ** 2,
         2 * std[usable] / magnitude[usable],
-        trusted=_coherent(response, row)[usable],
+        trusted=np.ones(np.count_nonzero(usable), dtype=bool) if sampled else _coherent(response, row)[usable],
         provenance=response.provenance,
         bandwidth_hz=spacing_hz * noise_bandwidth_bins(named_window(response.provenance.window)),
         tonal=False,
+        sampled=sampled,
     )
+
+
+def _scatter_along(values: NDArray[np.complexfloating[Any, Any]]) -> Floats:
+    """One sigma of the magnitude, from the fourth differences of neighbouring lines.
+
+    A smooth function has next to none; Gaussian noise of sigma s in real and imaginary part has a variance of
+    (1 + 16 + 36 + 16 + 1) s^2 in each. Their median over the lines around looks past a resonance.
+    """
+    if values.size < FEWEST_LINES:
+        return np.full(values.size, np.inf)
+    differences = np.abs(np.convolve(values, (1, -4, 6, -4, 1), mode="valid"))
+    around = scipy.ndimage.median_filter(differences, size=FLOOR_LINES, mode="nearest")
+    # The magnitude of two Gaussian numbers is Rayleigh's, whose median is sqrt(2 ln 2) sigma.
+    return np.asarray(np.pad(around, 2, mode="edge") / np.sqrt(70 * 2 * np.log(2)), dtype=np.float64)
 
 
 def _curve(
@@ -213,10 +239,12 @@ def _curve(
     provenance: Provenance,
     bandwidth_hz: float,
     tonal: bool,
+    sampled: bool = False,
 ) -> _Curve:
     line_sampled = provenance.averaging == "periodic"
     # Whole periods don't leak, and a transient that has died away has no trend: only the offset itself is excluded.
-    first_hz = 0.0 if line_sampled or provenance.averaging == "impact" else 2 * bandwidth_hz
+    whole = line_sampled or sampled or provenance.averaging == "impact"
+    first_hz = 0.0 if whole else 2 * bandwidth_hz
     return _Curve(
         frequency_hz=frequency_hz,
         power=power,
@@ -227,6 +255,7 @@ def _curve(
         line_sampled=line_sampled,
         window=named_window(provenance.window),
         tonal=tonal,
+        sampled=sampled,
     )
 
 
@@ -242,7 +271,7 @@ def _coherent(response: FrequencyResponse, row: int) -> NDArray[np.bool_]:
 def _significant(curve: _Curve, min_prominence_db: float, false_alarm: float) -> list[_Found]:
     """Every maximum of a curve that the scatter of its lines doesn't explain."""
     power = curve.power
-    if power.size < 5:
+    if power.size < FEWEST_LINES:
         return []
     over_floor = power / _floor(curve)
     freedom = 2 / curve.relative_std**2
@@ -308,6 +337,9 @@ def _located(curve: _Curve, line: int, over_floor: float) -> _Found:
     else:
         run = _above_half(curve, line)
         narrow = run.size <= 2 * noise_bandwidth_bins(curve.window) + 1
+        if narrow and curve.sampled:
+            # Three points of a lone resonance tell all of it, however narrow it is.
+            run, narrow = np.arange(line - 1, line + 2), False
         frequency_hz, std_hz, power = _from_three(curve, line) if narrow else _from_resonance(curve, line, run)
     return _Found(
         frequency_hz=frequency_hz,

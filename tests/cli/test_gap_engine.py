@@ -77,4 +77,4 @@ def test_channels_at_different_rates_are_refused_with_what_to_do(
     assert (outcome.code, outcome.out, outcome.err.count("\n")) == (2, "", 1)
     assert "/shaker.wrench.force.x at 500 Hz" in outcome.err
     assert "at 250 Hz; bring them to one" in outcome.err
-    assert "chladni convert slow.mcap OUT.mcap --rate 500" in outcome.err
+    assert "chladni convert slow.mcap OUT.mcap --resample 500" in outcome.err

@@ -133,15 +133,19 @@ def test_a_universal_file_without_functions_shows_the_modes_that_it_holds(run, a
     assert "5 modes" in outcome.out
 
 
-@pytest.mark.parametrize("option", [["--operational"], ["--start", 0], ["--resolution", 0], ["--stamp", "log"]])
-def test_options_of_logs_are_refused_for_a_universal_file(run, tmp_path, option):
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (["--operational"], "frequency responses and 5 modes, but no samples over time; chladni frf arm.uff shows"),
+        (["--start", 0], "arm.uff: holds averaged functions already; leave out resolution"),
+        (["--resolution", 0], "arm.uff: holds averaged functions already; leave out resolution"),
+        (["--stamp", "log"], "stamp 'log' (--stamp) chooses among the times of messages"),
+        (["--reference", "/x.y"], "no reference '/x.y'; references: /shaker"),
+    ],
+)
+def test_options_of_samples_are_refused_for_functions(run, arm_log, tmp_path, option, words):
+    made = run("modes", arm_log, "--setup", arm_log.with_name("setup.toml"), "--uff", tmp_path / "arm.uff")
+    assert made.code == 0, made.err
     outcome = run("modes", tmp_path / "arm.uff", *option)
     assert outcome.code == 2
-    assert f"{option[0]} is for logs" in outcome.err
-
-
-def test_a_universal_file_with_neither_is_refused(run, shared_data):
-    outcome = run("modes", next(iter(sorted(shared_data.glob("*.uff")))))
-    assert outcome.code == 2
-    assert "chladni convert" in outcome.err
-    assert outcome.err.count("\n") == 1
+    assert words in outcome.err

@@ -136,7 +136,7 @@ def test_several_rates_need_one_for_a_table(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="a CSV table holds channels of one rate"):
         convert(source, tmp_path / "a.csv")
     assert not (tmp_path / "a.csv").exists()
-    done = convert(source, tmp_path / "a.csv", sample_rate_hz=100.0)
+    done = convert(source, tmp_path / "a.csv", resample_hz=100.0)
     assert len(done.channels) == 3
     # 0.8 of the lower Nyquist frequency, as the resampler promises; its kernel needs samples on both sides.
     (note,) = done.notes
@@ -144,7 +144,7 @@ def test_several_rates_need_one_for_a_table(tmp_path: Path) -> None:
     assert "up to 40 Hz" in note
     assert "s of a channel are left out" in note
     # In the order asked for.
-    picked = convert(source, tmp_path / "b.csv", channels=["/slow.value", PATHS[0]], sample_rate_hz=100.0)
+    picked = convert(source, tmp_path / "b.csv", channels=["/slow.value", PATHS[0]], resample_hz=100.0)
     assert picked.channels == ("/slow.value", PATHS[0])
 
 
@@ -160,7 +160,7 @@ def test_several_rates_need_one_for_a_table(tmp_path: Path) -> None:
         ("a", {}, SetupError, "the suffix '' isn't written"),
         ("there.csv", {}, LogError, "exists already"),
         ("in.npz", {"overwrite": True}, SetupError, "is the source itself"),
-        ("a.csv", {"channels": ["/x.y"]}, LogError, "no channel '/x.y'; channels: /wrist"),
+        ("a.csv", {"channels": ["/x.y"]}, LogError, "no channel '/x.y'; there are: /hammer.wrench"),
         ("a.csv", {"reading": {"colour": 1}}, SetupError, "read_npz has no option 'colour'; it has sample_rate_hz"),
         ("a.csv", {"layout": "batches"}, SetupError, "write_csv has no option 'layout'"),
     ],

@@ -538,7 +538,7 @@ def test_channels_on_several_grids_are_refused_with_the_remedy_of_either_surface
     write_scalars(tmp_path / "a.mcap", {"/a": (fast, range(1000)), "/b": (slow, range(300))})
     with open_log(tmp_path / "a.mcap") as log, pytest.raises(LogError, match="different sampling grids") as caught:
         log.read()
-    for remedy in ("in Python sample_rate_hz=100", "chladni convert a.mcap OUT.mcap --rate 100,"):
+    for remedy in ("in Python sample_rate_hz=100", "chladni convert a.mcap OUT.mcap --resample 100,"):
         assert remedy in str(caught.value)
 
 

@@ -1,4 +1,4 @@
-"""The registry of data files: which suffix is read and written by what.
+"""The registry of data files: which kind is read and written by what, and which kind a file is.
 
 The contract of a reader, which every command relies on::
 
@@ -15,13 +15,14 @@ The contract of a reader, which every command relies on::
 A writer is ``writer(series, path, *, overwrite, **options) -> losses``.
 """
 
+import re
 from collections.abc import Callable
 from inspect import signature
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from chladni.io.files.contents import FileContents
-from chladni.signals.errors import SetupError
+from chladni.signals.errors import LogError, SetupError
 
 Reader = Callable[..., FileContents]
 Writer = Callable[..., tuple[str, ...]]
@@ -40,17 +41,71 @@ READ_OPTIONS: Final = {
 }
 """Options that mean the same in all readers that have them."""
 
+MCAP: Final = ".mcap"
+# What the first bytes of a file say it is, whatever its name says. What isn't read is left to the name.
+_MAGIC: Final = (
+    (re.compile(rb"\x89MCAP"), MCAP),
+    (re.compile(rb"RIF[FX]....WAVE|RF64....WAVE|BW64....WAVE|riff\x2e\x91\xcf\x11", re.DOTALL), ".wav"),
+    (re.compile(rb"MATLAB [57]\.\d MAT-file"), ".mat"),
+    (re.compile(rb"PK\x03\x04.{26}[^\0]{1,200}\.npy", re.DOTALL), ".npz"),
+    (re.compile(rb"\x93NUMPY"), ".npy"),
+    (re.compile(rb"PAR1"), ".parquet"),
+    (re.compile(rb"ARROW1"), ".arrow"),
+    (re.compile(rb"TDSm"), ".tdms"),
+    (re.compile(rb"LabVIEW Measurement"), ".lvm"),
+    (re.compile(rb"\s*-1[ \t]*\r?\n[ \t]*\d{1,6}b?\b"), ".uff"),
+)
+_MAGIC_BYTES = 256
+_TEXT = re.compile(rb"(\xff\xfe|\xfe\xff).*|[^\0-\x08\x0e-\x1f]+", re.DOTALL)
 
-def is_data_file(path: Path | str) -> bool:
-    """Whether the suffix is that of a data file."""
-    return Path(path).suffix.lower() in FILE_SUFFIXES
+
+def file_kind(path: Path) -> str:
+    """Tell the kind of a file: `MCAP`, or the suffix of the data files that it is one of.
+
+    The first bytes decide where they tell; else the suffix, where it is that of a data file; else a text with lines
+    of numbers is a table. All other files count as MCAP, whose reader says what they look like.
+    """
+    suffix = path.suffix.lower()
+    try:
+        # A named pipe would block until someone writes to it.
+        start = _first_bytes(path) if path.is_file() else b""
+    except OSError:
+        start = b""
+    for magic, kind in _MAGIC:
+        if magic.match(start):
+            # Several suffixes stand for one kind.
+            known = kind == MCAP or kind in FILE_SUFFIXES
+            return suffix if known and _same_kind(suffix, kind) else kind if known else suffix
+    if suffix in FILE_SUFFIXES:
+        return suffix
+    return ".txt" if _TEXT.fullmatch(start) and _is_table(path) else MCAP
 
 
-def read_file(path: Path | str, **options: Any) -> FileContents:
-    """Read a data file of any kind, told by its suffix.
+def _first_bytes(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(_MAGIC_BYTES)
+
+
+def _same_kind(suffix: str, kind: str) -> bool:
+    return suffix in FILE_SUFFIXES and kind in FILE_SUFFIXES and reader_of(f"a{suffix}") is reader_of(f"a{kind}")
+
+
+def _is_table(path: Path) -> bool:
+    from chladni.io.files.csv_dialect import sniff_csv
+
+    try:
+        return sniff_csv(path).columns > 0
+    except (LogError, SetupError):
+        return False
+
+
+def read_file(path: Path | str, *, kind: str | None = None, **options: Any) -> FileContents:
+    """Read a data file of any kind.
 
     Parameters
     ----------
+    kind
+        As `file_kind` tells it; None goes by the suffix.
     options
         Of the reader, see `READ_OPTIONS`, ``full_scale`` of `read_wav` and alike.
 
@@ -61,7 +116,7 @@ def read_file(path: Path | str, **options: Any) -> FileContents:
     SetupError
         When the suffix isn't known, an option isn't, or an option is missing.
     """
-    contents: FileContents = call_with_options(reader_of(path), Path(path), options)
+    contents: FileContents = call_with_options(reader_of(f"a{kind}" if kind else path), Path(path), options)
     return contents
 
 
@@ -77,7 +132,7 @@ def call_with_options(function: Callable[..., Any], first: object, options: dict
 
 def reader_of(path: Path | str) -> Reader:
     """Give the reader of a file's kind; `SetupError` naming the kinds when there is none."""
-    from chladni.io.files import csv, mat, npz, uff, wav
+    from chladni.io.files import csv, mat, npz, uff_contents, wav
 
     readers: dict[str, Reader] = {
         ".csv": csv.read_csv,
@@ -85,8 +140,8 @@ def reader_of(path: Path | str) -> Reader:
         ".wav": wav.read_wav,
         ".mat": mat.read_mat,
         ".npz": npz.read_npz,
-        ".uff": uff.read_uff,
-        ".unv": uff.read_uff,
+        ".uff": uff_contents.read_universal_file,
+        ".unv": uff_contents.read_universal_file,
     }
     return _known(readers, path, "read")
 

@@ -10,7 +10,7 @@ from chladni.io.atomic import atomic_path
 from chladni.io.files.contents import MAX_BYTES, FileContents
 from chladni.io.files.mat_elements import HEADER_BYTES, read_mat_elements
 from chladni.io.files.named_arrays import series_of_arrays
-from chladni.io.files.series_fields import SERIES_FORMAT, series_fields, series_of_fields
+from chladni.io.files.series_fields import SERIES_FORMAT, series_fields, series_of_groups
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
 
@@ -33,7 +33,7 @@ def read_mat(
     sample_rate_hz
         Rate of foreign variables when nothing in the file says it.
     units
-        Unit by variable name, for foreign variables.
+        Unit by channel name, instead of that in the file.
     max_bytes
         Most memory that the variables may take, unpacked.
 
@@ -51,13 +51,8 @@ def read_mat(
     except LogError as error:
         raise LogError(f"{path}: this mat file can't be read: {error}") from error
     if variables.get("format") == SERIES_FORMAT:
-        return FileContents(
-            series=tuple(
-                series_of_fields(fields, where=f"{path}, {name}")
-                for name, fields in variables.items()
-                if isinstance(fields, Mapping)
-            )
-        )
+        groups = {name: fields for name, fields in variables.items() if isinstance(fields, Mapping)}
+        return FileContents(series=series_of_groups(groups, where=str(path), units=units))
     return series_of_arrays(_flat(variables), where=str(path), sample_rate_hz=sample_rate_hz, units=units)
 
 

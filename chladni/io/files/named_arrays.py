@@ -1,6 +1,7 @@
 """Time series from a set of named arrays, as ``.mat`` and ``.npz`` files hold them."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -55,7 +56,7 @@ def series_of_arrays(
     if times is None:
         return FileContents(series=(series_of_rows(rows, channels, sample_rate_hz=rate_hz),), notes=notes)
     placed = placed_rows(times_to_ns(times, where=where), rows, channels, where=where)
-    return FileContents(series=placed.series, notes=notes + placed.notes)
+    return replace(placed, notes=notes + placed.notes)
 
 
 def _is_signal(array: Any) -> bool:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from chladni.io.atomic import atomic_write
 from chladni.io.files.contents import MAX_BYTES, FileContents
 from chladni.io.files.named_arrays import series_of_arrays
-from chladni.io.files.series_fields import SERIES_FORMAT, series_fields, series_of_fields
+from chladni.io.files.series_fields import SERIES_FORMAT, series_fields, series_of_groups
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
 
@@ -50,7 +50,7 @@ def read_npz(
     sample_rate_hz
         Rate of foreign arrays when nothing in the file says it.
     units
-        Unit by array name, for foreign arrays.
+        Unit by channel name, instead of that in the file.
     max_bytes
         Most memory that the arrays may take together; their headers are checked before anything is unpacked.
 
@@ -71,10 +71,7 @@ def read_npz(
         raise LogError(f"{path}: this npz file can't be read: {error}") from error
     if str(content.get("format", "")) != SERIES_FORMAT:
         return series_of_arrays(content, where=str(path), sample_rate_hz=sample_rate_hz, units=units)
-    groups = _groups(content)
-    return FileContents(
-        series=tuple(series_of_fields(fields, where=f"{path}, {name}") for name, fields in groups.items())
-    )
+    return FileContents(series=series_of_groups(_groups(content), where=str(path), units=units))
 
 
 def write_npz(

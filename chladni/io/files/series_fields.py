@@ -16,14 +16,16 @@
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.channel import Channel, Role, Vector
-from chladni.signals.errors import ChladniError, LogError
+from chladni.signals.errors import ChladniError, LogError, SetupError
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.units import si_factor
 
 SERIES_FORMAT = "chladni.series/1"
 
@@ -48,8 +50,43 @@ def series_fields(series: TimeSeries) -> dict[str, NDArray[Any]]:
     return fields
 
 
-def series_of_fields(fields: Mapping[str, Any], *, where: str) -> TimeSeries:
-    """Make the series again; `LogError` naming the field that is missing or has the wrong shape."""
+def series_of_groups(
+    groups: Mapping[str, Mapping[str, Any]], *, where: str, units: Mapping[str, str] | None = None
+) -> tuple[TimeSeries, ...]:
+    """Make all series of a file again.
+
+    Parameters
+    ----------
+    groups
+        Fields of each series, by its name.
+    units
+        Unit by channel name of the numbers as they stand, instead of that in the file.
+
+    Raises
+    ------
+    LogError
+        Naming the field that is missing or has the wrong shape.
+    SetupError
+        When a unit is unknown, or stated for a channel that isn't there.
+    """
+    series = tuple(_series_of_fields(fields, where=f"{where}, {name}") for name, fields in groups.items())
+    known = [channel.name for part in series for channel in part.channels]
+    for name in units or {}:
+        if name not in known:
+            raise SetupError(f"{where}: has no channel {name!r} to give a unit; channels: {', '.join(known)}")
+    return tuple(_restated(part, units) for part in series) if units else series
+
+
+def _restated(series: TimeSeries, units: Mapping[str, str]) -> TimeSeries:
+    factors, channels = np.ones(len(series.channels)), list(series.channels)
+    for row, channel in enumerate(series.channels):
+        if channel.name in units:
+            factors[row], unit = si_factor(units[channel.name])
+            channels[row] = replace(channel, unit=unit)
+    return replace(series, values=series.values * factors[:, np.newaxis], channels=tuple(channels))
+
+
+def _series_of_fields(fields: Mapping[str, Any], *, where: str) -> TimeSeries:
     names = _texts(fields, "names", where)
     count = len(names)
     # The names say how many columns there are, so that axes squeezed away in MATLAB come back.

@@ -59,8 +59,8 @@ def read_uff(path: Path | str, *, units: Mapping[str, str] | None = None) -> Fil
     Returns
     -------
     FileContents
-        One series for each rate, start and length. The notes name functions that were left out, and say where the
-        rate was restored from an increment that the file rounds to six digits.
+        One series for each rate, start and length. The notes say where the rate was restored from an increment that
+        the file rounds to six digits.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def read_uff(path: Path | str, *, units: Mapping[str, str] | None = None) -> Fil
     names = _names([headers[number] for number in records])
     _require_known(path, names, units)
     system = next((header for header in headers if header.get("type") == UNITS), None)
-    notes = cut_off_note(path) + _left_out(path, headers, [number for number in functions if number not in records])
+    notes = cut_off_note(path)
     # Records of one measurement share their time axis; others in the same file may not.
     groups: dict[tuple[Any, ...], list[tuple[Dataset, Channel]]] = {}
     for number, name in zip(records, names, strict=True):
@@ -197,10 +197,6 @@ def _listed(headers: list[Dataset], functions: list[int]) -> str:
     return ", ".join(
         f"{FUNCTION_TYPES.get(kind, f'function type {kind}')} ({count})" for kind, count in kinds.items()
     )
-
-
-def _left_out(path: Path, headers: list[Dataset], others: list[int]) -> tuple[str, ...]:
-    return (f"{path}: left out, being no time records: {_listed(headers, others)}.",) if others else ()
 
 
 def _rate_notes(path: Path, headers: list[Dataset], records: list[int]) -> tuple[str, ...]:

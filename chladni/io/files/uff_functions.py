@@ -85,7 +85,12 @@ def function_datasets(
 
 
 def read_functions(
-    path: Path, file: Any, headers: Sequence[Dataset], names: Mapping[int, str], system: Dataset | None
+    path: Path,
+    file: Any,
+    headers: Sequence[Dataset],
+    names: Mapping[int, str],
+    system: Dataset | None,
+    units: Mapping[str, str] | None = None,
 ) -> tuple[FrequencyResponse | None, tuple[str, ...]]:
     """Read the frequency responses of a file, those of one frequency axis and a full grid of channels.
 
@@ -97,6 +102,8 @@ def read_functions(
         Name of a point by node.
     system
         Dataset 164, or None.
+    units
+        Unit by channel name, instead of that in the file.
 
     Returns
     -------
@@ -114,7 +121,7 @@ def read_functions(
             continue
         dataset = read_dataset(path, file, number)
         try:
-            pair, factor = _channels(dataset, names, system)
+            pair, factor = _channels(dataset, names, system, units or {})
         except SetupError as error:
             raise LogError(f"{path}: dataset {number + 1}: {error}") from error
         if header["func_type"] != COHERENCE:
@@ -234,7 +241,7 @@ def _frequency_axis(dataset: Dataset) -> NDArray[np.float64]:
 
 
 def _channels(
-    dataset: Dataset, names: Mapping[int, str], system: Dataset | None
+    dataset: Dataset, names: Mapping[int, str], system: Dataset | None, units: Mapping[str, str]
 ) -> tuple[tuple[Channel, Channel], float]:
     """Response and reference of a function, and the factor that turns its values into SI."""
     unit, factor = unit_of_header(dataset, system)
@@ -243,25 +250,37 @@ def _channels(
         "ordinate_spec_data_type": dataset["orddenom_spec_data_type"],
     }
     source_unit, source_factor = unit_of_header(below, system)
-    to_si, unit = si_factor(unit)
-    source_to_si, source_unit = si_factor(source_unit)
     # Names in full are told by our own fifth line; elsewhere the first two lines hold anything.
     ours = _AXIS.match(str(dataset["id5"]).strip()) is not None
-    measured = _channel(dataset, "rsp", names, dataset["id1"] if ours else "", unit)
-    source = _channel(dataset, "ref", names, dataset["id2"] if ours else "", source_unit)
-    return (measured, source), factor * to_si / (source_factor * source_to_si)
+    measured, factor = _channel(dataset, "rsp", names, dataset["id1"] if ours else "", (unit, factor), units)
+    source, below_one = _channel(
+        dataset, "ref", names, dataset["id2"] if ours else "", (source_unit, source_factor), units
+    )
+    return (measured, source), factor / below_one
 
 
-def _channel(dataset: Dataset, side: str, names: Mapping[int, str], title: str, unit: str) -> Channel:
+def _channel(
+    dataset: Dataset,
+    side: str,
+    names: Mapping[int, str],
+    title: str,
+    said: tuple[str, float],
+    units: Mapping[str, str],
+) -> tuple[Channel, float]:
+    """Give a channel, and the factor from its numbers to SI: by the unit that is stated, else as the file says."""
     node, axis = int(dataset[f"{side}_node"]), int(dataset[f"{side}_dir"])
     point = names.get(node, str(node))
-    return Channel(
-        name=title.strip() or f"{point}:{axis:+d}" + (" (reference)" if side == "ref" else ""),
+    name = title.strip() or f"{point}:{axis:+d}" + (" (reference)" if side == "ref" else "")
+    unit, factor = (units[name], 1.0) if name in units else said
+    to_si, unit = si_factor(unit)
+    channel = Channel(
+        name=name,
         unit=unit,
         point=point,
         direction=DIRECTIONS.get(axis),
         role="reference" if side == "ref" else "response",
     )
+    return channel, factor * to_si
 
 
 def _left_out_notes(path: Path, headers: Sequence[Dataset], used: int) -> tuple[str, ...]:

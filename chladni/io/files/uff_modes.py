@@ -100,12 +100,17 @@ def write_uff_modes(
     return losses + lost
 
 
-def read_uff_modes(path: Path | str) -> UffModes:
+def read_uff_modes(path: Path | str, *, units: Mapping[str, str] | None = None) -> UffModes:
     """Read modes, geometry and frequency responses from a universal file of any tool.
 
     Complex modes (analysis types 3 and 7) and normal modes (2) of dataset 55 are read, in SI by dataset 164. A
     component that's zero in all modes counts as not measured. Shapes are scaled so that their largest component is 1,
     and modal A and mass with them.
+
+    Parameters
+    ----------
+    units
+        Unit by name of a function's channel, instead of that in the file.
 
     Raises
     ------
@@ -119,14 +124,14 @@ def read_uff_modes(path: Path | str) -> UffModes:
     metre, newton = length_and_force(system)
     blocks = text_blocks(path, (NODES, TRACE_LINES, SHAPES))
     nodes = read_nodes(blocks, metre)
-    response, function_notes = read_functions(path, file, headers, nodes.names, system)
+    response, function_notes = read_functions(path, file, headers, nodes.names, system, units)
     found, shape_notes = read_shapes(blocks)
     notes = cut_off_note(path) + nodes.notes + function_notes + shape_notes
     if not found and not nodes.positions and response is None:
         kinds = ", ".join(sorted({str(header["type"]) for header in headers}))
         raise LogError(
             f"{path}: holds no mode, node or frequency response (datasets 55, 15, 58 of function type 4), but "
-            f"datasets {kinds}; chladni convert makes a log of time records, whose modes can be identified"
+            f"datasets {kinds}"
         )
     _require_nodes(path, found, nodes.positions)
     modes, mode_notes = mode_set_of(found, nodes, response, kilogram=newton / metre) if found else (None, ())

@@ -89,8 +89,8 @@ def write_wav(
     rate_hz = round(sound.sample_rate_hz)
     if rate_hz != sound.sample_rate_hz:
         raise SetupError(
-            f"a WAV file has whole sample rates, not {sound.sample_rate_hz!r} Hz; resample to {max(rate_hz, 1)} Hz "
-            "first"
+            f"a WAV file has whole sample rates, not {sound.sample_rate_hz!r} Hz; have it brought to "
+            f"one (--resample {max(rate_hz, 1)})"
         )
     if sound.values.nbytes > _MAX_DATA_BYTES:
         raise LogError(

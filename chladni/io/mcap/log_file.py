@@ -5,7 +5,6 @@ import stat
 import threading
 from pathlib import Path
 
-from chladni.io.files.formats import is_data_file
 from chladni.io.mcap.records import MAGIC
 from chladni.signals.errors import LogError
 
@@ -59,9 +58,6 @@ class LogFile:
         start = self.read(0, 16)
         if start.startswith(MAGIC):
             return
-        if is_data_file(self.path):
-            log = self.path.with_suffix(".mcap")
-            raise LogError(f"{self.path}: not an MCAP log; chladni convert {self.path} {log} makes a log of it")
         looks_like = [f"; it looks like {hint}" for magic, hint in _OTHER_FORMATS if start.startswith(magic)]
         raise LogError(
             f"{self.path}: not an MCAP log: starts with {start[:8].hex(' ')}, expected the MCAP magic "

@@ -111,13 +111,11 @@ def test_units_can_be_stated(tmp_path: Path) -> None:
         read_uff(tmp_path / "a.uff", units={"x": "mm"})
 
 
-def test_other_functions_are_left_out_with_a_word(tmp_path: Path) -> None:
+def test_other_functions_are_left_out(tmp_path: Path) -> None:
     (tmp_path / "a.uff").write_text(text_set() + text_set(kind=4) + text_set(kind=6))
     contents = read_uff(tmp_path / "a.uff")
     assert len(contents.series) == 1
-    assert contents.notes == (
-        f"{tmp_path / 'a.uff'}: left out, being no time records: frequency response function (1), coherence (1).",
-    )
+    assert contents.notes == ()
 
 
 def test_records_of_several_rates_are_several_series(tmp_path: Path) -> None:

@@ -82,7 +82,7 @@ def test_gaps_are_refused(tmp_path: Path) -> None:
 
 
 def test_fractional_rates_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(SetupError, match=r"not 610\.35 Hz; resample to 610 Hz"):
+    with pytest.raises(SetupError, match=r"not 610\.35 Hz; have it brought to one \(--resample 610\)"):
         write_wav(series_of(np.zeros((1, 3)), sample_rate_hz=610.35), tmp_path / "a.wav")
 
 

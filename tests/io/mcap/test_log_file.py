@@ -63,15 +63,6 @@ def test_a_folder_a_pipe_and_nothing_are_no_logs(tmp_path: Path) -> None:
             McapContainer.open(tmp_path / "pipe")
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".UFF", ".wav", ".mat", ".npz"])
-def test_a_data_file_is_no_log_but_can_be_made_one(tmp_path: Path, suffix: str) -> None:
-    path = tmp_path / f"run{suffix}"
-    path.write_bytes(b"0.1, 0.2\n0.3, 0.4\n")
-    with pytest.raises(LogError, match="not an MCAP log") as caught:
-        McapContainer.open(path)
-    assert str(caught.value).endswith(f"; chladni convert {path} {path.with_suffix('.mcap')} makes a log of it")
-
-
 def test_only_the_magic_is_a_log_cut_off(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     path.write_bytes(b"\x89MCAP0\r\n")
