@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from chladni.apps.findings import reading_sentences
+from chladni.apps.findings import reading_sentences, require_channels
 from chladni.apps.gap_document import Document, distortion_document, where_document
 from chladni.apps.sources import Span
 from chladni.gap.comparison.distortion import Distortion
@@ -85,6 +85,8 @@ def compare_with_simulated(
         missing.
     """
     span, logs = Span(start_s=start_s, end_s=end_s), (measured, simulated)
+    for log in logs:
+        require_channels(log, log.path.name)
     # One list for both, so that rows are the same channels.
     names = _shared(measured, simulated)
     first, second = (_read(log, names, span) for log in logs)
