@@ -1,5 +1,6 @@
 """The modal analyst's job: a log to validated modes and everything that can be said and shown of them."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,6 +12,8 @@ from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging
 from chladni.io.files.uff_modes import read_uff_modes
 from chladni.io.log import Log
+from chladni.io.log_info import some_of
+from chladni.io.setup import load_setup
 from chladni.modal.checks.driving_point import check_driving_point
 from chladni.modal.checks.reciprocity import check_reciprocity
 from chladni.modal.functions.circle_fit import CircleFit
@@ -29,6 +32,8 @@ from chladni.signals.geometry import Geometry
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.study import Study
+from chladni.signals.unit_text import in_unit
+from chladni.spectral.forms import MOTION_ORDER
 
 MethodName = Literal["plscf", "circle-fit", "half-power", "ssi-cov", "fdd", "efdd"]
 
@@ -121,25 +126,53 @@ def modal_study(
     return _study(log.path, log.geometry, found, response, notes=_checks(response))
 
 
-def universal_file_study(path: Path, *, method: MethodName | None = None, wanted: Wanted | None = None) -> ModalStudy:
+def universal_file_study(
+    path: Path, *, setup: Path | None = None, method: MethodName | None = None, wanted: Wanted | None = None
+) -> ModalStudy:
     """Identify the modes of the frequency responses in a universal file; without any, take the modes that it holds.
+
+    Parameters
+    ----------
+    setup
+        Setup file: units, points and directions of the functions' channels, and points and lines beside the file's.
+    method, wanted
+        As in `modal_study`.
 
     Raises
     ------
     LogError
         When the file can't be read, or holds neither frequency responses nor modes.
+    SetupError
+        When the setup file has mistakes, or doesn't fit the functions.
     EstimateError
         When there is too little to identify from.
     """
-    held, chosen = read_uff_modes(path), None if method is None else METHODS[method]()
+    held = read_uff_modes(path, setup=None if setup is None else load_setup(setup))
+    chosen = None if method is None else METHODS[method]()
     if held.response is not None:
+        response, notes = _of_one_form(held.response)
         with _told_of(path):
-            found = modes_of_response(held.response, method=chosen, wanted=wanted or Wanted())
-        return _study(path, held.geometry, found, held.response, notes=(*held.notes, *_checks(held.response)))
+            found = modes_of_response(response, method=chosen, wanted=wanted or Wanted())
+        return _study(path, held.geometry, found, response, notes=(*held.notes, *notes, *_checks(response)))
     if held.modes is None:
         raise LogError(f"{path}: holds neither frequency responses (dataset 58) nor modes (dataset 55)")
     told = "the modes are those that the file holds: there are no frequency responses in it to identify others from"
     return _study(path, held.geometry, held.modes, None, notes=(*held.notes, told))
+
+
+def _of_one_form(response: FrequencyResponse) -> tuple[FrequencyResponse, tuple[str, ...]]:
+    """Leave out responses that are no motion, or another than most, where there are such as are."""
+    orders = Counter(MOTION_ORDER[channel.unit] for channel in response.responses if channel.unit in MOTION_ORDER)
+    if not orders:
+        return response, ()
+    (order, _), *_ = orders.most_common()
+    chosen = [channel.name for channel in response.responses if MOTION_ORDER.get(channel.unit) == order]
+    others = [f"{one.name} {in_unit(one.unit)}" for one in response.responses if one.name not in chosen]
+    if not others:
+        return response, ()
+    form = next(channel.unit for channel in response.responses if channel.name == chosen[0])
+    told = f"modal vectors are of the responses {in_unit(form)}; left out: {some_of(others)}"
+    return response.select(chosen), (told,)
 
 
 @contextmanager

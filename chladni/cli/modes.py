@@ -92,9 +92,9 @@ def modes(
         _refuse(
             log,
             {"--reference": reference, "--operational": operational, "--channel": channel, "--resolution": resolution,
-             "--start": start, "--end": end, "--setup": setup, "--stamp": None if stamp == "auto" else stamp},
+             "--start": start, "--end": end, "--stamp": None if stamp == "auto" else stamp},
         )  # fmt: skip
-        found = universal_file_study(log, method=method, wanted=wanted)
+        found = universal_file_study(log, setup=setup, method=method, wanted=wanted)
     else:
         with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name) as progress:
             found = modal_study(

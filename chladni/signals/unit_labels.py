@@ -120,10 +120,9 @@ def read_label(label: str, *, quantity: str | None = None) -> tuple[float, str]:
     >>> read_label("lb", quantity="N")
     (4.4482216152605, 'N')
     """
-    bare = _bare(label)
-    # In capitals or without it's no answer; nA is a current.
-    if bare.casefold() in _NOTHING or bare in ("NA", "na"):
+    if says_nothing(label):
         return 1.0, "1"
+    bare = _bare(label)
     try:
         _require_linear(label, bare)
         chosen = _chosen(label, _readings(label, bare), quantity)
@@ -137,6 +136,19 @@ def read_label(label: str, *, quantity: str | None = None) -> tuple[float, str]:
     return chosen.factor, chosen.unit
 
 
+def says_nothing(label: str) -> bool:
+    """Whether a label is empty, or a word for nothing, as ``NONE`` and ``n/a``.
+
+    Examples
+    --------
+    >>> says_nothing("NONE"), says_nothing("nA")
+    (True, False)
+    """
+    bare = _bare(label)
+    # In capitals or without it's no answer; nA is a current.
+    return bare.casefold() in _NOTHING or bare in ("NA", "na")
+
+
 def same_quantity(unit: str, other: str) -> bool:
     """Whether two SI units are of one dimension; radians and degC count as dimensions.
 
@@ -146,6 +158,20 @@ def same_quantity(unit: str, other: str) -> bool:
     (True, True, False)
     """
     return _dimension(unit) == _dimension(other)
+
+
+def length_and_force_powers(unit: str) -> tuple[int, int] | None:
+    """Give the powers of length and force in an SI unit; None when it has others than these and time.
+
+    Examples
+    --------
+    >>> length_and_force_powers("Pa"), length_and_force_powers("m/s^2"), length_and_force_powers("V")
+    ((-2, 1), (1, 0), None)
+    """
+    powers = dict(_dimension(unit))
+    force = powers.pop("kg", 0)
+    length = powers.pop("m", 0) - force
+    return (length, force) if not powers.keys() - {"s"} else None
 
 
 def quantity_of_name(name: str) -> str | None:
