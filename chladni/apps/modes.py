@@ -1,5 +1,6 @@
 """Natural modes of a log, a series or frequency responses, in one call."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
@@ -27,6 +28,7 @@ from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.machine_harmonic import MachineHarmonic
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.unit_text import in_unit
 from chladni.signals.wording import counted
 from chladni.spectral.adaptive import adaptive_cross_spectra
 from chladni.spectral.blocks import leading_part
@@ -226,7 +228,7 @@ def functions_and_modes(
     named = (reference,) if isinstance(reference, str) else reference
     stored = stored_functions(source, named, channels)
     if stored is not None:
-        response = transfer(source, named, channels, estimator="H1", averaging=averaging, span=span)
+        response = _of_one_form(transfer(source, named, channels, estimator="H1", averaging=averaging, span=span))
         return response, modes_of_response(response, method=method, wanted=wanted)
     references = excitation_names(source, span, otherwise=ALONE) if named is None else tuple(named)
     coarse = _functions(source, references, channels, wanted, averaging, span, progress)
@@ -244,6 +246,21 @@ def functions_and_modes(
         "excitation, or average longer, for surer ones"
     )
     return coarse, replace(again, provenance=again.provenance.with_notes(told))
+
+
+def _of_one_form(response: FrequencyResponse) -> FrequencyResponse:
+    """Leave out responses that are no motion, or another than most, where there are such as are."""
+    orders = Counter(MOTION_ORDER[channel.unit] for channel in response.responses if channel.unit in MOTION_ORDER)
+    if not orders:
+        return response
+    (order, _), *_ = orders.most_common()
+    chosen = [channel for channel in response.responses if MOTION_ORDER.get(channel.unit) == order]
+    others = [f"{one.name} {in_unit(one.unit)}" for one in response.responses if one not in chosen]
+    if not others:
+        return response
+    told = f"modal vectors are of the responses {in_unit(chosen[0].unit)}; left out: {some_of(others)}"
+    kept = response.select([channel.name for channel in chosen])
+    return replace(kept, provenance=kept.provenance.with_notes(told))
 
 
 def _functions(

@@ -49,7 +49,7 @@ class FileLog(Log):
         self._path = path
         self._kind = kind
         self._contents = contents
-        self._geometry = geometry if geometry.points else contents.geometry
+        self._geometry = _joined(contents.geometry, geometry)
         self._info: LogInfo | None = None
 
     @property
@@ -74,7 +74,7 @@ class FileLog(Log):
 
     @property
     def geometry(self) -> Geometry:
-        """Points and lines of the setup file, else of the file itself."""
+        """Points and lines of the file, with those of the setup file before them."""
         return self._geometry
 
     @property
@@ -204,6 +204,12 @@ class FileLog(Log):
         first, last = (None if time_s is None else self.start_time_ns + round(time_s * NS_PER_S)
                        for time_s in (start_s, end_s))  # fmt: skip
         return first, last
+
+
+def _joined(own: Geometry, stated: Geometry) -> Geometry:
+    """The points of the file with those of the setup file, whose lines go before the file's."""
+    points = {point.name: point for point in (*own.points, *stated.points)}
+    return Geometry(points=tuple(points.values()), lines=stated.lines or own.lines)
 
 
 # --- windows and order -------------------------------------------------------------------------------------------

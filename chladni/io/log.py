@@ -121,7 +121,7 @@ class Log(ABC):
     @property
     @abstractmethod
     def geometry(self) -> Geometry:
-        """Points and lines of the setup file, else of the file itself; empty without."""
+        """Points and lines of the file itself and of the setup file; empty without."""
 
     @property
     @abstractmethod

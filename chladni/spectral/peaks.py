@@ -1,7 +1,6 @@
 """Named peaks of spectra and frequency responses: where, how high, how sure, on which channels."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.ndimage
@@ -15,6 +14,7 @@ from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
 from chladni.spectral.leakage import leakage, line_correlation, named_window
+from chladni.spectral.uncertainty import function_std
 from chladni.spectral.windows import noise_bandwidth_bins
 
 # The floor around a line is the median of a tenth of the spectrum, of this many lines at least.
@@ -197,10 +197,9 @@ def _density_curve(density: PowerSpectralDensity, row: int) -> _Curve:
 
 
 def _response_curve(response: FrequencyResponse, row: int, column: int) -> _Curve:
-    values, std = response.values[row, column], response.std[row, column]
-    magnitude, sampled = np.abs(values), response.provenance.averages == 0
-    if sampled and not np.isfinite(std).any():
-        std = _scatter_along(values)
+    magnitude, std = np.abs(response.values[row, column]), function_std(response, row, column)
+    # Whoever averaged elsewhere doesn't say how often, so that a coherence tells no chance.
+    sampled = response.provenance.effective_averages == 0
     usable = response.excited & np.isfinite(magnitude) & (magnitude > 0)
     spacing_hz = _spacing(response.frequency_hz)
     # A magnitude wrong by 1 % is a power wrong by 2 %.
@@ -214,20 +213,6 @@ def _response_curve(response: FrequencyResponse, row: int, column: int) -> _Curv
         tonal=False,
         sampled=sampled,
     )
-
-
-def _scatter_along(values: NDArray[np.complexfloating[Any, Any]]) -> Floats:
-    """One sigma of the magnitude, from the fourth differences of neighbouring lines.
-
-    A smooth function has next to none; Gaussian noise of sigma s in real and imaginary part has a variance of
-    (1 + 16 + 36 + 16 + 1) s^2 in each. Their median over the lines around looks past a resonance.
-    """
-    if values.size < FEWEST_LINES:
-        return np.full(values.size, np.inf)
-    differences = np.abs(np.convolve(values, (1, -4, 6, -4, 1), mode="valid"))
-    around = scipy.ndimage.median_filter(differences, size=FLOOR_LINES, mode="nearest")
-    # The magnitude of two Gaussian numbers is Rayleigh's, whose median is sqrt(2 ln 2) sigma.
-    return np.asarray(np.pad(around, 2, mode="edge") / np.sqrt(70 * 2 * np.log(2)), dtype=np.float64)
 
 
 def _curve(

@@ -3,12 +3,18 @@
 from typing import Self
 
 import numpy as np
+import scipy.ndimage
 from numpy.typing import NDArray
 
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
+from chladni.signals.frequency_response import FrequencyResponse
 
 Floats = NDArray[np.float64]
+# Fourth difference of neighbouring lines, and the lines around over which its median is taken: more than a resonance
+# of a light structure spans.
+_DIFFERENCES = (1, -4, 6, -4, 1)
+_LINES_AROUND = 51
 
 
 class EffectiveAverages:
@@ -172,3 +178,27 @@ def periodic_response_std(
     spread = own + np.abs(values) ** 2 * scatter[reference, reference].real - common
     variance = np.divide(np.maximum(spread, 0.0), power * periods, out=np.full(own.shape, np.inf), where=power > 0)
     return np.asarray(np.sqrt(variance / 2), dtype=np.float64)
+
+
+def function_std(response: FrequencyResponse, row: int, column: int) -> NDArray[np.float64]:
+    """Give one sigma of a function's magnitude: as it carries it, else from what its lines differ by.
+
+    Functions in files of other programs mostly have no error bars. A smooth function has next to no fourth
+    difference; Gaussian noise of sigma s in real and imaginary part has a variance of (1 + 16 + 36 + 16 + 1) s^2 in
+    each. The median over the lines around looks past a resonance.
+
+    Returns
+    -------
+    array
+        ``[frequency]``, infinite where nothing tells.
+    """
+    std = response.std[row, column]
+    values = response.values[row, column]
+    known = bool(response.provenance.effective_averages) or bool(np.isfinite(std).any())
+    if known or values.size < len(_DIFFERENCES):
+        return np.asarray(std, dtype=np.float64)
+    differences = np.abs(np.convolve(values, _DIFFERENCES, mode="valid"))
+    around = scipy.ndimage.median_filter(differences, size=_LINES_AROUND, mode="nearest")
+    # The magnitude of two Gaussian numbers is Rayleigh's, whose median is sqrt(2 ln 2) sigma.
+    sigma = around / np.sqrt(np.square(_DIFFERENCES).sum() * 2 * np.log(2))
+    return np.asarray(np.pad(sigma, len(_DIFFERENCES) // 2, mode="edge"), dtype=np.float64)

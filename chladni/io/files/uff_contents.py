@@ -1,29 +1,35 @@
 """A universal file as a whole: time records, frequency responses, modes and measurement points."""
 
+import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from chladni.io.files.contents import FileContents
-from chladni.io.files.uff import read_uff
-from chladni.io.files.uff_functions import COHERENCE, GENERAL, RESPONSE_FUNCTION
+from chladni.io.files.uff import time_records
+from chladni.io.files.uff_functions import RESPONSE_FUNCTION, is_read
 from chladni.io.files.uff_header import FUNCTION_TYPES, TIME_RESPONSE
-from chladni.io.files.uff_modes import read_uff_modes
-from chladni.io.files.uff_nodes import NODES
-from chladni.io.files.uff_sets import FUNCTION_AT_NODE, open_uff, read_headers
-from chladni.io.files.uff_shapes import SHAPES
+from chladni.io.files.uff_modes import MODAL_DATASETS, modal_test
+from chladni.io.files.uff_records import open_uff
+from chladni.io.files.uff_sets import FUNCTION_AT_NODE, HEADER, LEFT_OUT, UNITS, Dataset, listed_kinds, read_headers
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 
+_PART = re.compile(rf"(?P<name>dataset \d+(?: \([^)]*\))?):? (?P<reason>.*){re.escape(LEFT_OUT)}", re.DOTALL)
 
-def read_universal_file(path: Path | str, *, units: Mapping[str, str] | None = None) -> FileContents:
+
+def read_universal_file(
+    path: Path | str, *, units: Mapping[str, str] | None = None, time_unit: str | None = None
+) -> FileContents:
     """Read all that a universal file holds and that can be read.
 
     Parameters
     ----------
     units
         Unit by channel name, instead of that in the file.
+    time_unit
+        Unit of the abscissa of all time records, such as ``ms``, instead of that in the file.
 
     Returns
     -------
@@ -35,21 +41,21 @@ def read_universal_file(path: Path | str, *, units: Mapping[str, str] | None = N
     LogError
         When the file is damaged, or nothing in it can be read.
     SetupError
-        When a unit is unknown.
+        When a unit is unknown, or is stated for a channel that isn't there.
     """
     path = Path(path)
-    headers = read_headers(path, open_uff(path))
-    types = Counter(int(header["func_type"]) for header in headers if header["type"] == FUNCTION_AT_NODE)
-    modal = RESPONSE_FUNCTION in types or bool({NODES, SHAPES} & {header["type"] for header in headers})
-    found, unread = FileContents(series=()), _of_other_types(types)
+    file = open_uff(path)
+    headers = read_headers(file)
+    kinds = {header["type"] for header in headers}
+    types = {header.get("func_type") for header in headers}
+    modal = RESPONSE_FUNCTION in types or not kinds.isdisjoint(MODAL_DATASETS)
+    if not modal and FUNCTION_AT_NODE not in kinds:
+        raise LogError(f"{path}: holds no function, mode or measurement point, but datasets {listed_kinds(headers)}")
+    found, unread = FileContents(series=()), _unread(headers)
     failures: list[LogError] = []
-    if not types and not modal:
-        kinds = Counter(header["type"] for header in headers)
-        listed = ", ".join(f"{kind} ({count})" for kind, count in kinds.items())
-        raise LogError(f"{path}: holds no function, mode or measurement point, but datasets {listed}")
     if modal:
         try:
-            held = read_uff_modes(path, units=units)
+            held = modal_test(file, headers, units or {})
         except LogError as error:
             failures.append(error)
             unread.append(("functions, modes and points", _reason(path, error)))
@@ -57,9 +63,10 @@ def read_universal_file(path: Path | str, *, units: Mapping[str, str] | None = N
             found = replace(
                 found, functions=held.response, modes=held.modes, geometry=held.geometry, notes=held.notes
             )
+    others = _others(units, found.functions)
     if TIME_RESPONSE in types:
         try:
-            records = read_uff(path, units=_others(units, found.functions))
+            records = time_records(file, headers, units=others, time_unit=time_unit)
         except LogError as error:
             failures.append(error)
             unread.append(("time records", _reason(path, error)))
@@ -67,10 +74,18 @@ def read_universal_file(path: Path | str, *, units: Mapping[str, str] | None = N
             notes = tuple(dict.fromkeys((*records.notes, *found.notes)))
             found = replace(found, series=records.series, time_bases=records.time_bases, notes=notes)
     else:
-        _require_none(path, _others(units, found.functions))
+        _require_none(path, others)
     if failures and not (found.series or found.functions or found.modes):
         raise failures[0]
-    return replace(found, unread=(*found.unread, *unread))
+    notes, damaged = _parted(path, found.notes)
+    return replace(found, notes=notes, unread=(*damaged, *unread))
+
+
+def _parted(path: Path, notes: Sequence[str]) -> tuple[tuple[str, ...], list[tuple[str, str]]]:
+    """Tell what a part of the file was left out for from what was taken how."""
+    found = {note: _PART.fullmatch(note.removeprefix(f"{path}: ")) for note in notes}
+    damaged = [(part["name"], part["reason"]) for part in found.values() if part is not None]
+    return tuple(note for note, part in found.items() if part is None), damaged
 
 
 def _others(units: Mapping[str, str] | None, functions: FrequencyResponse | None) -> dict[str, str]:
@@ -85,12 +100,20 @@ def _require_none(path: Path, units: Mapping[str, str]) -> None:
         raise SetupError(f"{path}: has no channel {name!r} to give a unit; chladni info {path.name} names them")
 
 
-def _of_other_types(types: Mapping[int, int]) -> list[tuple[str, str]]:
-    """Functions of types that nothing here makes use of; the coherence and our own error bars go with a response."""
+def _unread(headers: Sequence[Dataset]) -> list[tuple[str, str]]:
+    """Name the functions and datasets that nothing here makes use of."""
+    types = Counter(
+        int(header["func_type"])
+        for header in headers
+        if "func_type" in header and header["func_type"] != TIME_RESPONSE and not is_read(header)
+    )
+    functions = [f"{FUNCTION_TYPES.get(kind, f'function type {kind}')} ({count})" for kind, count in types.items()]
+    known = (*MODAL_DATASETS, FUNCTION_AT_NODE, UNITS, HEADER)
+    others = [header for header in headers if header["type"] not in known]
+    datasets = [f"datasets {listed_kinds(others)}"] if others else []
     return [
-        (f"{FUNCTION_TYPES.get(kind, f'function type {kind}')} ({count})", "it's no record over time and no response")
-        for kind, count in types.items()
-        if kind not in (TIME_RESPONSE, RESPONSE_FUNCTION, COHERENCE, GENERAL)
+        *((name, "it's no record over time and no frequency response") for name in functions),
+        *((name, "they hold neither samples nor modes nor points") for name in datasets),
     ]
 
 

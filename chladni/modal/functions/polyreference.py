@@ -18,6 +18,7 @@ from chladni.modal.poles.stabilisation import StabilityLimits
 from chladni.signals.errors import SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
+from chladni.signals.unit_text import in_unit
 from chladni.spectral.forms import MOTION_ORDER, form
 
 Band = tuple[float, float]
@@ -147,7 +148,7 @@ def with_form(response: FrequencyResponse) -> tuple[FrequencyResponse, tuple[str
         return response, ()
     taken = tuple(replace(channel, unit="m/s^2", overload=None) for channel in response.responses)
     note = (
-        f"responses in {units.pop()!r} are taken as accelerations; another motion changes participation and "
+        f"responses {in_unit(units.pop())} are taken as accelerations; another motion changes participation and "
         "residuals, not frequencies and damping: state the unit in the setup file"
     )
     return replace(response, responses=taken), (note,)

@@ -102,20 +102,53 @@ def test_units_without_a_label_follow_dataset_164(tmp_path: Path) -> None:
     np.testing.assert_allclose(series.values[:, 0], [1e-3, 1e3], rtol=1e-15)
 
 
+def test_an_unknown_label_costs_its_channel_the_unit(tmp_path: Path) -> None:
+    (tmp_path / "a.uff").write_text(text_set(unit="furlongs") + text_set(id1="b"))
+    contents = read_uff(tmp_path / "a.uff")
+    (series,) = contents.series
+    assert [channel.unit for channel in series.channels] == ["1", "m/s^2"]
+    np.testing.assert_array_equal(series.values[0], [1.0, 2.0, -0.5])
+    (note,) = contents.notes
+    assert all(words in note for words in ("acc: ", "'furlongs'", "--read units=NAME:UNIT"))
+
+
 def test_units_can_be_stated(tmp_path: Path) -> None:
     (tmp_path / "a.uff").write_text(text_set(unit="furlongs"))
-    with pytest.raises(SetupError, match=r"channel 'acc'.*furlongs"):
-        read_uff(tmp_path / "a.uff")
-    assert read_uff(tmp_path / "a.uff", units={"acc": "mm"}).series[0].channels[0].unit == "m"
+    contents = read_uff(tmp_path / "a.uff", units={"acc": "mm"})
+    assert contents.series[0].channels[0].unit == "m"
+    assert contents.notes == ()
     with pytest.raises(SetupError, match="no channel 'x' to give a unit"):
         read_uff(tmp_path / "a.uff", units={"x": "mm"})
+    with pytest.raises(SetupError, match=r"\(acc\): unit 'fathoms'"):
+        read_uff(tmp_path / "a.uff", units={"acc": "fathoms"})
+    # The type says that it's a force, whose pound is one of force.
+    (tmp_path / "b.uff").write_text(text_set(quantity=13))
+    (series,) = read_uff(tmp_path / "b.uff", units={"acc": "lb"}).series
+    np.testing.assert_allclose(series.values[0], 4.4482216152605 * np.array([1.0, 2.0, -0.5]), rtol=1e-15)
 
 
-def test_other_functions_are_left_out(tmp_path: Path) -> None:
+def test_one_record_that_cannot_be_read_costs_no_other(tmp_path: Path) -> None:
+    broken = text_set(id1="broken").replace("2.00000e+00", "2.0000ze+00")
+    header = text_set(id1="header").replace("         2         3         1", "         x         3         1")
+    (tmp_path / "a.uff").write_text(broken + text_set(id1="whole") + header + text_set(id1="nodes", kind=4))
+    contents = read_uff(tmp_path / "a.uff")
+    assert [channel.name for series in contents.series for channel in series.channels] == ["whole"]
+    told = "\n".join(contents.notes)
+    for words in (
+        "dataset 1 has '2.0000ze+00' where a number is due",
+        "dataset 3 (type 58) can't be read",
+        "frequency response",
+    ):
+        assert words in told
+
+
+def test_other_functions_are_left_out_with_a_word(tmp_path: Path) -> None:
     (tmp_path / "a.uff").write_text(text_set() + text_set(kind=4) + text_set(kind=6))
     contents = read_uff(tmp_path / "a.uff")
     assert len(contents.series) == 1
-    assert contents.notes == ()
+    assert contents.notes == (
+        f"{tmp_path / 'a.uff'}: left out, being no time records: frequency response function (1), coherence (1).",
+    )
 
 
 def test_records_of_several_rates_are_several_series(tmp_path: Path) -> None:
@@ -213,7 +246,7 @@ def test_a_rate_that_contradicts_the_record_is_not_believed() -> None:
         (text_set(form=3), "of type 3"),
         (text_set(form=5), "complex values|holds 1"),
         (text_set(step=0.0), "is no sample interval"),
-        (text_set().replace("2.00000e+00", "2.0000ze+00"), "the values of dataset 1 can't be read"),
+        (text_set().replace("2.00000e+00", "2.0000ze+00"), "dataset 1 has '2.0000ze.00' where a number"),
         (text_set().replace("         2         3", "         x         3"), "can't be read"),
     ],
 )

@@ -545,11 +545,17 @@ def test_functions_that_make_no_grid_are_left_out_and_said(tmp_path: Path) -> No
 
 
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
-def test_functions_with_impossible_axes_or_units_are_refused(tmp_path: Path) -> None:
+def test_functions_with_impossible_axes_are_left_out_and_unknown_units_told(tmp_path: Path) -> None:
+    falling = frf_set(abscissa_spacing=0, x=np.array([1.0, 3.0, 2.0]))
     with pytest.raises(LogError, match="dataset 1: its frequencies don't rise"):
-        written(tmp_path / "a.uff", frf_set(abscissa_spacing=0, x=np.array([1.0, 3.0, 2.0])))
-    with pytest.raises(LogError, match=r"dataset 1: .*furlong"):
-        written(tmp_path / "b.uff", frf_set(ordinate_axis_units_lab="furlong"))
+        written(tmp_path / "a.uff", falling)
+    both = written(tmp_path / "b.uff", falling, frf_set(rsp_node=4, ordinate_axis_units_lab="furlong"))
+    assert both.response is not None
+    assert both.response.unit(0, 0) == "1/N"
+    np.testing.assert_allclose(both.response.values[0, 0], [1 + 1j, 2, 3j], rtol=1e-11)
+    told = "\n".join(both.notes)
+    assert "its frequencies don't rise; the file is damaged; it was left out" in told
+    assert "4:+3: unit 'furlong'" in told
 
 
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
