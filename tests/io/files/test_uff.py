@@ -134,7 +134,11 @@ def test_one_record_that_cannot_be_read_costs_no_other(tmp_path: Path) -> None:
     contents = read_uff(tmp_path / "a.uff")
     assert [channel.name for series in contents.series for channel in series.channels] == ["whole"]
     told = "\n".join(contents.notes)
-    for words in ("dataset 1 has '2.0000ze+00' where a number is due", "dataset 3 (type 58) can't be read", "frequency response"):
+    for words in (
+        "dataset 1 has '2.0000ze+00' where a number is due",
+        "dataset 3 (type 58) can't be read",
+        "frequency response",
+    ):
         assert words in told
 
 
@@ -224,6 +228,11 @@ def test_one_sample_is_no_record(tmp_path: Path) -> None:
 @pytest.mark.parametrize("rate", [50.0, 400.0, 610.35, 1000.0, 25600.0, 51200.0, 65536.0, 131072.0, 1e6])
 def test_the_rate_is_restored_from_six_digits(rate: float) -> None:
     assert rate_of_header({"abscissa_inc": float(f"{1 / rate:.5e}"), "id5": "NONE"}) == rate
+
+
+@pytest.mark.parametrize("increment", [0.3, 0.7, 1.1e-3, 1e-2 / 3 * 3])
+def test_an_increment_of_few_digits_is_meant_as_it_stands(increment: float) -> None:
+    assert rate_of_header({"abscissa_inc": increment, "id5": "NONE"}) == pytest.approx(1 / increment, rel=1e-15)
 
 
 def test_a_rate_that_contradicts_the_record_is_not_believed() -> None:
