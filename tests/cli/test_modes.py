@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.arm import FORCE, TOOL, short_arm
+from tests.io.files.uff_makers import response_set
 
 KEYS = {"frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std", "mpc", "shape", "relative_motion"}
 
@@ -131,6 +132,46 @@ def test_a_universal_file_without_functions_shows_the_modes_that_it_holds(run, a
     assert outcome.code == 0, outcome.err
     assert "those that the file holds" in " ".join(outcome.out.split())
     assert "5 modes" in outcome.out
+
+
+def accelerance(frequency_hz):
+    """One degree of freedom of 3 kg, 12 Hz and 1 %: -r^2 over m (1 - r^2 + 2 j zeta r)."""
+    ratio = frequency_hz / 12.0
+    return -(ratio**2) / (3.0 * (1 - ratio**2 + 0.02j * ratio))
+
+
+def test_functions_of_a_universal_file_without_unit_give_frequencies_and_take_a_setup_file(run, tmp_path):
+    values = accelerance(0.25 * np.arange(200))
+    path = tmp_path / "function.uff"
+    path.write_bytes(response_set(values, step=0.25, type=0, below_type=0, label="NONE"))
+    bare = run("modes", path, "--json", "-")
+    assert bare.code == 0, bare.err
+    (mode,) = bare.document["modes"]
+    assert mode["frequency_hz"] == pytest.approx(12.0, rel=1e-9)
+    assert mode["damping_ratio"] == pytest.approx(0.01, rel=1e-6)
+    setup = tmp_path / "setup.toml"
+    tables = [("1:+3", "m/s^2"), ("1:+3 (reference)", "N")]
+    setup.write_text(
+        'format = "chladni.setup/1"\n'
+        + "".join(f'[[channel]]\npath = "{name}"\nunit = "{unit}"\n' for name, unit in tables)
+    )
+    told = run("modes", path, "--setup", setup)
+    assert told.code == 0, told.err
+    assert "modal mass [kg]" in told.out
+    row = next(line for line in told.out.splitlines() if line.startswith("1 ") and "±" in line)
+    # The last column is the modal mass with its error.
+    assert float(row.split()[-3]) == pytest.approx(3.0, rel=1e-3)
+
+
+def test_one_function_without_unit_costs_no_other(run, tmp_path):
+    values = accelerance(0.25 * np.arange(200))
+    path = tmp_path / "functions.uff"
+    path.write_bytes(response_set(values, step=0.25) + response_set(values, step=0.25, node=2, label="EU"))
+    outcome = run("modes", path)
+    assert outcome.code == 0, outcome.err
+    told = " ".join(outcome.out.split())
+    assert "left out: 2:+3 without unit" in told
+    assert "whatever unit the sensor was set up in" in told
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,8 @@ def rate_of_header(header: dict[str, Any], second: float = 1.0) -> float | None:
     """Give the sample rate in Hz, None when the increment is no interval.
 
     The field of the increment holds six digits, 1.52588e-05 s where 1/65536 s is meant. Of all rates that round to
-    it the one with the fewest digits is taken, unless the record says the rate in full, as ours do.
+    it the one with the fewest digits is taken, unless the increment itself has fewer, as 0.3 s, or the record says
+    the rate in full, as ours do.
 
     Parameters
     ----------
@@ -83,7 +84,8 @@ def rate_of_header(header: dict[str, Any], second: float = 1.0) -> float | None:
     exact = _EXACT.match(str(header["id5"]).strip())
     if exact is not None and lowest <= float(exact["rate"]) <= highest:
         return float(exact["rate"])
-    return _shortest(lowest, highest, 1.0 / (increment * second))
+    rate_hz = _shortest(lowest, highest, 1.0 / (increment * second))
+    return rate_hz if _digits(rate_hz) <= _digits(increment) else 1.0 / (increment * second)
 
 
 def says_rate(header: dict[str, Any]) -> bool:
@@ -148,6 +150,11 @@ def header_of_channel(channel: Channel, series: TimeSeries) -> tuple[dict[str, A
         "orddenom_spec_data_type": 0,
     }
     return header, tuple(losses)
+
+
+def _digits(number: float) -> int:
+    """Decimal digits of a number, without zeros at its ends."""
+    return len(f"{number:.14e}".partition("e")[0].replace(".", "").rstrip("0"))
 
 
 def _shortest(lowest: float, highest: float, middle: float) -> float:

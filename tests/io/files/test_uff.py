@@ -230,6 +230,11 @@ def test_the_rate_is_restored_from_six_digits(rate: float) -> None:
     assert rate_of_header({"abscissa_inc": float(f"{1 / rate:.5e}"), "id5": "NONE"}) == rate
 
 
+@pytest.mark.parametrize("increment", [0.3, 0.7, 1.1e-3, 1e-2 / 3 * 3])
+def test_an_increment_of_few_digits_is_meant_as_it_stands(increment: float) -> None:
+    assert rate_of_header({"abscissa_inc": increment, "id5": "NONE"}) == pytest.approx(1 / increment, rel=1e-15)
+
+
 def test_a_rate_that_contradicts_the_record_is_not_believed() -> None:
     header = {"abscissa_inc": 0.001, "id5": "start_time_ns=0 sample_rate_hz=2000.0"}
     assert rate_of_header(header) == 1000.0

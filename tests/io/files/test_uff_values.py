@@ -127,7 +127,9 @@ def read_one(tmp_path: Path, content: bytes) -> tuple[NDArray, tuple[str, ...]]:
 def test_a_line_of_minus_one_among_the_values_ends_nothing(tmp_path: Path) -> None:
     raw = bytearray(LITTLE)
     raw[40:52] = b"\n    -1\n    "
-    (tmp_path / "a.uff").write_bytes(function_set(WAVE, raw=bytes(raw)) + function_set(WAVE[:3], id1="next", step=1.0))
+    (tmp_path / "a.uff").write_bytes(
+        function_set(WAVE, raw=bytes(raw)) + function_set(WAVE[:3], id1="next", step=1.0)
+    )
     contents = read_uff(tmp_path / "a.uff")
     assert contents.notes == ()
     np.testing.assert_array_equal(contents.series[0].values[0], np.frombuffer(bytes(raw), dtype="<f4"))

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 WIDTHS = {2: 13, 4: 20, 5: 13, 6: 20}
 
 
-def function_set(values: Sequence[complex] | NDArray[np.complexfloating] | NDArray[np.floating], **fields: object) -> bytes:
+def function_set(
+    values: Sequence[complex] | NDArray[np.complexfloating] | NDArray[np.floating], **fields: object
+) -> bytes:
     """A dataset 58 as text, or 58b where `raw` holds the bytes of its values."""
     given = {
         "id1": "acc", "id5": "NONE", "kind": 1, "node": 3, "dir": 1, "ref_node": 0, "ref_dir": 0, "form": 2,
@@ -19,10 +21,12 @@ def function_set(values: Sequence[complex] | NDArray[np.complexfloating] | NDArr
         "order": 1, "format": 2, "bytes": None, "exponent": "e", "newline": b"\n", "before_end": b"",
     } | fields  # fmt: skip
     lines = [given["id1"], "NONE", "NONE", "NONE", given["id5"]]
+    response = f"{'NONE':10s}{given['node']:10d}{given['dir']:4d}"
+    reference = f"{'NONE':10s}{given['ref_node']:10d}{given['ref_dir']:4d}"
+    form = f"{given['form']:10d}{given['count']:10d}{given['even']:10d}"
     lines += [
-        f"{given['kind']:5d}{0:10d}{0:5d}{0:10d} {'NONE':10s}{given['node']:10d}{given['dir']:4d}"
-        f" {'NONE':10s}{given['ref_node']:10d}{given['ref_dir']:4d}",
-        f"{given['form']:10d}{given['count']:10d}{given['even']:10d}{given['least']:13.5e}{given['step']:13.5e}{0:13.5e}",
+        f"{given['kind']:5d}{0:10d}{0:5d}{0:10d} {response} {reference}",
+        f"{form}{given['least']:13.5e}{given['step']:13.5e}{0:13.5e}",
         _axis(given["x_type"], (0, 0), given["x_axis"], given["x_label"]),
         _axis(given["type"], given["powers"], given["axis"], given["label"]),
         _axis(given["below_type"], (0, 0), "NONE", given["below"]),
