@@ -36,14 +36,16 @@ def convert(
         Literal["messages", "batches"] | None,
         typer.Option(help="Of a log: a message a sample, or blocks of samples.", show_default=False),
     ] = None,
+    time: options.Time = None,
+    time_unit: options.TimeUnit = None,
     read: Option = None,
     write: Option = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")] = False,
     json: options.Json = None,
 ) -> None:
-    """Convert csv, wav, mat, npz and universal files to MCAP and back.
+    """Convert the files of other programs to MCAP and back.
 
-    For example --read time_unit=ms --read names=time,force,tip --read units=force:N,tip:g of a csv file, or --write
+    For example --time-unit ms --read names=time,force,tip --read units=force:N,tip:g of a csv file, or --write
     binary=false of a universal file.
     """
     from chladni.io.convert import convert as convert_file
@@ -60,14 +62,14 @@ def convert(
         sample_rate_hz=rate,
         layout=layout,
         overwrite=overwrite,
-        reading=parse_options(read or (), "--read"),
+        reading=parse_options(read or (), "--read") | options.reading(time, time_unit),
         writing=parse_options(write or (), "--write"),
     )
     out.line(
         f"wrote {written.target}: {counted(len(written.channels), 'channel')}, samples: {count(written.samples)}, "
         f"{number(written.duration_s, digits=6)} s"
     )
-    out.lines((*written.notes, *written.losses))
+    out.lines((*written.notes, *(f"{name}: not read: {reason}." for name, reason in written.unread), *written.losses))
     out.json(
         {
             "format": "chladni.convert/1",
@@ -78,6 +80,7 @@ def convert(
             "duration_s": written.duration_s,
             "notes": list(written.notes),
             "losses": list(written.losses),
+            "unread": [{"name": name, "reason": reason} for name, reason in written.unread],
         }
     )
 

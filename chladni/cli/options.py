@@ -37,6 +37,20 @@ Overlap = Annotated[
 ]
 Start = Annotated[float | None, typer.Option(metavar="S", help="Seconds from the log's start.", show_default=False)]
 End = Annotated[float | None, typer.Option(metavar="S", help="Seconds from the log's start.", show_default=False)]
+Time = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME", help="Of a data file: the column that holds the times; none: none does.", show_default=False
+    ),
+]
+TimeUnit = Annotated[
+    str | None,
+    typer.Option(
+        metavar="UNIT",
+        help="What its numbers count: s, ms, us, ns, min, h, days, excel or datenum.",
+        show_default=False,
+    ),
+]
 Report = Annotated[
     Path | None,
     typer.Option(metavar="FILE.html", help="Write a self-contained HTML report.", show_default=False),
@@ -45,3 +59,9 @@ Figures = Annotated[
     Path | None,
     typer.Option(metavar="FOLDER", help="Save the figures as PNG and SVG.", show_default=False),
 ]
+
+
+def reading(time: str | None, time_unit: str | None) -> dict[str, str]:
+    """Give the options of a file's reader that are set."""
+    given = {"time": time, "time_unit": time_unit}
+    return {name: text for name, text in given.items() if text is not None}

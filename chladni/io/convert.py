@@ -32,6 +32,8 @@ class Conversion:
         Sentences on what the target doesn't hold or calls otherwise.
     notes
         Sentences on what was inferred from the source or left out of it.
+    unread
+        (name, reason) of each part of the source that isn't read.
     """
 
     source: Path
@@ -41,6 +43,7 @@ class Conversion:
     duration_s: float
     losses: tuple[str, ...]
     notes: tuple[str, ...]
+    unread: tuple[tuple[str, str], ...] = ()
 
 
 def convert(
@@ -61,7 +64,7 @@ def convert(
     Parameters
     ----------
     source, target
-        One of ``.mcap``, ``.csv``, ``.txt``, ``.wav``, ``.mat``, ``.npz``, ``.uff``, ``.unv`` each.
+        ``.mcap`` or one of `chladni.io.files.formats.FILE_SUFFIXES`; a target one of `WRITTEN_SUFFIXES` there.
     channels
         Names of the channels to convert; all by default.
     start_s, end_s
@@ -97,6 +100,7 @@ def convert(
         duration_s=_duration_s(contents.series),
         losses=losses,
         notes=contents.notes,
+        unread=contents.unread,
     )
 
 
