@@ -37,11 +37,15 @@ class Opener:
     ] = None
     time: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Of a data file, the column or vector of times.", show_default=False),
+        typer.Option(metavar="NAME", help="Of a data file, the column of times; none: none is.", show_default=False),
     ] = None
     time_unit: Annotated[
         str | None,
-        typer.Option(metavar="UNIT", help="Of a data file, what its times count, such as ms.", show_default=False),
+        typer.Option(
+            metavar="UNIT",
+            help="What its times count: s, ms, us, ns, min, h, days, excel or datenum.",
+            show_default=False,
+        ),
     ] = None
     read: Annotated[
         list[str] | None,

@@ -63,7 +63,7 @@ def convert(
     Parameters
     ----------
     source, target
-        One of ``.mcap``, ``.csv``, ``.txt``, ``.wav``, ``.mat``, ``.npz``, ``.uff``, ``.unv`` each.
+        ``.mcap`` or one of `chladni.io.files.formats.FILE_SUFFIXES`; a target one of `WRITTEN_SUFFIXES` there.
     channels
         Names of the channels to convert; all by default.
     start_s, end_s

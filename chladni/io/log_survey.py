@@ -156,7 +156,7 @@ def _file_channels(
     series: TimeSeries, base: TimeBase | None, kind: str, lost: NDArray[np.int64], faults: Faults, offset_s: float
 ) -> list[ChannelInfo]:
     clock = base or _stated_rate(series)
-    reason = "the file's own times" if base else f"no times in the file; its rate is {series.sample_rate_hz:.9g} Hz"
+    reason = "the file's own times" if base else f"samples follow one another at {series.sample_rate_hz:.9g} Hz"
     return [
         ChannelInfo(
             channel=channel,

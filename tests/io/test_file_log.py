@@ -120,11 +120,6 @@ def test_the_content_tells_the_kind(
 ) -> None:
     make(tmp_path / f"true.{kind}")
     shutil.copy(tmp_path / f"true.{kind}", tmp_path / name)
-    if kind == "csv" and name in ("a.mat", "a.wav"):
-        # A table has no magic; a name that claims another kind is believed, and what it lacks is told.
-        with pytest.raises(LogError, match=r"no mat file|no RIFF WAV file"):
-            chladni.open(tmp_path / name)
-        return
     with chladni.open(tmp_path / name, **options) as log:
         np.testing.assert_array_equal(log.read().values, truth())
         told = [note for note in log.notes if "by its content" in note]

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,25 @@ class FileContents:
     functions: "FrequencyResponse | None" = None
     modes: "ModeSet | None" = None
     geometry: Geometry = field(default_factory=Geometry)
+
+
+def with_notes(contents: FileContents, notes: Iterable[str]) -> FileContents:
+    """Put notes before those that there are."""
+    return replace(contents, notes=(*notes, *contents.notes))
+
+
+NOTHING: Final = FileContents(series=())
+"""What a part of a file holds of which nothing is told."""
+
+
+def joined(parts: Sequence[FileContents]) -> FileContents:
+    """Put what several parts of a file hold into one."""
+    return FileContents(
+        series=tuple(series for part in parts for series in part.series),
+        notes=tuple(note for part in parts for note in part.notes),
+        unread=tuple(left_out for part in parts for left_out in part.unread),
+        time_bases=tuple(base for part in parts for base in part.time_bases or (None,) * len(part.series)),
+    )
 
 
 def in_si(values: NDArray[np.floating[Any]], unit: str) -> tuple[NDArray[np.floating[Any]], str]:

@@ -28,9 +28,20 @@ Reader = Callable[..., FileContents]
 Writer = Callable[..., tuple[str, ...]]
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-WRITTEN_SUFFIXES: Final = (".csv", ".txt", ".wav", ".mat", ".npz", ".uff", ".unv")
+_CSV: Final = (".csv", ".txt", ".tsv")
+_WAV: Final = (".wav",)
+_LONG_WAV: Final = (".w64", ".rf64", ".bw64", ".bwf")
+_MAT: Final = (".mat",)
+_NPZ: Final = (".npz",)
+_NPY: Final = (".npy",)
+_UFF: Final = (".uff", ".unv")
+_ARROW: Final = (".parquet", ".pq", ".arrow", ".feather")
+_TDMS: Final = (".tdms",)
+_LVM: Final = (".lvm",)
+
+WRITTEN_SUFFIXES: Final = (*_CSV, *_WAV, *_MAT, *_NPZ, *_UFF, *_ARROW)
 """Data files that are written."""
-FILE_SUFFIXES: Final = WRITTEN_SUFFIXES
+FILE_SUFFIXES: Final = (*WRITTEN_SUFFIXES, *_LONG_WAV, *_NPY, *_TDMS, *_LVM)
 """Data files that are read."""
 READ_OPTIONS: Final = {
     "sample_rate_hz": "samples a second, where the file doesn't say it (--rate)",
@@ -40,6 +51,7 @@ READ_OPTIONS: Final = {
     "names": "names of the channels or columns, instead of what the file says",
 }
 """Options that mean the same in all readers that have them."""
+
 
 MCAP: Final = ".mcap"
 # What the first bytes of a file say it is, whatever its name says. What isn't read is left to the name.
@@ -56,6 +68,8 @@ _MAGIC: Final = (
     (re.compile(rb"\s*-1[ \t]*\r?\n[ \t]*\d{1,6}b?\b"), ".uff"),
 )
 _MAGIC_BYTES = 256
+# Text that has no magic; all other kinds begin with theirs.
+_TEXTS: Final = (*_CSV, *_LVM)
 _TEXT = re.compile(rb"(\xff\xfe|\xfe\xff).*|[^\0-\x08\x0e-\x1f]+", re.DOTALL)
 
 
@@ -76,9 +90,9 @@ def file_kind(path: Path) -> str:
             # Several suffixes stand for one kind.
             known = kind == MCAP or kind in FILE_SUFFIXES
             return suffix if known and _same_kind(suffix, kind) else kind if known else suffix
-    if suffix in FILE_SUFFIXES:
-        return suffix
-    return ".txt" if _TEXT.fullmatch(start) and _is_table(path) else MCAP
+    if suffix not in _TEXTS and _TEXT.fullmatch(start) and _is_table(path):
+        return ".txt"
+    return suffix if suffix in FILE_SUFFIXES else MCAP
 
 
 def _first_bytes(path: Path) -> bytes:
@@ -132,38 +146,41 @@ def call_with_options(function: Callable[..., Any], first: object, options: dict
 
 def reader_of(path: Path | str) -> Reader:
     """Give the reader of a file's kind; `SetupError` naming the kinds when there is none."""
-    from chladni.io.files import csv, mat, npz, uff_contents, wav
+    from chladni.io.files import arrow, csv, lvm, mat, npz, tdms, uff_contents, wav
 
-    readers: dict[str, Reader] = {
-        ".csv": csv.read_csv,
-        ".txt": csv.read_csv,
-        ".wav": wav.read_wav,
-        ".mat": mat.read_mat,
-        ".npz": npz.read_npz,
-        ".uff": uff_contents.read_universal_file,
-        ".unv": uff_contents.read_universal_file,
+    readers: dict[tuple[str, ...], Reader] = {
+        _CSV: csv.read_csv,
+        (*_WAV, *_LONG_WAV): wav.read_wav,
+        _MAT: mat.read_mat,
+        _NPZ: npz.read_npz,
+        _NPY: npz.read_npy,
+        _UFF: uff_contents.read_universal_file,
+        _ARROW: arrow.read_arrow,
+        _TDMS: tdms.read_tdms,
+        _LVM: lvm.read_lvm,
     }
     return _known(readers, path, "read")
 
 
 def writer_of(path: Path | str) -> Writer:
     """Give the writer of a file's kind; `SetupError` naming the kinds when there is none."""
-    from chladni.io.files import csv, mat, npz, uff, wav
+    from chladni.io.files import arrow, csv, mat, npz, uff, wav
 
-    writers: dict[str, Writer] = {
-        ".csv": csv.write_csv,
-        ".txt": csv.write_csv,
-        ".wav": wav.write_wav,
-        ".mat": mat.write_mat,
-        ".npz": npz.write_npz,
-        ".uff": uff.write_uff,
-        ".unv": uff.write_uff,
+    writers: dict[tuple[str, ...], Writer] = {
+        _CSV: csv.write_csv,
+        _WAV: wav.write_wav,
+        _MAT: mat.write_mat,
+        _NPZ: npz.write_npz,
+        _UFF: uff.write_uff,
+        _ARROW: arrow.write_arrow,
     }
     return _known(writers, path, "written")
 
 
-def _known(functions: dict[str, _Function], path: Path | str, verb: str) -> _Function:
+def _known(functions: dict[tuple[str, ...], _Function], path: Path | str, verb: str) -> _Function:
     suffix = Path(path).suffix.lower()
-    if suffix not in functions:
-        raise SetupError(f"{path}: the suffix {suffix!r} isn't {verb}; supported are .mcap, {', '.join(functions)}")
-    return functions[suffix]
+    for suffixes, function in functions.items():
+        if suffix in suffixes:
+            return function
+    known = ", ".join(suffix for suffixes in functions for suffix in suffixes)
+    raise SetupError(f"{path}: the suffix {suffix!r} isn't {verb}; supported are .mcap, {known}")

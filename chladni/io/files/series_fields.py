@@ -15,7 +15,7 @@
 ===================  ==================================================================
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -50,31 +50,24 @@ def series_fields(series: TimeSeries) -> dict[str, NDArray[Any]]:
     return fields
 
 
-def series_of_groups(
-    groups: Mapping[str, Mapping[str, Any]], *, where: str, units: Mapping[str, str] | None = None
-) -> tuple[TimeSeries, ...]:
-    """Make all series of a file again.
+def restated(series: Sequence[TimeSeries], units: Mapping[str, str] | None, *, where: str) -> tuple[TimeSeries, ...]:
+    """Take the numbers of series for those of other units.
 
     Parameters
     ----------
-    groups
-        Fields of each series, by its name.
     units
-        Unit by channel name of the numbers as they stand, instead of that in the file.
+        Unit by channel name of the numbers as they stand.
 
     Raises
     ------
-    LogError
-        Naming the field that is missing or has the wrong shape.
     SetupError
         When a unit is unknown, or stated for a channel that isn't there.
     """
-    series = tuple(_series_of_fields(fields, where=f"{where}, {name}") for name, fields in groups.items())
     known = [channel.name for part in series for channel in part.channels]
     for name in units or {}:
         if name not in known:
             raise SetupError(f"{where}: has no channel {name!r} to give a unit; channels: {', '.join(known)}")
-    return tuple(_restated(part, units) for part in series) if units else series
+    return tuple(_restated(part, units) for part in series) if units else tuple(series)
 
 
 def _restated(series: TimeSeries, units: Mapping[str, str]) -> TimeSeries:
@@ -86,7 +79,8 @@ def _restated(series: TimeSeries, units: Mapping[str, str]) -> TimeSeries:
     return replace(series, values=series.values * factors[:, np.newaxis], channels=tuple(channels))
 
 
-def _series_of_fields(fields: Mapping[str, Any], *, where: str) -> TimeSeries:
+def series_of_fields(fields: Mapping[str, Any], *, where: str) -> TimeSeries:
+    """Make the series again; `LogError` naming the field that is missing or has the wrong shape."""
     names = _texts(fields, "names", where)
     count = len(names)
     # The names say how many columns there are, so that axes squeezed away in MATLAB come back.
