@@ -5,7 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
+from pyarrow import feather, parquet
 from scipy.io import savemat, wavfile
 
 import chladni
@@ -60,6 +62,41 @@ def _uff(path: Path) -> None:
     write_uff(series(), path)
 
 
+def _npy(path: Path) -> None:
+    structured = np.zeros(SAMPLES, dtype=[("force", float), ("tip", float)])
+    structured["force"], structured["tip"] = truth()
+    np.save(path, structured)
+
+
+def _parquet(path: Path) -> None:
+    stamps = (np.arange(SAMPLES) * 5_000_000).astype("datetime64[ns]")
+    parquet.write_table(pa.table({"time": stamps, "force": truth()[0], "tip": truth()[1]}), path)
+
+
+def _feather(path: Path) -> None:
+    table = pa.table({"time": np.arange(SAMPLES) / RATE_HZ, "force [N]": truth()[0], "tip [m/s^2]": truth()[1]})
+    feather.write_feather(table, str(path))
+
+
+def _tdms(path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms", reason="TDMS files are read with the extra 'io'")
+    rate = {"wf_increment": 1 / RATE_HZ, "wf_samples": SAMPLES}
+    channels = [
+        nptdms.ChannelObject("run", name, row, properties=rate | {"unit_string": UNITS[name]})
+        for name, row in zip(NAMES, truth(), strict=True)
+    ]
+    with nptdms.TdmsWriter(str(path)) as writer:
+        writer.write_segment(channels)
+
+
+def _lvm(path: Path) -> None:
+    head = "LabVIEW Measurement\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\tOne\n***End_of_Header***\n\n"
+    head += f"Channels\t2\nSamples\t{SAMPLES}\t{SAMPLES}\nY_Unit_Label\tN\tm/s^2\nX0\t0\t0\nDelta_X\t0.005\t0.005\n"
+    rows = zip(np.arange(SAMPLES) / RATE_HZ, *truth(), strict=True)
+    body = "".join(f"{time!r}\t{force!r}\t{tip!r}\n" for time, force, tip in np.array(list(rows)).tolist())
+    path.write_text(f"{head}***End_of_Header***\nX_Value\tforce\ttip\tComment\n{body}")
+
+
 #: Kind, what makes one, options that it takes for it to be read, whether its times are a column.
 KINDS: list[tuple[str, Callable[[Path], object], dict[str, object], bool]] = [
     ("csv", table, {}, True),
@@ -69,6 +106,11 @@ KINDS: list[tuple[str, Callable[[Path], object], dict[str, object], bool]] = [
     ("npz", _npz, {"units": UNITS}, True),
     ("npz", lambda path: write_npz(series(), path), {}, False),
     ("uff", _uff, {}, False),
+    ("npy", _npy, {"units": UNITS, "sample_rate_hz": RATE_HZ}, False),
+    ("parquet", _parquet, {"units": UNITS}, True),
+    ("feather", _feather, {}, True),
+    ("tdms", _tdms, {}, False),
+    ("lvm", _lvm, {}, True),
 ]
 
 
@@ -124,7 +166,7 @@ def test_the_content_tells_the_kind(
         np.testing.assert_array_equal(log.read().values, truth())
         told = [note for note in log.notes if "by its content" in note]
     lies = Path(name).suffix != f".{kind}"
-    found = "txt" if kind == "csv" else kind
+    found = {"csv": "txt", "feather": "arrow"}.get(kind, kind)
     note = f"read as a .{found} file by its content; its suffix is {Path(name).suffix!r}."
     assert told == ([note] if lies else [])
 
