@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chladni.io.atomic import atomic_path
 from chladni.io.files.columns import Column, distinct, parse_titles
-from chladni.io.files.contents import MAX_BYTES, NOTHING, FileContents, joined, one_series
+from chladni.io.files.contents import MAX_BYTES, NOTHING, FileContents, joined, one_line, one_series
 from chladni.io.files.named_arrays import rate_of_scalar
 from chladni.io.files.series_fields import SERIES_FORMAT, restated, series_fields, series_of_fields
 from chladni.io.files.table import Part, series_of_parts
@@ -65,13 +65,15 @@ def read_arrow(
     path = Path(path)
     try:
         table, told = _table(path, max_bytes)
-    except (pa.ArrowException, OSError, MemoryError) as error:
-        raise LogError(f"{path}: this Arrow file can't be read: {_first_line(error)}") from error
-    metadata = _texts(table.schema.metadata)
-    if metadata.get("format") == SERIES_FORMAT:
-        own = _own(table, metadata.get("series", ""), str(path))
-        return joined([told, FileContents(series=restated([own], units, where=str(path)))])
-    columns, unread = _columns(table, metadata)
+        table.validate(full=True)
+        metadata = _texts(table.schema.metadata)
+        if metadata.get("format") == SERIES_FORMAT:
+            own = _own(table, metadata.get("series", ""), str(path))
+            return joined([told, FileContents(series=restated([own], units, where=str(path)))])
+        columns, unread = _columns(table, metadata)
+    # Names and texts are decoded when they're looked at.
+    except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError) as error:
+        raise LogError(f"{path}: this Arrow file can't be read: {one_line(error)}") from error
     part = Part(columns=columns, stated_rate_hz=_stated_rate_hz(metadata))
     options = TimeOptions(column=time, unit=time_unit, rate_hz=sample_rate_hz)
     return joined([told, series_of_parts([part], options, where=str(path), units=units, unread=unread)])
@@ -129,7 +131,7 @@ def _table(path: Path, max_bytes: int) -> tuple["pa.Table", FileContents]:
         with parquet.ParquetFile(path) as source:
             rows, columns = source.metadata.num_rows, source.metadata.num_columns
             # A packed column of equal numbers announces any count of rows in a few bytes.
-            _require_bounded(rows * columns * 8, max_bytes)
+            _require_bounded(path, rows * columns * 8, max_bytes)
             return _parquet(source)
     with pa.OSFile(str(path)) as source:
         if head.startswith(b"ARROW1"):
@@ -159,7 +161,7 @@ def _parquet(source: Any) -> tuple["pa.Table", FileContents]:
                 source.read(columns=[name])
                 good.append(name)
             except (pa.ArrowException, OSError) as error:
-                unread.append((name, f"damaged ({_first_line(error)})"))
+                unread.append((name, f"damaged ({one_line(error)})"))
         return source.read(columns=good), FileContents(series=(), unread=tuple(unread))
 
 
@@ -173,23 +175,23 @@ def _joined(
     notes = [] if closed else [f"{path}: was never closed; {{}} rows are read."]
     try:
         for batch in batches:
-            _require_bounded(sum(part.nbytes for part in read) + batch.nbytes, max_bytes)
+            # Offsets of text are taken from the file as they are: a wrong one would end the process.
+            batch.validate(full=True)
+            _require_bounded(path, sum(part.nbytes for part in read) + batch.nbytes, max_bytes)
             read.append(batch)
     except (pa.ArrowException, OSError) as error:
         if not read:
             raise
-        notes = [f"{path}: is cut short or damaged: {{}} rows are read ({_first_line(error)})."]
+        notes = [f"{path}: is cut short or damaged: {{}} rows are read ({one_line(error)})."]
     table = pa.Table.from_batches(read, schema=schema)
     return table, FileContents(series=(), notes=tuple(note.format(table.num_rows) for note in notes))
 
 
-def _require_bounded(size: int, max_bytes: int) -> None:
+def _require_bounded(path: Path, size: int, max_bytes: int) -> None:
     if size > max_bytes:
-        raise OSError(f"its columns take {size} bytes, {max_bytes} are allowed; raise max_bytes to read them")
-
-
-def _first_line(error: BaseException) -> str:
-    return str(error).partition("\n")[0][:200]
+        raise LogError(
+            f"{path}: its columns take {size} bytes, {max_bytes} are allowed; raise max_bytes to read them"
+        )
 
 
 def _texts(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
@@ -224,7 +226,7 @@ def _columns(table: "pa.Table", metadata: Mapping[str, str]) -> tuple[list[Colum
         try:
             numbers, text = _content(content)
         except pa.ArrowException as error:
-            unread.append((name, _first_line(error)))
+            unread.append((name, one_line(error)))
             continue
         columns.append(Column(name=name, numbers=numbers, text=text, unit=said, start_ns=title.start_ns))
     return columns, tuple(unread)
@@ -240,7 +242,9 @@ def _content(column: "pa.ChunkedArray") -> tuple[NDArray[Any] | None, "pa.Array 
         column = column.cast(kind.value_type)
         kind = column.type
     if kinds.is_string(kind) or kinds.is_large_string(kind) or kinds.is_null(kind):
-        return None, column.cast(pa.string()).fill_null("").combine_chunks()
+        text = column.cast(pa.string()).fill_null("").combine_chunks()
+        text.validate(full=True)
+        return None, text
     if kinds.is_timestamp(kind) or kinds.is_date(kind):
         numbers = column.cast(pa.timestamp("ns")).to_numpy()
     elif kinds.is_duration(kind) or kinds.is_time(kind):

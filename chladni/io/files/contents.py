@@ -207,6 +207,18 @@ def _laid_together(parts: Sequence[TimeSeries]) -> TimeSeries:
     )
 
 
+def one_line(said: object) -> str:
+    r"""Give the start of what a library says of a file as one line: it may hold the file's own bytes.
+
+    Examples
+    --------
+    >>> one_line(ValueError("bad name 'a\x00b'\nand more"))
+    "bad name 'a.b'"
+    """
+    line = str(said).partition("\n")[0][:120]
+    return "".join(letter if letter.isprintable() else "." for letter in line)
+
+
 def one_series(series: Iterable[TimeSeries], kind: str) -> TimeSeries:
     """Give the only series of a file kind that holds one rate; `LogError` naming the rates when there are more."""
     parts = tuple(series)

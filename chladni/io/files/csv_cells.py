@@ -139,7 +139,7 @@ class CellReader:
         except pa.ArrowInvalid:
             return []
         # An open quotation swallows lines.
-        if table.num_rows != len(lines):
+        if table.num_rows != len(lines) or table.num_columns != self._dialect.columns:
             return []
         return [pc.utf8_trim_whitespace(column.combine_chunks()) for column in table.columns]
 

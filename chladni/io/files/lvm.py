@@ -175,9 +175,8 @@ def _file_header(path: Path, lines: Sequence[str]) -> tuple[str, int, dict[str, 
     """Give the delimiter, the line behind the header, and its tags."""
     tagged = next((line for line in lines[:100] if line.startswith("Separator")), "Separator\tTab")
     # The tag itself is followed by what it names.
-    delimiter = {"tab": "\t", "comma": ","}.get(
-        tagged[len("Separator") :].strip(" \t,;\r\n").lower(), tagged[len("Separator")]
-    )
+    named = {"tab": "\t", "comma": ","}.get(tagged[len("Separator") :].strip(" \t,;\r\n").lower())
+    delimiter = named or next((mark for mark in "\t,;" if tagged[len("Separator") :].startswith(mark)), "\t")
     tags: dict[str, str] = {}
     for number, line in enumerate(lines):
         tag, *cells = split_cells(line, delimiter)

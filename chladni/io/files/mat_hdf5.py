@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from chladni.io.files.contents import one_line
 from chladni.io.files.mat_elements import Unreadable
 from chladni.signals.errors import LogError
 
@@ -44,7 +45,7 @@ def read_mat_hdf5(path: Path, *, max_bytes: int) -> dict[str, Any]:
             variables: dict[str, Any] = _Reader(h5py, file, max_bytes).group(file, 0)
             return variables
     except _DAMAGED as error:
-        raise LogError(f"its HDF5 structure is damaged ({str(error)[:100]})") from error
+        raise LogError(f"its HDF5 structure is damaged ({one_line(error)})") from error
 
 
 class _Reader:
@@ -56,6 +57,7 @@ class _Reader:
         self._max_bytes = max_bytes
         self._bytes = 0
         self._objects = 0
+        self._groups = {self._address(file)}
 
     def group(self, group: Any, depth: int) -> Any:
         """Give the members of a group: the variables, the fields of a struct, or a list for an array of structs."""
@@ -70,7 +72,7 @@ class _Reader:
             try:
                 content[name] = self._member(group[name], depth)
             except _DAMAGED as error:
-                content[name] = Unreadable(reason=f"damaged ({str(error)[:100]})")
+                content[name] = Unreadable(reason=f"damaged ({one_line(error)})")
         lengths = {len(part.parts) if isinstance(part, _OfEach) else -1 for part in content.values()}
         if len(lengths) == 1 and -1 not in lengths:
             rows = zip(*(part.parts for part in content.values()), strict=True)
@@ -85,6 +87,10 @@ class _Reader:
         if "MATLAB_object_decode" in member.attrs or kind in _OPAQUE:
             return Unreadable(reason=f"a {kind or 'class'} of MATLAB, which only MATLAB reads")
         if isinstance(member, self._h5py.Group):
+            address = self._address(member)
+            if address in self._groups:
+                return Unreadable(reason="a struct that stands elsewhere as well, or in itself")
+            self._groups.add(address)
             return self.group(member, depth + 1)
         if "MATLAB_empty" in member.attrs:
             return "" if kind == "char" else np.empty((0, 0))
@@ -93,6 +99,9 @@ class _Reader:
             parts = [self._member(self._file[place], depth + 1) for place in member[()].ravel()]
             return parts if kind == "cell" else _OfEach(parts=parts)
         return _array(member, kind)
+
+    def _address(self, member: Any) -> int:
+        return int(self._h5py.h5o.get_info(member.id).addr)
 
     def _require_bounded(self, member: Any) -> None:
         if member.is_virtual or member.external:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.files.columns import Column, channels_of, with_units
+from chladni.io.files.columns import Column, channels_of, distinct, with_units
 from chladni.io.files.contents import FileContents, joined, placed_rows, series_of_rows
 from chladni.io.files.time_column import find_times, is_row_number, rises
 from chladni.io.files.time_reading import NO_TIMES, TimeOptions, Times
@@ -29,7 +29,7 @@ class Part:
     Attributes
     ----------
     columns
-        All as long, their names distinct in the whole file.
+        All as long; names that stand twice in a file get a number.
     stated_rate_hz
         What the file states for their rows, None when it states nothing.
     stated_by
@@ -69,16 +69,18 @@ def series_of_parts(
     ChladniError
         When no part makes a series.
     """
-    columns = with_units([column for part in parts for column in part.columns], units, where=where)
-    named = {column.name: column for column in columns}
-    if options.column not in (None, NO_TIMES, *named):
-        raise SetupError(f"{where}: has no column {options.column!r} to be the time; columns: {', '.join(named)}")
+    columns = [column for part in parts for column in part.columns]
+    names = distinct([column.name for column in columns])
+    own = [replace(column, name=name) for column, name in zip(columns, names, strict=True)]
+    waiting = iter(with_units(own, units, where=where))
+    parts = [replace(part, columns=[next(waiting) for _ in part.columns]) for part in parts]
+    if options.column not in (None, NO_TIMES, *names):
+        raise SetupError(f"{where}: has no column {options.column!r} to be the time; columns: {', '.join(names)}")
     found: list[FileContents] = []
     failed: list[tuple[Part, ChladniError]] = []
     for part in parts:
-        whole = replace(part, columns=[named[name] for name in part.names])
         try:
-            found.append(_series_of_part(whole, _options_of(part, parts, options), where, units))
+            found.append(_series_of_part(part, _options_of(part, parts, options), where, units))
         except ChladniError as error:
             failed.append((part, error))
     if failed and not found:
@@ -172,7 +174,7 @@ def _signals(columns: Sequence[Column], apart: set[str]) -> tuple[list[Column], 
         if column.name in apart:
             continue
         reason = _why_no_signal(column)
-        if not reason and place == 0 and len(columns) > 1 and is_row_number(column):
+        if not reason and len(columns) > 1 and is_row_number(column, first=place == 0):
             reason = "it numbers the rows"
         if reason:
             unread.append((column.name, reason))

@@ -1,15 +1,18 @@
 """LabVIEW's TDMS files, by nptdms, which comes with the extra ``[io]``."""
 
-import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
+from logging import LogRecord
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chladni.io.files.columns import Column
-from chladni.io.files.contents import MAX_BYTES, FileContents
+from chladni.io.files.contents import MAX_BYTES, FileContents, one_line, with_notes
 from chladni.io.files.table import Part, series_of_parts
 from chladni.io.files.time_column import is_time_name
 from chladni.io.files.time_reading import NO_TIMES, NS_OF, UNIT_OF, TimeOptions, spelled
@@ -19,22 +22,9 @@ from chladni.signals.time_series import NS_PER_S
 
 # Property names of National Instruments, in the order of belief.
 _UNITS: Final = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
-# What nptdms raises where the bytes are wrong: it believes the lengths and types that it reads.
-_DAMAGED: Final = (
-    OSError,
-    ValueError,
-    KeyError,
-    TypeError,
-    IndexError,
-    AttributeError,
-    OverflowError,
-    NotImplementedError,
-    EOFError,
-    RuntimeError,
-    MemoryError,
-    ZeroDivisionError,
-    struct.error,
-)
+
+_MOST_SAID: Final = 3
+_Answer = TypeVar("_Answer")
 
 
 def read_tdms(
@@ -78,13 +68,30 @@ def read_tdms(
         raise LogError(
             f"{path}: TDMS files are read by nptdms, which this installation lacks; pip install 'chladni[io]'"
         ) from error
-    try:
-        with TdmsFile.open(path) as file:
-            channels, unread = _channels(path, file, max_bytes)
-    except _DAMAGED as error:
-        raise LogError(f"{path}: this TDMS file can't be read: {str(error)[:200]}") from error
+    # An index beside the file may be one of another file: what is open has none.
+    with _said() as said, path.open("rb") as raw:
+        channels, unread = _channels(path, _answer(path, lambda: TdmsFile.open(raw)), max_bytes)
     options = TimeOptions(column=time, unit=time_unit, rate_hz=sample_rate_hz)
-    return _contents(path, channels, unread, options, units)
+    contents = _contents(path, channels, unread, options, units)
+    return with_notes(contents, [f"{path}: {text}." for text in dict.fromkeys(map(one_line, said))][:_MOST_SAID])
+
+
+@contextmanager
+def _said() -> Iterator[list[str]]:
+    """Collect what nptdms has to say of a file, which it would write to the console."""
+    from nptdms.log import log_manager
+
+    said: list[str] = []
+
+    def collect(record: LogRecord) -> bool:
+        said.append(record.getMessage())
+        return False
+
+    log_manager.console_handler.addFilter(collect)
+    try:
+        yield said
+    finally:
+        log_manager.console_handler.removeFilter(collect)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,45 +109,55 @@ class _Channel:
         return 0 if self.column.numbers is None else self.column.numbers.size
 
 
+def _answer(where: object, call: Callable[[], _Answer]) -> _Answer:
+    """Ask nptdms, which believes lengths and types of the file, and raises whatever comes of wrong ones."""
+    try:
+        return call()
+    except Exception as error:
+        raise LogError(f"{where}: this TDMS file can't be read: {one_line(error)}") from error
+
+
 def _channels(path: Path, file: Any, max_bytes: int) -> tuple[list[_Channel], tuple[tuple[str, str], ...]]:
     """Read the channels of numbers, and say why others aren't; sizes are checked before memory is taken for them."""
     size, taken = path.stat().st_size, 0
-    found = [(group.name, channel) for group in file.groups() for channel in group.channels()]
-    names = [channel.name for _, channel in found]
+    found = _answer(
+        path, lambda: [(group.name, one, len(one), one.dtype) for group in file.groups() for one in group.channels()]
+    )
+    names = [channel.name for _, channel, _, _ in found]
     channels, unread = [], []
-    for group, channel in found:
+    for group, channel, length, dtype in found:
         name = channel.name if names.count(channel.name) == 1 else f"{group}/{channel.name}"
-        taken += 8 * len(channel)
-        if len(channel) > size or taken > max_bytes:
+        taken += 8 * length
+        if length > size or taken > max_bytes:
             raise LogError(
-                f"{path}: {name!r} announces {len(channel)} numbers, the file has {size} bytes and {max_bytes} are "
+                f"{path}: {name!r} announces {length} numbers, the file has {size} bytes and {max_bytes} are "
                 "allowed; raise max_bytes if it's sound"
             )
-        reason = _why_unread(channel)
+        reason = _why_unread(dtype, length, channel.properties)
+        try:
+            numbers = np.empty(0) if reason else _answer(path, partial(_values, channel))
+        except LogError as error:
+            reason = str(error).removeprefix(f"{path}: ")
         if reason:
             unread.append((name, reason))
             continue
-        try:
-            numbers = np.asarray(channel[:])
-        except _DAMAGED as error:
-            unread.append((name, f"damaged ({str(error)[:100]})"))
-            continue
         said = next((str(channel.properties[key]) for key in _UNITS if channel.properties.get(key)), None)
         rate_hz, start_ns = _waveform(channel.properties)
-        channels.append(
-            _Channel(
-                column=Column(name=name, numbers=numbers, unit=said), group=group, rate_hz=rate_hz, start_ns=start_ns
-            )
-        )
+        column = Column(name=name, numbers=numbers, unit=said)
+        channels.append(_Channel(column=column, group=group, rate_hz=rate_hz, start_ns=start_ns))
     return channels, tuple(unread)
 
 
-def _why_unread(channel: Any) -> str:
-    if channel.dtype.kind not in "fiubmM":
-        return "text" if channel.dtype.kind == "O" else f"{channel.dtype} numbers"
-    if not len(channel):
+def _values(channel: Any) -> NDArray[Any]:
+    return np.asarray(channel[:])
+
+
+def _why_unread(dtype: np.dtype[Any], length: int, properties: Mapping[str, Any]) -> str:
+    if dtype.kind not in "fiubmM":
+        return "text" if dtype.kind == "O" else f"{dtype} numbers"
+    if not length:
         return "empty"
-    axis = spelled(str(channel.properties.get("wf_xunit_string") or "s"))
+    axis = spelled(str(properties.get("wf_xunit_string") or "s"))
     return "" if axis in UNIT_OF else f"against an axis in {axis!r}, not time"
 
 
@@ -182,6 +199,7 @@ def _contents(
         group, rate_hz, start_ns = ("", one.rate_hz, one.start_ns) if waveform else (one.group, None, 0)
         parts.setdefault((group, one.samples, rate_hz, start_ns), []).append(one.column)
     stated = {(one.group, one.samples): one.rate_hz for one in channels if one.rate_hz is not None}
+    stated = {group: rate_hz for group, rate_hz in stated.items() if group in timed}
     return series_of_parts(
         [
             Part(columns=columns, stated_rate_hz=rate_hz or stated.get((group, samples)), start_ns=start_ns)

@@ -136,10 +136,11 @@ def is_time_name(name: str) -> bool:
     return bool(words) and all(word in _NAMES_OF_UNITS for word in words)
 
 
-def is_row_number(column: Column) -> bool:
-    """Whether a column only numbers the rows: called so, or nameless, and rising by one."""
+def is_row_number(column: Column, *, first: bool) -> bool:
+    """Whether a column only numbers the rows: as pandas calls it, or the first one, called so or nameless."""
     numbers = column.numbers
-    if column.name.lower() not in _COUNTERS or numbers is None or numbers.dtype.kind not in "fiu" or numbers.size < 3:
+    named = column.name.startswith("__index_level_") or (first and column.name.lower() in _COUNTERS)
+    if not named or numbers is None or numbers.dtype.kind not in "fiu" or numbers.size < 3:
         return False
     return bool((np.diff(numbers) == 1).all())
 

@@ -21,6 +21,7 @@ from chladni.signals.channel import Channel
 from chladni.signals.errors import ChladniError, LogError, SetupError
 from chladni.signals.testing import assert_close
 from chladni.signals.time_series import TimeSeries
+from tests.io.files.mat_bytes import element, mat_file, matrix
 
 KINDS = {"mat": (read_mat, write_mat), "npz": (read_npz, write_npz)}
 CHANNELS = (
@@ -219,19 +220,6 @@ def test_every_cut_is_told_or_harmless(tmp_path: Path, kind: str) -> None:
         (tmp_path / f"cut.{kind}").write_bytes(raw[:length])
         with pytest.raises(LogError):
             read(tmp_path / f"cut.{kind}")
-
-
-def mat_file(*elements: bytes) -> bytes:
-    return b"MATLAB 5.0".ljust(124) + b"\x00\x01IM" + b"".join(elements)
-
-
-def element(kind: int, content: bytes) -> bytes:
-    return struct.pack("<II", kind, len(content)) + content + bytes(-len(content) % 8)
-
-
-def matrix(kind: int, *parts: bytes, shape: tuple[int, ...] = (1, 1), name: bytes = b"x") -> bytes:
-    dimensions = element(5, struct.pack(f"<{len(shape)}i", *shape))
-    return element(14, element(6, struct.pack("<II", kind, 0)) + dimensions + element(1, name) + b"".join(parts))
 
 
 def nested(depth: int) -> bytes:

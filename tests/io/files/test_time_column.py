@@ -290,9 +290,11 @@ def test_times_coarser_than_the_rows_with_the_rate(tmp_path: Path, suffix: str) 
 
 def test_numbers_of_rows_are_told_from_signals() -> None:
     counted = np.arange(5)
-    assert is_row_number(Column(name="index", numbers=counted))
-    assert not is_row_number(Column(name="force", numbers=counted))
-    assert not is_row_number(Column(name="index", numbers=counted * 2))
+    assert is_row_number(Column(name="index", numbers=counted), first=True)
+    assert is_row_number(Column(name="__index_level_0__", numbers=counted), first=False)
+    assert not is_row_number(Column(name="index", numbers=counted), first=False)
+    assert not is_row_number(Column(name="force", numbers=counted), first=True)
+    assert not is_row_number(Column(name="index", numbers=counted * 2), first=True)
 
 
 @pytest.mark.parametrize(
