@@ -221,6 +221,34 @@ def _why_held(series: TimeSeries, row: int, method: JoinMethod) -> str:
     return "its samples are a staircase" if is_staircase(known) else ""
 
 
+def join_note(sources: Sequence[TimeSeries], found: Resampled) -> str:
+    """Say to which rate series were brought, which channels were held and why, and how true the others are."""
+    sentences = []
+    held = dict(found.held)
+    rate_hz = found.series.sample_rate_hz
+    if len(held) < len(found.series.channels):
+        sentences.append(
+            f"brought to {rate_hz:.6g} Hz by band-limited resampling: true to {found.error:.1g} of the amplitude up "
+            f"to {found.usable_hz:.4g} Hz, falling off above"
+        )
+    for reason in dict.fromkeys(held.values()):
+        names = [name for name, why in held.items() if why == reason]
+        listed = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+        sentences.append(f"{listed}: held between samples at {rate_hz:.6g} Hz ({reason})")
+    pairs = [(one, row) for one in sources for row in range(len(one.channels))]
+    lost_s = max(_valid_s(one, row) - _valid_s(found.series, place) for place, (one, row) in enumerate(pairs))
+    if lost_s * rate_hz > 1:
+        sentences.append(
+            f"up to {lost_s:.3g} s of a channel are left out: at its ends, at gaps, and where others have none"
+        )
+    return "; ".join(sentences)
+
+
+def _valid_s(series: TimeSeries, row: int) -> float:
+    count = series.samples if series.valid is None else int(np.count_nonzero(series.valid[row]))
+    return count / series.sample_rate_hz
+
+
 def is_staircase(values: NDArray[np.floating[Any]]) -> bool:
     """Whether samples stand still and then leap, as what is set now and then does, and no motion.
 
