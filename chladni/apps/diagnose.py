@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from chladni.apps.findings import damage_sentences
+from chladni.apps.findings import damage_sentences, reading_sentences
 from chladni.apps.gap_document import Document, gap_document
 from chladni.apps.sources import Span
 from chladni.gap.comparison.measuring import MatchedLog, matched_log
@@ -160,7 +160,7 @@ def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
             f"{some_of(held, count=NAMES_TOLD)}, the model listens to {some_of(sorted(wanted), count=NAMES_TOLD)}"
         )
     series = log.read(chosen, start_s=span.start_s, end_s=span.end_s)
-    damage = damage_sentences(log.damage)
+    damage = reading_sentences(log, everything=False)
     begins_s = (series.start_time_ns - log.start_time_ns) / NS_PER_S
     found = matched_log(model, series, log=name, held=held, begins_s=begins_s, damage=damage)
     return _with_use(found, series, damage)

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 
 from chladni.apps.unit_peaks import UnitPeaks
-from chladni.io.log_info import LogInfo, some_of
+from chladni.io.log import Log
+from chladni.io.log_info import LogInfo, some_of, unread_sentences
 from chladni.io.loss import Loss
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
@@ -22,6 +23,25 @@ def _damage_sentence(loss: Loss) -> str:
     where = "" if loss.offset is None else f" at byte {loss.offset} ({loss.record})"
     lost = "an unknown number of messages" if loss.lost_messages is None else counted(loss.lost_messages, "message")
     return f"Damage{where}: {loss.what}; {lost} lost."
+
+
+def reading_sentences(log: Log, *, everything: bool) -> tuple[str, ...]:
+    """Say what is to be known of what has been read of a log.
+
+    Parameters
+    ----------
+    log
+        After reading.
+    everything
+        Whether all channels were asked for, so that topics that can't be read are left out of it.
+
+    Returns
+    -------
+    tuple of str
+        What was lost, what is odd, what was left out.
+    """
+    left_out = [one for one in log.unread if everything and not one.complete]
+    return (*damage_sentences(log.damage), *log.oddities, *unread_sentences(left_out))
 
 
 def soundness_sentences(info: LogInfo) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from chladni.apps.findings import damage_sentences
+from chladni.apps.findings import reading_sentences
 from chladni.apps.gap_document import Document, distortion_document, where_document
 from chladni.apps.sources import Span
 from chladni.gap.comparison.distortion import Distortion
@@ -110,7 +110,7 @@ def compare_with_simulated(
         distortion=_shares(view.measured_split),
         simulated_distortion=_shares(view.simulated_split),
         remarks=(
-            *(told for log in logs for told in damage_sentences(log.damage)),
+            *(told for log in logs for told in reading_sentences(log, everything=False)),
             *view.remarks,
             *_split_remarks(view, moving_inputs(ours)),
         ),

@@ -4,7 +4,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
-from chladni.apps.findings import damage_sentences
+from chladni.apps.findings import reading_sentences
 from chladni.io.log import open_log
 from chladni.models.core.instrument import Instrument
 from chladni.models.core.model import Model
@@ -70,4 +70,4 @@ def recording_for(model: Model, log: Path | str) -> tuple[TimeSeries, tuple[str,
     with open_log(log) as opened:
         held = [channel.name for channel in opened.channels if channel.name in measured]
         recording = opened.read(list(dict.fromkeys([*driving, *held])))
-        return recording, damage_sentences(opened.damage)
+        return recording, reading_sentences(opened, everything=False)

@@ -42,7 +42,7 @@ def frf(
 ) -> None:
     """Transfer functions and coherence, with their uncertainty."""
     from chladni.apps.documents import frf_document
-    from chladni.apps.findings import damage_sentences
+    from chladni.apps.findings import reading_sentences
     from chladni.apps.sources import Span
     from chladni.apps.spectra import Averaging, transfer
     from chladni.io.log import open_log
@@ -61,7 +61,7 @@ def frf(
             span=Span(start_s=start, end_s=end),
             progress=progress,
         )
-        damage = damage_sentences(opened.damage)
+        damage = reading_sentences(opened, everything=response is None)
         geometry = opened.geometry
     peaks = find_response_peaks(found)
     _print_account(out, found)

@@ -73,7 +73,7 @@ def modes(
     report: options.Report = None,
 ) -> None:
     """Natural frequencies, damping ratios and modal vectors, with their uncertainty."""
-    from chladni.apps.findings import damage_sentences
+    from chladni.apps.findings import reading_sentences
     from chladni.apps.modal_study import UNIVERSAL_FILES, modal_study, universal_file_study
     from chladni.apps.modes import Wanted
     from chladni.apps.modes_document import modes_document
@@ -108,7 +108,7 @@ def modes(
                 span=Span(start_s=start, end_s=end),
                 progress=progress,
             )
-            damage = damage_sentences(opened.damage)
+            damage = reading_sentences(opened, everything=channel is None)
     print_modes(out, found.modes, found.validation)
     print_relative_motion(out, found.modes, found.study.relative_motion)
     out.lines(damage + found.study.findings)

@@ -30,7 +30,7 @@ def psd(
 ) -> None:
     """Averaged power spectral densities with named peaks."""
     from chladni.apps.documents import psd_document
-    from chladni.apps.findings import damage_sentences
+    from chladni.apps.findings import reading_sentences
     from chladni.apps.sources import Span
     from chladni.apps.spectra import Averaging, densities
     from chladni.apps.unit_peaks import unit_peaks
@@ -47,7 +47,7 @@ def psd(
             span=Span(start_s=start, end_s=end),
             progress=progress,
         )
-        damage = damage_sentences(opened.damage)
+        damage = reading_sentences(opened, everything=channel is None)
         geometry = opened.geometry
     document = psd_document(found)
     named = [group for density in found for group in unit_peaks(density)]

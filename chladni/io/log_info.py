@@ -1,14 +1,16 @@
 """What `chladni info` tells of a log."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any, Final
 
-from chladni.io.loss import Loss
+from chladni.io.gathering import LostMessages
+from chladni.io.loss import Loss, Unread
 from chladni.io.stamps import StampKind
 from chladni.signals.channel import Channel
 from chladni.signals.time_base import TimeBase
+from chladni.signals.wording import counted
 
 INFO_FORMAT: Final = "chladni.info/1"
 
@@ -72,13 +74,15 @@ class LogInfo:
     start_time_ns
         Time of the earliest sample, nanoseconds since the Unix epoch.
     duration_s
-        From there to the end of the last sample.
+        From there to the end of the last sample; of a log without samples that of its messages.
     channels
         In the order of the file.
     damage
         What was lost.
     findings
         Sentences about the log's soundness, the worst first.
+    unread
+        Topics, and fields of topics, that no channel was made of.
     """
 
     file: str
@@ -87,6 +91,7 @@ class LogInfo:
     channels: tuple[ChannelInfo, ...]
     damage: tuple[Loss, ...]
     findings: tuple[str, ...]
+    unread: tuple[Unread, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Give the content of ``chladni info --json``."""
@@ -97,6 +102,7 @@ class LogInfo:
             "channels": [one.to_json() for one in self.channels],
             "damage": [_loss_json(one) for one in self.damage],
             "findings": list(self.findings),
+            "unread": [one.to_json() for one in self.unread],
         }
 
 
@@ -122,3 +128,31 @@ def some_of(names: Sequence[str], *, count: int = 3) -> str:
     """
     more = f" and {len(names) - count} more" if len(names) > count else ""
     return ", ".join(names[:count]) + more
+
+
+def unread_sentences(unread: Iterable[Unread]) -> tuple[str, ...]:
+    """Say what was left out and why, all that share a reason together.
+
+    Examples
+    --------
+    >>> unread_sentences([Unread(topic="/a", reason="holds no number", messages=9)])
+    ('/a (9 messages): holds no number',)
+    """
+    groups: dict[str, list[Unread]] = {}
+    for one in unread:
+        groups.setdefault(one.reason, []).append(one)
+    return tuple(f"{_counted_names(group)}: {reason}" for reason, group in groups.items())
+
+
+def _counted_names(group: Sequence[Unread]) -> str:
+    known = [one.messages for one in group if one.messages is not None]
+    messages = f" ({counted(sum(known), 'message')})" if len(known) == len(group) else ""
+    return f"{some_of([one.name for one in group])}{messages}"
+
+
+def oddities(lost: LostMessages) -> tuple[str, ...]:
+    """Say what is odd about messages that were read all the same."""
+    groups: dict[tuple[str, int], list[str]] = {}
+    for (topic, what), messages in lost.told.items():
+        groups.setdefault((what, messages), []).append(topic)
+    return tuple(f"{some_of(topics)}: {what} ({counted(n, 'message')})" for (what, n), topics in groups.items())

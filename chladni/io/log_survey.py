@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from chladni.io.catalog import Catalog
 from chladni.io.gathering import Gathering, LostMessages, windowed
 from chladni.io.log_findings import log_findings
-from chladni.io.log_info import ChannelInfo, LogInfo
+from chladni.io.log_info import ChannelInfo, LogInfo, oddities
 from chladni.io.loss import losses
 from chladni.io.mcap.container import McapContainer
 from chladni.io.placement import Placement
@@ -33,10 +33,11 @@ def survey(container: McapContainer, content: Catalog, lost: LostMessages) -> Lo
     return LogInfo(
         file=content.file,
         start_time_ns=content.start_ns,
-        duration_s=_duration_s(content, monitors, placements),
+        duration_s=_duration_s(content, monitors, placements) or _logged_s(container),
         channels=tuple(found[source.channel.name] for source in content.channels),
         damage=damage,
-        findings=tuple(log_findings(content, monitors, placements, damage)),
+        findings=tuple(log_findings(content, monitors, placements, damage, oddities(lost))),
+        unread=content.unread,
     )
 
 
@@ -72,3 +73,13 @@ def _duration_s(content: Catalog, monitors: Sequence[SampleMonitor], placements:
         if monitor.samples
     ]
     return max(0, max(ends, default=content.start_ns) - content.start_ns) / NS_PER_S
+
+
+def _logged_s(container: McapContainer) -> float:
+    """From the first message to the end of the last one, which stands for a period as a sample does."""
+    counts, range_ns = container.message_counts(), container.time_range_ns
+    if range_ns is None:
+        return 0.0
+    most = max(counts.values(), default=0) if counts is not None else 0
+    period = 1 / (most - 1) if most > 1 else 0.0
+    return (range_ns[1] - range_ns[0]) * (1 + period) / NS_PER_S
