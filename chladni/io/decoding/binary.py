@@ -34,6 +34,7 @@ COMPACT_BYTES: Final = 256
 """Bytes a message for each column asked for, up to which irregular messages are first copied side by side."""
 
 _UINT16: Final = np.dtype(np.uint16)
+_EIGHT_BYTES: Final = (np.dtype(np.float64), np.dtype(np.int64), np.dtype(np.uint64))
 _BEHIND_WIDE_TEXT: Final = (
     "can't be decoded: numbers behind a wstring can't be found, since writers give a character 2 bytes or 4; "
     "record it as a string"
@@ -147,8 +148,25 @@ class BinaryDecoder:
         fitting, form = max(found, key=lambda one: one[0])
         # As with the byte order: a few that differ are damaged or foreign, most of them tell the form.
         if 2 * fitting < most:
-            raise LogError(self._misfit(heads, most - fitting, most))
+            raise LogError(
+                f"{self._misfit(heads, most - fitting, most)}; it isn't the one they were written with: record both "
+                "from the same build"
+            )
+        if form.rules.origin and not self._is_borne_out(form, found[0][1], heads):
+            raise LogError(
+                f"{self._misfit(heads, most - found[0][0], most)}: either it lacks a member, or numbers are aligned "
+                "from the encapsulation header on; the values of these messages don't show which"
+            )
         self._form = form
+
+    def _is_borne_out(self, form: Form, usual: Form, heads: Sequence[EncodedMessages]) -> bool:
+        """Whether values speak for an alignment, too.
+
+        Lengths alone would take a definition that lacks a last member of 4 bytes for alignment from the header.
+        """
+        numbers = [leaf for leaf in self._leaves.values() if leaf.info.kind == "number"]
+        tree = tree_of([leaf for leaf in numbers if leaf.info.dtype in _EIGHT_BYTES])
+        return _read_ordinarily(form, tree, heads) and not _read_ordinarily(usual, tree, heads)
 
     def _forms(self, heads: Sequence[EncodedMessages]) -> Iterator[Form]:
         if not self._encapsulated:
@@ -191,7 +209,7 @@ class BinaryDecoder:
             lengths = f" (a message has {heads[0].lengths[0]}, its definition makes {makes})"
         return (
             f"{self.record.name}: {wrong} of the first {most} messages don't have the bytes that the definition gives"
-            f" them{lengths}; it isn't the one they were written with: record both from the same build"
+            f" them{lengths}"
         )
 
     def _column(self, leaf: Leaf, pieces: list[Piece], batch: _Batch, cursor: Cursor) -> Column:
@@ -237,6 +255,28 @@ def _fitting(form: Form, messages: EncodedMessages) -> int:
     walk.measure(form.root, delimited=form.encapsulation not in (None, "plain"))
     # What takes too long to be measured speaks neither for nor against.
     return len(batch.bad) if walk.steps_left == 0 else len(walk.cursor)
+
+
+def _read_ordinarily(form: Form, tree: Tree, heads: Sequence[EncodedMessages]) -> bool:
+    """Whether the numbers of 8 bytes are such as are measured, in most of the messages.
+
+    Read from 4 bytes beside its place, a number has the half of another one, or padding, for its upper half: a
+    floating-point number then has any exponent, and an integer nothing in its lower half.
+    """
+    read, most, parts = 0, 0, [np.empty(0)]
+    for head in heads:
+        walk = _entered(_Batch(head).cursor(), form)
+        walk.read(form.root, tree)
+        read, most = read + len(walk.cursor), most + len(head.offsets)
+        parts += [piece.values.ravel() for pieces in walk.pieces.values() for piece in pieces]
+    floats = np.concatenate([part for part in parts if part.dtype == np.float64])
+    sizes = np.abs(floats[np.isfinite(floats) & (floats != 0)])
+    inside = (sizes >= np.finfo(np.float32).tiny) & (sizes <= np.finfo(np.float32).max)
+    integers = np.concatenate(
+        [np.empty(0, np.int64), *(one.view(np.int64) for one in parts if one.dtype.kind in "iu")]
+    )
+    halved = integers.any() and not (integers & 0xFFFFFFFF).any()
+    return 2 * read >= most and bool(inside.all()) and not halved
 
 
 def _entered(cursor: Cursor, form: Form) -> Walk:

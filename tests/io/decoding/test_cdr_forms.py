@@ -127,6 +127,31 @@ def test_what_takes_too_long_to_measure_is_taken_as_its_header_says(monkeypatch:
         decoder.informed_by([encoded])
 
 
+def test_a_definition_that_lacks_its_last_member_is_not_taken_for_another_alignment() -> None:
+    # {double; long} under {double}: as many bytes as 4 of padding and a double.
+    for write in (
+        lambda writer, index: writer.number("d", X[index]).number("i", 7),
+        lambda writer, index: writer.number("d", index).number("f", 25.3),
+        lambda writer, index: writer.number("d", X[index]).number("i", 0),
+        lambda writer, index: writer.number("d", 0.0).number("i", index),
+    ):
+        with pytest.raises(LogError, match=r"either it lacks a member, or numbers are aligned .* don't show which"):
+            idl_decoder("struct S { double x; };").informed_by([batch_of(written(write))])
+
+
+@pytest.mark.parametrize(("order", "code"), [("<", "d"), (">", "d"), ("<", "q")])
+def test_whole_numbers_show_their_alignment_too(order: str, code: str) -> None:
+    text = f"struct S {{ {'double' if code == 'd' else 'long long'} x, y; }};"
+    messages = written(lambda writer, i: writer.number(code, i, 2**40 + i), order=order, origin=4)
+    assert read(idl_decoder(text), messages, "y") == [2**40 + index for index in range(COUNT)]
+
+
+def test_zeros_show_no_alignment() -> None:
+    messages = written(lambda writer, _: writer.number("d", 0.0, 0.0), origin=4)
+    with pytest.raises(LogError, match="don't show which"):
+        idl_decoder("struct S { double x, y; };").informed_by([batch_of(messages)])
+
+
 # --- XCDR2 -------------------------------------------------------------------------------------------------------
 
 TYPES = """
