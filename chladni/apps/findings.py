@@ -41,7 +41,7 @@ def reading_sentences(log: Log, *, everything: bool) -> tuple[str, ...]:
         What was lost, what is odd, what was left out.
     """
     left_out = [one for one in log.unread if everything and not one.complete]
-    return (*damage_sentences(log.damage), *log.oddities, *unread_sentences(left_out))
+    return (*damage_sentences(log.damage), *log.notes, *unread_sentences(left_out))
 
 
 def soundness_sentences(info: LogInfo) -> tuple[str, ...]:

@@ -118,7 +118,7 @@ class Log:
         return losses(self._container.damage, self._lost)
 
     @property
-    def oddities(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[str, ...]:
         """What is odd about messages that have been read so far, in sentences."""
         return oddities(self._lost)
 

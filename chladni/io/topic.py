@@ -66,7 +66,7 @@ class Topic:
         """Numeric leaves that can't be read, and why."""
         return next(iter(self.decoders.values())).unread
 
-    def with_heads(self, heads: Mapping[int, Sequence[MessageBatch]]) -> "tuple[Topic, str | None]":
+    def with_head(self, head: Sequence[MessageBatch]) -> "tuple[Topic, str | None]":
         """Give the topic with the first messages of its channels, from which decoders learn what no schema tells.
 
         Returns
@@ -80,11 +80,11 @@ class Topic:
         reason = None
         for channel, decoder in self.decoders.items():
             try:
-                decoders[channel] = decoder.informed_by(heads[channel])
+                decoders[channel] = decoder.informed_by([batch for batch in head if batch.channel_id == channel])
             except LogError as error:
                 reason = str(error)
-        head = tuple(batch for channel in decoders for batch in heads[channel])
-        return replace(self, head=head, decoders=decoders), reason
+        readable = tuple(batch for batch in head if batch.channel_id in decoders)
+        return replace(self, head=readable, decoders=decoders), reason
 
 
 def topics_of(channels: Mapping[int, McapChannel]) -> tuple[dict[str, Topic], dict[str, str]]:
@@ -167,7 +167,7 @@ def read_heads(container: McapContainer, topics: Mapping[str, Topic]) -> tuple[d
     found: dict[str, Topic] = {}
     refused: dict[str, str] = {}
     for name, topic in topics.items():
-        informed, reason = topic.with_heads(heads)
+        informed, reason = topic.with_head([batch for channel in topic.decoders for batch in heads[channel]])
         if informed.decoders:
             found[name] = informed
         if reason is not None:

@@ -193,16 +193,16 @@ def test_what_is_odd_about_messages_is_told_with_their_number(tmp_path: Path) ->
         chunk_size=500,
     )
     with open_log(path) as log:
-        assert log.oddities == ()
+        assert log.notes == ()
         np.testing.assert_array_equal(log.read(["/j.x", "/m.x"]).values, [X, X])
         told = [
             "/j: the schema calls x an integer, which its values aren't; they are read as they are",
             "/m: numbers are aligned from the encapsulation header on, as the lengths of the messages show",
         ]
-        assert sorted(log.oddities) == [f"{one} (200 messages)" for one in told]
+        assert sorted(log.notes) == [f"{one} (200 messages)" for one in told]
         # Read again, they aren't odd twice.
-        assert set(log.oddities) <= set(log.info().findings)
-        assert sorted(log.oddities) == [f"{one} (200 messages)" for one in told]
+        assert set(log.notes) <= set(log.info().findings)
+        assert sorted(log.notes) == [f"{one} (200 messages)" for one in told]
         assert log.info().damage == ()
 
 
