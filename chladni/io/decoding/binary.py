@@ -263,19 +263,21 @@ def _read_ordinarily(form: Form, tree: Tree, heads: Sequence[EncodedMessages]) -
     Read from 4 bytes beside its place, a number has the half of another one, or padding, for its upper half: a
     floating-point number then has any exponent, and an integer nothing in its lower half.
     """
-    read, most, parts = 0, 0, [np.empty(0)]
+    read, most = 0, 0
+    floats, integers = [np.empty(0)], [np.empty(0, np.int64)]
     for head in heads:
         walk = _entered(_Batch(head).cursor(), form)
         walk.read(form.root, tree)
         read, most = read + len(walk.cursor), most + len(head.offsets)
-        parts += [piece.values.ravel() for pieces in walk.pieces.values() for piece in pieces]
-    floats = np.concatenate([part for part in parts if part.dtype == np.float64])
-    sizes = np.abs(floats[np.isfinite(floats) & (floats != 0)])
+        for values in (piece.values.ravel() for pieces in walk.pieces.values() for piece in pieces):
+            if values.dtype == np.float64:
+                floats.append(values.view(np.float64))
+            else:
+                integers.append(values.view(np.int64))
+    sizes, whole = np.abs(np.concatenate(floats)), np.concatenate(integers)
+    sizes = sizes[np.isfinite(sizes) & (sizes != 0)]
     inside = (sizes >= np.finfo(np.float32).tiny) & (sizes <= np.finfo(np.float32).max)
-    integers = np.concatenate(
-        [np.empty(0, np.int64), *(one.view(np.int64) for one in parts if one.dtype.kind in "iu")]
-    )
-    halved = integers.any() and not (integers & 0xFFFFFFFF).any()
+    halved = bool(whole.any()) and not (whole & 0xFFFFFFFF).any()
     return 2 * read >= most and bool(inside.all()) and not halved
 
 
