@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from chladni.apps.findings import damage_sentences, reading_sentences, require_channels
+from chladni.apps.findings import reading_sentences, require_channels
 from chladni.apps.gap_document import Document, gap_document
 from chladni.apps.sources import Span, joined
 from chladni.gap.comparison.measuring import MatchedLog, matched_log
@@ -162,10 +162,10 @@ def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
             f"{some_of(held, count=NAMES_TOLD)}, the model listens to {some_of(sorted(wanted), count=NAMES_TOLD)}"
         )
     series, notes = joined(log, chosen, span)
-    damage = damage_sentences(log.damage)
+    damage = reading_sentences(log, everything=False)
     begins_s = (series.start_time_ns - log.start_time_ns) / NS_PER_S
     found = matched_log(model, series, log=name, held=held, begins_s=begins_s, damage=damage)
-    return _with_use(found, series, (*reading_sentences(log), *notes))
+    return _with_use(found, series, (*damage, *notes))
 
 
 def _of_series(model: Model, series: TimeSeries, name: str) -> _Read:

@@ -10,7 +10,7 @@ from chladni.apps.modes import Method, Wanted, functions_and_modes, modes_of_res
 from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging
 from chladni.io.log import Log
-from chladni.io.log_findings import unread_findings
+from chladni.io.log_info import unread_sentences
 from chladni.modal.checks.driving_point import check_driving_point
 from chladni.modal.checks.reciprocity import check_reciprocity
 from chladni.modal.functions.circle_fit import CircleFit
@@ -157,7 +157,7 @@ def _study(
 ) -> ModalStudy:
     geometry = log.geometry
     validation, motions = validate(modes), relative_motion(modes, geometry)
-    told = (*log.notes, *unread_findings(log.unread), *notes)
+    told = (*log.notes, *unread_sentences(one for one in log.unread if not one.complete), *notes)
     study = Study(
         title=log.path.name,
         response=response,

@@ -69,7 +69,7 @@ def frf(
             span=Span(start_s=start, end_s=end, join=join),
             progress=progress,
         )
-        told = reading_sentences(opened)
+        told = reading_sentences(opened, everything=response is None)
         geometry = opened.geometry
     peaks = find_response_peaks(found)
     _print_account(out, found)

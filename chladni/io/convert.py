@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from chladni.io.files.formats import MCAP, WRITTEN_SUFFIXES, call_with_options, writer_of
 from chladni.io.log import Log, open_log
+from chladni.io.loss import Unread
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
 
@@ -44,7 +45,7 @@ class Conversion:
     duration_s: float
     losses: tuple[str, ...]
     notes: tuple[str, ...]
-    unread: tuple[tuple[str, str], ...] = ()
+    unread: tuple[Unread, ...] = ()
 
 
 def convert(

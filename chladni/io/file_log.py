@@ -15,7 +15,7 @@ from chladni.io.log import Log
 from chladni.io.log_info import LogInfo, some_of
 from chladni.io.log_reader import SampleGrid
 from chladni.io.log_survey import survey_file
-from chladni.io.loss import Loss
+from chladni.io.loss import Loss, Unread
 from chladni.io.message_path import near_matches
 from chladni.io.setup import ChannelSetup, Setup, refined
 from chladni.io.stamps import StampRequest
@@ -92,9 +92,9 @@ class FileLog(Log):
         return tuple(told)
 
     @property
-    def unread(self) -> tuple[tuple[str, str], ...]:
-        """(name, reason) of each part of the file that isn't read."""
-        return self._contents.unread
+    def unread(self) -> tuple[Unread, ...]:
+        """Columns and parts of the file that no channel is made of."""
+        return tuple(Unread(topic=name, reason=reason) for name, reason in self._contents.unread)
 
     @property
     def functions(self) -> "FrequencyResponse | None":
@@ -162,7 +162,9 @@ class FileLog(Log):
     def info(self) -> LogInfo:
         """Look at all samples once and tell whether the file is sound."""
         if self._info is None:
-            self._info = survey_file(self._path.name, self._kind.removeprefix("."), self._contents, self.notes)
+            self._info = survey_file(
+                self._path.name, self._kind.removeprefix("."), self._contents, notes=self.notes, unread=self.unread
+            )
         return self._info
 
     def close(self) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 from chladni.io.files.formats import MCAP, file_kind
 from chladni.io.log_info import LogInfo
 from chladni.io.log_reader import SampleGrid, several_grids
-from chladni.io.loss import Loss
+from chladni.io.loss import Loss, Unread
 from chladni.io.mcap.limits import Limits
 from chladni.io.setup import Setup, load_setup
 from chladni.io.stamps import StampRequest
@@ -131,12 +131,12 @@ class Log(ABC):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what was inferred from the file."""
+        """Sentences on what was inferred from the file, or is odd about what has been read so far."""
         return ()
 
     @property
-    def unread(self) -> tuple[tuple[str, str], ...]:
-        """(name, reason) of each part of the file that isn't read."""
+    def unread(self) -> tuple[Unread, ...]:
+        """Topics, columns and fields that no channel is made of."""
         return ()
 
     @property
