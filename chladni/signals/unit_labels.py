@@ -80,7 +80,7 @@ _NAMES = (
     (frozenset(["pressure", "druck"]), "Pa"),
     (frozenset(["mass", "masse"]), "kg"),
     (frozenset(["charge", "ladung"]), "C"),
-    (frozenset(["temp", "temperature", "temperatur"]), "degC"),
+    (frozenset(["temp", "temperature"]), "degC"),
 )
 _TWICE = re.compile(r"/\s*([A-Za-z_]+)\s*\*\s*\1\b")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
@@ -134,6 +134,12 @@ def read_label(label: str, *, quantity: str | None = None) -> tuple[float, str]:
         if chosen.unit != quantity:
             raise
     return chosen.factor, chosen.unit
+
+
+def require_label(label: str) -> None:
+    """Raise `SetupError` for a label that is no unit whatever the values are; one of several meanings passes."""
+    _require_linear(label, bare := _bare(label))
+    _readings(label, bare)
 
 
 def says_nothing(label: str) -> bool:

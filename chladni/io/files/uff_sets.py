@@ -9,7 +9,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +58,8 @@ _SYSTEMS = {
 # Writers round the factors, some to four digits.
 _SAME_FACTOR = 1e-3
 _LEAST_FACTOR = 1e-30
+# Far above any time or frequency: the last of the abscissae must not overflow.
+_LARGEST = 1e100
 
 
 def cut_off_note(file: UniversalFile) -> tuple[str, ...]:
@@ -209,9 +211,12 @@ def _integer(text: str, name: str, *, blank: bool) -> int:
 def _real(field: str, name: str) -> float:
     text = field.strip().upper().replace("D", "E")
     try:
-        return float(text) if text else 0.0
+        number = float(text) if text else 0.0
     except ValueError:
-        raise LogError(f"found {text[:20]!r} where a number is due ({name})") from None
+        number = nan
+    if not abs(number) < _LARGEST:
+        raise LogError(f"found {text[:20]!r} where a number is due ({name})")
+    return number
 
 
 def _values(raw: bytes, header: Dataset, layout: Layout) -> Values:

@@ -64,8 +64,12 @@ class Layout:
         """Take apart abscissae and values, which stand one after the other."""
         rows = numbers.reshape(self.count, -1)
         x = None if self.even else rows[:, 0].copy()
-        parts = rows if self.even else rows[:, 1:]
-        return x, (parts[:, 0] + 1j * parts[:, 1] if self.parts == 2 else parts[:, 0].copy())
+        return x, self.joined(rows if self.even else rows[:, 1:])
+
+    def joined(self, parts: Numbers) -> NDArray[Any]:
+        """Make complex values of two numbers each; real ones have one."""
+        columns = np.ascontiguousarray(parts)
+        return (columns.view(np.complex128) if self.parts == 2 else columns)[:, 0]
 
 
 def layout_of(kind: int, count: int, *, even: bool) -> Layout | None:
@@ -199,8 +203,7 @@ class _Reading:
 def _reading(rows: NDArray[np.uint8], head: int, layout: Layout, name: str) -> _Reading:
     numbers, clean = _decoded(rows[:, head:], layout.width, name)
     x, clean_x = _decoded(rows[:, :head], head, name) if head else (None, True)
-    parts = numbers.reshape(layout.count, layout.parts)
-    data = parts[:, 0] + 1j * parts[:, 1] if layout.parts == 2 else parts[:, 0]
+    data = layout.joined(numbers.reshape(layout.count, layout.parts))
     believable = clean and clean_x and _measured(numbers) and (x is None or _measured(x))
     return _Reading(values=Values(x=x, data=data), believable=believable)
 
