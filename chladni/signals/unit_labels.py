@@ -265,7 +265,8 @@ def _with_words(text: str, words: Mapping[str, str]) -> str:
 
 def _meanings(symbol: str, label: str) -> tuple[tuple[str, ...], bool]:
     """The words a symbol may stand for, and whether the first is the usual one."""
-    if symbol in _MEANINGS:
+    # Within a product C is coulomb: nothing is measured in degrees Celsius over something.
+    if symbol in _MEANINGS and (symbol != "C" or label == symbol):
         return _MEANINGS[symbol]
     if symbol in _PREFIXED:
         prefix, base = _PREFIXED[symbol]

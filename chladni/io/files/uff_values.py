@@ -80,6 +80,27 @@ def layout_of(kind: int, count: int, *, even: bool) -> Layout | None:
     return Layout(width=width, parts=parts, count=count, even=even)
 
 
+def fortran_number(text: str) -> float:
+    """Read a number as Fortran writes it: an exponent of E or D, or of three digits and no letter.
+
+    Raises
+    ------
+    ValueError
+        When it's no number.
+
+    Examples
+    --------
+    >>> fortran_number("1.5D+01"), fortran_number("-2.5-101")
+    (15.0, -2.5e-101)
+    """
+    try:
+        return float(text)
+    except ValueError:
+        plain = text.strip().upper().replace("D", "E")
+        sign = max(plain.rfind("+"), plain.rfind("-"))
+        return float(f"{plain[:sign]}E{plain[sign:]}" if sign > 0 and "E" not in plain else plain)
+
+
 # --- text --------------------------------------------------------------------------------------------------------
 
 
@@ -113,18 +134,9 @@ def text_values(body: bytes, layout: Layout) -> Values:
 def _parsed(words: list[bytes]) -> Numbers | None:
     """The numbers of all words; None when one is none."""
     try:
-        return np.array([_number(word) for word in words], dtype=np.float64)
+        return np.array([fortran_number(word.decode("latin-1")) for word in words], dtype=np.float64)
     except ValueError:
         return None
-
-
-def _number(word: bytes) -> float:
-    try:
-        return float(word)
-    except ValueError:
-        text = word.decode("latin-1").upper().replace("D", "E")
-        sign = max(text.rfind("+"), text.rfind("-"))
-        return float(f"{text[:sign]}E{text[sign:]}" if sign > 0 and "E" not in text else text)
 
 
 # --- binary ------------------------------------------------------------------------------------------------------
