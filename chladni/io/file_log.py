@@ -12,6 +12,7 @@ from chladni.io.files.contents import FileContents, on_common_grids
 from chladni.io.files.formats import read_file
 from chladni.io.known_schemas import likely_role
 from chladni.io.log import Log
+from chladni.io.log_findings import unread_findings
 from chladni.io.log_info import LogInfo, some_of
 from chladni.io.log_reader import SampleGrid
 from chladni.io.log_survey import survey_file
@@ -179,10 +180,10 @@ class FileLog(Log):
             held.append(counted(len(functions.responses) * len(functions.references), "frequency response"))
         if self.modes is not None:
             held.append(counted(self.modes.frequency_hz.size, "mode"))
-        remedy = "frf" if self.functions is not None else "modes" if held else "info"
-        held += [what for what, _ in self._contents.unread]
-        what = f"{' and '.join(held)}, but no samples over time" if held else "no samples over time"
-        raise LogError(f"{name}: holds {what}; chladni {remedy} {name} shows what it holds")
+        told = [f"holds {' and '.join(held)}, but no samples over time" if held else "holds no samples over time"]
+        if held:
+            told.append(f"chladni {'modes' if self.functions is None else 'frf'} {name} shows them")
+        raise LogError(f"{name}: {'; '.join([*told, *unread_findings(self.unread)])}")
 
     def _selected(self, paths: Sequence[str] | None) -> list[TimeSeries]:
         self._require_samples()

@@ -30,6 +30,7 @@ def open(  # noqa: A001  # as in gzip and tarfile: users write chladni.open
     setup: Setup | Path | str | None = None,
     stamp: StampRequest = "auto",
     limits: Limits | None = None,
+    sample_rate_hz: float | None = None,
     **reading: Any,
 ) -> "Log":
     """Open an MCAP log or a data file of any kind that is read; its first bytes tell the kind, else its suffix.
@@ -45,9 +46,10 @@ def open(  # noqa: A001  # as in gzip and tarfile: users write chladni.open
         ``auto``: the own stamp where messages have one that moves, else the publish time, else the log time.
     limits
         Of an MCAP log: how much memory it may ask for.
+    sample_rate_hz
+        True rate of the samples, where the file doesn't say it; nothing is resampled.
     reading
-        Of a data file: options of its reader, see `chladni.io.files.formats.READ_OPTIONS`; ``sample_rate_hz`` of
-        either.
+        Of a data file: options of its reader, see `chladni.io.files.formats.READ_OPTIONS`.
 
     Returns
     -------
@@ -74,11 +76,14 @@ def open(  # noqa: A001  # as in gzip and tarfile: users write chladni.open
     if kind == MCAP:
         from chladni.io.mcap_log import open_mcap
 
-        return open_mcap(path, setup=known, stamp=stamp, limits=limits, options=reading)
+        return open_mcap(
+            path, setup=known, stamp=stamp, limits=limits, sample_rate_hz=sample_rate_hz, options=reading
+        )
     # Readers bring in numpy's and scipy's own, which a log of messages does without.
     from chladni.io.file_log import open_file
 
-    return open_file(path, kind, setup=known, stamp=stamp, options=reading)
+    rate = {} if sample_rate_hz is None else {"sample_rate_hz": sample_rate_hz}
+    return open_file(path, kind, setup=known, stamp=stamp, options=rate | reading)
 
 
 def open_log(
@@ -87,10 +92,11 @@ def open_log(
     setup: Setup | Path | str | None = None,
     stamp: StampRequest = "auto",
     limits: Limits | None = None,
+    sample_rate_hz: float | None = None,
     **reading: Any,
 ) -> "Log":
     """Open a log; the same as `open`, under a name that hides no builtin."""
-    return open(path, setup=setup, stamp=stamp, limits=limits, **reading)
+    return open(path, setup=setup, stamp=stamp, limits=limits, sample_rate_hz=sample_rate_hz, **reading)
 
 
 class Log(ABC):

@@ -30,9 +30,20 @@ LATENESS_NS = 30 * NS_PER_S
 
 
 def open_mcap(
-    path: Path, *, setup: Setup, stamp: StampRequest, limits: Limits | None, options: Mapping[str, Any]
+    path: Path,
+    *,
+    setup: Setup,
+    stamp: StampRequest,
+    limits: Limits | None,
+    sample_rate_hz: float | None,
+    options: Mapping[str, Any],
 ) -> "McapLog":
     """Open an MCAP log; no sample is read yet. See `chladni.io.log.open`."""
+    if sample_rate_hz is not None:
+        raise SetupError(
+            f"{path}: the stamps of its messages say the rate; leave the sample rate out, or bring channels to "
+            "another rate with chladni convert --resample HZ"
+        )
     for name in options:
         raise SetupError(f"{path}: {name} is for data files; messages of an MCAP log say their times and names")
     container = McapContainer.open(path, limits=limits)

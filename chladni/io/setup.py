@@ -11,8 +11,9 @@ from chladni.io.toml_reader import read_toml, tables
 from chladni.signals.channel import Channel, Role, Vector, unit_direction
 from chladni.signals.errors import SetupError
 from chladni.signals.geometry import Geometry, Point
+from chladni.signals.unit_labels import quantity_of_name, read_label
 from chladni.signals.unit_text import in_unit
-from chladni.signals.units import parse_quantity, quotient, si_factor
+from chladni.signals.units import parse_quantity, quantity_by, quotient, si_factor
 
 if TYPE_CHECKING:
     from chladni.io.setup_file import BatchTable, ChannelTable
@@ -59,10 +60,11 @@ class ChannelSetup:
         Raises
         ------
         SetupError
-            When a sensitivity is given for a log that isn't in volts, amperes or coulombs.
+            When a sensitivity is given for a log that isn't in volts, amperes or coulombs, or a unit has several
+            meanings and nothing tells which.
         """
         if self.unit is not None:
-            factor, unit = si_factor(self.unit)
+            factor, unit = self._stated(self.unit, unit)
         if self.sensitivity is None:
             return factor, unit
         if unit == "1":
@@ -75,6 +77,13 @@ class ChannelSetup:
             )
         per_unit, sensitivity_unit = self.sensitivity
         return factor / per_unit, quotient(unit, sensitivity_unit)
+
+    def _stated(self, label: str, unit: str) -> tuple[float, str]:
+        """Read a unit as a label: what lb means is settled by the unit of the log, else by the channel's name."""
+        try:
+            return read_label(label, quantity=quantity_of_name(self.path) if unit == "1" else unit)
+        except SetupError as error:
+            raise SetupError(f"{self.place}: {self.path} unit: {error}") from error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,8 +167,8 @@ def _channel(table: "ChannelTable", place: str) -> ChannelSetup:
         path=table.path,
         place=place,
         unit=table.unit,
-        sensitivity=None if table.sensitivity is None else parse_quantity(table.sensitivity),
-        overload=None if table.range is None else parse_quantity(table.range),
+        sensitivity=None if table.sensitivity is None else quantity_by(table.sensitivity, read_label),
+        overload=None if table.range is None else quantity_by(table.range, read_label),
         point=table.point,
         direction=None if table.direction is None else unit_direction(table.direction),
         role=table.role,

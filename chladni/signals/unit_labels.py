@@ -80,7 +80,7 @@ _NAMES = (
     (frozenset(["pressure", "druck"]), "Pa"),
     (frozenset(["mass", "masse"]), "kg"),
     (frozenset(["charge", "ladung"]), "C"),
-    (frozenset(["temp", "temperature", "temperatur"]), "degC"),
+    (frozenset(["temp", "temperature"]), "degC"),
 )
 _TWICE = re.compile(r"/\s*([A-Za-z_]+)\s*\*\s*\1\b")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
@@ -134,6 +134,12 @@ def read_label(label: str, *, quantity: str | None = None) -> tuple[float, str]:
         if chosen.unit != quantity:
             raise
     return chosen.factor, chosen.unit
+
+
+def require_label(label: str) -> None:
+    """Raise `SetupError` for a label that is no unit whatever the values are; one of several meanings passes."""
+    _require_linear(label, bare := _bare(label))
+    _readings(label, bare)
 
 
 def says_nothing(label: str) -> bool:
@@ -259,7 +265,8 @@ def _with_words(text: str, words: Mapping[str, str]) -> str:
 
 def _meanings(symbol: str, label: str) -> tuple[tuple[str, ...], bool]:
     """The words a symbol may stand for, and whether the first is the usual one."""
-    if symbol in _MEANINGS:
+    # Within a product C is coulomb: nothing is measured in degrees Celsius over something.
+    if symbol in _MEANINGS and (symbol != "C" or label == symbol):
         return _MEANINGS[symbol]
     if symbol in _PREFIXED:
         prefix, base = _PREFIXED[symbol]

@@ -4,6 +4,7 @@ The symbols and their scales are in ``units.txt``, read by pint on first need; S
 """
 
 import re
+from collections.abc import Callable
 from difflib import get_close_matches
 from functools import lru_cache
 from math import isfinite
@@ -99,11 +100,16 @@ def parse_quantity(text: str) -> tuple[float, str]:
     >>> parse_quantity("100 mV/m")
     (0.1, 'V/m')
     """
+    return quantity_by(text, si_factor)
+
+
+def quantity_by(text: str, unit_in_si: Callable[[str], tuple[float, str]]) -> tuple[float, str]:
+    """Read a number with its unit, the unit by `unit_in_si`, as `parse_quantity` does."""
     # Cut, because text from a file may be of any length and the message below repeats it.
     match = _QUANTITY.fullmatch(text[:200])
     if match is None or not isfinite(float(match["number"])):
         raise SetupError(f"quantity {text[:60]!r}: begins with no finite number; quantities look like '1.2 kN/mm'")
-    factor, unit = si_factor(match["unit"].strip())
+    factor, unit = unit_in_si(match["unit"].strip())
     value = float(match["number"]) * factor
     if not isfinite(value):
         raise SetupError(f"quantity {text[:60]!r}: too large for a floating point number in {unit}")

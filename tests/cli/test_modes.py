@@ -177,7 +177,7 @@ def test_one_function_without_unit_costs_no_other(run, tmp_path):
 @pytest.mark.parametrize(
     ("option", "words"),
     [
-        (["--operational"], "frequency responses and 5 modes, but no samples over time; chladni frf arm.uff shows"),
+        (["--operational"], "responses and 5 modes, but no samples over time; chladni frf arm.uff shows them"),
         (["--start", 0], "arm.uff: holds averaged functions already; leave out resolution"),
         (["--resolution", 0], "arm.uff: holds averaged functions already; leave out resolution"),
         (["--stamp", "log"], "stamp 'log' (--stamp) chooses among the times of messages"),

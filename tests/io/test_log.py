@@ -891,6 +891,11 @@ def test_units_in_comments_and_metadata(tmp_path: Path) -> None:
         ("chladni.overload.z", "inf", "overload", None),
         ("chladni.point.z", "tip", "point", "tip"),
         ("unit", "g", "unit", "m/s^2"),
+        ("unit", "Gs", "unit", "m/s^2"),
+        ("unit", "RPM", "unit", "rad/s"),
+        ("unit", "EU", "unit", "1"),
+        ("unit", "C", "unit", "1"),
+        ("chladni.unit.z", "C", "unit", "C"),
         ("chladni.unit.z", "bananas", "unit", "1"),
     ],
 )

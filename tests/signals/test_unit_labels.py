@@ -45,6 +45,7 @@ def test_of_the_labels_nearly_all_are_read() -> None:
         ("nm", "m", 1e-9, "m"),
         ("C", "degC", 1.0, "degC"),
         ("C", "C", 1.0, "C"),
+        ("C/N", None, 1.0, "C/N"),
         ("gal", "m/s^2", 0.01, "m/s^2"),
         ("g/lb", "(m/s^2)/N", G / POUND_FORCE, "(m/s^2)/N"),
         ("NM", "N m", 1.0, "N m"),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from chladni.io.files.contents import unit_in_si
 from chladni.signals.channel import Channel
 from chladni.signals.errors import SetupError
 from chladni.signals.time_series import NS_PER_S
@@ -86,11 +87,11 @@ def _parse_title(text: str) -> Title:
 
 
 def is_unit(text: str) -> bool:
-    """Whether a text is a unit that is known."""
-    from chladni.signals.units import si_factor
+    """Whether a text is a unit, whatever it measures."""
+    from chladni.signals.unit_labels import require_label
 
     try:
-        si_factor(text)
+        require_label(text)
     except SetupError:
         return False
     return True
@@ -123,13 +124,11 @@ def channels_of(
     SetupError
         When a unit that the caller states in `units` isn't known.
     """
-    from chladni.signals.units import si_factor
-
     channels, notes = [], []
     for column in columns:
         unit = column.unit or "1"
         try:
-            si_factor(unit)
+            unit_in_si(column.name, unit)
         except SetupError as error:
             if column.name in (units or {}):
                 raise SetupError(f"{where}: channel {column.name!r}: {error}") from error

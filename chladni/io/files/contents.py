@@ -73,17 +73,24 @@ def joined(parts: Sequence[FileContents]) -> FileContents:
     )
 
 
-def in_si(values: NDArray[np.floating[Any]], unit: str) -> tuple[NDArray[np.floating[Any]], str]:
-    """Give the values in SI and their unit; values already in SI are given back untouched, to the bit."""
-    from chladni.signals.units import si_factor
+def unit_in_si(name: str, label: str) -> tuple[float, str]:
+    """Give the factor to SI and the SI unit of a column by its label; its name settles what a label may mean.
 
-    factor, si_unit = si_factor(unit)
-    return (values if factor == 1.0 else values * factor), si_unit
+    Raises
+    ------
+    SetupError
+        When the label is no unit, or leaves the unit open.
+    """
+    from chladni.signals.unit_labels import quantity_of_name, read_label
+
+    return read_label(label, quantity=quantity_of_name(name))
 
 
 def _channel_in_si(values: NDArray[np.floating[Any]], channel: Channel) -> tuple[NDArray[np.floating[Any]], str]:
     try:
-        return in_si(values, channel.unit)
+        factor, unit = unit_in_si(channel.name, channel.unit)
+        # Values already in SI are given back untouched, to the bit.
+        return (values if factor == 1.0 else values * factor), unit
     except SetupError as error:
         raise SetupError(f"channel {channel.name!r}: {error}; or state its unit yourself") from error
 

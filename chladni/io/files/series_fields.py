@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from chladni.signals.channel import Channel, Role, Vector
 from chladni.signals.errors import ChladniError, LogError, SetupError
 from chladni.signals.time_series import TimeSeries
-from chladni.signals.units import si_factor
+from chladni.signals.unit_labels import read_label
 
 SERIES_FORMAT = "chladni.series/1"
 
@@ -74,7 +74,9 @@ def _restated(series: TimeSeries, units: Mapping[str, str]) -> TimeSeries:
     factors, channels = np.ones(len(series.channels)), list(series.channels)
     for row, channel in enumerate(series.channels):
         if channel.name in units:
-            factors[row], unit = si_factor(units[channel.name])
+            factors[row], unit = read_label(
+                units[channel.name], quantity=None if channel.unit == "1" else channel.unit
+            )
             channels[row] = replace(channel, unit=unit)
     return replace(series, values=series.values * factors[:, np.newaxis], channels=tuple(channels))
 

@@ -15,7 +15,7 @@ from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.provenance import Provenance
-from chladni.signals.units import si_factor
+from chladni.signals.unit_labels import read_label
 from chladni.signals.wording import counted
 
 GENERAL, RESPONSE_FUNCTION, COHERENCE = 0, 4, 6
@@ -298,7 +298,7 @@ def _as_stated(channel: Channel, found: FoundUnit, units: Mapping[str, str]) -> 
             f"{channel.name}: the unit {units[channel.name]!r} is stated, but the file labels the ratio of response "
             "and reference; leave it out"
         )
-    factor, unit = si_factor(units[channel.name])
+    factor, unit = read_label(units[channel.name], quantity=None if found.unit == "1" else found.unit)
     return replace(channel, unit=unit), FoundUnit(factor=factor, unit=unit)
 
 

@@ -34,6 +34,8 @@ DIRECTIONS: dict[int, Vector] = {
     for turn in (0, 3 if code > 0 else -3)
 }
 TYPE_OF_UNIT = {"m": 8, "m/s": 11, "m/s^2": 12, "Pa": 15}
+#: How the fifth line begins in records and functions that chladni wrote.
+OUR_LINES = ("start_time_ns=", "start_hz=")
 # Our own fifth line: the fields of the record round rate and start to six digits.
 _EXACT = re.compile(r"^start_time_ns=(?P<start>-?\d{1,19}) sample_rate_hz=(?P<rate>\d+(\.\d+)?(e[+-]\d+)?)$")
 _EXCITATION_FORCE = 13

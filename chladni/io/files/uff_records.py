@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 
-from chladni.io.files.uff_values import layout_of
+from chladni.io.files.uff_values import fortran_number, layout_of
 from chladni.signals.errors import LogError
 
 _DELIMITER = re.compile(rb"^ {4}-1[ \t]*\r?$", re.MULTILINE)
@@ -70,7 +70,7 @@ class TextBlock:
         """Read `count` numbers of a line, up to 1e100 (below 1e-100: zero); `LogError` when they aren't there."""
         texts = _fields(self.line(index), width, count)
         try:
-            numbers = [_believable(float(text.replace("D", "E").replace("d", "e"))) for text in texts]
+            numbers = [_believable(fortran_number(text)) for text in texts]
         except ValueError:
             numbers = []
         if len(numbers) != count or not all(map(isfinite, numbers)):

@@ -9,7 +9,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from chladni.io.atomic import atomic_path
 from chladni.io.files.uff_records import UniversalFile
-from chladni.io.files.uff_values import Layout, Values, binary_values, layout_of, text_values
+from chladni.io.files.uff_values import Layout, Values, binary_values, fortran_number, layout_of, text_values
 from chladni.signals.errors import LogError
 
 Dataset = dict[str, Any]
@@ -58,6 +58,8 @@ _SYSTEMS = {
 # Writers round the factors, some to four digits.
 _SAME_FACTOR = 1e-3
 _LEAST_FACTOR = 1e-30
+# Far above any time or frequency: the last of the abscissae must not overflow.
+_LARGEST = 1e100
 
 
 def cut_off_note(file: UniversalFile) -> tuple[str, ...]:
@@ -161,9 +163,9 @@ def contradiction(system: Dataset | None) -> str | None:
 
 
 def _units(lines: list[str]) -> Dataset:
-    words = " ".join(lines[2:]).replace("D", "E").replace("d", "e").split()
+    words = " ".join(lines[2:]).split()
     try:
-        length, force = float(words[0]), float(words[1])
+        length, force = fortran_number(words[0]), fortran_number(words[1])
         code = int((lines[1] if len(lines) > 1 else "")[:10])
     except (ValueError, IndexError):
         raise LogError("its lines aren't a units code and factors of length and force") from None
@@ -207,11 +209,14 @@ def _integer(text: str, name: str, *, blank: bool) -> int:
 
 
 def _real(field: str, name: str) -> float:
-    text = field.strip().upper().replace("D", "E")
+    text = field.strip()
     try:
-        return float(text) if text else 0.0
+        number = fortran_number(text) if text else 0.0
     except ValueError:
-        raise LogError(f"found {text[:20]!r} where a number is due ({name})") from None
+        number = nan
+    if not abs(number) < _LARGEST:
+        raise LogError(f"found {text[:20]!r} where a number is due ({name})")
+    return number
 
 
 def _values(raw: bytes, header: Dataset, layout: Layout) -> Values:

@@ -6,11 +6,13 @@ other the surer one is taken and told; where neither is surer the values have no
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import pi
 from pathlib import Path
 from typing import Literal
 
+from chladni.io.files.uff_header import OUR_LINES
 from chladni.io.files.uff_sets import Dataset, contradiction
 from chladni.io.log_info import some_of
 from chladni.signals.errors import LogError, SetupError
@@ -22,7 +24,7 @@ from chladni.signals.unit_labels import (
     says_nothing,
 )
 from chladni.signals.unit_text import read, symbol_as_written, write
-from chladni.signals.units import quotient
+from chladni.signals.units import quotient, si_factor
 
 # Data type: SI unit along an axis and about one, powers of length and force in each (table of unit exponents).
 _QUANTITIES: dict[int, tuple[tuple[str, int, int], tuple[str, int, int]]] = {
@@ -142,6 +144,10 @@ def _axis_unit(header: Dataset, axis: str, direction: str) -> FoundUnit:
     label, types = _label(header, axis), _types(header, axis, direction)
     if not label:
         return _by_type(header, axis, types)
+    if _ours(header):
+        with suppress(SetupError):
+            factor, unit = si_factor(label)
+            return FoundUnit(factor=factor, unit=unit)
     for unit, *_ in types:
         found = _read(label, unit)
         if found is not None:
@@ -239,6 +245,11 @@ def _label(header: Dataset, axis: str) -> str:
     return named[1] if named else ""
 
 
+def _ours(header: Dataset) -> bool:
+    """Whether chladni wrote a function: then its labels are SI, and C is coulomb."""
+    return str(header.get("id5", "")).strip().startswith(OUR_LINES)
+
+
 def _type_name(kind: int) -> str:
     return _TYPE_NAMES.get(kind, f"type {kind}")
 
@@ -251,7 +262,7 @@ def _ratio(header: Dataset) -> tuple[FoundUnit, FoundUnit] | None:
     label, below = _label(header, "ordinate"), _label(header, "orddenom")
     responses = [unit for unit, *_ in _types(header, "ordinate", "rsp_dir")]
     references = [unit for unit, *_ in _types(header, "orddenom", "ref_dir")]
-    if not label or any(_read(label, unit) for unit in responses):
+    if not label or _ours(header) or any(_read(label, unit) for unit in responses):
         return None
     above, under = _split(label)
     if not references:

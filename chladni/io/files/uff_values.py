@@ -64,8 +64,12 @@ class Layout:
         """Take apart abscissae and values, which stand one after the other."""
         rows = numbers.reshape(self.count, -1)
         x = None if self.even else rows[:, 0].copy()
-        parts = rows if self.even else rows[:, 1:]
-        return x, (parts[:, 0] + 1j * parts[:, 1] if self.parts == 2 else parts[:, 0].copy())
+        return x, self.joined(rows if self.even else rows[:, 1:])
+
+    def joined(self, parts: Numbers) -> NDArray[Any]:
+        """Make complex values of two numbers each; real ones have one."""
+        columns = np.ascontiguousarray(parts)
+        return (columns.view(np.complex128) if self.parts == 2 else columns)[:, 0]
 
 
 def layout_of(kind: int, count: int, *, even: bool) -> Layout | None:
@@ -74,6 +78,27 @@ def layout_of(kind: int, count: int, *, even: bool) -> Layout | None:
         return None
     width, parts = VALUE_SIZES[kind]
     return Layout(width=width, parts=parts, count=count, even=even)
+
+
+def fortran_number(text: str) -> float:
+    """Read a number as Fortran writes it: an exponent of E or D, or of three digits and no letter.
+
+    Raises
+    ------
+    ValueError
+        When it's no number.
+
+    Examples
+    --------
+    >>> fortran_number("1.5D+01"), fortran_number("-2.5-101")
+    (15.0, -2.5e-101)
+    """
+    try:
+        return float(text)
+    except ValueError:
+        plain = text.strip().upper().replace("D", "E")
+        sign = max(plain.rfind("+"), plain.rfind("-"))
+        return float(f"{plain[:sign]}E{plain[sign:]}" if sign > 0 and "E" not in plain else plain)
 
 
 # --- text --------------------------------------------------------------------------------------------------------
@@ -109,18 +134,9 @@ def text_values(body: bytes, layout: Layout) -> Values:
 def _parsed(words: list[bytes]) -> Numbers | None:
     """The numbers of all words; None when one is none."""
     try:
-        return np.array([_number(word) for word in words], dtype=np.float64)
+        return np.array([fortran_number(word.decode("latin-1")) for word in words], dtype=np.float64)
     except ValueError:
         return None
-
-
-def _number(word: bytes) -> float:
-    try:
-        return float(word)
-    except ValueError:
-        text = word.decode("latin-1").upper().replace("D", "E")
-        sign = max(text.rfind("+"), text.rfind("-"))
-        return float(f"{text[:sign]}E{text[sign:]}" if sign > 0 and "E" not in text else text)
 
 
 # --- binary ------------------------------------------------------------------------------------------------------
@@ -199,8 +215,7 @@ class _Reading:
 def _reading(rows: NDArray[np.uint8], head: int, layout: Layout, name: str) -> _Reading:
     numbers, clean = _decoded(rows[:, head:], layout.width, name)
     x, clean_x = _decoded(rows[:, :head], head, name) if head else (None, True)
-    parts = numbers.reshape(layout.count, layout.parts)
-    data = parts[:, 0] + 1j * parts[:, 1] if layout.parts == 2 else parts[:, 0]
+    data = layout.joined(numbers.reshape(layout.count, layout.parts))
     believable = clean and clean_x and _measured(numbers) and (x is None or _measured(x))
     return _Reading(values=Values(x=x, data=data), believable=believable)
 

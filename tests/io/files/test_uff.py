@@ -179,6 +179,8 @@ def test_what_is_written_comes_back(tmp_path: Path, binary: bool) -> None:
             Channel(name="force", unit="N", point="12", direction=(1.0, 0.0, 0.0), role="reference"),
             Channel(name="turn", unit="rad/s", direction=(0.0, 1.0, 0.0)),
             Channel(name="plain"),
+            # Labels of other programs leave open whether C is charge or temperature, ours don't.
+            Channel(name="charge", unit="C"),
         ]
     )
     losses = write_uff(series, tmp_path / "a.uff", binary=binary)
