@@ -183,8 +183,9 @@ class Log:
     ) -> Iterator[TimeSeries]:
         """Read channels block by block, in memory that doesn't grow with the samples of the log.
 
-        One pass over the log fits the time base to all stamps (16 bytes of memory a message), a second one places
-        the samples; the blocks one after another are what `read` gives.
+        One pass over the log fits the time base to all stamps (some 30 bytes of memory a message), a second one
+        places the samples; the blocks one after another are what `read` gives. A log that is stored far out of order
+        takes more passes.
 
         Parameters
         ----------

@@ -33,6 +33,10 @@ class ChannelInfo:
         (start, end) in seconds from the log's start: last sample before and first one after; the longest ones.
     clipped
         Samples at the sensor's limit.
+    untimed
+        Messages left out because their stamp is no time.
+    publishers
+        How many publish the channel's topic at once.
     """
 
     channel: Channel
@@ -43,6 +47,8 @@ class ChannelInfo:
     time_base: TimeBase
     gaps: tuple[tuple[float, float], ...]
     clipped: int
+    untimed: int = 0
+    publishers: int = 1
 
     def to_json(self) -> dict[str, Any]:
         """Give plain lists, numbers and texts; null where nothing is known."""
@@ -58,6 +64,8 @@ class ChannelInfo:
             "gaps": [list(gap) for gap in self.gaps],
             "duplicates": self.time_base.duplicates,
             "clipped": self.clipped,
+            "untimed": self.untimed,
+            "publishers": self.publishers,
         }
 
 
