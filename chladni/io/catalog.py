@@ -3,10 +3,15 @@
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from chladni.io.arrival import arrival_order
+from chladni.io.batch_messages import BatchLayout
 from chladni.io.channel_source import ChannelSource
 from chladni.io.loss import Unread
 from chladni.io.mcap.container import McapContainer
-from chladni.io.message_path import near_matches, parse_message_path
+from chladni.io.message_path import MessagePath, near_matches, parse_message_path
+from chladni.io.publishers import at_once
 from chladni.io.setup import ChannelSetup, Setup, refined
 from chladni.io.stamps import (
     StampChoice,
@@ -18,7 +23,7 @@ from chladni.io.stamps import (
     head_of,
 )
 from chladni.io.stream import Stream
-from chladni.io.topic import Topic, read_heads, topics_of
+from chladni.io.topic import Topic, apart, read_arrivals, read_earlier_heads, read_heads, topics_of
 from chladni.io.topic_channels import TopicChannels, topic_channels
 from chladni.signals.errors import LogError, SetupError
 
@@ -49,6 +54,9 @@ class Catalog:
     start_ns
         Earliest sample of the topics with channels, else the first message: zero of all times in seconds. 0 for an
         empty log.
+    publishers
+        Names of the publishers of topics that several publish on at once, by topic. Each is listed as a topic of its
+        own.
     """
 
     file: str
@@ -60,6 +68,7 @@ class Catalog:
     setups: Mapping[tuple[str, str], ChannelSetup]
     lags_ns: Mapping[str, tuple[int, int] | None]
     start_ns: int
+    publishers: Mapping[str, tuple[str, ...]]
 
     def resolve(self, path: str) -> ChannelSource:
         """Find the channel that a path names.
@@ -82,7 +91,33 @@ class Catalog:
         if not parsed.steps:
             names = [one.channel.name for one in self.channels if one.topic == parsed.topic]
             raise LogError(f"{path!r} is a topic; name a channel of it; {near_matches(path, names)}")
-        return self.topics[parsed.topic].resolve(parsed)
+        source = self.topics[parsed.topic].resolve(parsed)
+        self._require_one_publisher(parsed, source)
+        return source
+
+    def _require_one_publisher(self, path: MessagePath, source: ChannelSource) -> None:
+        """Refuse a channel that several publish at once; one that only one of them knows is read."""
+        if source.selector is not None and source.selector.message_filters:
+            # A filter may tell the publishers apart; where it doesn't, their samples show it.
+            return
+        names = [f"{publisher}.{path.rest}" for publisher in self.publishers.get(path.topic, ())]
+        known = [name for name in names if self._is_known(name)]
+        if len(known) > 1:
+            raise LogError(
+                f"{path.text!r}: {len(known)} publish on {path.topic} at once; their samples are no single signal; "
+                f"name one of them: {' or '.join(known)}"
+            )
+
+    def _is_known(self, path: str) -> bool:
+        try:
+            source = self._resolved(path)
+        except LogError:
+            return False
+        return self.topics[source.topic].may_hold(source)
+
+    def publishing_with(self, topic: str) -> int:
+        """How many publish at once on a listed topic, or with it where it is one of several publishers itself."""
+        return next((len(names) for whole, names in self.publishers.items() if topic in (whole, *names)), 1)
 
     def streams(self, sources: Sequence[ChannelSource]) -> list[Stream]:
         """Group channels whose samples come in the same messages.
@@ -92,7 +127,9 @@ class Catalog:
         groups: dict[object, list[ChannelSource]] = {}
         for source in sources:
             selector = source.selector
-            key = (source.topic, *((selector.message_filters, selector.element_filters) if selector else ()))
+            key: tuple[object, ...] = (source.topic,)
+            if selector is not None:
+                key += (selector.publisher, selector.message_filters, selector.element_filters)
             groups.setdefault(key, []).append(source)
         return [self._stream(tuple(group)) for group in groups.values()]
 
@@ -121,10 +158,17 @@ def read_catalog(container: McapContainer, *, setup: Setup, request: StampReques
     """
     topics, refused = topics_of(container.channels)
     topics, undecodable = read_heads(container, topics)
+    topics, changed = read_earlier_heads(container, topics)
     _require_known_batches(setup, topics)
-    readable, unreadable = _channels_of(topics, setup)
-    refused |= undecodable | unreadable
-    listed = [source for channels in readable.values() for source in channels.listed()]
+    readable, unreadable = _channels_of(topics, setup.batches, setup)
+    refused |= undecodable | changed | unreadable
+    parts, unreadable = _parts(container, readable, setup)
+    refused |= unreadable
+    publishers = _publishers(container, readable, parts)
+    listed_topics = [name for topic in readable for name in publishers.get(topic, (topic,))]
+    readable |= {name: part for found in parts.values() for name, part in found.items()}
+    publishers |= {name: one.publishers for name, one in readable.items() if one.publishers}
+    listed = [source for name in listed_topics for source in readable[name].listed()]
     heads = {name: _head(channels.topic) for name, channels in readable.items()}
     choices = _choices(heads, {source.topic for source in listed}, request)
     catalog = Catalog(
@@ -137,20 +181,59 @@ def read_catalog(container: McapContainer, *, setup: Setup, request: StampReques
         setups={},
         lags_ns={topic: None if head is None else head.lag_range_ns(choices[topic]) for topic, head in heads.items()},
         start_ns=_start_ns(heads, choices, {source.topic for source in listed}, container.time_range_ns),
+        publishers=publishers,
     )
     setups = _setups(catalog, setup, listed)
     channels = tuple(with_setup(source, setups.get((source.topic, source.field))) for source in listed)
     return replace(catalog, channels=channels, setups=setups)
 
 
-def _channels_of(topics: Mapping[str, Topic], setup: Setup) -> tuple[dict[str, TopicChannels], dict[str, str]]:
+def _parts(
+    container: McapContainer, readable: Mapping[str, TopicChannels], setup: Setup
+) -> tuple[dict[str, dict[str, TopicChannels]], dict[str, str]]:
+    """Look at each MCAP channel of topics that have several by itself; what can't be read is told as a topic is."""
+    parts: dict[str, dict[str, TopicChannels]] = {}
+    refused: dict[str, str] = {}
+    for name, whole in readable.items():
+        if len(whole.topic.decoders) > 1:
+            topics = apart(whole.topic, container.channels)
+            parts[name], unreadable = _channels_of(topics, dict.fromkeys(topics, setup.batches.get(name)), setup)
+            refused |= unreadable
+    return parts, refused
+
+
+def _publishers(
+    container: McapContainer, readable: Mapping[str, TopicChannels], parts: Mapping[str, Mapping[str, TopicChannels]]
+) -> dict[str, tuple[str, ...]]:
+    """Find the topics with channels whose MCAP channels send the same at once, and name those that send."""
+    several = {name: readable[name].topic for name in parts if any(True for _ in readable[name].listed())}
+    found: dict[str, tuple[str, ...]] = {}
+    for name, one in (read_arrivals(container, several) if several else {}).items():
+        order = arrival_order(one.log_ns, one)
+        came = one if order is None else one.kept(order)
+        sending = set() if came.channel is None else set(np.unique(came.channel).tolist())
+        own = {part: one for part, one in parts[name].items() if sending & set(one.topic.decoders)}
+        if came.channel is not None and at_once(came.log_ns, came.channel) and not _share_joints(own):
+            found[name] = tuple(own)
+    return found
+
+
+def _share_joints(parts: Mapping[str, TopicChannels]) -> bool:
+    """Whether publishers name the elements of their arrays, and each has its own: then the names tell them apart."""
+    names = [part.element_names for part in parts.values()]
+    return all(names) and sum(map(len, names)) == len(frozenset().union(*names))
+
+
+def _channels_of(
+    topics: Mapping[str, Topic], layouts: Mapping[str, BatchLayout | None], setup: Setup
+) -> tuple[dict[str, TopicChannels], dict[str, str]]:
     readable: dict[str, TopicChannels] = {}
     refused: dict[str, str] = {}
     for name, topic in topics.items():
         try:
-            readable[name] = topic_channels(topic, setup.batches.get(name))
+            readable[name] = topic_channels(topic, layouts.get(name))
         except LogError as error:
-            if name in setup.batches:
+            if layouts.get(name) is not None:
                 raise SetupError(f"{setup.path}: [[batch]] {name}: {error}") from None
             refused[name] = str(error)
     return readable, refused
@@ -160,8 +243,8 @@ def _head(topic: Topic) -> TopicHead | None:
     if not topic.head:
         return None
     own = find_own_stamp(topic.fields, topic.schema_name)
-    decoded = topic.decode_head(own.leaves) if own is not None else []
-    return head_of(topic.head, own, decoded)
+    leaves = () if own is None else own.leaves
+    return head_of(topic.head_with(leaves), own, topic.decode_head(leaves) if leaves else [])
 
 
 def _choices(
@@ -177,7 +260,7 @@ def _choices(
             # Nobody asked for this topic's time; a text topic without stamps must not stop the log from being read.
             choices[topic] = choose_stamp(head, "auto", topic=topic)
     signals = {topic: head for topic, head in heads.items() if head is not None and topic in with_channels}
-    shifts = clock_shifts_ns({topic: head for topic, head in signals.items() if len(head.log_ns) > 1}, choices)
+    shifts = clock_shifts_ns({topic: head for topic, head in signals.items() if head.messages > 1}, choices)
     return choices | {topic: choices[topic].shifted(shift_ns) for topic, shift_ns in shifts.items()}
 
 
@@ -189,7 +272,7 @@ def _start_ns(
 ) -> int:
     signals = {topic: head for topic, head in heads.items() if head is not None and topic in with_channels}
     # One message samples nothing, and latched ones carry the time of long ago.
-    starts = [head.start_ns(choices[topic]) for topic, head in signals.items() if len(head.log_ns) > 1]
+    starts = [head.start_ns(choices[topic]) for topic, head in signals.items() if head.messages > 1]
     starts = starts or [head.start_ns(choices[topic]) for topic, head in signals.items()]
     return min(starts, default=0 if logged_ns is None else logged_ns[0])
 
@@ -201,11 +284,11 @@ def _unread(
     messages: dict[str, int] = {}
     for channel in container.channels.values():
         messages[channel.topic] = messages.get(channel.topic, 0) + (known or {}).get(channel.id, 0)
-    for topic, count in messages.items():
-        counted = None if known is None else count
+    for topic in dict.fromkeys((*messages, *refused)):
+        counted = None if known is None else messages.get(topic)
         if topic in refused:
             yield Unread(topic=topic, reason=f"can't be decoded: {refused[topic]}", messages=counted)
-        if topic in readable:
+        if topic in messages and topic in readable:
             yield from readable[topic].unread(counted)
 
 

@@ -12,8 +12,7 @@ from chladni.io.files.contents import FileContents, on_common_grids
 from chladni.io.files.formats import read_file
 from chladni.io.known_schemas import likely_role
 from chladni.io.log import Log
-from chladni.io.log_findings import unread_findings
-from chladni.io.log_info import LogInfo, some_of
+from chladni.io.log_info import LogInfo, some_of, unread_sentences
 from chladni.io.log_reader import SampleGrid
 from chladni.io.log_survey import survey_file
 from chladni.io.loss import Loss, Unread
@@ -183,7 +182,7 @@ class FileLog(Log):
         told = [f"holds {' and '.join(held)}, but no samples over time" if held else "holds no samples over time"]
         if held:
             told.append(f"chladni {'modes' if self.functions is None else 'frf'} {name} shows them")
-        raise LogError(f"{name}: {'; '.join([*told, *unread_findings(self.unread)])}")
+        raise LogError(f"{name}: {'; '.join([*told, *unread_sentences(self.unread)])}")
 
     def _selected(self, paths: Sequence[str] | None) -> list[TimeSeries]:
         self._require_samples()

@@ -38,6 +38,7 @@ def log_findings(
     if damage:
         yield damage_finding(damage)
     yield from odd
+    yield from _publisher_findings(content)
     yield from together(_stamp_findings(placements))
     yield from together(finding for placement in placements for finding in _clock_findings(placement))
     yield from together(finding for monitor in monitors for finding in _missing_samples(monitor))
@@ -73,6 +74,11 @@ def damage_finding(damage: Sequence[Loss]) -> str:
 # --- of topics ---------------------------------------------------------------------------------------------------
 
 
+def _publisher_findings(content: Catalog) -> Iterator[str]:
+    for topic, names in content.publishers.items():
+        yield f"{topic}: {len(names)} publish here at once; each has channels of its own: {some_of(names)}"
+
+
 def _stamp_findings(placements: Sequence[Placement]) -> Iterator[tuple[str, str]]:
     """Which topics don't simply go by their own stamps, and why."""
     for placement in placements:
@@ -87,6 +93,11 @@ def _clock_findings(placement: Placement) -> Iterator[tuple[str, str]]:
     if not base.samples:
         yield label, "no usable messages"
         return
+    if placement.stored_late:
+        yield (
+            label,
+            f"{counted(placement.stored_late, 'message')} stored behind later ones, read in the order of time",
+        )
     if base.verdict != "regular" or base.gap_count or base.jumps or base.wander_s * base.rate_hz > 1:
         yield label, base.advice
     if base.jumps:

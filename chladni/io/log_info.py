@@ -38,6 +38,10 @@ class ChannelInfo:
         (start, end) in seconds from the log's start: last sample before and first one after; the longest ones.
     clipped
         Samples at the sensor's limit.
+    untimed
+        Messages left out because their stamp is no time.
+    publishers
+        How many publish the channel's topic at once.
     """
 
     channel: Channel
@@ -48,6 +52,8 @@ class ChannelInfo:
     time_base: TimeBase
     gaps: tuple[tuple[float, float], ...]
     clipped: int
+    untimed: int = 0
+    publishers: int = 1
 
     def to_json(self) -> dict[str, Any]:
         """Give plain lists, numbers and texts; null where nothing is known."""
@@ -63,6 +69,8 @@ class ChannelInfo:
             "gaps": [list(gap) for gap in self.gaps],
             "duplicates": self.time_base.duplicates,
             "clipped": self.clipped,
+            "untimed": self.untimed,
+            "publishers": self.publishers,
         }
 
 
@@ -158,12 +166,12 @@ def unread_sentences(unread: Iterable[Unread]) -> tuple[str, ...]:
     Examples
     --------
     >>> unread_sentences([Unread(topic="/a", reason="holds no number", messages=9)])
-    ('/a (9 messages): holds no number',)
+    ('/a (9 messages) not read: holds no number',)
     """
     groups: dict[str, list[Unread]] = {}
     for one in unread:
         groups.setdefault(one.reason, []).append(one)
-    return tuple(f"{_counted_names(group)}: {reason}" for reason, group in groups.items())
+    return tuple(f"{_counted_names(group)} not read: {reason}" for reason, group in groups.items())
 
 
 def _counted_names(group: Sequence[Unread]) -> str:

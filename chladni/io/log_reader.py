@@ -2,16 +2,17 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.gathering import Gathering, LostMessages, gather, windowed
-from chladni.io.grid_blocks import BlockGrid, PlacedPiece, blocks_of
+from chladni.io.grid_blocks import BlockGrid, PlacedPiece, blocks_of, complete
 from chladni.io.grid_buffer import GridBuffer, grid_rows
 from chladni.io.mcap.container import McapContainer
-from chladni.io.placement import ALIGNED, Group, Placement, group_placements
+from chladni.io.placement import ALIGNED, NOWHERE, Group, Placement, group_placements, lowest_index
 from chladni.io.stream import Piece, Stream, read_pieces
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
@@ -130,7 +131,7 @@ class LogReader:
     def series(self) -> tuple[TimeSeries, ...]:
         """Everything, one series for each grid."""
         gatherings = gather(self.streams, self.pieces(), with_values=True)
-        groups = self.groups([one.place() for one in gatherings])
+        groups = self.groups(self._placements(gatherings))
         by_stream = {id(one.stream): one for one in gatherings}
         series = [self._laid_out(group, by_stream) for group in groups]
         return self._some([one for one in series if one is not None])
@@ -140,10 +141,17 @@ class LogReader:
         sizes: list[tuple[int, int]] = []
         gatherings = gather(self.streams, _sized(self.pieces(with_values=False), sizes), with_values=False)
         return FirstPass(
-            placements=tuple(one.place() for one in gatherings),
+            placements=self._placements(gatherings),
             sizes=tuple(sizes),
             dtype=np.result_type(*(one.dtype for one in gatherings)),
         )
+
+    def _placements(self, gatherings: Sequence[Gathering]) -> tuple[Placement, ...]:
+        placements = tuple(one.place() for one in gatherings)
+        lost = LostMessages()
+        lost.add_untimed(placements)
+        self.lost.merge(lost)
+        return placements
 
     def blocks(self, known: "FirstPass", seconds: float) -> Iterator[TimeSeries]:
         """Everything, block by block, in a second pass.
@@ -166,8 +174,11 @@ class LogReader:
         )
         members = {id(one.stream): number for number, one in enumerate(group.placements)}
         member_of = [members.get(id(one.stream)) for one in known.placements]
-        lowest = _lowest(known.sizes, member_of, group.placements)
-        return blocks_of(grid, self._placed(member_of, group.placements, rows.rows), _complete(lowest, last))
+        lowest, highest = _extents(known.sizes, member_of, group.placements)
+        return chain.from_iterable(
+            blocks_of(part, self._placed(member_of, group.placements, rows.rows), complete(lowest, last))
+            for part in grid.parts(lowest, highest)
+        )
 
     def grids(self, known: "FirstPass") -> tuple[SampleGrid, ...]:
         """What grids the channels lie on; see `groups`."""
@@ -326,22 +337,21 @@ def _sized(pieces: Iterable[tuple[int, Piece]], sizes: list[tuple[int, int]]) ->
         yield stream, piece
 
 
-def _lowest(
+def _extents(
     sizes: Sequence[tuple[int, int]], member_of: Sequence[int | None], placements: Sequence[Placement]
-) -> NDArray[np.int64]:
-    """Lowest grid index of each piece, in the order of the file."""
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Lowest and highest grid index of each piece, in the order of the file."""
     starts = [0] * len(placements)
-    lowest = []
+    extents = []
     for stream, messages in sizes:
         member = member_of[stream]
         if member is not None:
-            part = placements[member].index[starts[member] : starts[member] + messages]
-            starts[member] += messages
-            lowest.append(int(part.min()))
-    return np.array(lowest, np.int64)
-
-
-def _complete(lowest: NDArray[np.int64], last: int) -> list[int]:
-    """For each piece the grid index below which no later piece has a sample."""
-    following = np.append(lowest[1:], last)
-    return [int(below) for below in np.minimum.accumulate(following[::-1])[::-1]]
+            placement, part = placements[member], slice(starts[member], starts[member] + messages)
+            starts[member] = part.stop
+            ends = (
+                placement.index[part] if placement.counts is None else placement.index[part] + placement.counts[part]
+            )
+            # A piece of which nothing has a place on the grid isn't waited for.
+            extents.append((lowest_index(placement.index[part], otherwise=-NOWHERE), int(ends.max())))
+    lowest, highest = np.array(extents, np.int64).reshape(-1, 2).T
+    return lowest, highest

@@ -23,7 +23,7 @@ from chladni.signals.time_series import NS_PER_S, TimeSeries
 def survey(container: McapContainer, content: Catalog, lost: LostMessages) -> LogInfo:
     """Read every channel listed once.
 
-    Stamps are kept (8 bytes a message), samples only as long as they're being judged.
+    Stamps and log times are kept (some 20 bytes a message), samples only as long as they're being judged.
     """
     streams = content.streams(content.channels)
     monitors = [SampleMonitor(gathering=Gathering(stream=stream)) for stream in streams]
@@ -32,14 +32,15 @@ def survey(container: McapContainer, content: Catalog, lost: LostMessages) -> Lo
         monitors[index].watch(piece)
     for monitor in monitors:
         monitor.judge()
-    lost.merge(pass_lost)
     placements = [monitor.gathering.place() for monitor in monitors]
+    pass_lost.add_untimed(placements)
+    lost.merge(pass_lost)
     found = dict(_channels(content, monitors, placements))
     damage = losses(container.damage, lost)
     return LogInfo(
         file=content.file,
         start_time_ns=content.start_ns,
-        duration_s=_duration_s(content, monitors, placements) or _logged_s(container),
+        duration_s=_duration_s(content, placements) or _logged_s(container),
         channels=tuple(found[source.channel.name] for source in content.channels),
         damage=damage,
         findings=tuple(log_findings(content, monitors, placements, damage, oddities(lost))),
@@ -52,7 +53,7 @@ def _channels(
 ) -> Iterator[tuple[str, ChannelInfo]]:
     for monitor, placement in zip(monitors, placements, strict=True):
         stream, base = placement.stream, placement.time_base
-        first_ns = monitor.gathering.first_ns(content.start_ns)
+        first_ns = content.start_ns if placement.first_ns is None else placement.first_ns
         offset_s = (first_ns - content.start_ns) / NS_PER_S
         gaps = tuple((start + offset_s, end + offset_s) for start, end in base.gaps)
         for row, channel in enumerate(stream.channels):
@@ -61,23 +62,21 @@ def _channels(
                 ChannelInfo(
                     channel=channel,
                     encoding=stream.topic.encoding,
-                    samples=monitor.samples - (int(monitor.missing[row]) if monitor.samples else 0),
+                    samples=base.samples - (int(monitor.missing[row]) if monitor.samples else 0),
                     stamp=stream.choice.kind,
                     stamp_reason=stream.choice.reason,
                     time_base=base,
                     gaps=gaps,
                     clipped=monitor.clipped(channel.name),
+                    publishers=max(placement.publishers, content.publishing_with(stream.topic.name)),
+                    untimed=placement.untimed + monitor.gathering.untimed,
                 ),
             )
 
 
-def _duration_s(content: Catalog, monitors: Sequence[SampleMonitor], placements: Sequence[Placement]) -> float:
+def _duration_s(content: Catalog, placements: Sequence[Placement]) -> float:
     """From the log's start to the end of its last sample."""
-    ends = [
-        monitor.gathering.end_ns(placement.time_base.rate_hz)
-        for monitor, placement in zip(monitors, placements, strict=True)
-        if monitor.samples
-    ]
+    ends = [placement.end_ns for placement in placements if placement.end_ns is not None]
     return max(0, max(ends, default=content.start_ns) - content.start_ns) / NS_PER_S
 
 

@@ -133,8 +133,8 @@ class McapLog(Log):
     ) -> Iterator[TimeSeries]:
         """Read channels block by block, in memory that doesn't grow with the samples of the log; see `Log.blocks`.
 
-        One pass over the log fits the time base to all stamps (16 bytes of memory a message), a second one places
-        the samples.
+        One pass over the log fits the time base to all stamps (some 30 bytes of memory a message), a second one
+        places the samples. A log that is stored far out of order takes more passes.
         """
         if not (isfinite(seconds) and seconds > 0):
             raise LogError(f"blocks of {seconds} s: seconds must be finite and positive")

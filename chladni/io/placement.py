@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,12 +33,20 @@ class Placement:
         Fitted to its stamps.
     index
         ``[message]``, grid index of each message's (first) sample, in the order of the file, counted from the
-        origin of the group; empty when the stream has no uniform time base.
+        origin of the group, `NOWHERE` for messages without a time; empty when the stream has no uniform time base.
     counts
         ``[message]``, samples of each; None when each has one.
     taken
         ``[message]``, samples at its start that are left out because an earlier message has their place; None when
         there are none.
+    first_ns, end_ns
+        First stamp in the order of arrival, and the end of the last sample; None when there is none.
+    untimed
+        Messages left out because their stamps are no times beside the others.
+    stored_late
+        Messages that the file holds behind later ones.
+    publishers
+        How many publish at once, by their stamps alone.
     """
 
     stream: Stream
@@ -45,11 +54,16 @@ class Placement:
     index: NDArray[np.int64]
     counts: NDArray[np.int64] | None
     taken: NDArray[np.int64] | None = None
+    first_ns: int | None = None
+    end_ns: int | None = None
+    untimed: int = 0
+    stored_late: int = 0
+    publishers: int = 1
 
     @property
     def first(self) -> int:
         """Grid index of the first sample."""
-        return int(self.index.min())
+        return lowest_index(self.index, 0)
 
     @property
     def last(self) -> int:
@@ -80,8 +94,21 @@ class Placement:
         return replace(self, index=self.index + samples) if samples else self
 
 
+def lowest_index(index: NDArray[np.int64], otherwise: int) -> int:
+    """Lowest grid index of messages that have a place on the grid."""
+    lowest = int(index.min(initial=-NOWHERE))
+    if lowest < NOWHERE // 2:
+        lowest = int(index[index > NOWHERE // 2].min(initial=-NOWHERE))
+    return lowest if lowest < -NOWHERE else otherwise
+
+
 def place_stream(
-    stream: Stream, stamps_ns: NDArray[np.int64], counts: NDArray[np.int64] | None, period_s: float
+    stream: Stream,
+    stamps_ns: NDArray[np.int64],
+    counts: NDArray[np.int64] | None,
+    period_s: float,
+    *,
+    chosen: NDArray[np.int64] | None = None,
 ) -> Placement:
     """Fit the time base of a stream and give each message its place.
 
@@ -95,17 +122,68 @@ def place_stream(
         ``[message]``, samples of each; None when each has one.
     period_s
         Time between the samples of a batch message, as it says itself.
+    chosen
+        Indices of the messages that have a time, in the order in which they came; None for all in file order.
     """
-    if counts is None:
-        base = fit_time_base(stamps_ns)
+    timed_ns = stamps_ns if chosen is None else stamps_ns[chosen]
+    sizes = counts if counts is None or chosen is None else counts[chosen]
+    if sizes is None:
+        base = fit_time_base(timed_ns)
     else:
-        base = fit_batch_time_base(stamps_ns, counts, nominal_rate_hz=1 / period_s if period_s > 0 else None)
-    if not (base.uniform and stamps_ns.size):
-        return Placement(stream=stream, time_base=base, index=np.zeros(0, np.int64), counts=counts)
-    index = message_index(stamps_ns, base, counts=counts)
-    return Placement(
-        stream=stream, time_base=base, index=index, counts=counts, taken=_taken(stamps_ns, index, counts)
+        base = fit_batch_time_base(timed_ns, sizes, nominal_rate_hz=1 / period_s if period_s > 0 else None)
+    placement = Placement(
+        stream=stream,
+        time_base=base,
+        index=np.zeros(0, np.int64),
+        counts=counts,
+        first_ns=int(timed_ns[0]) if timed_ns.size else None,
+        end_ns=_end_ns(timed_ns, sizes, base.rate_hz),
     )
+    if not (base.uniform and timed_ns.size):
+        return placement
+    index = message_index(timed_ns, base, counts=sizes)
+    taken = _taken(timed_ns, index, sizes)
+    if chosen is None:
+        return replace(placement, index=index, taken=taken)
+    return replace(
+        placement,
+        index=_in_file(index, chosen, stamps_ns.size, otherwise=NOWHERE),
+        taken=None if taken is None else _in_file(taken, chosen, stamps_ns.size, otherwise=0),
+    )
+
+
+def without_grid(base: TimeBase, stamps_ns: NDArray[np.int64], advice: str) -> TimeBase:
+    """Give the time base of messages that have no grid, and the reason in place of its advice."""
+    span_s = float(np.ptp(stamps_ns)) / NS_PER_S
+    return replace(
+        base,
+        verdict="irregular",
+        advice=advice,
+        rate_hz=(stamps_ns.size - 1) / span_s if span_s else 0.0,
+        rate_std_hz=inf,
+        gaps=(),
+        gap_count=0,
+        missing=0,
+    )
+
+
+def _in_file(
+    numbers: NDArray[np.int64], chosen: NDArray[np.int64], messages: int, *, otherwise: int
+) -> NDArray[np.int64]:
+    """Bring what belongs to the chosen messages into the order of the file."""
+    spread = np.full(messages, otherwise, np.int64)
+    spread[chosen] = numbers
+    return spread
+
+
+def _end_ns(stamps_ns: NDArray[np.int64], counts: NDArray[np.int64] | None, rate_hz: float) -> int | None:
+    """End of the last sample, at least its stamp."""
+    if not stamps_ns.size:
+        return None
+    period_ns = NS_PER_S / rate_hz if rate_hz > 0 else 0.0
+    if counts is None:
+        return int(stamps_ns.max()) + round(period_ns)
+    return int((stamps_ns + np.rint(counts * period_ns)).max())
 
 
 def _taken(

@@ -6,7 +6,7 @@ from tests.make_logs import with_strange_topics
 
 CHANNEL_KEYS = {
     "name", "unit", "encoding", "rate_hz", "samples", "stamp", "stamp_reason", "jitter_s",
-    "gaps", "duplicates", "clipped",
+    "gaps", "duplicates", "clipped", "untimed", "publishers",
 }  # fmt: skip
 
 

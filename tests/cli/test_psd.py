@@ -5,7 +5,7 @@ from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 from tests.arm import TOOL, WRIST, short_arm
-from tests.make_logs import with_strange_topics
+from tests.make_logs import two_sensors, with_strange_topics
 
 
 def tool_samples():
@@ -40,6 +40,20 @@ def test_a_part_of_the_log(run, arm_log):
     segments = tool_samples()[5000:15000].reshape(10, 1000)
     power = np.mean((segments - segments.mean(axis=1, keepdims=True)) ** 2)
     assert document["channels"][0]["rms"] == pytest.approx(np.sqrt(power), rel=1e-9)
+
+
+def test_of_two_publishers_on_a_topic_each_has_a_spectrum_and_one_can_be_named(run, tmp_path):
+    two_sensors(tmp_path / "two.mcap", offset_s=0.003, seconds=40)
+    names = ["/s{@channel==1}.data", "/s{@channel==2}.data"]
+    both = run("psd", tmp_path / "two.mcap", "--channel", names[0], "--resolution", 0.5, "--json", "-").document
+    assert [channel["name"] for channel in both["channels"]] == names[:1]
+    assert both["channels"][0]["peaks"][0]["frequency_hz"] == pytest.approx(5.0, abs=0.01)
+    second = run("psd", tmp_path / "two.mcap", "--channel", names[1], "--resolution", 0.5, "--json", "-").document
+    assert second["channels"][0]["peaks"][0]["frequency_hz"] == pytest.approx(7.0, abs=0.01)
+    assert second["channels"][0]["rms"] == pytest.approx(3 / np.sqrt(2), rel=0.01)
+    refused = run("psd", tmp_path / "two.mcap", "--channel", "/s.data")
+    assert refused.code == 2
+    assert f"name one of them: {' or '.join(names)}" in " ".join(refused.err.split())
 
 
 def test_people_get_levels_peaks_and_what_was_left_out(run, arm_log):

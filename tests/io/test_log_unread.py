@@ -70,7 +70,7 @@ def test_a_topic_that_cannot_be_decoded_costs_only_itself(tmp_path: Path, what: 
         assert (unread.name, unread.messages, unread.complete) == (topic, COUNT, False)
         assert unread.reason.startswith("can't be decoded: ")
         assert told in unread.reason
-        assert f"{topic} (200 messages): {unread.reason}" in info.findings
+        assert f"{topic} (200 messages) not read: {unread.reason}" in info.findings
         assert info.to_json()["unread"] == [{"name": topic, "reason": unread.reason, "messages": COUNT}]
         assert info.damage == ()
         with pytest.raises(LogError, match="can't be decoded"):
@@ -81,8 +81,8 @@ def test_topics_that_share_a_reason_share_a_sentence() -> None:
     same = [Unread(topic=f"/{name}", reason="holds no number", messages=3) for name in "abcd"]
     other = Unread(topic="/e", field="x", reason="is too long")
     assert unread_sentences([*same[:2], other, *same[2:]]) == (
-        "/a, /b, /c and 1 more (12 messages): holds no number",
-        "/e.x: is too long",
+        "/a, /b, /c and 1 more (12 messages) not read: holds no number",
+        "/e.x not read: is too long",
     )
 
 
