@@ -132,7 +132,7 @@ def test_a_log_of_text_alone_is_told_as_such(tmp_path: Path, period_ns: int) -> 
         # As for samples, the last message stands for a period, too.
         assert info.duration_s == pytest.approx(COUNT * period_ns / 1e9)
         assert log.start_time_ns == info.start_time_ns == START_NS
-        assert info.findings == ("/chatter, /rare (201 messages): holds no number",)
+        assert info.findings == ("/chatter, /rare (201 messages) not read: holds no number",)
         assert [(one.name, one.messages) for one in info.unread] == [("/chatter", COUNT), ("/rare", 1)]
         with pytest.raises(LogError, match=r"no channel that could be read \(/chatter, /rare .*: holds no number\)"):
             log.read()
@@ -176,7 +176,7 @@ def test_a_log_of_text_that_counts_nothing_still_has_a_duration(tmp_path: Path) 
             maker.write(chatter, content, START_NS + index * 10_000_000)
     with open_log(tmp_path / "a.mcap") as log:
         assert log.info().duration_s == pytest.approx(1.99)
-        assert log.info().findings == ("/chatter: holds no number",)
+        assert log.info().findings == ("/chatter not read: holds no number",)
 
 
 # --- what is odd, and read all the same ---------------------------------------------------------------------------
