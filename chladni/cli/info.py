@@ -7,6 +7,7 @@ from chladni.cli.channel_rows import grouped_rows
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.words import NOTHING, count, number, unit
+from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
     from chladni.io.loss import Unread
@@ -52,5 +53,5 @@ def _row(channel: dict[str, Any]) -> list[str]:
 
 def _unread_row(topic: "Unread") -> list[str]:
     """Row of a topic without channels; the reason is told below the table, or there is none."""
-    messages = "" if topic.messages is None else f"{count(topic.messages)} messages, "
+    messages = "" if topic.messages is None else f"{counted(topic.messages, 'message')}, "
     return [topic.name, *[NOTHING] * 5, f"{messages}{'no signal' if topic.complete else 'not read'}"]
