@@ -251,3 +251,18 @@ def protobuf_log(path: Path, values: Iterable[float], *, rate_hz: float = 100.0)
             stamp = timestamp_pb2.Timestamp(seconds=stamp_ns // 10**9, nanos=stamp_ns % 10**9).SerializeToString()
             body = b"\x0a" + bytes([len(stamp)]) + stamp + b"\x11" + struct.pack("<d", value)
             log.write(channel, body, stamp_ns + 1_000_000)
+
+
+def with_strange_topics(path: Path) -> Path:
+    """A log at 100 Hz: noise in /good.x, messages that can't be decoded in /bad, and text in /text."""
+    values = np.random.default_rng(1).standard_normal(100)
+    with LogMaker(path) as maker:
+        topics = [
+            (maker.json("/good"), [{"x": value} for value in values.tolist()]),
+            (maker.raw("/bad", encoding="flatbuffer"), [b"????"] * 100),
+            (maker.json("/text"), [{"note": "all is well"}] * 100),
+        ]
+        for index in range(100):
+            for channel, messages in topics:
+                maker.write(channel, messages[index], START_NS + index * 10_000_000)
+    return path

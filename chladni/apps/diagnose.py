@@ -161,7 +161,7 @@ def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
     damage = damage_sentences(log.damage)
     begins_s = (series.start_time_ns - log.start_time_ns) / NS_PER_S
     found = matched_log(model, series, log=name, held=held, begins_s=begins_s, damage=damage)
-    return _with_use(found, series, reading_sentences(log))
+    return _with_use(found, series, reading_sentences(log, everything=False))
 
 
 def _of_series(model: Model, series: TimeSeries, name: str) -> _Read:

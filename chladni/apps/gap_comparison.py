@@ -112,7 +112,7 @@ def compare_with_simulated(
         distortion=_shares(view.measured_split),
         simulated_distortion=_shares(view.simulated_split),
         remarks=(
-            *(told for log in logs for told in reading_sentences(log)),
+            *(told for log in logs for told in reading_sentences(log, everything=False)),
             *view.remarks,
             *_split_remarks(view, moving_inputs(ours)),
         ),

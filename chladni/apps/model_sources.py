@@ -69,4 +69,4 @@ def recording_for(model: Model, log: Log) -> tuple[TimeSeries, tuple[str, ...]]:
     measured = {terminal.channel for terminal in compiled.outputs if terminal.channel is not None}
     held = [channel.name for channel in log.channels if channel.name in measured]
     recording = log.read(list(dict.fromkeys([*driving, *held])))
-    return recording, reading_sentences(log)
+    return recording, reading_sentences(log, everything=False)

@@ -47,7 +47,7 @@ def convert(
     binary=false of a universal file.
     """
     from chladni.io.convert import convert as convert_file
-    from chladni.io.log_findings import unread_findings
+    from chladni.io.log_info import unread_sentences
     from chladni.signals.wording import counted
 
     require_places(reads=[source, opener.setup], writes={"OUT": target, "--json": json})
@@ -68,7 +68,7 @@ def convert(
         f"wrote {written.target}: {counted(len(written.channels), 'channel')}, samples: {count(written.samples)}, "
         f"{number(written.duration_s, digits=6)} s"
     )
-    out.lines((*written.notes, *unread_findings(written.unread), *written.losses))
+    out.lines((*written.notes, *unread_sentences(written.unread), *written.losses))
     out.json(
         {
             "format": "chladni.convert/1",
@@ -79,6 +79,6 @@ def convert(
             "duration_s": written.duration_s,
             "notes": list(written.notes),
             "losses": list(written.losses),
-            "unread": [{"name": name, "reason": reason} for name, reason in written.unread],
+            "unread": [one.to_json() for one in written.unread],
         }
     )

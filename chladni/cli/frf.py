@@ -68,7 +68,7 @@ def frf(
             span=Span(start_s=start, end_s=end),
             progress=progress,
         )
-        told = reading_sentences(opened)
+        told = reading_sentences(opened, everything=response is None)
         geometry = opened.geometry
     peaks = find_response_peaks(found)
     _print_account(out, found)

@@ -49,7 +49,7 @@ def psd(
             span=Span(start_s=start, end_s=end),
             progress=progress,
         )
-        told = reading_sentences(opened)
+        told = reading_sentences(opened, everything=channel is None)
         geometry = opened.geometry
     document = psd_document(found)
     named = [group for density in found for group in unit_peaks(density)]

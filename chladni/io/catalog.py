@@ -1,9 +1,10 @@
 """What a log holds: topics, which time each is stamped with, and the channels, as the setup file refines them."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from chladni.io.channel_source import ChannelSource
+from chladni.io.loss import Unread
 from chladni.io.mcap.container import McapContainer
 from chladni.io.message_path import near_matches, parse_message_path
 from chladni.io.setup import ChannelSetup, Setup, refined
@@ -35,7 +36,9 @@ class Catalog:
     choices
         Which time of a topic's messages is their samples'.
     refused
-        Why the other topics can't be read.
+        Why the other topics, or some channels of these, can't be read.
+    unread
+        The same and all else that no channel was made of, in the order of the file.
     channels
         Every channel that is listed, in the order of the file.
     setups
@@ -44,13 +47,15 @@ class Catalog:
         Least and most time between a topic's samples and their log time in its first messages; None where the two
         don't run together, so that a time window can't be found by log time.
     start_ns
-        Earliest sample of the topics with channels: zero of all times in seconds. 0 for an empty log.
+        Earliest sample of the topics with channels, else the first message: zero of all times in seconds. 0 for an
+        empty log.
     """
 
     file: str
     topics: Mapping[str, TopicChannels]
     choices: Mapping[str, StampChoice]
     refused: Mapping[str, str]
+    unread: tuple[Unread, ...]
     channels: tuple[ChannelSource, ...]
     setups: Mapping[tuple[str, str], ChannelSetup]
     lags_ns: Mapping[str, tuple[int, int] | None]
@@ -72,7 +77,7 @@ class Catalog:
 
     def _resolved(self, path: str) -> ChannelSource:
         parsed = parse_message_path(path, [*self.topics, *self.refused])
-        if parsed.topic in self.refused:
+        if parsed.topic not in self.topics:
             raise LogError(f"{path!r}: messages of {parsed.topic} can't be decoded: {self.refused[parsed.topic]}")
         if not parsed.steps:
             names = [one.channel.name for one in self.channels if one.topic == parsed.topic]
@@ -115,10 +120,10 @@ def read_catalog(container: McapContainer, *, setup: Setup, request: StampReques
         When the messages' own stamp is asked for and a topic with channels has none.
     """
     topics, refused = topics_of(container.channels)
-    topics = read_heads(container, topics)
+    topics, undecodable = read_heads(container, topics)
     _require_known_batches(setup, topics)
     readable, unreadable = _channels_of(topics, setup)
-    refused |= unreadable
+    refused |= undecodable | unreadable
     listed = [source for channels in readable.values() for source in channels.listed()]
     heads = {name: _head(channels.topic) for name, channels in readable.items()}
     choices = _choices(heads, {source.topic for source in listed}, request)
@@ -127,10 +132,11 @@ def read_catalog(container: McapContainer, *, setup: Setup, request: StampReques
         topics=readable,
         choices=choices,
         refused=refused,
+        unread=tuple(_unread(container, readable, refused)),
         channels=(),
         setups={},
         lags_ns={topic: None if head is None else head.lag_range_ns(choices[topic]) for topic, head in heads.items()},
-        start_ns=_start_ns(heads, choices, {source.topic for source in listed}),
+        start_ns=_start_ns(heads, choices, {source.topic for source in listed}, container.time_range_ns),
     )
     setups = _setups(catalog, setup, listed)
     channels = tuple(with_setup(source, setups.get((source.topic, source.field))) for source in listed)
@@ -176,12 +182,31 @@ def _choices(
 
 
 def _start_ns(
-    heads: Mapping[str, TopicHead | None], choices: Mapping[str, StampChoice], with_channels: Collection[str]
+    heads: Mapping[str, TopicHead | None],
+    choices: Mapping[str, StampChoice],
+    with_channels: Collection[str],
+    logged_ns: tuple[int, int] | None,
 ) -> int:
     signals = {topic: head for topic, head in heads.items() if head is not None and topic in with_channels}
     # One message samples nothing, and latched ones carry the time of long ago.
     starts = [head.start_ns(choices[topic]) for topic, head in signals.items() if len(head.log_ns) > 1]
-    return min(starts or [head.start_ns(choices[topic]) for topic, head in signals.items()], default=0)
+    starts = starts or [head.start_ns(choices[topic]) for topic, head in signals.items()]
+    return min(starts, default=0 if logged_ns is None else logged_ns[0])
+
+
+def _unread(
+    container: McapContainer, readable: Mapping[str, TopicChannels], refused: Mapping[str, str]
+) -> Iterator[Unread]:
+    known = container.message_counts()
+    messages: dict[str, int] = {}
+    for channel in container.channels.values():
+        messages[channel.topic] = messages.get(channel.topic, 0) + (known or {}).get(channel.id, 0)
+    for topic, count in messages.items():
+        counted = None if known is None else count
+        if topic in refused:
+            yield Unread(topic=topic, reason=f"can't be decoded: {refused[topic]}", messages=counted)
+        if topic in readable:
+            yield from readable[topic].unread(counted)
 
 
 # --- setup -------------------------------------------------------------------------------------------------------

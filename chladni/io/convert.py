@@ -8,6 +8,7 @@ from typing import Any
 
 from chladni.io.files.formats import MCAP, WRITTEN_SUFFIXES, call_with_options, writer_of
 from chladni.io.log import Log, open_log
+from chladni.io.loss import Unread
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
 
@@ -31,7 +32,7 @@ class Conversion:
     notes
         Sentences on what was inferred from the source or left out of it.
     unread
-        (name, reason) of each part of the source that isn't read.
+        What of the source no channel was made of; none where channels were named.
     """
 
     source: Path
@@ -41,7 +42,7 @@ class Conversion:
     duration_s: float
     losses: tuple[str, ...]
     notes: tuple[str, ...]
-    unread: tuple[tuple[str, str], ...] = ()
+    unread: tuple[Unread, ...] = ()
 
 
 def convert(
@@ -93,7 +94,7 @@ def convert(
     rate = {} if sample_rate_hz is None else {"sample_rate_hz": sample_rate_hz}
     with open_log(source, **{**(reading or {}), **rate}) as log:
         series, notes = _read(log, channels, start_s, end_s, resample_hz)
-        unread = log.unread
+        unread = log.unread if channels is None else ()
     options = dict(writing or {}) | ({} if layout is None else {"layout": layout})
     names, losses = _write(series, target, overwrite=overwrite, options=options)
     return Conversion(

@@ -12,11 +12,10 @@ from chladni.io.files.contents import FileContents, on_common_grids
 from chladni.io.files.formats import read_file
 from chladni.io.known_schemas import likely_role
 from chladni.io.log import Log
-from chladni.io.log_findings import unread_findings
-from chladni.io.log_info import LogInfo, some_of
+from chladni.io.log_info import LogInfo, some_of, unread_sentences
 from chladni.io.log_reader import SampleGrid
 from chladni.io.log_survey import survey_file
-from chladni.io.loss import Loss
+from chladni.io.loss import Loss, Unread
 from chladni.io.message_path import near_matches
 from chladni.io.setup import ChannelSetup, Setup, refined
 from chladni.io.stamps import StampRequest
@@ -93,9 +92,9 @@ class FileLog(Log):
         return tuple(told)
 
     @property
-    def unread(self) -> tuple[tuple[str, str], ...]:
-        """(name, reason) of each part of the file that isn't read."""
-        return self._contents.unread
+    def unread(self) -> tuple[Unread, ...]:
+        """Parts of the file that no channel is made of."""
+        return tuple(Unread(topic=name, reason=f"not read: {reason}") for name, reason in self._contents.unread)
 
     @property
     def functions(self) -> "FrequencyResponse | None":
@@ -163,7 +162,8 @@ class FileLog(Log):
     def info(self) -> LogInfo:
         """Look at all samples once and tell whether the file is sound."""
         if self._info is None:
-            self._info = survey_file(self._path.name, self._kind.removeprefix("."), self._contents, self.notes)
+            kind = self._kind.removeprefix(".")
+            self._info = survey_file(self._path.name, kind, self._contents, notes=self.notes, unread=self.unread)
         return self._info
 
     def close(self) -> None:
@@ -181,7 +181,7 @@ class FileLog(Log):
         told = [f"holds {' and '.join(held)}, but no samples over time" if held else "holds no samples over time"]
         if held:
             told.append(f"chladni {'modes' if self.functions is None else 'frf'} {name} shows them")
-        raise LogError(f"{name}: {'; '.join([*told, *unread_findings(self.unread)])}")
+        raise LogError(f"{name}: {'; '.join([*told, *unread_sentences(self.unread)])}")
 
     def _selected(self, paths: Sequence[str] | None) -> list[TimeSeries]:
         self._require_samples()

@@ -13,20 +13,22 @@ from chladni.io.stream import Piece, Stream
 
 @dataclass(slots=True, kw_only=True)
 class LostMessages:
-    """Messages that were read and could not be used, by topic and reason."""
+    """Messages that were read and could not be used, by topic and reason; and what is odd about those that could."""
 
     counts: dict[tuple[str, str], int] = field(default_factory=dict)
+    told: dict[tuple[str, str], int] = field(default_factory=dict)
 
     def add(self, topic: str, piece: Piece) -> None:
         """Count what one piece lost."""
-        for reason, messages in piece.lost.items():
-            key = (topic, reason)
-            self.counts[key] = self.counts.get(key, 0) + messages
+        for mine, found in ((self.counts, piece.lost), (self.told, piece.told)):
+            for reason, messages in found.items():
+                mine[topic, reason] = mine.get((topic, reason), 0) + messages
 
     def merge(self, other: "LostMessages") -> None:
         """Keep the larger count of each: a log that is read again loses the same messages again."""
-        for key, messages in other.counts.items():
-            self.counts[key] = max(messages, self.counts.get(key, 0))
+        for mine, found in ((self.counts, other.counts), (self.told, other.told)):
+            for key, messages in found.items():
+                mine[key] = max(messages, mine.get(key, 0))
 
 
 @dataclass(slots=True, kw_only=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 from chladni.io.files.formats import MCAP, file_kind
 from chladni.io.log_info import LogInfo
 from chladni.io.log_reader import SampleGrid, several_grids
-from chladni.io.loss import Loss
+from chladni.io.loss import Loss, Unread
 from chladni.io.mcap.limits import Limits
 from chladni.io.setup import Setup, load_setup
 from chladni.io.stamps import StampRequest
@@ -140,8 +140,8 @@ class Log(ABC):
         return ()
 
     @property
-    def unread(self) -> tuple[tuple[str, str], ...]:
-        """(name, reason) of each part of the file that isn't read."""
+    def unread(self) -> tuple[Unread, ...]:
+        """Topics, fields of topics, and parts of a data file that no channel is made of."""
         return ()
 
     @property

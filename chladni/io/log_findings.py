@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from chladni.io.catalog import Catalog
 from chladni.io.channel_source import UNKNOWN_UNIT
-from chladni.io.log_info import some_of
+from chladni.io.log_info import some_of, unread_sentences
 from chladni.io.loss import Loss
 from chladni.io.placement import Placement
 from chladni.io.sample_monitor import SampleMonitor
@@ -16,7 +16,11 @@ MOST_LOSSES_TOLD = 3
 
 
 def log_findings(
-    content: Catalog, monitors: Sequence[SampleMonitor], placements: Sequence[Placement], damage: Sequence[Loss]
+    content: Catalog,
+    monitors: Sequence[SampleMonitor],
+    placements: Sequence[Placement],
+    damage: Sequence[Loss],
+    odd: Sequence[str],
 ) -> Iterator[str]:
     """Say what is wrong with a log, the worst first.
 
@@ -28,9 +32,12 @@ def log_findings(
         Of each stream: what its samples and its stamps showed.
     damage
         What was lost.
+    odd
+        What is odd about messages that were read.
     """
     if damage:
         yield damage_finding(damage)
+    yield from odd
     yield from together(_stamp_findings(placements))
     yield from together(finding for placement in placements for finding in _clock_findings(placement))
     yield from together(finding for monitor in monitors for finding in _missing_samples(monitor))
@@ -140,18 +147,9 @@ def _constant(dead: Sequence[SensorFault]) -> Iterator[tuple[str, str]]:
 
 
 def _content_findings(content: Catalog) -> Iterator[str]:
-    yield from together((topic, f"can't be decoded: {reason}") for topic, reason in content.refused.items())
-    yield from together(
-        (f"{name}.{leaf}", "an array this long isn't listed; single elements can be read by path")
-        for name, channels in content.topics.items()
-        for leaf in channels.skipped_arrays()
-    )
+    # Text beside signals is no trouble; where there is nothing else it is what the log holds.
+    yield from unread_sentences(one for one in content.unread if not (one.complete and content.channels))
     yield from unit_findings([source.channel for source in content.channels])
-
-
-def unread_findings(unread: Iterable[tuple[str, str]]) -> Iterator[str]:
-    """Say which parts of a file aren't read, and why."""
-    yield from together((name, f"not read: {reason}") for name, reason in unread)
 
 
 def unit_findings(channels: Sequence[Channel]) -> Iterator[str]:

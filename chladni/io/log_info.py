@@ -1,15 +1,17 @@
 """What `chladni info` tells of a log."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any, Final, Literal
 
-from chladni.io.loss import Loss
+from chladni.io.gathering import LostMessages
+from chladni.io.loss import Loss, Unread
 from chladni.io.stamps import StampKind
 from chladni.signals.channel import Channel
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.time_base import TimeBase
+from chladni.signals.wording import counted
 
 INFO_FORMAT: Final = "chladni.info/1"
 SampleTime = StampKind | Literal["column", "rate"]
@@ -75,7 +77,7 @@ class LogInfo:
     start_time_ns
         Time of the earliest sample, nanoseconds since the Unix epoch.
     duration_s
-        From there to the end of the last sample.
+        From there to the end of the last sample; of a log without samples that of its messages.
     channels
         In the order of the file.
     damage
@@ -83,7 +85,7 @@ class LogInfo:
     findings
         Sentences about the log's soundness, the worst first.
     unread
-        (name, reason) of each part that isn't read.
+        Topics, and fields of topics, or parts of a data file, that no channel was made of.
     functions
         Frequency responses that the file holds ready-made, or None.
     """
@@ -94,7 +96,7 @@ class LogInfo:
     channels: tuple[ChannelInfo, ...]
     damage: tuple[Loss, ...]
     findings: tuple[str, ...]
-    unread: tuple[tuple[str, str], ...] = ()
+    unread: tuple[Unread, ...] = ()
     functions: FrequencyResponse | None = None
 
     def to_json(self) -> dict[str, Any]:
@@ -105,9 +107,9 @@ class LogInfo:
             "duration_s": self.duration_s,
             "channels": [one.to_json() for one in self.channels],
             "damage": [_loss_json(one) for one in self.damage],
-            "unread": [{"name": name, "reason": reason} for name, reason in self.unread],
-            "functions": [] if self.functions is None else _functions_json(self.functions),
             "findings": list(self.findings),
+            "unread": [one.to_json() for one in self.unread],
+            **({} if self.functions is None else {"functions": _functions_json(self.functions)}),
         }
 
 
@@ -148,3 +150,31 @@ def some_of(names: Sequence[str], *, count: int = 3) -> str:
     """
     more = f" and {len(names) - count} more" if len(names) > count else ""
     return ", ".join(names[:count]) + more
+
+
+def unread_sentences(unread: Iterable[Unread]) -> tuple[str, ...]:
+    """Say what was left out and why, all that share a reason together.
+
+    Examples
+    --------
+    >>> unread_sentences([Unread(topic="/a", reason="holds no number", messages=9)])
+    ('/a (9 messages): holds no number',)
+    """
+    groups: dict[str, list[Unread]] = {}
+    for one in unread:
+        groups.setdefault(one.reason, []).append(one)
+    return tuple(f"{_counted_names(group)}: {reason}" for reason, group in groups.items())
+
+
+def _counted_names(group: Sequence[Unread]) -> str:
+    known = [one.messages for one in group if one.messages is not None]
+    messages = f" ({counted(sum(known), 'message')})" if len(known) == len(group) else ""
+    return f"{some_of([one.name for one in group])}{messages}"
+
+
+def oddities(lost: LostMessages) -> tuple[str, ...]:
+    """Say what is odd about messages that were read all the same."""
+    groups: dict[tuple[str, int], list[str]] = {}
+    for (topic, what), messages in lost.told.items():
+        groups.setdefault((what, messages), []).append(topic)
+    return tuple(f"{some_of(topics)}: {what} ({counted(n, 'message')})" for (what, n), topics in groups.items())

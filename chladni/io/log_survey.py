@@ -9,16 +9,9 @@ from numpy.typing import NDArray
 from chladni.io.catalog import Catalog
 from chladni.io.files.contents import FileContents
 from chladni.io.gathering import Gathering, LostMessages, windowed
-from chladni.io.log_findings import (
-    fault_findings,
-    log_findings,
-    missing_sentence,
-    together,
-    unit_findings,
-    unread_findings,
-)
-from chladni.io.log_info import ChannelInfo, LogInfo
-from chladni.io.loss import losses
+from chladni.io.log_findings import fault_findings, log_findings, missing_sentence, together, unit_findings
+from chladni.io.log_info import ChannelInfo, LogInfo, oddities, unread_sentences
+from chladni.io.loss import Unread, losses
 from chladni.io.mcap.container import McapContainer
 from chladni.io.placement import Placement
 from chladni.io.sample_monitor import STRETCH_VALUES, Faults, SampleMonitor, clipped_samples, judge_samples
@@ -46,10 +39,11 @@ def survey(container: McapContainer, content: Catalog, lost: LostMessages) -> Lo
     return LogInfo(
         file=content.file,
         start_time_ns=content.start_ns,
-        duration_s=_duration_s(content, monitors, placements),
+        duration_s=_duration_s(content, monitors, placements) or _logged_s(container),
         channels=tuple(found[source.channel.name] for source in content.channels),
         damage=damage,
-        findings=tuple(log_findings(content, monitors, placements, damage)),
+        findings=tuple(log_findings(content, monitors, placements, damage, oddities(lost))),
+        unread=content.unread,
     )
 
 
@@ -87,10 +81,22 @@ def _duration_s(content: Catalog, monitors: Sequence[SampleMonitor], placements:
     return max(0, max(ends, default=content.start_ns) - content.start_ns) / NS_PER_S
 
 
+def _logged_s(container: McapContainer) -> float:
+    """From the first message to the end of the last one, which stands for a period as a sample does."""
+    counts, range_ns = container.message_counts(), container.time_range_ns
+    if range_ns is None:
+        return 0.0
+    most = max(counts.values(), default=0) if counts is not None else 0
+    period = 1 / (most - 1) if most > 1 else 0.0
+    return (range_ns[1] - range_ns[0]) * (1 + period) / NS_PER_S
+
+
 # --- data files --------------------------------------------------------------------------------------------------
 
 
-def survey_file(file: str, kind: str, contents: FileContents, notes: Sequence[str]) -> LogInfo:
+def survey_file(
+    file: str, kind: str, contents: FileContents, *, notes: Sequence[str], unread: tuple[Unread, ...]
+) -> LogInfo:
     """Look at the samples of a data file once.
 
     Parameters
@@ -99,8 +105,8 @@ def survey_file(file: str, kind: str, contents: FileContents, notes: Sequence[st
         Its name, and what it is.
     contents
         What was read of it.
-    notes
-        Sentences about that.
+    notes, unread
+        Sentences about that, and what isn't read.
     """
     faults: Faults = {}
     begin_ns = min((part.start_time_ns for part in contents.series), default=0)
@@ -118,7 +124,7 @@ def survey_file(file: str, kind: str, contents: FileContents, notes: Sequence[st
         ]
     told = (
         notes,
-        unread_findings(contents.unread),
+        unread_sentences(unread),
         together(missing),
         fault_findings(list(faults.values())),
         unit_findings([one.channel for one in channels]),
@@ -130,7 +136,7 @@ def survey_file(file: str, kind: str, contents: FileContents, notes: Sequence[st
         channels=tuple(channels),
         damage=(),
         findings=tuple(chain.from_iterable(told)),
-        unread=contents.unread,
+        unread=unread,
         functions=contents.functions,
     )
 

@@ -10,10 +10,10 @@ from chladni.io.catalog import Catalog, read_catalog
 from chladni.io.channel_source import ChannelSource
 from chladni.io.gathering import LostMessages
 from chladni.io.log import Log
-from chladni.io.log_info import LogInfo
+from chladni.io.log_info import LogInfo, oddities, unread_sentences
 from chladni.io.log_reader import FirstPass, LogReader, SampleGrid, Window
 from chladni.io.log_survey import survey
-from chladni.io.loss import Loss, losses
+from chladni.io.loss import Loss, Unread, losses
 from chladni.io.mcap.container import McapContainer
 from chladni.io.mcap.limits import Limits
 from chladni.io.setup import Setup
@@ -102,6 +102,16 @@ class McapLog(Log):
         return losses(self._container.damage, self._lost)
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What is odd about messages that have been read so far, in sentences."""
+        return oddities(self._lost)
+
+    @property
+    def unread(self) -> tuple[Unread, ...]:
+        """Topics, and fields of topics, that no channel is made of."""
+        return self._content.unread
+
+    @property
     def _content(self) -> Catalog:
         if self._catalog is None:
             self._catalog = read_catalog(self._container, setup=self._setup, request=self._stamp)
@@ -171,7 +181,7 @@ class McapLog(Log):
             raise LogError(f"{self.path.name}: no channel is asked for; name one, or None for all")
         sources = content.channels if paths is None else tuple(content.resolve(path) for path in dict.fromkeys(paths))
         if not sources:
-            reasons = "; ".join(f"{topic}: {why}" for topic, why in list(content.refused.items())[:3])
+            reasons = "; ".join(unread_sentences(content.unread)[:3])
             raise LogError(
                 f"{self.path.name}: the log has no channel that could be read{reasons and f' ({reasons})'}"
             )

@@ -1,7 +1,7 @@
 """A stream: channels of one topic whose samples come in the same messages, and so at the same times."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,8 @@ class Piece:
         ``[channel, sample]``, SI, messages one after another; NaN where a message doesn't hold the channel.
     lost
         Messages that are not in it, by the reason why.
+    told
+        What is odd about messages that are in it, and about how many.
     """
 
     stamps_ns: NDArray[np.int64]
@@ -42,6 +44,7 @@ class Piece:
     period_s: float
     values: NDArray[np.floating[Any]]
     lost: Mapping[str, int]
+    told: Mapping[str, int] = field(default_factory=dict)
 
     def within(self, start_ns: int | None, end_ns: int | None) -> "Piece":
         """Give the messages that have a sample with ``start_ns <= time < end_ns``."""
@@ -127,9 +130,10 @@ class Stream:
         if unstamped:
             lost[f"{self.choice.label} is no time between 1970 and 2116"] = unstamped
         if self.layout is not None:
-            return self._blocks(decoded, stamps_ns, usable, lost, with_values=with_values)
+            piece = self._blocks(decoded, stamps_ns, usable, lost, with_values=with_values)
+            return replace(piece, told=decoded.told)
         piece = self._single_samples(decoded, stamps_ns, kept_messages(decoded, self.filters) & usable, lost)
-        return piece if with_values else replace(piece, values=piece.values[:0])
+        return replace(piece, told=decoded.told, values=piece.values if with_values else piece.values[:0])
 
     def without(self, messages: int, reason: str) -> Piece:
         """Give an empty piece that says why `messages` of them are not in it."""

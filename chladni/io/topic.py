@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from chladni.io.decoding import Decoded, Decoder, FieldInfo, make_decoder
+from chladni.io.decoding import Decoded, Decoder, FieldInfo, definition_text, make_decoder
 from chladni.io.mcap.channel_registry import McapChannel
 from chladni.io.mcap.container import McapContainer
 from chladni.io.mcap.message_batch import MessageBatch
@@ -61,12 +61,30 @@ class Topic:
         """Decode some leaves of the first messages."""
         return [self.decode(batch, leaves) for batch in self.head]
 
-    def with_head(self, head: Sequence[MessageBatch]) -> "Topic":
-        """Give the topic with its first messages, from which decoders without a schema learn their fields."""
-        decoders = dict(self.decoders)
-        for batch in head:
-            decoders[batch.channel_id] = decoders[batch.channel_id].informed_by(batch)
-        return replace(self, head=tuple(head), decoders=decoders)
+    @property
+    def unread(self) -> Mapping[str, str]:
+        """Numeric leaves that can't be read, and why."""
+        return next(iter(self.decoders.values())).unread
+
+    def with_head(self, head: Sequence[MessageBatch]) -> "tuple[Topic, str | None]":
+        """Give the topic with the first messages of its channels, from which decoders learn what no schema tells.
+
+        Returns
+        -------
+        topic : Topic
+            Without the channels whose messages can't be decoded.
+        reason : str or None
+            Why one of them can't.
+        """
+        decoders: dict[int, Decoder] = {}
+        reason = None
+        for channel, decoder in self.decoders.items():
+            try:
+                decoders[channel] = decoder.informed_by([batch for batch in head if batch.channel_id == channel])
+            except LogError as error:
+                reason = str(error)
+        readable = tuple(batch for batch in head if batch.channel_id in decoders)
+        return replace(self, head=readable, decoders=decoders), reason
 
 
 def topics_of(channels: Mapping[int, McapChannel]) -> tuple[dict[str, Topic], dict[str, str]]:
@@ -111,7 +129,7 @@ def _new_topic(channel: McapChannel, decoder: Decoder) -> Topic:
         encoding=channel.message_encoding,
         metadata=dict(channel.metadata),
         decoders={channel.id: decoder},
-        schema_text=schema.data.decode("utf-8", "replace") if schema is not None and is_text else "",
+        schema_text=definition_text(schema.data) if schema is not None and is_text else "",
     )
 
 
@@ -126,11 +144,18 @@ def _joined(topic: Topic, channel: McapChannel, decoder: Decoder) -> Topic:
 # --- first messages ----------------------------------------------------------------------------------------------
 
 
-def read_heads(container: McapContainer, topics: Mapping[str, Topic]) -> dict[str, Topic]:
+def read_heads(container: McapContainer, topics: Mapping[str, Topic]) -> tuple[dict[str, Topic], dict[str, str]]:
     """Give the topics with their first messages.
 
     All topics are looked for together, since most begin in the same few chunks; those that don't are then looked
     for alone, where an index leads straight to them.
+
+    Returns
+    -------
+    topics : dict
+        Topics whose messages can be decoded.
+    refused : dict
+        Why messages of the others can't.
     """
     counts = container.message_counts()
     heads: dict[int, list[MessageBatch]] = {channel: [] for topic in topics.values() for channel in topic.decoders}
@@ -139,10 +164,15 @@ def read_heads(container: McapContainer, topics: Mapping[str, Topic]) -> dict[st
     for channel in sorted(missing):
         if not heads[channel]:
             _fill(heads, {channel}, container.batches({channel}), budget=_JOINT_BATCHES, counts=counts)
-    return {
-        name: topic.with_head([batch for channel in topic.decoders for batch in heads[channel]])
-        for name, topic in topics.items()
-    }
+    found: dict[str, Topic] = {}
+    refused: dict[str, str] = {}
+    for name, topic in topics.items():
+        informed, reason = topic.with_head([batch for channel in topic.decoders for batch in heads[channel]])
+        if informed.decoders:
+            found[name] = informed
+        if reason is not None:
+            refused[name] = reason
+    return found, refused
 
 
 def _fill(

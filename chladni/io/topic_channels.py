@@ -12,6 +12,7 @@ from chladni.io.decoding import FieldInfo
 from chladni.io.decoding.columns import Strings
 from chladni.io.field_selector import FieldFilter, FieldSelector, names_beside, resolve_fields
 from chladni.io.known_schemas import MAX_LISTED_ELEMENTS, has_signals, is_signal
+from chladni.io.loss import Unread
 from chladni.io.message_path import FieldStep, IndexStep, MessagePath, near_matches, quoted
 from chladni.io.topic import Topic
 from chladni.signals.errors import LogError
@@ -58,19 +59,38 @@ class TopicChannels:
         """
         if self.layout is not None:
             return self._column_source(path)
+        if path.rest in self.topic.unread:
+            raise LogError(f"{path.text!r} {self.topic.unread[path.rest]}")
         selector = resolve_fields(path, self.topic.fields)
         return self._leaf_source(selector, field=self._spelling(path, selector), name=path.text)
 
-    def skipped_arrays(self) -> tuple[str, ...]:
+    def unread(self, messages: int | None) -> Iterator[Unread]:
+        """Say what no channel is made of: fields that can't be read, or all of a topic of `messages` messages."""
+        if not any(self.listed()):
+            yield self._nothing_listed(messages)
+            return
+        for path, reason in self.topic.unread.items():
+            yield Unread(topic=self.topic.name, field=path, reason=reason)
+        for path in self._long_arrays():
+            reason = "an array this long isn't listed; single elements can be read by path"
+            yield Unread(topic=self.topic.name, field=path, reason=reason)
+
+    def _nothing_listed(self, messages: int | None) -> Unread:
+        hidden = next(iter(self.topic.unread.values()), None)
+        numbers = any(info.kind == "number" for info in self.topic.fields)
+        if hidden is not None:
+            reason = hidden
+        elif numbers:
+            reason = "none of its numbers is listed as a signal; single ones can be read by path"
+        else:
+            reason = "holds no number"
+        return Unread(topic=self.topic.name, reason=reason, messages=messages, complete=hidden is None)
+
+    def _long_arrays(self) -> Iterator[str]:
         """Numeric arrays that are too long to be listed element by element."""
-        return tuple(
-            info.path
-            for info in self.topic.fields
-            if self.layout is None
-            and info.kind == "number"
-            and info.array is not None
-            and self._length(info) > MAX_LISTED_ELEMENTS
-        )
+        for info in self.topic.fields if self.layout is None else ():
+            if info.kind == "number" and info.array is not None and self._length(info) > MAX_LISTED_ELEMENTS:
+                yield info.path
 
     # --- batch messages ---
 

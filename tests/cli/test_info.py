@@ -2,6 +2,8 @@ import json
 
 import pytest
 
+from tests.make_logs import with_strange_topics
+
 CHANNEL_KEYS = {
     "name", "unit", "encoding", "rate_hz", "samples", "stamp", "stamp_reason", "jitter_s",
     "gaps", "duplicates", "clipped",
@@ -10,7 +12,7 @@ CHANNEL_KEYS = {
 
 def test_the_document_holds_what_was_promised(run, arm_log):
     document = run("info", arm_log, "--json", "-").document
-    assert set(document) >= {"format", "start_time_ns", "duration_s", "channels", "damage"}
+    assert set(document) == {"format", "start_time_ns", "duration_s", "channels", "damage", "findings", "unread"}
     assert document["format"] == "chladni.info/1"
     assert document["duration_s"] == pytest.approx(25.0)
     assert [set(channel) for channel in document["channels"]] == [CHANNEL_KEYS] * 6
@@ -69,3 +71,16 @@ def test_many_channels_are_grouped_in_the_table_and_listed_in_the_document(run, 
     outcome = run("info", tmp_path / "wide.mcap", "--json", "-")
     assert [channel["name"] for channel in outcome.document["channels"]] == [f"/daq.a{n}" for n in range(20)]
     assert "/daq.{a0..19} " in outcome.err
+
+
+def test_topics_without_channels_are_in_the_table_and_in_the_document(run, tmp_path):
+    log = with_strange_topics(tmp_path / "a.mcap")
+    outcome = run("info", log, "--json", "-")
+    assert outcome.code == 0
+    assert [one["name"] for one in outcome.document["channels"]] == ["/good.x"]
+    assert [(one["name"], one["messages"]) for one in outcome.document["unread"]] == [("/bad", 100), ("/text", 100)]
+    assert all(set(one) == {"name", "reason", "messages"} for one in outcome.document["unread"])
+    table = outcome.err.splitlines()
+    assert any(line.startswith("/bad ") and line.endswith("100 messages, not read") for line in table)
+    assert any(line.startswith("/text ") and line.endswith("100 messages, no signal") for line in table)
+    assert any(line.startswith("- /bad (100 messages): can't be decoded: ") for line in table)

@@ -5,6 +5,7 @@ from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 from tests.arm import TOOL, WRIST, short_arm
+from tests.make_logs import with_strange_topics
 
 
 def tool_samples():
@@ -91,3 +92,14 @@ def test_a_table_that_is_cut_says_so_and_how_it_is_ordered(run, tmp_path):
     assert [f"Peaks in {unit}, the highest first, 10 at most" in mixed for unit in ("m/s^2", "N")] == [True, True]
     # The title is one line, however narrow the table is.
     assert any(line.startswith("Levels: ") and line.rstrip().endswith("Hz apart") for line in alike.splitlines())
+
+
+def test_a_topic_that_cannot_be_decoded_is_told_and_the_rest_is_averaged(run, tmp_path):
+    log = with_strange_topics(tmp_path / "a.mcap")
+    outcome = run("psd", log, "--json", "-")
+    assert outcome.code == 0
+    assert [channel["name"] for channel in outcome.document["channels"]] == ["/good.x"]
+    assert "- /bad (100 messages): can't be decoded: " in outcome.err
+    # Text holds nothing that could be averaged, and who names a channel knows what is left out.
+    assert "/text" not in outcome.err
+    assert "/bad" not in run("psd", log, "--channel", "/good.x", "--json", "-").err
