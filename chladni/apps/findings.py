@@ -28,7 +28,8 @@ def require_channels(log: Log, name: str) -> None:
         # The file's own error says what it holds, and what shows it.
         log.grids()
     # The damage is known when all has been read, and nothing is left to read that would take long.
-    told = " ".join((*damage_sentences(log.info().damage), *log.notes, *unread_sentences(log.unread)))
+    log.info()
+    told = " ".join((*damage_sentences(log.damage), *log.notes, *unread_sentences(log.unread)))
     raise LogError(
         f"{name}: holds no channel that can be read; {told or 'record at least one message with a number in it'}"
     )

@@ -47,7 +47,7 @@ class OpenedLog:
             self.channels: tuple[Channel, ...] = self._log.channels
             info = self._log.info()
             self.duration_s: float = info.duration_s
-            self.damage = reading_sentences(self._log)
+            self.damage = reading_sentences(self._log, everything=True)
             require_channels(self._log, title)
             closing.pop_all()
 

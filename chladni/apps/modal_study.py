@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from chladni.apps.findings import reading_sentences
 from chladni.apps.modes import Method, Wanted, functions_and_modes, modes_of_responses
 from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging
 from chladni.io.log import Log
-from chladni.io.log_info import unread_sentences
 from chladni.modal.checks.driving_point import check_driving_point
 from chladni.modal.checks.reciprocity import check_reciprocity
 from chladni.modal.functions.circle_fit import CircleFit
@@ -105,12 +105,12 @@ def modal_study(
                 span=part,
                 progress=progress,
             )
-        return _study(log, found, None)
+        return _study(log, channels, found, None)
     if not log.channels and log.functions is None and log.modes is not None:
         told = (
             "the modes are those that the file holds: there are no frequency responses in it to identify others from"
         )
-        return _study(log, log.modes, None, notes=(told,))
+        return _study(log, channels, log.modes, None, notes=(told,))
     with _told_of(log.path):
         response, found = functions_and_modes(
             log,
@@ -122,7 +122,7 @@ def modal_study(
             span=part,
             progress=progress,
         )
-    return _study(log, found, response, notes=_checks(response))
+    return _study(log, channels, found, response, notes=_checks(response))
 
 
 @contextmanager
@@ -153,11 +153,16 @@ def _require_consistent(references: Sequence[str] | None, operational: bool, met
 
 
 def _study(
-    log: Log, modes: ModeSet, response: FrequencyResponse | None, *, notes: tuple[str, ...] = ()
+    log: Log,
+    channels: Sequence[str] | None,
+    modes: ModeSet,
+    response: FrequencyResponse | None,
+    *,
+    notes: tuple[str, ...] = (),
 ) -> ModalStudy:
     geometry = log.geometry
     validation, motions = validate(modes), relative_motion(modes, geometry)
-    told = (*log.notes, *unread_sentences(one for one in log.unread if not one.complete), *notes)
+    told = (*reading_sentences(log, everything=channels is None), *notes)
     study = Study(
         title=log.path.name,
         response=response,

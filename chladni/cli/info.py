@@ -27,18 +27,19 @@ def info(
     with opener(log) as opened, out.progress(log.name):
         found = opened.info()
     content = found.to_json()
-    rows = [*map(_row, content["channels"]), *(_unread_row(one) for one in found.unread if not one.field)]
-    if rows or not content["functions"]:
+    unread = [one for one in found.unread if not one.field]
+    functions = content.get("functions", [])
+    if content["channels"] or unread or not functions:
         out.table(
             f"{log.name}: {number(found.duration_s)} s",
             ["channel", "unit", "rate [Hz]", "samples", "jitter [s]", "stamp", "trouble"],
-            grouped_rows(rows),
+            grouped_rows([*map(_row, content["channels"]), *(_unread_row(one) for one in unread)]),
         )
-    if content["functions"]:
+    if functions:
         out.table(
-            f"{log.name}: {counted(len(content['functions']), 'frequency response')}",
+            f"{log.name}: {counted(len(functions), 'frequency response')}",
             ["response", "reference", "unit", "lines", "from [Hz]", "to [Hz]"],
-            grouped_rows([_function_row(function) for function in content["functions"]]),
+            grouped_rows([_function_row(function) for function in functions]),
         )
     out.lines(found.findings)
     out.json(content)
@@ -71,5 +72,5 @@ def _row(channel: dict[str, Any]) -> list[str]:
 
 def _unread_row(topic: "Unread") -> list[str]:
     """Row of a topic without channels; the reason is told below the table, or there is none."""
-    messages = "" if topic.messages is None else f"{count(topic.messages)} messages, "
+    messages = "" if topic.messages is None else f"{counted(topic.messages, 'message')}, "
     return [topic.name, *[NOTHING] * 5, f"{messages}{'no signal' if topic.complete else 'not read'}"]

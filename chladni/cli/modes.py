@@ -69,7 +69,6 @@ def modes(
     report: options.Report = None,
 ) -> None:
     """Natural frequencies, damping ratios and modal vectors, with their uncertainty."""
-    from chladni.apps.findings import damage_sentences
     from chladni.apps.modal_study import modal_study
     from chladni.apps.modes import Wanted
     from chladni.apps.modes_document import modes_document
@@ -94,10 +93,9 @@ def modes(
             span=Span(start_s=start, end_s=end, join=join),
             progress=progress,
         )
-        damage = damage_sentences(opened.damage)
     print_modes(out, found.modes, found.validation)
     print_relative_motion(out, found.modes, found.study.relative_motion)
-    out.lines(damage + found.study.findings)
+    out.lines(found.study.findings)
     _write(out, found, uff=uff, csv=csv, save=save)
     out.pictures(found.study, figures=figures, report=report)
     motions, passed_on = found.study.relative_motion, found.transmissibility

@@ -35,7 +35,7 @@ class Conversion:
     notes
         Sentences on what was inferred from the source or left out of it.
     unread
-        (name, reason) of each part of the source that isn't read.
+        What of the source no channel was made of; none where channels were named.
     """
 
     source: Path
@@ -100,7 +100,7 @@ def convert(
     rate = {} if sample_rate_hz is None else {"sample_rate_hz": sample_rate_hz}
     with open_log(source, **{**(reading or {}), **rate}) as log:
         series, notes = _read(log, channels, start_s, end_s, resample_hz, join)
-        unread = log.unread
+        unread = log.unread if channels is None else ()
     options = dict(writing or {}) | ({} if layout is None else {"layout": layout})
     names, losses = _write(series, target, overwrite=overwrite, options=options)
     return Conversion(

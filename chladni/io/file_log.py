@@ -93,8 +93,8 @@ class FileLog(Log):
 
     @property
     def unread(self) -> tuple[Unread, ...]:
-        """Columns and parts of the file that no channel is made of."""
-        return tuple(Unread(topic=name, reason=reason) for name, reason in self._contents.unread)
+        """Parts of the file that no channel is made of."""
+        return tuple(Unread(topic=name, reason=f"not read: {reason}") for name, reason in self._contents.unread)
 
     @property
     def functions(self) -> "FrequencyResponse | None":
@@ -162,9 +162,8 @@ class FileLog(Log):
     def info(self) -> LogInfo:
         """Look at all samples once and tell whether the file is sound."""
         if self._info is None:
-            self._info = survey_file(
-                self._path.name, self._kind.removeprefix("."), self._contents, notes=self.notes, unread=self.unread
-            )
+            kind = self._kind.removeprefix(".")
+            self._info = survey_file(self._path.name, kind, self._contents, notes=self.notes, unread=self.unread)
         return self._info
 
     def close(self) -> None:

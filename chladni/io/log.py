@@ -142,7 +142,7 @@ class Log(ABC):
 
     @property
     def unread(self) -> tuple[Unread, ...]:
-        """Topics, columns and fields that no channel is made of."""
+        """Topics, fields of topics, and parts of a data file that no channel is made of."""
         return ()
 
     @property

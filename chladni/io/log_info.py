@@ -93,7 +93,7 @@ class LogInfo:
     findings
         Sentences about the log's soundness, the worst first.
     unread
-        Topics, columns and fields that no channel was made of.
+        Topics, and fields of topics, or parts of a data file, that no channel was made of.
     functions
         Frequency responses that the file holds ready-made, or None.
     """
@@ -115,9 +115,9 @@ class LogInfo:
             "duration_s": self.duration_s,
             "channels": [one.to_json() for one in self.channels],
             "damage": [_loss_json(one) for one in self.damage],
-            "functions": [] if self.functions is None else _functions_json(self.functions),
             "findings": list(self.findings),
             "unread": [one.to_json() for one in self.unread],
+            **({} if self.functions is None else {"functions": _functions_json(self.functions)}),
         }
 
 
@@ -166,12 +166,12 @@ def unread_sentences(unread: Iterable[Unread]) -> tuple[str, ...]:
     Examples
     --------
     >>> unread_sentences([Unread(topic="/a", reason="holds no number", messages=9)])
-    ('/a (9 messages) not read: holds no number',)
+    ('/a (9 messages): holds no number',)
     """
     groups: dict[str, list[Unread]] = {}
     for one in unread:
         groups.setdefault(one.reason, []).append(one)
-    return tuple(f"{_counted_names(group)} not read: {reason}" for reason, group in groups.items())
+    return tuple(f"{_counted_names(group)}: {reason}" for reason, group in groups.items())
 
 
 def _counted_names(group: Sequence[Unread]) -> str:

@@ -104,10 +104,8 @@ def survey_file(
         Its name, and what it is.
     contents
         What was read of it.
-    notes
-        Sentences about that.
-    unread
-        What of it wasn't read.
+    notes, unread
+        Sentences about that, and what isn't read.
     """
     faults: Faults = {}
     begin_ns = min((part.start_time_ns for part in contents.series), default=0)

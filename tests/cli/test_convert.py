@@ -68,9 +68,9 @@ def test_what_is_not_read_is_told(run, tmp_path):
     table.write_text("n,state,a\n" + "".join(f"{index * 5},on,{index % 7}\n" for index in range(60)))
     outcome = run("convert", table, tmp_path / "a.npz", "--time", "n", "--time-unit", "ms")
     assert outcome.code == 0, outcome.err
-    assert "state not read: text, such as 'on'" in outcome.out
+    assert "state: not read: text, such as 'on'" in outcome.out
     document = run("convert", table, tmp_path / "b.npz", "--time", "n", "--time-unit", "ms", "--json", "-").document
-    assert document["unread"] == [{"name": "state", "reason": "text, such as 'on'", "messages": None}]
+    assert document["unread"] == [{"name": "state", "reason": "not read: text, such as 'on'", "messages": None}]
     # The advice of a refusal, followed.
     assert run("convert", table, tmp_path / "c.npz").code == 2
     assert run("convert", table, tmp_path / "c.npz", "--time", "none", "--rate", 200).code == 0

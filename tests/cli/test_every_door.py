@@ -266,7 +266,7 @@ def test_what_is_not_read_is_told_by_every_command(run: Run, tmp_path: Path) -> 
     for command in ("info", "psd", "frf", "modes"):
         outcome = run(command, path)
         assert outcome.code == 0, outcome.err
-        assert "power spectral density (1) not read" in " ".join(outcome.out.split())
+        assert "power spectral density (1): not read" in " ".join(outcome.out.split())
 
 
 # --- functions that a file holds ready-made ----------------------------------------------------------------------

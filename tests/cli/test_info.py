@@ -92,4 +92,4 @@ def test_topics_without_channels_are_in_the_table_and_in_the_document(run, tmp_p
     table = outcome.err.splitlines()
     assert any(line.startswith("/bad ") and line.endswith("100 messages, not read") for line in table)
     assert any(line.startswith("/text ") and line.endswith("100 messages, no signal") for line in table)
-    assert any(line.startswith("- /bad (100 messages) not read: can't be decoded: ") for line in table)
+    assert any(line.startswith("- /bad (100 messages): can't be decoded: ") for line in table)

@@ -113,7 +113,7 @@ def test_a_topic_that_cannot_be_decoded_is_told_and_the_rest_is_averaged(run, tm
     outcome = run("psd", log, "--json", "-")
     assert outcome.code == 0
     assert [channel["name"] for channel in outcome.document["channels"]] == ["/good.x"]
-    assert "- /bad (100 messages) not read: can't be decoded: " in outcome.err
+    assert "- /bad (100 messages): can't be decoded: " in outcome.err
     # Text holds nothing that could be averaged, and who names a channel knows what is left out.
     assert "/text" not in outcome.err
     assert "/bad" not in run("psd", log, "--channel", "/good.x", "--json", "-").err

@@ -70,7 +70,7 @@ def test_a_topic_that_cannot_be_decoded_costs_only_itself(tmp_path: Path, what: 
         assert (unread.name, unread.messages, unread.complete) == (topic, COUNT, False)
         assert unread.reason.startswith("can't be decoded: ")
         assert told in unread.reason
-        assert f"{topic} (200 messages) not read: {unread.reason}" in info.findings
+        assert f"{topic} (200 messages): {unread.reason}" in info.findings
         assert info.to_json()["unread"] == [{"name": topic, "reason": unread.reason, "messages": COUNT}]
         assert info.damage == ()
         with pytest.raises(LogError, match="can't be decoded"):
@@ -81,8 +81,8 @@ def test_topics_that_share_a_reason_share_a_sentence() -> None:
     same = [Unread(topic=f"/{name}", reason="holds no number", messages=3) for name in "abcd"]
     other = Unread(topic="/e", field="x", reason="is too long")
     assert unread_sentences([*same[:2], other, *same[2:]]) == (
-        "/a, /b, /c and 1 more (12 messages) not read: holds no number",
-        "/e.x not read: is too long",
+        "/a, /b, /c and 1 more (12 messages): holds no number",
+        "/e.x: is too long",
     )
 
 
@@ -132,7 +132,7 @@ def test_a_log_of_text_alone_is_told_as_such(tmp_path: Path, period_ns: int) -> 
         # As for samples, the last message stands for a period, too.
         assert info.duration_s == pytest.approx(COUNT * period_ns / 1e9)
         assert log.start_time_ns == info.start_time_ns == START_NS
-        assert info.findings == ("/chatter, /rare (201 messages) not read: holds no number",)
+        assert info.findings == ("/chatter, /rare (201 messages): holds no number",)
         assert [(one.name, one.messages) for one in info.unread] == [("/chatter", COUNT), ("/rare", 1)]
         with pytest.raises(LogError, match=r"no channel that could be read \(/chatter, /rare .*: holds no number\)"):
             log.read()
@@ -176,7 +176,7 @@ def test_a_log_of_text_that_counts_nothing_still_has_a_duration(tmp_path: Path) 
             maker.write(chatter, content, START_NS + index * 10_000_000)
     with open_log(tmp_path / "a.mcap") as log:
         assert log.info().duration_s == pytest.approx(1.99)
-        assert log.info().findings == ("/chatter not read: holds no number",)
+        assert log.info().findings == ("/chatter: holds no number",)
 
 
 # --- what is odd, and read all the same ---------------------------------------------------------------------------

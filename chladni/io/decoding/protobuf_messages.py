@@ -254,12 +254,28 @@ def _read(table: NDArray[np.uint8], slot: Slot | None, dtype: np.dtype[np.generi
 def _reader(chosen: _Chosen) -> Callable[[Message], Sequence[object]]:
     """Function that gives the values of a leaf in one message: one, or, below a list of messages, any number."""
     leaf, fields = chosen
-    optional = any(field.has_presence for field in fields)
-    if optional or any(leaf.lists) or not isinstance(leaf.type, Primitive | Text):
+    if any(leaf.lists) or not isinstance(leaf.type, Primitive | Text):
         return partial(_values, chosen=chosen)
     # The common case: plain numbers, reached by attributes alone.
-    reach = attrgetter(".".join(leaf.names))
-    return lambda message: (reach(message),)
+    if not any(map(_is_optional, fields)):
+        reach = attrgetter(".".join(leaf.names))
+        return lambda message: (reach(message),)
+    way = [(field.name, _is_optional(field)) for field in fields]
+    missing = (_value(None, leaf.type),)
+
+    def read(message: Any) -> Sequence[object]:
+        for name, optional in way:
+            if optional and not message.HasField(name):
+                return missing
+            message = getattr(message, name)
+        return (message,)
+
+    return read
+
+
+def _is_optional(field: FieldDescriptor) -> bool:
+    """Whether a field that a message leaves out has no value at all."""
+    return field.has_presence and not field.has_default_value
 
 
 def _values(message: Message, chosen: _Chosen) -> Sequence[object]:
@@ -275,8 +291,8 @@ def _member(place: Any, field: FieldDescriptor) -> object:
     if place is None:
         return None
     # Entries of a map have a key and a value, always.
-    optional = field.has_presence and not field.has_default_value and not isinstance(place, _Entry)
-    return None if optional and not place.HasField(field.name) else getattr(place, field.name)
+    absent = _is_optional(field) and not isinstance(place, _Entry) and not place.HasField(field.name)
+    return None if absent else getattr(place, field.name)
 
 
 class _Entry(NamedTuple):
