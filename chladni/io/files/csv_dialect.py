@@ -236,6 +236,8 @@ def _titles(path: Path, lines: Sequence[str], rows: _Rows) -> tuple[tuple[str, .
     """Find the names, and the units where the line below holds them."""
     columns = len(rows.lines[0])
     # np.savetxt puts # before the titles; some writers end only the rows, others only the titles, with a delimiter.
+    # Spreadsheets write the delimiter itself into the first line.
+    lines = ["" if line.startswith("sep=") else line for line in lines]
     titles = [_fitted(split_cells(line.lstrip("# "), rows.delimiter), rows) for line in lines]
     found = [cells for cells in titles if any(cells)]
     if not found:

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from chladni.io.files.contents import FileContents
-from chladni.signals.errors import SetupError
+from chladni.signals.errors import LogError, SetupError
 
 Reader = Callable[..., FileContents]
 Writer = Callable[..., tuple[str, ...]]
@@ -72,7 +72,10 @@ def read_file(path: Path | str, **options: Any) -> FileContents:
     SetupError
         When the suffix isn't known, an option isn't, or an option is missing.
     """
-    contents: FileContents = call_with_options(reader_of(path), Path(path), options)
+    reader = reader_of(path)
+    if not Path(path).is_file():
+        raise LogError(f"{path}: no such file")
+    contents: FileContents = call_with_options(reader, Path(path), options)
     return contents
 
 

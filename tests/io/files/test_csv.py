@@ -241,6 +241,7 @@ def test_delimiters_behind_the_last_cell_are_no_columns(tmp_path: Path, end: str
         ("t / s,F / kN\n", ["F"], ["N"]),
         ("t [s],hammer / N\n", ["hammer / N"], ["1"]),
         ("# made by hand\n# time [s], a\n", ["a"], ["1"]),
+        ("sep=,\ntime [s],a\n", ["a"], ["1"]),
         ("X,a\nSequence,Volt,0,5e-3\ntime [s],a\n", ["a"], ["1"]),
     ],
 )
@@ -262,6 +263,13 @@ def test_a_table_that_is_padded_and_whose_head_is_repeated(tmp_path: Path) -> No
     np.testing.assert_array_equal(contents.series[0].values[0], np.arange(60))
     assert contents.series[0].valid is None
     assert contents.notes == (f"{tmp_path / 'a.csv'}: 2 lines without numbers left out, the first is line 25.",)
+
+
+@pytest.mark.parametrize("mark", ["\f", "\v", "\x1c", "\u2028", "\x85"])
+def test_marks_that_only_look_like_ends_of_lines(tmp_path: Path, mark: str) -> None:
+    rows = "".join(f"{index / 100},{index}\n" for index in range(60))
+    series = only(file_of(tmp_path, f"# measured{mark}by me\ntime [s],a{mark}b\n{rows}"))
+    np.testing.assert_array_equal(series.values, [np.arange(60)])
 
 
 def test_rows_that_are_cut_are_gaps(tmp_path: Path) -> None:

@@ -154,6 +154,17 @@ def test_cells_of_vectors(tmp_path: Path, version: str) -> None:
     np.testing.assert_array_equal(series.values, [SIGNAL, SIGNAL * 2])
 
 
+def test_a_cell_of_unlike_members(tmp_path: Path) -> None:
+    cell = np.empty(4, dtype=object)
+    cell[:] = [SIGNAL, "text", np.eye(3), 1.0]
+    savemat(tmp_path / "a.mat", {"c": cell})
+    with pytest.raises(SetupError, match="give the sample rate"):
+        read_mat(tmp_path / "a.mat")
+    contents = read_mat(tmp_path / "a.mat", sample_rate_hz=200.0)
+    assert [channel.name for channel in contents.series[0].channels] == ["c[0]"]
+    assert contents.unread == (("c[2]", "of 9 numbers beside 60 samples"),)
+
+
 def test_arrays_of_structs_as_simulink_logs_them(tmp_path: Path) -> None:
     signals = np.empty(2, dtype=[("values", object), ("label", object)])
     signals[0], signals[1] = (SIGNAL, "a"), (SIGNAL * 2, "b")
