@@ -310,6 +310,27 @@ def test_three_decimals_behind_a_comma(tmp_path: Path) -> None:
     assert only(doubtful, sample_rate_hz=1.0, decimal=",").values[0, 0] == 1.234
 
 
+def test_addresses_and_numbers_of_parts_are_text(tmp_path: Path) -> None:
+    rows = "".join(f"{index};192.168.100.{index % 9};123 456;{index % 7}\n" for index in range(60))
+    contents = read_csv(file_of(tmp_path, f"n;address;part;a\n{rows}"), sample_rate_hz=100.0)
+    assert [channel.name for channel in contents.series[0].channels] == ["a"]
+    assert dict(contents.unread)["address"] == "text, such as '192.168.100.0'"
+
+
+@pytest.mark.parametrize("cell", ["1 234,5", "1'234,5", "1.234,5"])
+def test_thousands_that_are_set_apart_are_refused(tmp_path: Path, cell: str) -> None:
+    with pytest.raises(LogError, match="has a sign between thousands"):
+        read_csv(file_of(tmp_path, f"a;b\n1;{cell}\n2;{cell}\n"), sample_rate_hz=1.0)
+
+
+def test_a_table_of_thousands_of_columns(tmp_path: Path) -> None:
+    names = [f"a long name of channel {number}" for number in range(4000)]
+    row = ",".join(map(str, range(4000)))
+    series = only(file_of(tmp_path, ",".join(names) + f"\n{row}\n{row}\n"), sample_rate_hz=1.0)
+    assert [channel.name for channel in series.channels] == names
+    np.testing.assert_array_equal(series.values[:, 1], np.arange(4000))
+
+
 def test_an_unknown_unit_costs_only_the_unit(tmp_path: Path) -> None:
     contents = read_csv(file_of(tmp_path, "a [g],b [furlongs]\n1,2\n3,4\n"), sample_rate_hz=1.0)
     (series,) = contents.series

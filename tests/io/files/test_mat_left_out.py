@@ -45,6 +45,12 @@ def test_objects_of_matlab_cost_nothing_else(tmp_path: Path) -> None:
     assert contents.unread == tuple(expected)
 
 
+def test_an_object_that_may_have_held_the_times_is_named(tmp_path: Path) -> None:
+    (tmp_path / "a.mat").write_bytes(mat_file(opaque("when", "datetime"), numbers("x", SIGNAL)))
+    with pytest.raises(SetupError, match=r"give the sample rate .*'when' isn't read: a datetime of MATLAB"):
+        read_mat(tmp_path / "a.mat")
+
+
 def test_a_damaged_variable_costs_nothing_else(tmp_path: Path) -> None:
     bad = matrix(6, element(99, bytes(8)), name=b"bad")
     (tmp_path / "a.mat").write_bytes(mat_file(numbers("fs", np.array([200.0])), bad, numbers("x", SIGNAL)))
