@@ -9,7 +9,6 @@ from chladni.io.files.formats import (
     FILE_SUFFIXES,
     READ_OPTIONS,
     WRITTEN_SUFFIXES,
-    is_data_file,
     read_file,
     reader_of,
     writer_of,
