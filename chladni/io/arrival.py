@@ -13,8 +13,8 @@ from chladni.io.mcap.message_batch import MessageBatch
 _MOST, _LOST = 90, 2
 #: Steps from half to one and a half of their median are even: neither a message more nor one less would fit in.
 _EVEN: Final = (0.5, 1.5)
-#: Messages of a shuffled log are evenly spaced by log time, nine in ten at least, and mostly aren't as stored.
-_EVENLY_SORTED, _EVENLY_STORED = 0.9, 0.5
+#: Messages of a shuffled log are evenly spaced by log time, nine in ten at least; as stored a quarter is not.
+_EVENLY_SORTED, _EVENLY_STORED = 0.9, 0.75
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -11,7 +11,7 @@ from chladni.io.channel_source import ChannelSource
 from chladni.io.loss import Unread
 from chladni.io.mcap.container import McapContainer
 from chladni.io.message_path import MessagePath, near_matches, parse_message_path
-from chladni.io.publishers import at_once
+from chladni.io.publishers import at_once, evenly_in_turn
 from chladni.io.setup import ChannelSetup, Setup, refined
 from chladni.io.stamps import (
     StampChoice,
@@ -57,6 +57,8 @@ class Catalog:
     publishers
         Names of the publishers of topics that several publish on at once, by topic. Each is listed as a topic of its
         own.
+    in_turn
+        Names of the MCAP channels of topics where they send evenly in turn, by topic, and are read as one source.
     """
 
     file: str
@@ -69,6 +71,7 @@ class Catalog:
     lags_ns: Mapping[str, tuple[int, int] | None]
     start_ns: int
     publishers: Mapping[str, tuple[str, ...]]
+    in_turn: Mapping[str, tuple[str, ...]]
 
     def resolve(self, path: str) -> ChannelSource:
         """Find the channel that a path names.
@@ -164,7 +167,7 @@ def read_catalog(container: McapContainer, *, setup: Setup, request: StampReques
     refused |= undecodable | changed | unreadable
     parts, unreadable = _parts(container, readable, setup)
     refused |= unreadable
-    publishers = _publishers(container, readable, parts)
+    publishers, in_turn = _publishers(container, readable, parts)
     listed_topics = [name for topic in readable for name in publishers.get(topic, (topic,))]
     readable |= {name: part for found in parts.values() for name, part in found.items()}
     publishers |= {name: one.publishers for name, one in readable.items() if one.publishers}
@@ -182,6 +185,7 @@ def read_catalog(container: McapContainer, *, setup: Setup, request: StampReques
         lags_ns={topic: None if head is None else head.lag_range_ns(choices[topic]) for topic, head in heads.items()},
         start_ns=_start_ns(heads, choices, {source.topic for source in listed}, container.time_range_ns),
         publishers=publishers,
+        in_turn=in_turn,
     )
     setups = _setups(catalog, setup, listed)
     channels = tuple(with_setup(source, setups.get((source.topic, source.field))) for source in listed)
@@ -204,18 +208,22 @@ def _parts(
 
 def _publishers(
     container: McapContainer, readable: Mapping[str, TopicChannels], parts: Mapping[str, Mapping[str, TopicChannels]]
-) -> dict[str, tuple[str, ...]]:
-    """Find the topics with channels whose MCAP channels send the same at once, and name those that send."""
+) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
+    """Find the topics whose MCAP channels send the same at once, and those where they do so evenly in turn."""
     several = {name: readable[name].topic for name in parts if any(True for _ in readable[name].listed())}
-    found: dict[str, tuple[str, ...]] = {}
+    at_a_time: dict[str, tuple[str, ...]] = {}
+    in_turn: dict[str, tuple[str, ...]] = {}
     for name, one in (read_arrivals(container, several) if several else {}).items():
         order = arrival_order(one.log_ns, one)
         came = one if order is None else one.kept(order)
-        sending = set() if came.channel is None else set(np.unique(came.channel).tolist())
-        own = {part: one for part, one in parts[name].items() if sending & set(one.topic.decoders)}
-        if came.channel is not None and at_once(came.log_ns, came.channel) and not _share_joints(own):
+        if came.channel is None or not at_once(came.log_ns, came.channel):
+            continue
+        sending = set(np.unique(came.channel).tolist())
+        own = {part: channels for part, channels in parts[name].items() if sending & set(channels.topic.decoders)}
+        if not _share_joints(own):
+            found = in_turn if evenly_in_turn(came.log_ns, came.channel) else at_a_time
             found[name] = tuple(own)
-    return found
+    return at_a_time, in_turn
 
 
 def _share_joints(parts: Mapping[str, TopicChannels]) -> bool:

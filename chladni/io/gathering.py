@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chladni.io.arrival import Arrivals, arrival_order, stored_late
 from chladni.io.placement import Placement, place_stream, without_grid
-from chladni.io.publishers import at_once, count_by_stamps, told_apart
+from chladni.io.publishers import at_once, count_by_stamps, evenly_in_turn, told_apart
 from chladni.io.stream import Piece, Stream
 from chladni.io.untimed import SLACK_NS, untimed
 from chladni.signals.stamp_order import LEAP_NS
@@ -146,7 +146,7 @@ def _publishers(
     placement: Placement, stamps_ns: NDArray[np.int64], channel: NDArray[np.uint16] | None
 ) -> tuple[str, ...]:
     """What tells the publishers of a stream apart, in a path; empty where there's one."""
-    if channel is not None and at_once(stamps_ns, channel):
+    if channel is not None and at_once(stamps_ns, channel) and not evenly_in_turn(stamps_ns, channel):
         return tuple(f"@channel=={number}" for number in np.unique(channel).tolist())
     verdict = placement.time_base.verdict
     if placement.counts is not None or placement.stream.publisher is not None or verdict in ("still", "short"):

@@ -77,6 +77,8 @@ def damage_finding(damage: Sequence[Loss]) -> str:
 def _publisher_findings(content: Catalog) -> Iterator[str]:
     for topic, names in content.publishers.items():
         yield f"{topic}: {len(names)} publish here at once; each has channels of its own: {some_of(names)}"
+    for topic, names in content.in_turn.items():
+        yield f"{topic}: {len(names)} MCAP channels send in turn and are read as one; each alone: {some_of(names)}"
 
 
 def _stamp_findings(placements: Sequence[Placement]) -> Iterator[tuple[str, str]]:

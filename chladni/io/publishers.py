@@ -13,6 +13,11 @@ from chladni.signals.clock_verdict import JITTERED
 #: takes a place of its own, and doubles the step around it. This is half way.
 _IN_PLACE: Final = 1.5
 
+#: From the tenth to the ninetieth percentile of Gaussian steps, in standard deviations.
+_SIGMAS: Final = 2.56
+#: Timers of one source keep its period in the mean; a share of it that says nothing.
+_TIMER: Final = 0.01
+
 
 def at_once(times_ns: NDArray[np.int64], source: NDArray[np.integer]) -> bool:
     """Tell whether messages with different labels come from publishers that send at the same time.
@@ -46,12 +51,41 @@ def at_once(times_ns: NDArray[np.int64], source: NDArray[np.integer]) -> bool:
     return crossed and not in_place and _overlap(times_ns, source)
 
 
+def evenly_in_turn(times_ns: NDArray[np.int64], source: NDArray[np.integer]) -> bool:
+    """Tell whether messages of several MCAP channels lie as evenly together as those of each do.
+
+    Then they are one source: two that know nothing of each other hardly send half a period apart. Were they two, each
+    alone would show a tone above its own Nyquist frequency at another one.
+
+    Parameters
+    ----------
+    times_ns, source
+        As for `at_once`.
+    """
+    steps = np.diff(times_ns)
+    own = [_spread(_single_steps(np.diff(one))) for one in _of_each(times_ns, source) if one.size >= SHORT]
+    middle = float(np.median(steps)) if steps.size else 0.0
+    if not own or _spread(steps) > max(JITTERED * middle, _CLEARLY * max(own)):
+        return False
+    single = _single_steps(steps, middle)
+    from_to = np.stack((source[:-1], source[1:]))[:, source[1:] != source[:-1]]
+    between = single[source[1:] != source[:-1]]
+    for pair in np.unique(from_to, axis=1).T:
+        some = between[np.all(from_to == pair[:, None], axis=0)]
+        # Four standard errors of a median, and what timers leave out.
+        off = 5 * max(own) / _SIGMAS / np.sqrt(some.size) + _TIMER * middle
+        if abs(float(np.median(some)) - middle) > off:
+            return False
+    return True
+
+
+def _of_each(times_ns: NDArray[np.int64], source: NDArray[np.integer]) -> list[NDArray[np.int64]]:
+    return [times_ns[source == label] for label in np.unique(source)]
+
+
 def _overlap(times_ns: NDArray[np.int64], source: NDArray[np.integer]) -> bool:
     """Whether messages of some label come between those of another."""
-    ends = sorted(
-        (int(times_ns[places[0]]), int(times_ns[places[-1]]))
-        for places in (np.flatnonzero(source == label) for label in np.unique(source))
-    )
+    ends = sorted((int(one[0]), int(one[-1])) for one in _of_each(times_ns, source))
     return any(after[0] < before[1] for before, after in pairwise(ends))
 
 
@@ -116,7 +150,7 @@ def told_apart(times_ns: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     for number, chain in enumerate(chains):
         owner[chain] = number
     between = np.diff(rising_ns)[owner[1:] != owner[:-1]]
-    scatter = [_spread(_single_steps(rising_ns[chain])) for chain in chains]
+    scatter = [_spread(_single_steps(np.diff(rising_ns[chain]))) for chain in chains]
     sure = between.size and int(between.min()) > max(scatter)
     return [order[chain] for chain in chains] if sure else []
 
@@ -217,14 +251,13 @@ def _clearly_apart(times_ns: NDArray[np.int64], chains: list[NDArray[np.int64]])
     if max(int(chain[0]) for chain in chains) > min(int(chain[-1]) for chain in chains):
         return False
     together = _spread(np.diff(times_ns))
-    return all(together >= _CLEARLY * _spread(_single_steps(times_ns[chain])) for chain in chains)
+    return all(together >= _CLEARLY * _spread(_single_steps(np.diff(times_ns[chain]))) for chain in chains)
 
 
-def _single_steps(times_ns: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Steps of one publisher, those over lost messages divided among them."""
-    steps = np.diff(times_ns)
-    periods = np.maximum(1, np.rint(steps / np.median(steps)))
-    single: NDArray[np.float64] = steps / periods
+def _single_steps(steps: NDArray[np.int64], period_ns: float | None = None) -> NDArray[np.float64]:
+    """Divide the steps over lost messages among them; the period is the median step where it isn't given."""
+    periods = np.rint(steps / max(1.0, float(np.median(steps)) if period_ns is None else period_ns))
+    single: NDArray[np.float64] = steps / np.maximum(1, periods)
     return single
 
 

@@ -172,7 +172,7 @@ def test_blocks_take_bounded_memory_however_far_out_of_order_the_log_is(
 
 
 @pytest.mark.parametrize("layout", LAYOUTS.values(), ids=LAYOUTS.keys())
-@pytest.mark.parametrize("offset_s", [0.005, 0.003, 0.0])
+@pytest.mark.parametrize("offset_s", [0.004, 0.003, 0.0])
 @pytest.mark.parametrize("joins_at", [0, 150])
 def test_publishers_at_once_are_channels_of_their_own(
     tmp_path: Path, offset_s: float, joins_at: int, layout: Mapping[str, Any]
@@ -196,6 +196,24 @@ def test_publishers_at_once_are_channels_of_their_own(
             log.read(["/s.data"])
         told_names = str(caught.value).partition("name one of them: ")[2].split(" or ")
         assert told_names == names
+
+
+@pytest.mark.parametrize("layout", LAYOUTS.values(), ids=LAYOUTS.keys())
+def test_channels_that_alternate_evenly_are_one_source(tmp_path: Path, layout: Mapping[str, Any]) -> None:
+    """A tone above the Nyquist frequency of either would be another tone in both."""
+    number = np.arange(2 * COUNT)
+    values = tone(number, tone_hz=40.0)
+    times = START_NS + number * PERIOD_NS
+    write_numbers(tmp_path / "a.mcap", times, values, channel=(number % 2).tolist(), **layout)
+    with open_log(tmp_path / "a.mcap") as log:
+        require_whole(log, "/s.data", values)
+        assert (
+            "/s: 2 MCAP channels send in turn and are read as one; each alone: /s{@channel==1}, /s{@channel==2}"
+            in log.info().findings
+        )
+        alone = log.read(["/s{@channel==2}.data"])
+        assert alone.sample_rate_hz == RATE_HZ / 2
+        np.testing.assert_array_equal(alone.values[0], values[1::2])
 
 
 def test_paths_of_publishers_that_are_none(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from chladni.io.publishers import at_once, count_by_stamps, told_apart
+from chladni.io.publishers import at_once, count_by_stamps, evenly_in_turn, told_apart
 
 SECONDS = 40.0
 
@@ -44,6 +44,21 @@ AT_ONCE = {
 @pytest.mark.parametrize("publishers", AT_ONCE.values(), ids=AT_ONCE.keys())
 def test_publishers_at_once(publishers: tuple[NDArray[np.int64], ...]) -> None:
     assert at_once(*together(*publishers))
+
+
+@pytest.mark.parametrize("name", AT_ONCE)
+def test_only_half_way_between_they_may_be_one_source(name: str) -> None:
+    assert evenly_in_turn(*together(*AT_ONCE[name])) == (name == "half way between")
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.03])
+@pytest.mark.parametrize("jitter", [0.0, 0.02, 0.1])
+@pytest.mark.parametrize("channels", [2, 3])
+def test_one_source_through_channels_in_turn(channels: int, jitter: float, lost: float) -> None:
+    number = np.arange(4000)
+    keep = np.random.default_rng(9).random(number.size) >= lost
+    times = np.rint((number + jitter * np.random.default_rng(1).standard_normal(number.size)) * 5e6).astype(np.int64)
+    assert evenly_in_turn(times[keep], (number % channels)[keep])
 
 
 @pytest.mark.parametrize("jitter", [0.0, 0.1])
