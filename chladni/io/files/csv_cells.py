@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 # What loggers and spreadsheets write for a missing number.
 _MISSING: Final = ("", "-", "--", "---", "?", "na", "n/a", "#n/a", "null", "none", "nan")
-# 1,234.5 or 1,234 among decimal points, 1.234,5 or 1.234 among decimal commas, 1 234.5 and 1'234.5 anywhere.
-_THOUSANDS: Final = (
-    r"^[+-]?(\d{1,3}(,\d{3})+(\.\d+)?|\d{1,3}(\.\d{3})+(,\d+)?|\d{1,3}([ '’]\d{3})+([.,]\d+)?|\d+[.,]\d+)$"
-)
+# Numbers whose thousands are set apart: 1,234.5 and 1.234,5 and 1 234.5, whatever stands beside them.
+_THOUSANDS: Final = r"^[+-]?(\d{1,3}(,\d{3})+\.\d+|\d{1,3}(\.\d{3})+,\d+|\d{1,3}([ '’]\d{3})+[.,]\d+)$"
+# Beside numbers also 1,234 and 1 234, and another decimal sign than theirs; elsewhere that may be an address.
+_DOUBTFUL: Final = r"^[+-]?(\d+([.,]\d+)+|\d{1,3}([ '’]\d{3})+)$"
 # A table of which more rows are short isn't the one that its head tells.
 _MOST_SHORT: Final = 0.1
 
@@ -37,6 +37,8 @@ class Cells:
         Parts of ``[row]`` numbers, NaN where a cell is blank or no number.
     text
         Parts of ``[row]`` cells; empty where only the numbers are kept.
+    numeric
+        Whether most cells of the head are numbers.
     keep_text
         Whether the text is kept besides: of times, whose digits count, and of what is no number.
     good, bad
@@ -47,6 +49,7 @@ class Cells:
 
     numbers: list[NDArray[np.float64]] = field(default_factory=list)
     text: list["pa.Array"] = field(default_factory=list)
+    numeric: bool
     keep_text: bool
     good: int = 0
     bad: int = 0
@@ -90,7 +93,9 @@ class CellReader:
     """
 
     def __init__(self, path: Path, dialect: CsvDialect, keep_text: Sequence[bool]) -> None:
-        self.columns = [Cells(keep_text=keep) for keep in keep_text]
+        self.columns = [
+            Cells(numeric=numeric, keep_text=keep) for numeric, keep in zip(dialect.numeric, keep_text, strict=True)
+        ]
         self.rows = 0
         self._path = path
         self._dialect = dialect
@@ -191,7 +196,8 @@ class CellReader:
         if not cells.bad:
             cells.first_bad = (int(lines[wrong[0]]), text[int(wrong[0])].as_py())
         cells.bad += wrong.size
-        grouped = np.flatnonzero(np.asarray(pc.match_substring_regex(text.take(wrong), _THOUSANDS)))
+        pattern = f"{_THOUSANDS}|{_DOUBTFUL}" if cells.numeric else _THOUSANDS
+        grouped = np.flatnonzero(np.asarray(pc.match_substring_regex(text.take(wrong), pattern)))
         if grouped.size:
             place = int(wrong[grouped[0]])
             raise LogError(

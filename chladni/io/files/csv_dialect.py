@@ -12,7 +12,8 @@ from chladni.io.files.time_reading import UNIT_OF, spelled
 from chladni.io.files.time_text import is_time_text
 from chladni.signals.errors import LogError
 
-_HEAD_BYTES: Final = 65536
+# Enough for most heads; the larger one for tables of thousands of columns, and for long remarks.
+_HEAD_BYTES: Final = (2**16, 2**22)
 NUMBER: Final = r"(?i)^[+-]?(\d+([.,]\d*)?|[.,]\d+)([ed][+-]?\d+)?$|^[+-]?(nan|inf|infinity)$"
 """A number with either decimal sign, as a regular expression; Fortran writes 1.0D+00."""
 _NUMBER: Final = re.compile(NUMBER)
@@ -90,7 +91,7 @@ class _Rows:
 
 
 def sniff_csv(path: Path, *, decimal: str | None = None) -> CsvDialect:
-    """Find out how a file is written from its first 64 KiB.
+    """Find out how a file is written from its start.
 
     Parameters
     ----------
@@ -102,9 +103,12 @@ def sniff_csv(path: Path, *, decimal: str | None = None) -> CsvDialect:
     LogError
         When there are no rows of numbers, the names don't fit the columns, or a number can be read in two ways.
     """
-    encoding, lines = _head(path)
-    runs = [run for delimiter in (*_DELIMITERS, LONE) if (run := _longest_run(lines, delimiter)) is not None]
-    if not runs:
+    for size in _HEAD_BYTES:
+        encoding, lines = _head(path, size)
+        runs = [run for delimiter in (*_DELIMITERS, LONE) if (run := _longest_run(lines, delimiter)) is not None]
+        if runs:
+            break
+    else:
         raise LogError(f"{path}: no line of numbers within the first {len(lines)} lines; is it a CSV file?")
     longest = max(len(run.lines) for run in runs)
     # Rows of numbers alone are surer than rows with text, and "1,5" is two cells before it's one.
@@ -151,10 +155,10 @@ def _kind(cell: str) -> _Kind:
     return "number" if is_number(cell) else "time" if is_time_text(cell) else "text"
 
 
-def _head(path: Path) -> tuple[str, list[str]]:
+def _head(path: Path, size: int) -> tuple[str, list[str]]:
     with path.open("rb") as file:
-        head = file.read(_HEAD_BYTES)
-        whole = len(head) < _HEAD_BYTES
+        head = file.read(size)
+        whole = len(head) < size
     # Analysers on Windows write m/s² in cp1252, spreadsheets mark UTF-8 and UTF-16 at the start.
     encoding = next((codec for mark, codec in _MARKS.items() if head.startswith(mark)), "utf-8")
     if encoding != "utf-16" and b"\0" in head:
@@ -236,6 +240,8 @@ def _titles(path: Path, lines: Sequence[str], rows: _Rows) -> tuple[tuple[str, .
     """Find the names, and the units where the line below holds them."""
     columns = len(rows.lines[0])
     # np.savetxt puts # before the titles; some writers end only the rows, others only the titles, with a delimiter.
+    # Spreadsheets write the delimiter itself into the first line.
+    lines = ["" if line.startswith("sep=") else line for line in lines]
     titles = [_fitted(split_cells(line.lstrip("# "), rows.delimiter), rows) for line in lines]
     found = [cells for cells in titles if any(cells)]
     if not found:

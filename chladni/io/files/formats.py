@@ -130,7 +130,10 @@ def read_file(path: Path | str, *, kind: str | None = None, **options: Any) -> F
     SetupError
         When the suffix isn't known, an option isn't, or an option is missing.
     """
-    contents: FileContents = call_with_options(reader_of(f"a{kind}" if kind else path), Path(path), options)
+    reader = reader_of(f"a{kind}" if kind else path)
+    if not Path(path).is_file():
+        raise LogError(f"{path}: no such file")
+    contents: FileContents = call_with_options(reader, Path(path), options)
     return contents
 
 

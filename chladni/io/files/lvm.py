@@ -7,6 +7,7 @@ they are followed: the count of samples is often wrong, and so is the step where
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal, InvalidOperation
+from io import StringIO
 from pathlib import Path
 from typing import Final
 
@@ -75,7 +76,7 @@ def read_lvm(
     """
     path = Path(path)
     lines, encoding = _lines(path)
-    if not lines or not lines[0].lstrip("\ufeff").startswith(_MAGIC):
+    if not lines or not lines[0].startswith(_MAGIC):
         return read_csv(path, sample_rate_hz=sample_rate_hz, time=time, time_unit=time_unit, units=units)
     options = TimeOptions(column=time, unit=time_unit, rate_hz=sample_rate_hz)
     tables = _tables(path, lines, encoding)
@@ -138,9 +139,11 @@ class _Table:
 def _lines(path: Path) -> tuple[list[str], str]:
     raw = path.read_bytes()
     try:
-        return raw.decode("utf-8").splitlines(keepends=True), "utf-8"
+        text, encoding = raw.decode("utf-8-sig"), "utf-8-sig"
     except UnicodeDecodeError:
-        return raw.decode("cp1252", errors="replace").splitlines(keepends=True), "cp1252"
+        text, encoding = raw.decode("cp1252", errors="replace"), "cp1252"
+    # As files are read: what str.splitlines takes for ends of lines besides may stand within one.
+    return list(StringIO(text, newline=None)), encoding
 
 
 def _tables(path: Path, lines: Sequence[str], encoding: str) -> list[_Table]:

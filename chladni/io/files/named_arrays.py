@@ -23,7 +23,8 @@ _INTERVAL_NAMES: Final = frozenset(
     {"dt", "ts", "deltat", "tsample"}
     | {f"{how}{what}" for how in ("sample", "sampling") for what in ("time", "interval", "period")}
 )
-_HZ: Final = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
+# The longer ones first: each ends in hz.
+_HZ: Final = {"khz": 1e3, "mhz": 1e6, "hz": 1.0}
 # Two scalars say the same rate when they're this near: an interval is often rounded.
 _SAME_RATE: Final = 0.01
 
@@ -151,18 +152,19 @@ def rate_of_scalar(name: str, number: float) -> float | None:
     >>> [rate_of_scalar(name, 0.5) for name in ("fs", "sample_rate_kHz", "dt", "dt_ms", "mass")]
     [0.5, 500.0, 2.0, 2000.0, None]
     """
-    words = words_of(name)
     if not (np.isfinite(number) and number > 0):
         return None
-    *before, last = words or [""]
-    if "".join(words) in _RATE_NAMES:
+    words = words_of(name)
+    joined = "".join(words)
+    if joined in _RATE_NAMES:
         return number
-    if last in _HZ and "".join(before) in (*_RATE_NAMES, "rate"):
-        return number * _HZ[last]
-    if last in UNIT_OF and "".join(before) in _INTERVAL_NAMES:
-        return NS_PER_S / (number * NS_OF[UNIT_OF[last]])
+    for unit, factor in _HZ.items():
+        if joined.endswith(unit) and joined.removesuffix(unit) in (*_RATE_NAMES, "rate"):
+            return number * factor
+    if words and words[-1] in UNIT_OF and "".join(words[:-1]) in _INTERVAL_NAMES:
+        return NS_PER_S / (number * NS_OF[UNIT_OF[words[-1]]])
     # Seconds by custom; whole numbers of them may be milliseconds as well.
-    return 1 / number if "".join(words) in _INTERVAL_NAMES and number < 1 else None
+    return 1 / number if joined in _INTERVAL_NAMES and number < 1 else None
 
 
 def _nearest(rates: Mapping[str, list[_Rate]], struct: str) -> list[_Rate]:

@@ -84,7 +84,10 @@ def series_of_parts(
         except ChladniError as error:
             failed.append((part, error))
     if failed and not found:
-        raise failed[0][1]
+        first = failed[0][1]
+        # What could have said it may be among what isn't read.
+        told = "".join(f"; {name!r} isn't read: {reason}" for name, reason in unread[:3])
+        raise type(first)(f"{first}{told}") from first
     reasons = [(name, str(error).removeprefix(f"{where}: ")) for part, error in failed for name in part.names]
     contents = joined(found)
     return replace(contents, unread=(*unread, *contents.unread, *reasons))

@@ -155,7 +155,7 @@ def rises(column: Column) -> bool:
 
 def _finest(found: Sequence[Times], unclear: Sequence[str], where: str) -> tuple[Times, tuple[tuple[str, str], ...]]:
     """Take the times that tell most rows apart: those to a millisecond, not the date to a second beside them."""
-    best = max(found, key=lambda times: np.unique(times.stamps_ns[times.known]).size)
+    best = max(found, key=lambda times: int(np.count_nonzero(np.diff(times.stamps_ns[times.known]))))
     others = [times for times in found if times is not best]
     for other in others:
         _require_agreement(best, other, where)

@@ -47,10 +47,11 @@ NS_OF: Final = {
 DATE_WORDS: Final = frozenset({"date", "datum", "datetime", "datenum", "serial"})
 """Words in the name of a column that counts days."""
 
-# 1970-01-01 in days: spreadsheets count from 1899-12-30, MATLAB's datenum from year 0.
+# 1970-01-01 in days: spreadsheets count from 1899-12-30, MATLAB's datenum from year 0; and LabVIEW's seconds.
 _DAYS: Final = {"excel": (25_569, "days of a spreadsheet"), "datenum": (719_529, "days of MATLAB's datenum")}
-# From 1990 to 2100, in days since 1970: the date that a measurement may have.
-_RECENT_DAYS: Final = (7_305, 47_482)
+_SINCE_1904_S: Final = 2_082_844_800
+# From 1990 to 2050, in days since 1970: the date that a measurement may have.
+_RECENT_DAYS: Final = (7_305, 29_220)
 # Rates at which vibration is sampled. A reading outside of them is as likely as one in another unit.
 _USUAL_HZ: Final = (1.0, 1e6)
 # Up to a month: what counts seconds from the start of a measurement or a machine.
@@ -217,32 +218,37 @@ def _bare(column: Column, numbers: NDArray[Any], options: TimeOptions, where: st
     if agreeing:
         reading = _stated(spelled(agreeing[0]), numbers)
         return _Reading(unit=reading.unit, zero=reading.zero, told=f"{reading.unit}, as {rate_hz:g} Hz says")
-    readings = [*_since_1970(numbers, rates_hz), *_recent_days(column, numbers, rates_hz)]
+    dates = DATE_WORDS.intersection(words_of(column.name))
+    readings = [*_since_an_epoch(numbers, rates_hz), *_recent_days(numbers, rates_hz)]
     lowest_hz, highest_hz = _USUAL_HZ
     # Seconds in whole numbers may be milliseconds as well; with a fraction they're what a bare time is by custom.
     in_seconds = lowest_hz < rates_hz["seconds"] <= highest_hz and np.abs(numbers).max(initial=0) < _LONGEST_RUN_S
-    if in_seconds and not readings:
-        readings = [_Reading(unit="seconds", told="taken for seconds")]
+    if in_seconds and not (dates and readings):
+        readings.append(_Reading(unit="seconds", told="taken for seconds"))
     if len(readings) == 1:
         return readings[0]
-    possible = [f"{rate:.8g} Hz if they count {unit}" for unit, rate in rates_hz.items() if 1e-2 < rate < 1e8]
+    possible = [
+        f"{float(f'{rate:.4g}'):.10g} Hz if they count {unit}" for unit, rate in rates_hz.items() if 1e-2 < rate < 1e8
+    ]
     raise SetupError(f"{where} has no unit: its numbers make {', '.join(possible[:4]) or 'no usual rate'}; {_REMEDY}")
 
 
-def _since_1970(numbers: NDArray[Any], rates_hz: dict[str, float]) -> list[_Reading]:
-    """Read numbers as long as those that count from 1970 to a date of our days."""
+def _since_an_epoch(numbers: NDArray[Any], rates_hz: dict[str, float]) -> list[_Reading]:
+    """Read numbers as long as those that count from 1970, or LabVIEW's 1904, to a date of our days."""
+    epochs = [
+        *((unit, 0, f"{unit} since 1970") for unit in ("seconds", "milliseconds", "microseconds", "nanoseconds")),
+        ("seconds", _SINCE_1904_S, "seconds since 1904"),
+    ]
     return [
-        _Reading(unit=unit, told=f"{unit} since 1970")
-        for unit in ("seconds", "milliseconds", "microseconds", "nanoseconds")
-        if _within(numbers, *(days * NS_PER_DAY // NS_OF[unit] for days in _RECENT_DAYS))
+        _Reading(unit=unit, zero=zero, told=told)
+        for unit, zero, told in epochs
+        if _within(numbers, *(zero + days * NS_PER_DAY // NS_OF[unit] for days in _RECENT_DAYS))
         and _USUAL_HZ[0] * (1 - _SAME_RATE) < rates_hz[unit] <= _USUAL_HZ[1]
     ]
 
 
-def _recent_days(column: Column, numbers: NDArray[Any], rates_hz: dict[str, float]) -> list[_Reading]:
-    """Read numbers as large as those that count days to a date of ours, where seconds are out of the question."""
-    if not DATE_WORDS.intersection(words_of(column.name)) and rates_hz["seconds"] <= _USUAL_HZ[1]:
-        return []
+def _recent_days(numbers: NDArray[Any], rates_hz: dict[str, float]) -> list[_Reading]:
+    """Read numbers as large as those that count days to a date of ours."""
     return [
         _Reading(unit="days", zero=zero, told=told)
         for name, (zero, told) in _DAYS.items()

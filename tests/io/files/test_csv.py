@@ -241,6 +241,7 @@ def test_delimiters_behind_the_last_cell_are_no_columns(tmp_path: Path, end: str
         ("t / s,F / kN\n", ["F"], ["N"]),
         ("t [s],hammer / N\n", ["hammer / N"], ["1"]),
         ("# made by hand\n# time [s], a\n", ["a"], ["1"]),
+        ("sep=,\ntime [s],a\n", ["a"], ["1"]),
         ("X,a\nSequence,Volt,0,5e-3\ntime [s],a\n", ["a"], ["1"]),
     ],
 )
@@ -262,6 +263,13 @@ def test_a_table_that_is_padded_and_whose_head_is_repeated(tmp_path: Path) -> No
     np.testing.assert_array_equal(contents.series[0].values[0], np.arange(60))
     assert contents.series[0].valid is None
     assert contents.notes == (f"{tmp_path / 'a.csv'}: 2 lines without numbers left out, the first is line 25.",)
+
+
+@pytest.mark.parametrize("mark", ["\f", "\v", "\x1c", "\u2028", "\x85"])
+def test_marks_that_only_look_like_ends_of_lines(tmp_path: Path, mark: str) -> None:
+    rows = "".join(f"{index / 100},{index}\n" for index in range(60))
+    series = only(file_of(tmp_path, f"# measured{mark}by me\ntime [s],a{mark}b\n{rows}"))
+    np.testing.assert_array_equal(series.values, [np.arange(60)])
 
 
 def test_rows_that_are_cut_are_gaps(tmp_path: Path) -> None:
@@ -300,6 +308,27 @@ def test_three_decimals_behind_a_comma(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="decimal=,"):
         read_csv(doubtful, sample_rate_hz=1.0)
     assert only(doubtful, sample_rate_hz=1.0, decimal=",").values[0, 0] == 1.234
+
+
+def test_addresses_and_numbers_of_parts_are_text(tmp_path: Path) -> None:
+    rows = "".join(f"{index};192.168.100.{index % 9};123 456;{index % 7}\n" for index in range(60))
+    contents = read_csv(file_of(tmp_path, f"n;address;part;a\n{rows}"), sample_rate_hz=100.0)
+    assert [channel.name for channel in contents.series[0].channels] == ["a"]
+    assert dict(contents.unread)["address"] == "text, such as '192.168.100.0'"
+
+
+@pytest.mark.parametrize("cell", ["1 234,5", "1'234,5", "1.234,5"])
+def test_thousands_that_are_set_apart_are_refused(tmp_path: Path, cell: str) -> None:
+    with pytest.raises(LogError, match="has a sign between thousands"):
+        read_csv(file_of(tmp_path, f"a;b\n1;{cell}\n2;{cell}\n"), sample_rate_hz=1.0)
+
+
+def test_a_table_of_thousands_of_columns(tmp_path: Path) -> None:
+    names = [f"a long name of channel {number}" for number in range(4000)]
+    row = ",".join(map(str, range(4000)))
+    series = only(file_of(tmp_path, ",".join(names) + f"\n{row}\n{row}\n"), sample_rate_hz=1.0)
+    assert [channel.name for channel in series.channels] == names
+    np.testing.assert_array_equal(series.values[:, 1], np.arange(4000))
 
 
 def test_an_unknown_unit_costs_only_the_unit(tmp_path: Path) -> None:

@@ -45,6 +45,12 @@ def test_objects_of_matlab_cost_nothing_else(tmp_path: Path) -> None:
     assert contents.unread == tuple(expected)
 
 
+def test_an_object_that_may_have_held_the_times_is_named(tmp_path: Path) -> None:
+    (tmp_path / "a.mat").write_bytes(mat_file(opaque("when", "datetime"), numbers("x", SIGNAL)))
+    with pytest.raises(SetupError, match=r"give the sample rate .*'when' isn't read: a datetime of MATLAB"):
+        read_mat(tmp_path / "a.mat")
+
+
 def test_a_damaged_variable_costs_nothing_else(tmp_path: Path) -> None:
     bad = matrix(6, element(99, bytes(8)), name=b"bad")
     (tmp_path / "a.mat").write_bytes(mat_file(numbers("fs", np.array([200.0])), bad, numbers("x", SIGNAL)))
@@ -152,6 +158,17 @@ def test_cells_of_vectors(tmp_path: Path, version: str) -> None:
     (series,) = read_mat(tmp_path / "a.mat").series
     assert [channel.name for channel in series.channels] == ["c[0]", "c[1]"]
     np.testing.assert_array_equal(series.values, [SIGNAL, SIGNAL * 2])
+
+
+def test_a_cell_of_unlike_members(tmp_path: Path) -> None:
+    cell = np.empty(4, dtype=object)
+    cell[:] = [SIGNAL, "text", np.eye(3), 1.0]
+    savemat(tmp_path / "a.mat", {"c": cell})
+    with pytest.raises(SetupError, match="give the sample rate"):
+        read_mat(tmp_path / "a.mat")
+    contents = read_mat(tmp_path / "a.mat", sample_rate_hz=200.0)
+    assert [channel.name for channel in contents.series[0].channels] == ["c[0]"]
+    assert contents.unread == (("c[2]", "of 9 numbers beside 60 samples"),)
 
 
 def test_arrays_of_structs_as_simulink_logs_them(tmp_path: Path) -> None:

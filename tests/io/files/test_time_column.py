@@ -82,6 +82,7 @@ UNDERSTOOD = {
     "epoch": (START_S + INDEX / RATE_HZ, "seconds since 1970"),
     "time": (45413.5 + INDEX / RATE_HZ / 86400, "days of a spreadsheet"),
     "datenum": (739373.5 + INDEX / RATE_HZ / 86400, "days of MATLAB's datenum by its name"),
+    "Timestamp": (2_082_844_800 + START_S + INDEX / RATE_HZ, "seconds since 1904"),
     "elapsed_min": (INDEX / RATE_HZ / 60, "minutes by its name"),
 }
 # Days since year 0 leave 10 us between two numbers of double precision.
@@ -103,7 +104,7 @@ def test_times_are_understood_and_said(tmp_path: Path, suffix: str, name: str) -
     rate_hz, start_ns, values = only(contents)
     assert rate_hz == pytest.approx(RATE_HZ, rel=1e-6)
     np.testing.assert_array_equal(values, SIGNAL)
-    dated = "1970" in told or "days" in told
+    dated = "since" in told or "days" in told
     expected_ns = START_S * 10**9 if dated else round(float(times[0]) * 1e9) if name in ("Zeit", "t") else 0
     assert abs(start_ns - expected_ns) < START_TOLERANCE_NS
     assert contents.notes == (f"{path}: times from {name!r}: {told}.",)
@@ -118,21 +119,25 @@ def test_times_are_understood_and_said(tmp_path: Path, suffix: str, name: str) -
         (INDEX * 5000, "us", "200 Hz if they count microseconds"),
         (INDEX * 5_000_000, "ns", "200 Hz if they count nanoseconds"),
         (INDEX / RATE_HZ / 86400, "days", "Hz if they count hours"),
+        # Days of our time, or 8.5 days of a machine that is sampled at 864 kHz.
+        (739373.5 + INDEX / 10.0 / 86400, "days", "10.*Hz if they count days"),
+        (45413.5 + INDEX / 10.0 / 86400, "days", "10.*Hz if they count days"),
     ],
 )
 def test_what_can_be_read_in_two_ways_is_asked_for(
     tmp_path: Path, suffix: str, times: np.ndarray, unit: str, rates: str
 ) -> None:
     path = WRITERS[suffix](tmp_path / f"a{suffix}", {"time": times, "x": SIGNAL})
+    rate_hz = 10.0 if rates.startswith("10") else RATE_HZ
     with pytest.raises(SetupError, match=rf"'time' has no unit.*{rates}.*--time-unit s\|ms.*--time none --rate HZ"):
         read_file(path)
     # Each of the remedies works.
-    assert only(read_file(path, time_unit=unit))[0] == pytest.approx(RATE_HZ, rel=1e-6)
-    settled = read_file(path, sample_rate_hz=RATE_HZ)
-    assert only(settled)[0] == RATE_HZ
-    assert f"as {RATE_HZ:g} Hz says" in settled.notes[0]
-    left_out = read_file(path, time="none", sample_rate_hz=RATE_HZ)
-    assert only(left_out)[0] == RATE_HZ
+    assert only(read_file(path, time_unit=unit))[0] == pytest.approx(rate_hz, rel=1e-6)
+    settled = read_file(path, sample_rate_hz=rate_hz)
+    assert only(settled)[0] == rate_hz
+    assert f"as {rate_hz:g} Hz says" in settled.notes[0]
+    left_out = read_file(path, time="none", sample_rate_hz=rate_hz)
+    assert only(left_out)[0] == rate_hz
     assert left_out.unread == (("time", "times that weren't asked for"),)
 
 
