@@ -1,7 +1,7 @@
 """Units of a function in a universal file: what its labels, its data types and dataset 164 say, brought together.
 
-The label goes before the unit that the type implies (note to record 8 of dataset 58). Where the two contradict each
-other the surer one is taken and told; where neither is surer the values have no unit, and both are named.
+The label goes before the unit that the type implies (note to record 8 of dataset 58), also where the two contradict
+each other, which is told: the label is what the writer's own plots show. A type settles what a label may mean.
 """
 
 import re
@@ -23,7 +23,7 @@ from chladni.signals.unit_labels import (
     same_quantity,
     says_nothing,
 )
-from chladni.signals.unit_text import read, symbol_as_written, write
+from chladni.signals.unit_text import in_unit, read, symbol_as_written, write
 from chladni.signals.units import quotient, si_factor
 
 # Data type: SI unit along an axis and about one, powers of length and force in each (table of unit exponents).
@@ -44,8 +44,6 @@ _TYPE_NAMES = {
     17: "time", 18: "frequency", 19: "rpm", 20: "order",
 }  # fmt: skip
 _GENERAL, _TIME, _FREQUENCY, _RPM = 1, 17, 18, 19
-# What a sensor gives before its sensitivity: values labelled so are of no other quantity, whatever it measures.
-_ELECTRICAL = frozenset(["V", "A", "C", "1"])
 # What a function is over: a label that ends in something else over a length is one unit, as N/m^2.
 _REFERENCES = frozenset(
     ["N", "N m", "m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "V", "A", "C", "Pa", "m^3/s", "m^3"]
@@ -151,19 +149,18 @@ def _axis_unit(header: Dataset, axis: str, direction: str) -> FoundUnit:
     for unit, *_ in types:
         found = _read(label, unit)
         if found is not None:
-            return replace(found, notes=found.notes + _beside_system(header, label, found, types))
+            kind = _type_name(header[f"{axis}_spec_data_type"])
+            notes = tuple(f"of type {kind} but labelled {note}" for note in found.notes)
+            return replace(found, notes=notes + _beside_system(header, label, found, types))
     try:
         factor, unit = read_label(label, quantity=quantity_of_name(str(header[f"{axis}_axis_lab"])))
     except SetupError as error:
         return FoundUnit(notes=(f"{error}; the values have no unit",))
-    kind = _type_name(header[f"{axis}_spec_data_type"])
     if not types:
         return FoundUnit(factor=factor, unit=unit, notes=_other_exponents(header, axis, label, unit))
-    if unit in _ELECTRICAL:
-        return FoundUnit(factor=factor, unit=unit, notes=(f"of type {kind} but labelled {label!r}, which was taken",))
-    return FoundUnit(
-        notes=(f"of type {kind} but labelled {label!r}, and nothing tells which is right; the values have no unit",)
-    )
+    kind = _type_name(header[f"{axis}_spec_data_type"])
+    told = f"of type {kind} but labelled {label!r}, which is {in_unit(unit)}; the label was taken"
+    return FoundUnit(factor=factor, unit=unit, notes=(told,))
 
 
 def _read(label: str, quantity: str) -> FoundUnit | None:
@@ -178,7 +175,7 @@ def _read(label: str, quantity: str) -> FoundUnit | None:
         alone = read_label(label)[1]
     except SetupError:
         alone = quantity
-    told = () if same_quantity(alone, quantity) else (f"the label {label!r} was taken as {factor:g} {quantity}",)
+    told = () if same_quantity(alone, quantity) else (f"{label!r}, which was taken as {factor:g} {quantity}",)
     return FoundUnit(factor=factor, unit=quantity, notes=told)
 
 

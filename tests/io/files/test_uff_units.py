@@ -92,15 +92,9 @@ def test_the_name_of_the_axis_helps_where_label_or_type_are_silent(
         (0, "lb", "it may be lbf or lbm"),
         (12, "dB", "logarithmic"),
         (12, "furlong", "'furlong': not known"),
-        # A velocity and a force that say to be an acceleration: one of two is wrong.
-        (12, "m/s", "of type acceleration but labelled 'm/s', and nothing tells which is right"),
-        (12, "N", "of type acceleration but labelled 'N'"),
-        (13, "g", "of type excitation force but labelled 'g'"),
     ],
 )
-def test_what_is_open_or_contradicts_itself_costs_only_its_own_unit(
-    tmp_path: Path, kind: int, label: str, words: str
-) -> None:
+def test_what_is_left_open_costs_only_its_own_unit(tmp_path: Path, kind: int, label: str, words: str) -> None:
     content = function_set(WAVE, type=kind, label=label) + function_set(WAVE, id1="other", label="g")
     contents = read(tmp_path, content)
     (series,) = contents.series
@@ -118,13 +112,15 @@ def test_what_is_open_or_contradicts_itself_costs_only_its_own_unit(
 @pytest.mark.parametrize(
     ("kind", "label", "factor", "unit", "words"),
     [
-        (12, "V", 1.0, "V", "of type acceleration but labelled 'V', which was taken"),
-        (13, "mV", 1e-3, "V", "of type excitation force but labelled 'mV', which was taken"),
-        (12, "counts", 1.0, "1", "labelled 'counts', which was taken"),
-        (13, "kg", G, "N", "the label 'kg' was taken as 9.80665 N"),
+        (12, "V", 1.0, "V", "of type acceleration but labelled 'V', which is in V; the label was taken"),
+        (13, "mV", 1e-3, "V", "of type excitation force but labelled 'mV', which is in V; the label was taken"),
+        (12, "counts", 1.0, "1", "labelled 'counts', which is without unit; the label was taken"),
+        (12, "mm", 1e-3, "m", "of type acceleration but labelled 'mm', which is in m; the label was taken"),
+        (13, "g", G, "m/s^2", "of type excitation force but labelled 'g', which is in m/s^2; the label was taken"),
+        (13, "kg", G, "N", "of type excitation force but labelled 'kg', which was taken as 9.80665 N"),
     ],
 )
-def test_the_surer_of_two_is_taken_and_told(
+def test_where_label_and_type_contradict_each_other_the_label_is_taken_and_told(
     tmp_path: Path, kind: int, label: str, factor: float, unit: str, words: str
 ) -> None:
     contents = read(tmp_path, function_set(WAVE, type=kind, label=label))
@@ -320,12 +316,12 @@ def test_functions_by_types_and_labels(
 
 
 def test_a_function_of_contradicting_units_keeps_its_values_and_says_so(tmp_path: Path) -> None:
-    found = modal(tmp_path, response_set(LINES, label="Pa") + response_set(LINES, node=2, label="g"))
-    assert function_of(found) == (pytest.approx(1.0), "1", "N")
+    found = modal(tmp_path, response_set(LINES, label="kPa") + response_set(LINES, node=2, label="g"))
+    assert function_of(found) == (pytest.approx(1e3), "Pa", "N")
     assert found.response is not None
     assert found.response.responses[1].unit == "m/s^2"
     (note,) = found.notes
-    assert "1:+3: of type acceleration but labelled 'Pa'" in note
+    assert "1:+3: of type acceleration but labelled 'kPa'" in note
     assert "--read units=NAME:UNIT" in note
 
 
