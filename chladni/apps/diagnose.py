@@ -7,7 +7,7 @@ from pathlib import Path
 
 from chladni.apps.findings import damage_sentences, reading_sentences, require_channels
 from chladni.apps.gap_document import Document, gap_document
-from chladni.apps.sources import Span
+from chladni.apps.sources import Span, joined
 from chladni.gap.comparison.measuring import MatchedLog, matched_log
 from chladni.gap.records.diagnosis import Diagnosis
 from chladni.gap.records.log_use import LogUse
@@ -20,6 +20,7 @@ from chladni.models.effects.effect_kind import EffectKind
 from chladni.models.effects.wording import nearest
 from chladni.models.files.model_file import load_model
 from chladni.signals.errors import LogError, SetupError
+from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 StepProgress = Callable[[str, float], None]
@@ -37,6 +38,7 @@ def diagnose_gap(
     seed: int = 0,
     start_s: float | None = None,
     end_s: float | None = None,
+    join: JoinMethod = "auto",
     progress: StepProgress | None = None,
 ) -> Diagnosis:
     """Say where a model and the logs of its machine disagree, which unmodelled effect causes it, and what it closes.
@@ -56,6 +58,8 @@ def diagnose_gap(
         Of everything random; the same input and seed give the same answer.
     start_s, end_s
         Only samples with ``start_s <= t < end_s``, seconds from each log's start.
+    join
+        How channels of several sampling grids become one, see `chladni.signals.resampling.join_resampled`.
     progress
         Called with the name of the step and the share done, 0 to 1.
 
@@ -87,7 +91,7 @@ def diagnose_gap(
     # Before anything is read: a misspelt word would leave nothing out, in silence.
     left_out = known_effects(leave_out, own_effects)
     chosen = load_model(model) if isinstance(model, Path | str) else model
-    read = list(_measured(chosen, _several(logs), Span(start_s=start_s, end_s=end_s)))
+    read = list(_measured(chosen, _several(logs), Span(start_s=start_s, end_s=end_s, join=join)))
     found = diagnose(
         chosen,
         [one.measurement for one in read],
@@ -157,11 +161,11 @@ def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
             f"{name}: holds no channel that model {model.name!r} listens to; it holds "
             f"{some_of(held, count=NAMES_TOLD)}, the model listens to {some_of(sorted(wanted), count=NAMES_TOLD)}"
         )
-    series = log.read(chosen, start_s=span.start_s, end_s=span.end_s)
+    series, notes = joined(log, chosen, span)
     damage = damage_sentences(log.damage)
     begins_s = (series.start_time_ns - log.start_time_ns) / NS_PER_S
     found = matched_log(model, series, log=name, held=held, begins_s=begins_s, damage=damage)
-    return _with_use(found, series, reading_sentences(log, everything=False))
+    return _with_use(found, series, (*reading_sentences(log, everything=False), *notes))
 
 
 def _of_series(model: Model, series: TimeSeries, name: str) -> _Read:

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from chladni.apps.excitation import FORCE_UNITS, constant_channels
-from chladni.apps.sources import Progress, Span, Watched, watched_grids
+from chladni.apps.sources import Progress, Span, Watched, on_one_grid
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.channel import Channel
@@ -69,7 +69,8 @@ def responses_alone(
     if isinstance(source, TimeSeries):
         return _of_series(source, channels, span)
     if channels is not None:
-        return _of_named(source, source.names(channels), span, progress), ()
+        grid = _of_named(source, source.names(channels), span, progress)
+        return grid, grid.notes
     return _of_log(source, span, progress)
 
 
@@ -87,12 +88,7 @@ def _of_series(series: TimeSeries, channels: Sequence[str] | None, span: Span) -
 
 def _of_named(log: Log, names: tuple[str, ...], span: Span, progress: Progress) -> Watched:
     motions_of_one_unit([channel for channel in log.channels if channel.name in names], named=True)
-    for grid in watched_grids(log, names, span, progress=progress):
-        if set(names) <= set(grid.names):
-            return grid
-    # Not on one grid: the log's own error names the grids and the remedies.
-    log.read(list(names), start_s=span.start_s, end_s=span.end_s)
-    raise EstimateError(f"{log.path.name}: no sampling grid holds all of {', '.join(names)}")
+    return on_one_grid(log, names, span, progress=progress)
 
 
 def _of_log(log: Log, span: Span, progress: Progress) -> tuple[Watched, tuple[str, ...]]:

@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chladni.apps.excitation import excitation_names, stored_functions
-from chladni.apps.sources import Progress, Span, Watched, no_progress, watched_grids
+from chladni.apps.sources import Progress, Span, Watched, no_progress, on_one_grid, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.adaptive import adaptive_cross_spectra
 from chladni.spectral.bands import total_rms
@@ -148,6 +149,7 @@ def frf(
     overlap: float | None = None,
     start_s: float | None = None,
     end_s: float | None = None,
+    join: JoinMethod = "auto",
 ) -> FrequencyResponse:
     """Estimate transfer functions and coherence.
 
@@ -168,6 +170,9 @@ def frf(
         ``H1``, ``H2`` or ``Hv``, see `frequency_response`.
     resolution_hz, window, overlap, start_s, end_s
         See `psd`. For a hammer test the resolution sets the length of a record.
+    join
+        How named channels of several sampling grids become one, see `chladni.signals.resampling.join_resampled`; a
+        note says how it was done.
 
     Returns
     -------
@@ -204,7 +209,7 @@ def frf(
         responses,
         estimator=estimator,
         averaging=averaging,
-        span=Span(start_s=start_s, end_s=end_s),
+        span=Span(start_s=start_s, end_s=end_s, join=join),
     )
 
 
@@ -244,6 +249,7 @@ def transfer(
     named = None if responses is None else source.names(responses)
     try:
         spectra = averaging.spectra(grid, references)
+        spectra = replace(spectra, provenance=spectra.provenance.with_notes(*grid.notes))
         _require_moving(grid, references)
         spectra = _without_constant(spectra, grid, keep=(*references, *(named or ())))
         return frequency_response(
@@ -319,9 +325,7 @@ def _grid_of(
     for grid in watched_grids(log, names, span, progress=progress):
         if wanted <= set(grid.names):
             return grid
-    # Not on one grid: the log's own error names the grids and the remedies.
-    log.read(sorted(wanted), start_s=span.start_s, end_s=span.end_s)
-    raise EstimateError(f"{log.path.name}: no sampling grid holds all of {', '.join(sorted(wanted))}")
+    return on_one_grid(log, sorted(wanted), span, progress=progress)
 
 
 def _without_constant(spectra: CrossSpectra, watched: Watched, *, keep: Sequence[str]) -> CrossSpectra:

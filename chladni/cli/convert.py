@@ -27,8 +27,9 @@ def convert(
     end: options.End = None,
     resample: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Bring all channels to this rate, band-limited.", show_default=False),
+        typer.Option(metavar="HZ", help="Bring all channels to this rate.", show_default=False),
     ] = None,
+    join: options.Join = "auto",
     layout: Annotated[
         Literal["messages", "batches"] | None,
         typer.Option(help="Of a log: a message a sample, or blocks of samples.", show_default=False),
@@ -59,6 +60,7 @@ def convert(
         start_s=start,
         end_s=end,
         resample_hz=resample,
+        join=join,
         layout=layout,
         overwrite=overwrite,
         reading=opener.options(),

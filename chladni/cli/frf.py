@@ -41,6 +41,7 @@ def frf(
     overlap: options.Overlap = None,
     start: options.Start = None,
     end: options.End = None,
+    join: options.Join = "auto",
     opener: Opener,
     json: options.Json = None,
     figures: options.Figures = None,
@@ -65,7 +66,7 @@ def frf(
             response,
             estimator=estimator,
             averaging=Averaging(resolution_hz=resolution, window=window, overlap=overlap),
-            span=Span(start_s=start, end_s=end),
+            span=Span(start_s=start, end_s=end, join=join),
             progress=progress,
         )
         told = reading_sentences(opened, everything=response is None)

@@ -52,6 +52,7 @@ def modes(
     resolution: options.Resolution = None,
     start: options.Start = None,
     end: options.End = None,
+    join: options.Join = "auto",
     opener: Opener,
     json: options.Json = None,
     uff: Annotated[
@@ -89,7 +90,7 @@ def modes(
             method=method,
             wanted=wanted,
             resolution_hz=resolution,
-            span=Span(start_s=start, end_s=end),
+            span=Span(start_s=start, end_s=end, join=join),
             progress=progress,
         )
     print_modes(out, found.modes, found.validation)

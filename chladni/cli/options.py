@@ -1,7 +1,7 @@
 """Arguments and options that several commands share."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -32,6 +32,12 @@ Overlap = Annotated[
 ]
 Start = Annotated[float | None, typer.Option(metavar="S", help="Seconds from the log's start.", show_default=False)]
 End = Annotated[float | None, typer.Option(metavar="S", help="Seconds from the log's start.", show_default=False)]
+Join = Annotated[
+    Literal["auto", "hold", "band-limited"],
+    typer.Option(
+        help="How channels of several sampling grids become one; auto holds commands and staircases between samples."
+    ),
+]
 Report = Annotated[
     Path | None,
     typer.Option(metavar="FILE.html", help="Write a self-contained HTML report.", show_default=False),

@@ -10,7 +10,7 @@ from math import isfinite
 from typing import Final
 
 from chladni.io.field_selector import FieldSelector
-from chladni.io.known_schemas import known_unit, likely_role, possible_units
+from chladni.io.known_schemas import is_command, known_unit, likely_role, possible_units
 from chladni.io.topic import Topic
 from chladni.signals.channel import Channel, Vector, unit_direction
 from chladni.signals.errors import SetupError
@@ -93,6 +93,7 @@ def channel_of(topic: Topic, *, name: str, field: str, leaf: str, unit: str | No
         role="reference" if role == "reference" else "response" if role == "response" else likely_role(name, si_unit),
         overload=None if overload is None else overload * factor,
         units_possible=possible_units(topic.schema_name, leaf) if si_unit == UNKNOWN_UNIT else (),
+        held=is_command(topic.schema_name),
     )
     return channel, factor
 

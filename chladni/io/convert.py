@@ -4,13 +4,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from chladni.io.files.formats import MCAP, WRITTEN_SUFFIXES, call_with_options, writer_of
 from chladni.io.log import Log, open_log
 from chladni.io.loss import Unread
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
+
+if TYPE_CHECKING:
+    from chladni.signals.resampling import JoinMethod
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +57,7 @@ def convert(
     end_s: float | None = None,
     sample_rate_hz: float | None = None,
     resample_hz: float | None = None,
+    join: "JoinMethod" = "auto",
     layout: str | None = None,
     overwrite: bool = False,
     reading: Mapping[str, Any] | None = None,
@@ -72,7 +76,9 @@ def convert(
     sample_rate_hz
         True rate of the samples, where the source doesn't say it; nothing is resampled.
     resample_hz
-        Bring all channels to this rate, band-limited.
+        Bring all channels to this rate.
+    join
+        How, see `chladni.signals.resampling.join_resampled`: ``band-limited``, ``hold``, or what each channel tells.
     layout
         Of a log: ``messages`` or ``batches``, see `chladni.io.mcap.writer.write_mcap`. By default messages, when all
         names are message paths, else batches, which keep any name.
@@ -93,7 +99,7 @@ def convert(
     _require_paths(source, target, overwrite=overwrite)
     rate = {} if sample_rate_hz is None else {"sample_rate_hz": sample_rate_hz}
     with open_log(source, **{**(reading or {}), **rate}) as log:
-        series, notes = _read(log, channels, start_s, end_s, resample_hz)
+        series, notes = _read(log, channels, start_s, end_s, resample_hz, join)
         unread = log.unread if channels is None else ()
     options = dict(writing or {}) | ({} if layout is None else {"layout": layout})
     names, losses = _write(series, target, overwrite=overwrite, options=options)
@@ -128,37 +134,18 @@ def _read(
     start_s: float | None,
     end_s: float | None,
     resample_hz: float | None,
+    join: "JoinMethod",
 ) -> tuple[tuple[TimeSeries, ...], tuple[str, ...]]:
     """Give the series, and sentences on what was inferred or lost."""
     series = log.read_groups(channels, start_s=start_s, end_s=end_s)
     notes = (*(loss.what for loss in log.damage), *log.notes)
     if resample_hz is None:
         return series, notes
-    joined, note = _on_one_grid(series, resample_hz)
-    return (joined if channels is None else joined.select(log.names(channels)),), (*notes, note)
+    from chladni.signals.resampling import join_note, join_resampled
 
-
-def _on_one_grid(series: tuple[TimeSeries, ...], sample_rate_hz: float) -> tuple[TimeSeries, str]:
-    """Resample, and say how true that is and what it costs."""
-    from chladni.signals.resampling import join_resampled
-
-    found = join_resampled(series, sample_rate_hz=sample_rate_hz)
-    valid_s = [seconds for part in series for seconds in _valid_s(part)]
-    lost_s = max(before - after for before, after in zip(valid_s, _valid_s(found.series), strict=True))
-    note = (
-        f"resampled to {sample_rate_hz:g} Hz: true to {found.error:.1g} of the amplitude up to "
-        f"{found.usable_hz:.4g} Hz, falling off above"
-    )
-    if lost_s * sample_rate_hz > 1:
-        note += f"; up to {lost_s:.3g} s of a channel are left out: at its ends, at gaps, and where others have none"
-    return found.series, note
-
-
-def _valid_s(part: TimeSeries) -> list[float]:
-    """Seconds of samples that each channel has."""
-    if part.valid is None:
-        return [part.duration_s] * len(part.channels)
-    return [int(count) / part.sample_rate_hz for count in part.valid.sum(axis=1)]
+    found = join_resampled(series, sample_rate_hz=resample_hz, method=join)
+    joined = found.series if channels is None else found.series.select(log.names(channels))
+    return (joined,), (*notes, join_note(series, found))
 
 
 def _write(

@@ -21,6 +21,7 @@ from chladni.signals.time_series import TimeSeries
 if TYPE_CHECKING:
     from chladni.signals.frequency_response import FrequencyResponse
     from chladni.signals.mode_set import ModeSet
+    from chladni.signals.resampling import JoinMethod
 
 
 def open(  # noqa: A001  # as in gzip and tarfile: users write chladni.open
@@ -161,6 +162,7 @@ class Log(ABC):
         start_s: float | None = None,
         end_s: float | None = None,
         sample_rate_hz: float | None = None,
+        join: "JoinMethod | None" = None,
     ) -> TimeSeries:
         """Read channels onto one uniform grid.
 
@@ -172,7 +174,11 @@ class Log(ABC):
         start_s, end_s
             Only samples with ``start_s <= t < end_s``, seconds from the log's start.
         sample_rate_hz
-            Resample to this rate, band-limited; needed when channels have different rates or grids.
+            Rate of the grid; by default that of the channels, or as `join` chooses it.
+        join
+            How channels of different grids become one, see `chladni.signals.resampling.join_resampled`:
+            ``band-limited``, ``hold``, or ``auto``, as each channel tells. By default ``band-limited`` at
+            `sample_rate_hz`; without either such channels are refused.
 
         Returns
         -------
@@ -186,8 +192,12 @@ class Log(ABC):
             a grid and no rate is given, or the window holds no sample.
         """
         groups = self.read_groups(paths, start_s=start_s, end_s=end_s)
-        if sample_rate_hz is not None:
-            return _on_one_grid(groups, sample_rate_hz, list(dict.fromkeys(paths)) if paths is not None else None)
+        if sample_rate_hz is not None or (join is not None and len(groups) > 1):
+            # Resampling brings in scipy's filters, which a plain read does without.
+            from chladni.signals.resampling import join as on_one_grid
+
+            joined = on_one_grid(groups, sample_rate_hz=sample_rate_hz, method=join or "band-limited")
+            return joined if paths is None else joined.select(list(self.names(paths)))
         if len(groups) > 1:
             told = [(one.channels, one.sample_rate_hz, one.start_time_ns) for one in groups]
             raise LogError(several_grids(self.path.name, told))
@@ -265,11 +275,3 @@ class Log(ABC):
         traceback: TracebackType | None,
     ) -> None:
         self.close()
-
-
-def _on_one_grid(groups: Sequence[TimeSeries], sample_rate_hz: float, order: Sequence[str] | None) -> TimeSeries:
-    # Resampling brings in scipy's filters, which a plain read does without.
-    from chladni.signals.resampling import join
-
-    joined = join(groups, sample_rate_hz=sample_rate_hz)
-    return joined if order is None else joined.select(order)

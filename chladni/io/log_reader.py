@@ -295,9 +295,9 @@ def several_grids(file: str, told: Sequence[tuple[Sequence[Channel], float, int]
     ]
     highest_hz = f"{max(rate_hz for _, rate_hz, _ in told):.6g}"
     return (
-        f"{file}: channels have {len(grids)} different sampling grids: {'; '.join(grids)}; bring them to one by "
-        f"band-limited resampling: chladni convert {file} OUT.mcap --resample {highest_hz}, in Python "
-        f"sample_rate_hz={highest_hz}"
+        f"{file}: channels have {len(grids)} different sampling grids: {'; '.join(grids)}; bring them to one: "
+        f"chladni convert {file} OUT.mcap --resample {highest_hz}, in Python sample_rate_hz={highest_hz} or "
+        'join="auto"'
     )
 
 

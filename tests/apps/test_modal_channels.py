@@ -110,7 +110,10 @@ def test_named_channels_of_a_log_are_taken_as_they_are(log):
     assert notes == ()
 
 
-def test_named_channels_of_two_grids_are_refused_by_the_log(log):
+def test_named_channels_of_two_grids_are_joined_and_it_is_said(log):
     names = ["/slow/a.accel.linear.x", "/fast/a.accel.linear.x"]
-    with pytest.raises(Exception, match="/slow/a"):
-        responses_alone(log, names, Span(), progress=no_progress)
+    samples, notes = responses_alone(log, names, Span(), progress=no_progress)
+    assert samples.names == tuple(names)
+    (note,) = notes
+    assert note.startswith("2 sampling grids joined: brought to ")
+    assert "band-limited" in note

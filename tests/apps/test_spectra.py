@@ -10,6 +10,7 @@ from chladni.signals.errors import EstimateError, LogError
 from chladni.signals.testing import assert_close
 from chladni.signals.time_series import TimeSeries
 from tests.arm import FORCE, TOOL, WRIST, write_arm
+from tests.make_logs import FLOAT64, LogMaker
 
 
 @pytest.fixture(scope="module")
@@ -99,8 +100,54 @@ def test_responses_default_to_what_moves_on_the_references_clock(tmp_path):
     with chladni.open_log(two_rates(tmp_path)) as log:
         with pytest.raises(EstimateError, match="response"):
             chladni.frf(log, reference="/slow.accel.linear.x")
+        named = chladni.frf(log, reference="/slow.accel.linear.x", response="/fast.accel.linear.x")
+    assert named.frequency_hz[-1] == 50.0
+    assert any("2 sampling grids joined: brought to 100 Hz by band-limited" in one for one in named.provenance.notes)
+
+
+LATE_S, GAIN = 0.012, 0.5
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory):
+    """Commands at 50 Hz, and a state at 250 Hz that is half of what was commanded three samples before."""
+    path = tmp_path_factory.mktemp("driven") / "drive.mcap"
+    commands = np.random.default_rng(4).standard_normal(6000)
+    state = GAIN * np.repeat(commands, 5)
+    start_ns = 1_700_000_000_000_000_000
+    with LogMaker(path) as maker:
+        command = maker.ros2("/drive", "my_msgs/msg/MotorCommand", FLOAT64)
+        encoder = maker.ros2("/encoder", "std_msgs/msg/Float64", FLOAT64)
+        for number, value in enumerate(commands):
+            maker.write(command, {"data": value}, start_ns + number * 20_000_000)
+        for number, value in enumerate(state):
+            maker.write(encoder, {"data": value}, start_ns + number * 4_000_000 + round(LATE_S * 1e9))
+    return path
+
+
+def test_commands_are_held_between_their_messages(driven):
+    with chladni.open_log(driven) as log:
+        found = chladni.frf(log, reference="/drive.data", response="/encoder.data", resolution_hz=0.5)
+    assert found.frequency_hz[-1] == 125.0
+    low = (found.frequency_hz > 0.5) & (found.frequency_hz < 24.0)
+    expected = GAIN * np.exp(-2j * np.pi * LATE_S * found.frequency_hz)
+    # The state is exact; what is left of windows of 2 s of a delay of 12 ms.
+    np.testing.assert_allclose(found.values[0, 0, low], expected[low], atol=0.02)
+    assert any("its message type is a command" in note for note in found.provenance.notes)
+
+
+def test_the_way_of_joining_can_be_named(driven):
+    with chladni.open_log(driven) as log:
+        smooth = chladni.frf(log, reference="/drive.data", response="/encoder.data", join="band-limited")
+        series = log.read(["/encoder.data", "/drive.data"], join="auto")
         with pytest.raises(LogError, match="different sampling grids"):
-            chladni.frf(log, reference="/slow.accel.linear.x", response="/fast.accel.linear.x")
+            log.read(["/encoder.data", "/drive.data"])
+    assert smooth.frequency_hz[-1] == 25.0
+    assert not any("held" in note for note in smooth.provenance.notes)
+    assert [channel.name for channel in series.channels] == ["/encoder.data", "/drive.data"]
+    assert series.sample_rate_hz == 250.0
+    # Both begin where the encoder does, three samples after the first command.
+    np.testing.assert_array_equal(series.values[0, 3:], GAIN * series.values[1, :-3])
 
 
 def test_a_response_of_a_series_and_of_its_log_agree(arm_log):

@@ -140,7 +140,7 @@ def test_several_rates_need_one_for_a_table(tmp_path: Path) -> None:
     assert len(done.channels) == 3
     # 0.8 of the lower Nyquist frequency, as the resampler promises; its kernel needs samples on both sides.
     (note,) = done.notes
-    assert "resampled to 100 Hz" in note
+    assert "brought to 100 Hz by band-limited resampling" in note
     assert "up to 40 Hz" in note
     assert "s of a channel are left out" in note
     # In the order asked for.
