@@ -52,9 +52,10 @@ def compare(
 
     require_places(reads=[before, after, opener.setup], writes={"--json": json}, folders={"--figures": figures})
     out = Output(json)
+    opening = opener.among([before, after])
     with (
-        opener(before) as old,
-        opener(after) as new,
+        opening(before) as old,
+        opening(after) as new,
         out.progress(f"{before.name}, {after.name}") as progress,
     ):
         found = compare_logs(

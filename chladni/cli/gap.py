@@ -94,10 +94,11 @@ def gap(
 
     wanted.require_places([*files, *(simulated or ()), opener.setup])
     out = Output(json)
+    open_one = opener.among([*(files if simulated else files[1:]), *(simulated or ())])
     with ExitStack() as opened:
 
         def opening(path: Path) -> "Log":
-            return opened.enter_context(opener(path))
+            return opened.enter_context(open_one(path))
 
         if simulated:
             _require_pairs(files, simulated, wanted, without)

@@ -62,6 +62,18 @@ class Opener:
 
         return open_log(path, **self.options())
 
+    def among(self, paths: Sequence[Path]) -> "Callable[[Path], Log]":
+        """Give what opens each of several files; where logs stand beside data files, by the options for its kind."""
+        from chladni.io.files.formats import MCAP, file_kind
+        from chladni.io.log import open_log
+
+        if len({file_kind(path) == MCAP for path in paths}) < 2:
+            return self
+        given = self.options()
+        of_messages = {name: value for name, value in given.items() if name in ("setup", "stamp", "sample_rate_hz")}
+        of_rows = {name: value for name, value in given.items() if name != "stamp"}
+        return lambda path: open_log(path, **(of_messages if file_kind(path) == MCAP else of_rows))
+
     def options(self) -> dict[str, Any]:
         """Give what was said, by the names that `chladni.io.log.open` has for it."""
         said = {

@@ -53,9 +53,9 @@ def view(
         folders={"--figures": figures},
     )
     out = Output(json)
-    studies = []
+    opening, studies = opener.among(logs), []
     for log in logs:
-        with opener(log) as opened, out.progress(log.name) as progress:
+        with opening(log) as opened, out.progress(log.name) as progress:
             studies.append(
                 analyse(
                     opened,

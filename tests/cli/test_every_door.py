@@ -158,6 +158,20 @@ def test_a_file_is_compared_with_a_log(run: Run, file: tuple[Path, tuple[object,
     assert changes["force"] == pytest.approx(0, abs=1e-6)
 
 
+def test_options_for_one_kind_are_no_matter_for_the_other(run: Run, log: Path, tmp_path: Path) -> None:
+    series = measured(gain=2.0)
+    table = np.column_stack([1000 * series.times_s(), series.values.T])
+    header = "stamp,/daq.force [N],/daq.tip [m/s^2]"
+    np.savetxt(tmp_path / "after.csv", table, delimiter=",", header=header, comments="")
+    options = ("--time-unit", "ms", "--stamp", "log", "--json", "-")
+    outcome = run("compare", log, tmp_path / "after.csv", *options)
+    assert outcome.code == 0, outcome.err
+    changes = {one["channel"]: one["change_db"] for one in outcome.document["levels"]}
+    assert changes["/daq.tip"] == pytest.approx(20 * np.log10(2), abs=0.01)
+    for alone in (log, tmp_path / "after.csv"):
+        assert run("compare", alone, alone, *options).code == 2
+
+
 def test_simulated_and_measured_files_are_held_against_each_other(
     run: Run, file: tuple[Path, tuple[object, ...]], tmp_path: Path
 ) -> None:
