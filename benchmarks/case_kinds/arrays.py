@@ -252,7 +252,7 @@ def _w64(folder: Path) -> Path:
     return path
 
 
-NOT_CLOSED = r"closed|\bcut\b|stream|claim|announce|truncat|as far as|\bsizes?\b|\bbytes\b"
+NOT_CLOSED = r"closed|\bcut\b|stream|claim|announce|truncated|as far as|\bsizes?\b|\bbytes\b"
 
 
 def _check_wav(count: int, *, channels: int = 1, kind: str = "16", word: bool = True) -> Check:

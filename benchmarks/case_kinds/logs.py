@@ -43,7 +43,7 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One message: its channel, its log time, its bytes, and its publisher's number where the file's order differs."""
+    """One message: its channel, its log time, its bytes, and its number where the file's order differs."""
 
     topic: Topic
     log_ns: int
