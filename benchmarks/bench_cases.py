@@ -53,8 +53,8 @@ def table(verdicts: list[Verdict]) -> str:
         lines.append(f"| {kind} | {len(of_kind) - len(others)} | {len(of_kind)} | {words} |")
     good = sum(verdict.good for verdict in verdicts)
     silent = sum(verdict.outcome in SILENT for verdict in verdicts)
-    share = f", {100 * good / len(verdicts):.0f} %" if verdicts else ""
-    lines.append(f"| all | {good} | {len(verdicts)} | {silent} silently wrong{share} right |")
+    share = 100 * good / max(len(verdicts), 1)
+    lines.append(f"| all | {good} | {len(verdicts)} | {share:.0f} % right, {silent} silently wrong |")
     failing = [f"{v.case.kind}/{v.case.name}: {v.outcome}: {v.why}" for v in verdicts if not v.good]
     return "\n".join([*lines, "", *failing])
 
@@ -72,6 +72,8 @@ def main() -> int:
     warnings.simplefilter("ignore")
     cases = [case for case in all_cases() if not options.kind or any(word in case.kind for word in options.kind)]
     cases = [case for case in cases if options.name in case.name]
+    if not cases:
+        parser.error(f"no such kind or name; kinds are {', '.join(dict.fromkeys(case.kind for case in all_cases()))}")
 
     def tell(line: str) -> None:
         if options.verbose:
