@@ -94,7 +94,7 @@ def test_of_two_sensors_laws_tell_where_two_effects_are(first) -> None:
     assert pairs._weighed_pairs(study, replace(nothing, held=np.ones_like(nothing.held)), forces) == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_laws_whose_runs_are_lost_are_followed_from_the_states_that_two_forces_tell() -> None:
     caught = chladni.attached("ripple", "j0", {"amplitude": 20.0, "period": 1e-3, "phase": 0.7})
     rubbing = chladni.attached("coulomb_friction", "j1", {"force": 5.0})

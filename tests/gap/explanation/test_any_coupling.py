@@ -71,7 +71,7 @@ def test_velocities_explain_no_other_effect(word: str, site: str, values: dict[s
     assert found.chi - 1.0 > 0.2 * (before - 1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_wheel_is_no_effect_of_the_catalogue_and_the_answer_says_what_fits() -> None:
     found = diagnose(arm(), [measured((Wheel(),), seed=3)])
     assert found.verdict == "unknown"
