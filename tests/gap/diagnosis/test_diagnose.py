@@ -81,7 +81,7 @@ def test_the_recovered_force_follows_the_law(friction: Diagnosis) -> None:
 
 @pytest.mark.slow
 def test_the_same_input_gives_the_same_document_on_any_number_of_cores(monkeypatch: pytest.MonkeyPatch) -> None:
-    log = measured((chladni.attached("saturation", "shaker", {"limit": 120.0}),), seconds=5.0)
+    log = measured((chladni.attached("saturation", "shaker", {"limit": 120.0}),), seconds=3.0)
     found = []
     for cores in (1, 3):
         monkeypatch.setattr("chladni.gap.side_by_side.threads", lambda cores=cores: cores)
@@ -92,7 +92,7 @@ def test_the_same_input_gives_the_same_document_on_any_number_of_cores(monkeypat
 @pytest.mark.parametrize(
     ("effect", "site", "values"),
     [
-        pytest.param("hardening_stiffness", "hand", {"cubic": 3e10}, marks=pytest.mark.slow),
+        pytest.param("hardening_stiffness", "hand", {"cubic": 3e10}, marks=pytest.mark.nightly),
         ("saturation", "shaker", {"limit": 120.0}),
         pytest.param("delay", "shaker", {"delay": 2.3e-3}, marks=pytest.mark.slow),
         ("gain_error", "acc_arm", {"gain": 1.2}),
@@ -198,7 +198,7 @@ def test_a_sensor_s_square_passes_for_no_noise() -> None:
     assert any(remark.startswith("acc_arm: what is left follows its own signal") for remark in found.remarks)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_without_its_word_the_cause_is_unknown_or_of_its_family() -> None:
     stop = chladni.attached("one_sided_stop", "hand", {"stiffness": 5e5, "clearance": 1e-4})
     found = diagnose(arm(), [measured((stop,), seed=7, seconds=5.0)], leave_out=frozenset({"one_sided_stop"}))

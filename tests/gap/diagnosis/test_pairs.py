@@ -20,7 +20,7 @@ from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.structures.structure_output import StructureOutput
 from tests.gap import made_log
-from tests.gap.arm import arm, measured, with_outputs
+from tests.gap.arm import all_but, arm, measured, with_outputs
 from tests.gap.made_log import band_noise, chain
 
 SPRING = chladni.attached("hardening_stiffness", "hand", {"cubic": 3e10})
@@ -46,7 +46,7 @@ def test_details_of_one_law_mustn_t_name_a_second(effects: tuple[AttachedEffect,
 
 @pytest.mark.slow
 def test_the_second_is_found_behind_the_first() -> None:
-    study = study_of(arm(), measured((SPRING, LATE), seconds=6.0, seed=4), leave_out=frozenset(), own={})
+    study = study_of(arm(), measured((SPRING, LATE), seconds=6.0, seed=4), leave_out=all_but(), own={})
     first = single_causes(study, lambda _: None).ranked[0]
     found = weighed(second_causes(study, first))[0]
     assert {one.effect for one in found.hypothesis.effects} == {"hardening_stiffness", "time_offset"}
@@ -55,7 +55,7 @@ def test_the_second_is_found_behind_the_first() -> None:
 
 @pytest.mark.slow
 def test_a_second_effect_is_kept_though_the_first_turns_out_to_be_nothing(monkeypatch) -> None:
-    study = study_of(arm(), measured((SPRING, LATE), seconds=6.0, seed=4), leave_out=frozenset(), own={})
+    study = study_of(arm(), measured((SPRING, LATE), seconds=6.0, seed=4), leave_out=all_but(), own={})
     first = study.contest.enter(hypothesis_of((WHEEL,), study.location.tuned.z))
     # As an oscillator that imitates something else is, once that isn't all of the gap any more.
     monkeypatch.setattr(
