@@ -60,8 +60,12 @@ def test_the_bodies_and_both_coefficients_are_found() -> None:
     [
         ("time_offset", "acc_wrist", {"offset": 1e-4}),
         ("delay", "shaker", {"delay": 2e-4}),
-        ("mounting_resonance", "acc_arm", {"frequency": 250.0, "damping_ratio": 0.03}),
-        ("extra_mode", "arm", {"mass": 0.4, "frequency": 30.0, "damping_ratio": 0.02}),
+        pytest.param(
+            "mounting_resonance", "acc_arm", {"frequency": 250.0, "damping_ratio": 0.03}, marks=pytest.mark.nightly
+        ),
+        pytest.param(
+            "extra_mode", "arm", {"mass": 0.4, "frequency": 30.0, "damping_ratio": 0.02}, marks=pytest.mark.nightly
+        ),
         ("coulomb_friction", "elbow", {"force": 8.0}),
     ],
 )
