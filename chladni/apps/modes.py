@@ -14,6 +14,7 @@ from chladni.io.log_info import some_of
 from chladni.modal.functions.bands import join_bands
 from chladni.modal.functions.circle_fit import CircleFit
 from chladni.modal.functions.half_power import HalfPower
+from chladni.modal.functions.line_spacing import longest_segment_s
 from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
 from chladni.modal.responses.efdd import EnhancedFrequencyDomainDecomposition
 from chladni.modal.responses.fdd import FrequencyDomainDecomposition
@@ -38,10 +39,6 @@ FromResponses = CovarianceDrivenSubspace | FrequencyDomainDecomposition | Enhanc
 FromFunctions = PolyReferenceLeastSquares | CircleFit | HalfPower
 Method = FromFunctions | FromResponses
 
-# Segments of a record, end to end, that modes are identified from: half as many as a spectrum for the eye has, twice
-# the lines in each peak. Each further reference takes some of the averages for itself.
-SEGMENTS, SEGMENTS_A_REFERENCE = 8, 4
-LONGEST_SEGMENT = 1 << 16
 # Machines are looked for in the beginning of a stream, in one piece.
 SAMPLES_FOR_MACHINES = 1 << 20
 # A hammer drives modes as far as its force stays within 20 dB (ISO 7626-5); beyond, side lobes of its pulse still
@@ -279,15 +276,10 @@ def _modal_averaging(response: FrequencyResponse, averaging: Averaging) -> Avera
 
     A fit averages over lines itself, but can't part modes that the window has smeared into one.
     """
-    account = response.provenance
-    if averaging != Averaging() or account.averaging != "linear":
+    longest_s = longest_segment_s(response)
+    if averaging != Averaging() or longest_s <= response.provenance.segment_s:
         return averaging
-    hop_s = account.segment_s * (1 - account.overlap)
-    duration_s = account.segment_s + (account.averages - 1) * hop_s
-    segments = SEGMENTS + SEGMENTS_A_REFERENCE * (len(response.references) - 1)
-    rate_hz = 2 * float(response.frequency_hz[-1])
-    longest_s = min(duration_s / segments, LONGEST_SEGMENT / rate_hz)
-    return averaging if longest_s <= account.segment_s else replace(averaging, resolution_hz=1 / longest_s)
+    return replace(averaging, resolution_hz=1 / longest_s)
 
 
 def _from_samples(

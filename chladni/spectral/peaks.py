@@ -14,6 +14,7 @@ from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
 from chladni.spectral.leakage import leakage, line_correlation, named_window
+from chladni.spectral.uncertainty import std_or_scatter
 from chladni.spectral.windows import noise_bandwidth_bins
 
 # The floor around a line is the median of a tenth of the spectrum, of this many lines at least.
@@ -189,14 +190,17 @@ def _density_curve(density: PowerSpectralDensity, row: int) -> _Curve:
 
 
 def _response_curve(response: FrequencyResponse, row: int, column: int) -> _Curve:
-    magnitude, std = np.abs(response.values[row, column]), response.std[row, column]
-    usable = response.excited & np.isfinite(magnitude) & (magnitude > 0)
+    values = response.values[row, column]
+    usable = response.excited & np.isfinite(values) & (values != 0)
+    magnitude, std = np.abs(values[usable]), response.std[row, column, usable]
+    if _without_averages(response):
+        std = std_or_scatter(values[usable], std)
     spacing_hz = _spacing(response.frequency_hz)
     # A magnitude wrong by 1 % is a power wrong by 2 %.
     return _curve(
         response.frequency_hz[usable],
-        magnitude[usable] ** 2,
-        2 * std[usable] / magnitude[usable],
+        magnitude**2,
+        2 * std / magnitude,
         trusted=_coherent(response, row)[usable],
         provenance=response.provenance,
         bandwidth_hz=spacing_hz * noise_bandwidth_bins(named_window(response.provenance.window)),
@@ -235,8 +239,20 @@ def _coherent(response: FrequencyResponse, row: int) -> NDArray[np.bool_]:
 
     With few averages the std is itself an accident, small on some of many lines; the coherence tells which.
     """
+    if _without_averages(response):
+        return np.ones(response.frequency_hz.shape, bool)
     freedom = max(response.provenance.effective_averages - len(response.references), 0.0)
     return np.asarray((1 - response.coherence[row]) ** freedom <= COHERENT_BY_CHANCE)
+
+
+def _without_averages(response: FrequencyResponse) -> bool:
+    """Whether nothing was averaged: a file that tells of no averages, or a hit a reference.
+
+    The force of a single hit has no line of chance, as a single segment of a random one has.
+    """
+    account = response.provenance
+    single = account.averaging == "impact" and account.effective_averages <= len(response.references)
+    return single or not account.effective_averages
 
 
 def _significant(curve: _Curve, min_prominence_db: float, false_alarm: float) -> list[_Found]:

@@ -319,3 +319,39 @@ def test_few_averages_do_not_lend_a_weak_peak_the_height_of_its_neighbour():
         assert height <= peak.height * (1 + 1e-9) <= 1.4 * height
         # It lies within the lines that are its own, not those up to the neighbour a hertz away.
         assert peak.frequency_std_hz < 0.5
+
+
+def as_in_a_file(response):
+    return replace(
+        response,
+        std=np.full(response.std.shape, np.inf),
+        coherence=np.full(response.coherence.shape, np.nan),
+        provenance=Provenance(estimator="as in the file"),
+    )
+
+
+def test_functions_of_a_file_have_their_peaks_without_std_coherence_and_averages():
+    response = oscillators(lambda f: np.ones(f.size, dtype=bool))
+    peaks, known = find_response_peaks(as_in_a_file(response)), find_response_peaks(response)
+    assert [peak.channels for peak in peaks] == [peak.channels for peak in known]
+    np.testing.assert_allclose([p.frequency_hz for p in peaks], [p.frequency_hz for p in known], atol=0.01)
+
+
+def test_noise_in_a_file_has_no_peaks():
+    response = as_in_a_file(oscillators(lambda f: np.ones(f.size, dtype=bool)))
+    # One in a hundred functions may have one by chance; so have 3 or more of 40 once in 100 times.
+    found = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        noise = rng.standard_normal(response.values.shape) + 1j * rng.standard_normal(response.values.shape)
+        found += len(find_response_peaks(replace(response, values=noise)))
+    assert found <= 2
+
+
+def test_a_single_hit_has_its_peaks_and_a_single_segment_none():
+    response = oscillators(lambda f: np.ones(f.size, dtype=bool))
+    one = replace(as_in_a_file(response), coherence=np.ones(response.coherence.shape))
+    hit = Provenance(averaging="impact", averages=1, effective_averages=1.0)
+    assert len(find_response_peaks(replace(one, provenance=hit))) == 4
+    segment = Provenance(averages=1, effective_averages=1.0)
+    assert find_response_peaks(replace(one, provenance=segment)) == ()
