@@ -14,7 +14,7 @@ from chladni.io.log_info import some_of
 from chladni.modal.functions.bands import join_bands
 from chladni.modal.functions.circle_fit import CircleFit
 from chladni.modal.functions.half_power import HalfPower
-from chladni.modal.functions.line_spacing import longest_segment_s
+from chladni.modal.functions.line_spacing import longest_modal_segment_s
 from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
 from chladni.modal.responses.efdd import EnhancedFrequencyDomainDecomposition
 from chladni.modal.responses.fdd import FrequencyDomainDecomposition
@@ -276,7 +276,7 @@ def _modal_averaging(response: FrequencyResponse, averaging: Averaging) -> Avera
 
     A fit averages over lines itself, but can't part modes that the window has smeared into one.
     """
-    longest_s = longest_segment_s(response)
+    longest_s = longest_modal_segment_s(response)
     if averaging != Averaging() or longest_s <= response.provenance.segment_s:
         return averaging
     return replace(averaging, resolution_hz=1 / longest_s)

@@ -12,13 +12,17 @@ from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.wording import rounded_up
 from chladni.spectral.adaptive import adaptive_cross_spectra
-from chladni.spectral.bands import total_rms
+from chladni.spectral.bands import band_rms, total_rms
 from chladni.spectral.blocks import Source
 from chladni.spectral.excitation import HAMMER_RANGE
 from chladni.spectral.frequency_response import Estimator, frequency_response
+from chladni.spectral.peaks import judged_above_hz
 from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.response_advice import longest_segment_s
 from chladni.spectral.windows import Window
 
 # A tenth of the variance is half a decibel: less than that is lost at the ends of any record.
@@ -255,9 +259,36 @@ def _require_moving(watched: Watched, references: Sequence[str]) -> None:
 def _density(source: TimeSeries | Watched, averaging: Averaging) -> PowerSpectralDensity:
     spectra = averaging.spectra(source, None)
     if not isinstance(source, Watched):
-        return power_spectral_density(spectra)
+        density = power_spectral_density(spectra)
+        return replace(density, provenance=density.provenance.with_notes(*_unjudged(density)))
     density = power_spectral_density(_without_constant(spectra, source, keep=()))
-    return replace(density, provenance=density.provenance.with_notes(*_missing_variance(density, source)))
+    notes = (*_missing_variance(density, source), *_unjudged(density))
+    return replace(density, provenance=density.provenance.with_notes(*notes))
+
+
+def _unjudged(density: PowerSpectralDensity) -> tuple[str, ...]:
+    """Say so when much of a spectrum lies where no peak is looked for: it may be a tone."""
+    above_hz, account = judged_above_hz(density), density.provenance
+    if not above_hz:
+        return ()
+    low = np.square(band_rms(density, bands_hz=[(0.0, above_hz)]).rms[:, 0])
+    share = low / np.maximum(np.square(total_rms(density).rms[:, 0]), np.finfo(float).tiny)
+    slow = [channel.name for channel, one in zip(density.channels, share, strict=True) if one > MISSING_TOLD]
+    if not slow:
+        return ()
+    note = (
+        f"{some_of(slow)}: up to {share.max():.0%} of what the spectrum holds lies below {above_hz:.3g} Hz, where a "
+        f"trend leaks and no peak is looked for; if it isn't drift, {_finest(account)}"
+    )
+    return (note,)
+
+
+def _finest(account: Provenance) -> str:
+    """Ask for the finest lines that the record allows, or for a longer record."""
+    longest_s = longest_segment_s(account)
+    if longest_s <= account.segment_s:
+        return "measure longer"
+    return f"ask for a resolution of {rounded_up(1 / longest_s, digits=2)} Hz"
 
 
 def _missing_variance(density: PowerSpectralDensity, watched: Watched) -> tuple[str, ...]:
@@ -272,11 +303,9 @@ def _missing_variance(density: PowerSpectralDensity, watched: Watched) -> tuple[
     missing = [channel.name for channel, one in zip(density.channels, share, strict=True) if one > MISSING_TOLD]
     if not missing:
         return ()
-    spacing_hz = float(density.frequency_hz[1] - density.frequency_hz[0])
     note = (
         f"{some_of(missing)}: up to {share.max():.0%} of the variance isn't in the spectrum: it is slower than the "
-        f"segments of {account.segment_s:.4g} s, or at the ends of the record; if it isn't drift, ask for finer than "
-        f"{spacing_hz:.3g} Hz"
+        f"segments of {account.segment_s:.4g} s, or at the ends of the record; if it isn't drift, {_finest(account)}"
     )
     return (note,)
 

@@ -85,11 +85,13 @@ def _print_account(out: Output, response: "FrequencyResponse") -> None:
 
 
 def _print_peaks(out: Output, response: "FrequencyResponse", peaks: "tuple[Peak, ...]") -> None:
-    if not peaks:
-        out.line("No peak stands out of the scatter on the excited lines.")
-        return
-    from chladni.spectral.peaks import MOST_PEAKS
+    from chladni.spectral.peaks import MOST_PEAKS, judged_above_hz
 
+    above_hz = judged_above_hz(response)
+    if not peaks:
+        where = f" above {number(above_hz)} Hz" if above_hz else ""
+        out.line(f"No peak stands out of the scatter on the excited lines{where}.")
+        return
     functions = [peak.channels for peak in peaks]
     cut = f", {MOST_PEAKS} a function at most" if max(map(functions.count, functions)) == MOST_PEAKS else ""
     # A single reference is the same in every row, and its place is the title.

@@ -14,7 +14,7 @@ from chladni.modal.fit.synthesis import modal_fit
 from chladni.modal.functions.candidates import Candidates
 from chladni.modal.functions.cmif import complex_mode_indicator
 from chladni.modal.functions.grouped_refinement import select_modes
-from chladni.modal.functions.line_spacing import COARSE, closer_lines, longest_segment_s, nothing_found
+from chladni.modal.functions.line_spacing import COARSE, lines_for, longest_modal_segment_s, nothing_found
 from chladni.modal.functions.pruned_fit import PrunedFit
 from chladni.modal.poles.stabilisation import StabilityLimits, stabilisation_diagram
 from chladni.signals.frequency_response import FrequencyResponse
@@ -153,14 +153,15 @@ class ModeReport:
         found = [] if fit.fitted is None else fit.fitted.model.frequency_hz.tolist()
         told: dict[float, float] = {}
         for pole in fit.unresolved:
-            frequency_hz, width_hz = float(abs(pole)) / (2 * pi), float(-pole.real) / pi
+            # What is narrower than a tenth of a line is left to the next look.
+            frequency_hz, width_hz = float(abs(pole)) / (2 * pi), max(float(-pole.real) / pi, step_hz / 10)
             # A second round may have found it, or met it again.
             if all(abs(other_hz - frequency_hz) > max(width_hz, step_hz) for other_hz in (*found, *told)):
                 told[frequency_hz] = width_hz
         if not told:
             return ()
         where, narrowest_hz = ", ".join(f"{frequency_hz:.4g}" for frequency_hz in sorted(told)), min(told.values())
-        advice = "average longer" if narrowest_hz > COARSE * step_hz else closer_lines(self.response, narrowest_hz)
+        advice = "average longer" if narrowest_hz > COARSE * step_hz else lines_for(self.response, narrowest_hz)
         note = (
             f"no mode is taken near {where} Hz: what stands out there isn't known to half its width, or to half of "
             f"the {step_hz:.3g} Hz between lines; {advice}"
@@ -177,15 +178,17 @@ class ModeReport:
             )
         coarse = shown[fit.significance.width[shown] < COARSE]
         if coarse.size:
-            frequency_hz, damping_ratio = fitted.model.frequency_hz[coarse], fitted.model.damping_ratio[coarse]
+            # As wide as they may be: a damping that is told from zero by nothing asks for no finer lines than that.
+            frequency_hz = fitted.model.frequency_hz[coarse]
+            width_hz = 2 * frequency_hz * (fitted.model.damping_ratio + fitted.damping_std)[coarse]
             frequencies = ", ".join(f"{one_hz:.4g}" for one_hz in frequency_hz)
             # Whole periods, hits and files have no window.
             carried = (
                 "their damping is only as good as the model of the window"
-                if longest_segment_s(self.response)
+                if longest_modal_segment_s(self.response)
                 else "few lines carry their damping"
             )
-            closer = closer_lines(self.response, float(np.min(2 * damping_ratio * frequency_hz)))
+            closer = lines_for(self.response, float(np.min(width_hz)))
             notes.append(
                 f"modes at {frequencies} Hz are less than {COARSE:g} lines wide at half power: {carried}; {closer}"
             )

@@ -212,8 +212,8 @@ def _design(lines: JudgedLines, places: NDArray[np.intp], poles: Complex, partic
     direct = participation[:, :, None] / (s - poles[:, None])[:, None, :]
     partner = participation.conj()[:, :, None] / (s - poles.conj()[:, None])[:, None, :]
     modes = np.stack([direct + partner, 1j * (direct - partner)], axis=1)
-    # Each mode in units of its peak, or the weak ones would sink in rounding.
-    modes = modes * -poles.real[:, None, None, None] / np.abs(participation).max(axis=1)[:, None, None, None]
+    # Each mode in units of its highest line, or the weak ones would sink in rounding.
+    modes = modes / np.abs(modes).max(axis=(1, 2, 3), keepdims=True)
     centred = (s.imag - s.imag.mean()) / max(np.ptp(s.imag), 1e-300)
     power = centred ** np.arange(BACKGROUND)[:, None]
     references = participation.shape[1]

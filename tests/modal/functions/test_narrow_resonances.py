@@ -7,7 +7,7 @@ import pytest
 
 import chladni
 from chladni.modal.functions.judged_lines import judged_lines
-from chladni.modal.functions.line_spacing import closer_lines, longest_segment_s, nothing_found
+from chladni.modal.functions.line_spacing import lines_for, longest_modal_segment_s, nothing_found
 from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
 from chladni.modal.functions.significance import SignificanceRules, mode_significance
 from chladni.signals.provenance import Provenance
@@ -61,10 +61,8 @@ def test_one_percent_of_noise_hides_no_mode(of_the_rms):
 
 def test_the_lines_that_would_carry_the_damping_are_named():
     (note,) = [n for n in IDENTIFY(functions(1e-3)).provenance.notes if "lines wide at half power" in n]
-    # The first mode is 2 x 0.001 x 51.3 = 0.103 Hz wide, and two lines are asked for.
-    assert note.endswith(
-        "few lines carry their damping; lines 0.051 Hz apart or closer help, from records 19 times as long"
-    )
+    # The first mode is 2 x 0.001 x 51.3 = 0.1026 Hz wide, and two lines are asked for.
+    assert note.endswith("few lines carry their damping; lines 0.052 Hz apart help, from records 19 times as long")
     wide = IDENTIFY(functions(0.03))
     assert not any("lines wide at half power" in n for n in wide.provenance.notes)
 
@@ -123,24 +121,24 @@ def account(**given):
     return replace(made, provenance=Provenance(**given))
 
 
-def test_advice_on_lines_is_that_of_the_measurement():
+# 401 half-overlapping segments of 1 s are 201 s.
+AVERAGED = {"segment_s": 1.0, "averages": 401, "effective_averages": 300.0, "overlap": 0.5}
+
+
+def test_lines_for_modes_leave_an_eighth_of_the_record_as_a_segment():
     """1 Hz lines up to 399 Hz; a resonance 0.1 Hz wide asks for lines 0.05 Hz apart."""
-    averaged = {"segment_s": 1.0, "averages": 401, "effective_averages": 300.0}
-    # 401 half-overlapping segments are 201 s, an eighth of which has lines 0.04 Hz apart.
-    long = account(overlap=0.5, **averaged)
-    assert longest_segment_s(long) == pytest.approx(201 / 8)
-    assert closer_lines(long, 0.1) == "ask for a resolution of 0.05 Hz or finer"
-    assert closer_lines(long, 0.01) == "ask for a resolution of 0.04 Hz; a record 8 times as long helps further"
-    short = account(segment_s=1.0, averages=4, effective_averages=4.0)
-    assert closer_lines(short, 0.1) == "a record 40 times as long helps"
-    period = account(averaging="periodic", **averaged)
-    assert closer_lines(period, 0.1) == "a period 20 times as long or more helps"
-    hits = account(averaging="impact", segment_s=1.0, averages=5, effective_averages=5.0)
-    assert closer_lines(hits, 0.1) == "lines 0.05 Hz apart or closer help, from records 20 times as long"
+    long = account(**AVERAGED)
+    assert longest_modal_segment_s(long) == pytest.approx(201 / 8)
+    assert lines_for(long, 0.1) == "ask for a resolution of 0.05 Hz"
+    assert lines_for(long, 0.01) == "ask for a resolution of 0.0399 Hz; a record 8 times as long helps further"
+    broken = account(longest_s=4.0, **AVERAGED)
+    assert lines_for(broken, 0.1) == "ask for a resolution of 0.25 Hz; a record 5 times as long helps further"
+    period = account(averaging="periodic", **AVERAGED)
+    assert longest_modal_segment_s(period) == 0
+    assert lines_for(period, 0.1) == "a period 20 times as long helps"
 
 
 def test_what_to_try_where_nothing_is_found():
-    averaged = {"segment_s": 1.0, "averages": 401, "effective_averages": 300.0, "overlap": 0.5}
-    assert "ask for a resolution of 0.04 Hz" in nothing_found(account(**averaged))
-    assert "look at a band where the coherence is better" in nothing_found(account(averaging="periodic", **averaged))
+    assert "ask for a resolution of 0.0399 Hz" in nothing_found(account(**AVERAGED))
+    assert "look at a band where the coherence is better" in nothing_found(account(averaging="periodic", **AVERAGED))
     assert "lines closer than these, 1 Hz apart" in nothing_found(account())
