@@ -13,6 +13,7 @@ from chladni.io.files.uff_modes import read_uff_modes
 from chladni.io.log import Log
 from chladni.modal.checks.driving_point import check_driving_point
 from chladni.modal.checks.reciprocity import check_reciprocity
+from chladni.modal.checks.roving import over_hit_points
 from chladni.modal.functions.circle_fit import CircleFit
 from chladni.modal.functions.half_power import HalfPower
 from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
@@ -133,9 +134,10 @@ def universal_file_study(path: Path, *, method: MethodName | None = None, wanted
     """
     held, chosen = read_uff_modes(path), None if method is None else METHODS[method]()
     if held.response is not None:
+        response = over_hit_points(held.response)
         with _told_of(path):
-            found = modes_of_response(held.response, method=chosen, wanted=wanted or Wanted())
-        return _study(path, held.geometry, found, held.response, notes=(*held.notes, *_checks(held.response)))
+            found = modes_of_response(response, method=chosen, wanted=wanted or Wanted())
+        return _study(path, held.geometry, found, response, notes=(*held.notes, *_checks(response)))
     if held.modes is None:
         raise LogError(f"{path}: holds neither frequency responses (dataset 58) nor modes (dataset 55)")
     told = "the modes are those that the file holds: there are no frequency responses in it to identify others from"

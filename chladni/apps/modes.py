@@ -11,6 +11,7 @@ from chladni.apps.sources import Progress, Span, Watched, no_progress
 from chladni.apps.spectra import Averaging, transfer
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
+from chladni.modal.checks.roving import over_hit_points
 from chladni.modal.functions.bands import join_bands
 from chladni.modal.functions.circle_fit import CircleFit
 from chladni.modal.functions.half_power import HalfPower
@@ -112,7 +113,8 @@ def identify_modes(
     Returns
     -------
     ModeSet
-        Empty when there is no mode; its notes say why.
+        Empty when there is no mode; its notes say why. Shapes are over the responses, or, by reciprocity, over the
+        references where there are fewer responses than forces, as of a hammer that roved (see `over_hit_points`).
 
     Raises
     ------
@@ -129,7 +131,7 @@ def identify_modes(
     wanted = Wanted.of(bands_hz=_bands(band_hz), count=count, frequencies_hz=frequencies_hz)
     span, averaging = Span(start_s=start_s, end_s=end_s), Averaging(resolution_hz=resolution_hz)
     if isinstance(source, FrequencyResponse):
-        return modes_of_response(source, method=method, wanted=wanted)
+        return modes_of_response(over_hit_points(source), method=method, wanted=wanted)
     if isinstance(source, CrossSpectra):
         return modes_of_spectra(source, method=method, wanted=wanted)
     if operational or isinstance(method, FromResponses):
@@ -259,7 +261,7 @@ def _functions(
     names, notes = motions_of_one_unit(response.responses, named=channels is not None)
     chosen = response.select(names)
     told = _end_of_hammer(chosen) if anywhere else ()
-    return replace(chosen, provenance=chosen.provenance.with_notes(*notes, *told))
+    return over_hit_points(replace(chosen, provenance=chosen.provenance.with_notes(*notes, *told)))
 
 
 def _end_of_hammer(response: FrequencyResponse) -> tuple[str, ...]:

@@ -258,27 +258,35 @@ def _require_moving(watched: Watched, references: Sequence[str]) -> None:
 
 def _density(source: TimeSeries | Watched, averaging: Averaging) -> PowerSpectralDensity:
     spectra = averaging.spectra(source, None)
-    if not isinstance(source, Watched):
+    if isinstance(source, Watched):
+        density = power_spectral_density(_without_constant(spectra, source, keep=()))
+        # Segments that were skipped hold variance, too, and that is told.
+        whole = [0.0 if density.provenance.skipped else source.variance(one.name) for one in density.channels]
+    else:
         density = power_spectral_density(spectra)
-        return replace(density, provenance=density.provenance.with_notes(*_unjudged(density)))
-    density = power_spectral_density(_without_constant(spectra, source, keep=()))
-    notes = (*_missing_variance(density, source), *_unjudged(density))
-    return replace(density, provenance=density.provenance.with_notes(*notes))
+        whole = [0.0] * len(density.channels)
+    return replace(density, provenance=density.provenance.with_notes(*_slow_variance(density, whole)))
 
 
-def _unjudged(density: PowerSpectralDensity) -> tuple[str, ...]:
-    """Say so when much of a spectrum lies where no peak is looked for: it may be a tone."""
-    above_hz, account = judged_above_hz(density), density.provenance
-    if not above_hz:
+def _slow_variance(density: PowerSpectralDensity, whole: Sequence[float]) -> tuple[str, ...]:
+    """Say so when much of a signal is slower than what peaks are looked for in: it may be drift, or a tone.
+
+    ``whole[channel]`` is the variance of the samples, 0 where that isn't known.
+    """
+    low_hz = judged_above_hz(density)
+    # Whole periods and hits leave nothing out.
+    if not low_hz:
         return ()
-    low = np.square(band_rms(density, bands_hz=[(0.0, above_hz)]).rms[:, 0])
-    share = low / np.maximum(np.square(total_rms(density).rms[:, 0]), np.finfo(float).tiny)
+    judged = np.square(band_rms(density, bands_hz=[(low_hz, float(density.frequency_hz[-1]))]).rms[:, 0])
+    total = np.maximum(np.square(total_rms(density).rms[:, 0]), np.asarray(whole))
+    share = 1 - judged / np.maximum(total, np.finfo(float).tiny)
     slow = [channel.name for channel, one in zip(density.channels, share, strict=True) if one > MISSING_TOLD]
     if not slow:
         return ()
     note = (
-        f"{some_of(slow)}: up to {share.max():.0%} of what the spectrum holds lies below {above_hz:.3g} Hz, where a "
-        f"trend leaks and no peak is looked for; if it isn't drift, {_finest(account)}"
+        f"{some_of(slow)}: up to {share.max():.0%} of the variance is slower than {low_hz:.3g} Hz, where a trend "
+        "leaks and no peak is looked for, or at the ends of the record; if it isn't drift, "
+        f"{_finest(density.provenance)}"
     )
     return (note,)
 
@@ -289,25 +297,6 @@ def _finest(account: Provenance) -> str:
     if longest_s <= account.segment_s:
         return "measure longer"
     return f"ask for a resolution of {rounded_up(1 / longest_s, digits=2)} Hz"
-
-
-def _missing_variance(density: PowerSpectralDensity, watched: Watched) -> tuple[str, ...]:
-    """Say so when much of a signal is slower than the segments: its levels and peaks leave that out."""
-    account = density.provenance
-    # Whole periods and hits leave out on purpose, skipped segments for another reason, which is told.
-    if account.averaging != "linear" or account.skipped:
-        return ()
-    within = np.square(total_rms(density).rms[:, 0])
-    whole = np.array([watched.variance(channel.name) for channel in density.channels])
-    share = 1 - within / np.maximum(whole, np.finfo(float).tiny)
-    missing = [channel.name for channel, one in zip(density.channels, share, strict=True) if one > MISSING_TOLD]
-    if not missing:
-        return ()
-    note = (
-        f"{some_of(missing)}: up to {share.max():.0%} of the variance isn't in the spectrum: it is slower than the "
-        f"segments of {account.segment_s:.4g} s, or at the ends of the record; if it isn't drift, {_finest(account)}"
-    )
-    return (note,)
 
 
 def _of_series(series: TimeSeries, names: Sequence[str] | None, span: Span) -> TimeSeries:

@@ -89,14 +89,15 @@ def _highest(channel: "Document") -> list[str]:
 def _print_peaks(out: Output, density: "PowerSpectralDensity", found: "UnitPeaks") -> None:
     from chladni.spectral.peaks import MOST_PEAKS, judged_above_hz
 
-    above_hz = judged_above_hz(density)
-    where = ("" if found.unit == "1" else f" in {found.unit}") + (f" above {number(above_hz)} Hz" if above_hz else "")
+    where = "" if found.unit == "1" else f" in {found.unit}"
+    low_hz = judged_above_hz(density)
+    judged = f", above {number(low_hz)} Hz" if low_hz else ""
     if not found.peaks:
-        out.line(f"No peak stands out of the scatter{where}.")
+        out.line(f"No peak stands out of the scatter{where}{judged}.")
         return
     at_most = f", {MOST_PEAKS} at most" if len(found.peaks) == MOST_PEAKS else ""
     out.table(
-        f"Peaks{where}, the highest first{at_most}",
+        f"Peaks{where}, the highest first{at_most}{judged}",
         ["strongest in", "frequency [Hz]", "density", "unit"],
         [
             [
