@@ -20,7 +20,7 @@ def survey(container: McapContainer, content: Catalog, lost: LostMessages) -> Lo
     Stamps are kept (8 bytes a message), samples only as long as they're being judged.
     """
     streams = content.streams(content.channels)
-    monitors = [SampleMonitor(gathering=Gathering(stream=stream)) for stream in streams]
+    monitors = [SampleMonitor(gathering=Gathering(stream=stream), start_ns=content.start_ns) for stream in streams]
     pass_lost = LostMessages()
     for index, piece in windowed(streams, read_pieces(container, streams), pass_lost, window_ns=(None, None)):
         monitors[index].watch(piece)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from chladni.io.gathering import Gathering
 from chladni.io.stream import Piece
 from chladni.signals.sensor_quality import SensorFault, sensor_quality
-from chladni.signals.time_series import TimeSeries
+from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 STRETCH_VALUES: Final = 1 << 24
 """Values of a stream that are judged together: 128 MiB in double precision. A longer log is judged in stretches."""
@@ -23,6 +23,8 @@ class SampleMonitor:
     ----------
     gathering
         Stamps of its messages.
+    start_ns
+        Start of the log, from which seconds are counted.
     samples
         Samples seen.
     missing
@@ -32,6 +34,7 @@ class SampleMonitor:
     """
 
     gathering: Gathering
+    start_ns: int
     samples: int = 0
     missing: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     faults: dict[tuple[str, str], SensorFault] = field(default_factory=dict)
@@ -50,7 +53,7 @@ class SampleMonitor:
         """Judge what has been kept back, and let it go."""
         if not self._waiting:
             return
-        values = _in_order(self._waiting)
+        pieces, values = self._waiting, _in_order(self._waiting)
         self._waiting, self._waiting_values = [], 0
         nan = np.isnan(values)
         self.samples += values.shape[1]
@@ -58,20 +61,41 @@ class SampleMonitor:
         self.missing = self.missing + missing if self.missing.size else missing
         series = TimeSeries(
             values=values,
-            # Rules look at neighbouring samples; where they lie in time doesn't matter.
+            # Rules look at neighbouring samples; where they lie in time is looked up for what is found.
             sample_rate_hz=1.0,
             channels=self.gathering.stream.channels,
             valid=~nan if missing.any() else None,
         )
-        for fault in sensor_quality(series):
+        found = sensor_quality(series)
+        if not found:
+            return
+        moments = np.array([(fault.first_s, fault.last_s) for fault in found])
+        times_s = (_stamps_of(pieces, moments.astype(np.int64)) - self.start_ns) / NS_PER_S
+        for fault, (first_s, last_s) in zip(found, times_s.tolist(), strict=True):
             key = (fault.channel, fault.kind)
             known = self.faults.get(key)
-            self.faults[key] = fault if known is None else replace(known, count=known.count + fault.count)
+            self.faults[key] = (
+                replace(fault, first_s=first_s, last_s=last_s)
+                if known is None
+                else replace(known, count=known.count + fault.count, last_s=last_s)
+            )
 
     def clipped(self, channel: str) -> int:
         """Samples of a channel at the sensor's limit."""
         fault = self.faults.get((channel, "clipped"))
         return 0 if fault is None else fault.count
+
+
+def _stamps_of(pieces: list[Piece], places: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Stamps of samples that are counted in the order of stamps."""
+    stamps = np.concatenate([piece.stamps_ns for piece in pieces])
+    order = np.argsort(stamps, kind="stable")
+    if pieces[0].counts is None:
+        return np.asarray(stamps[order][places])
+    counts = np.concatenate([piece.counts for piece in pieces if piece.counts is not None])[order]
+    message = np.searchsorted(np.cumsum(counts), places, side="right")
+    later = places - (np.cumsum(counts) - counts)[message]
+    return np.asarray(stamps[order][message] + np.rint(later * pieces[0].period_s * NS_PER_S).astype(np.int64))
 
 
 def _in_order(pieces: list[Piece]) -> NDArray[np.floating[Any]]:

@@ -132,13 +132,14 @@ def _level_and_share(squares: Floats, power: Floats, used: NDArray[np.bool_]) ->
         level = level * np.sqrt(_ratio(gain, trust))
         gain, trust = gain * power, trust * power
         share = share * np.sqrt(_ratio(gain, trust))
-    return level + share * power
+    return np.asarray(level + share * power, dtype=np.float64)
 
 
 def _ratio(above: Floats, below: Floats) -> Floats:
     """Sums over the last axis, 0 of a function without lines or without power."""
     total = below.sum(axis=-1, keepdims=True)
-    return np.divide(above.sum(axis=-1, keepdims=True), total, out=np.zeros_like(total), where=total > 0)
+    ratio = np.divide(above.sum(axis=-1, keepdims=True), total, out=np.zeros_like(total), where=total > 0)
+    return np.asarray(ratio, dtype=np.float64)
 
 
 def _weights(
