@@ -13,9 +13,11 @@ from chladni.apps.sources import Progress, Span, Watched, no_progress
 from chladni.apps.spectra import Averaging, transfer
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
+from chladni.modal.checks.roving import over_hit_points
 from chladni.modal.functions.bands import join_bands
 from chladni.modal.functions.circle_fit import CircleFit
 from chladni.modal.functions.half_power import HalfPower
+from chladni.modal.functions.line_spacing import longest_modal_segment_s
 from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
 from chladni.modal.responses.efdd import EnhancedFrequencyDomainDecomposition
 from chladni.modal.responses.fdd import FrequencyDomainDecomposition
@@ -41,10 +43,6 @@ FromResponses = CovarianceDrivenSubspace | FrequencyDomainDecomposition | Enhanc
 FromFunctions = PolyReferenceLeastSquares | CircleFit | HalfPower
 Method = FromFunctions | FromResponses
 
-# Segments of a record, end to end, that modes are identified from: half as many as a spectrum for the eye has, twice
-# the lines in each peak. Each further reference takes some of the averages for itself.
-SEGMENTS, SEGMENTS_A_REFERENCE = 8, 4
-LONGEST_SEGMENT = 1 << 16
 # Machines are looked for in the beginning of a stream, in one piece.
 SAMPLES_FOR_MACHINES = 1 << 20
 # A hammer drives modes as far as its force stays within 20 dB (ISO 7626-5); beyond, side lobes of its pulse still
@@ -120,7 +118,8 @@ def identify_modes(
     Returns
     -------
     ModeSet
-        Empty when there is no mode; its notes say why.
+        Empty when there is no mode; its notes say why. Shapes are over the responses, or, by reciprocity, over the
+        references where there are fewer responses than forces, as of a hammer that roved (see `over_hit_points`).
 
     Raises
     ------
@@ -137,7 +136,7 @@ def identify_modes(
     wanted = Wanted.of(bands_hz=_bands(band_hz), count=count, frequencies_hz=frequencies_hz)
     span, averaging = Span(start_s=start_s, end_s=end_s), Averaging(resolution_hz=resolution_hz)
     if isinstance(source, FrequencyResponse):
-        return modes_of_response(source, method=method, wanted=wanted)
+        return modes_of_response(over_hit_points(source), method=method, wanted=wanted)
     if isinstance(source, CrossSpectra):
         return modes_of_spectra(source, method=method, wanted=wanted)
     if isinstance(source, Log) and not source.channels and source.functions is None and source.modes is not None:
@@ -228,7 +227,8 @@ def functions_and_modes(
     named = (reference,) if isinstance(reference, str) else reference
     stored = stored_functions(source, named, channels)
     if stored is not None:
-        response = _of_one_form(transfer(source, named, channels, estimator="H1", averaging=averaging, span=span))
+        held = transfer(source, named, channels, estimator="H1", averaging=averaging, span=span)
+        response = over_hit_points(_of_one_form(held))
         return response, modes_of_response(response, method=method, wanted=wanted)
     references = excitation_names(source, span, otherwise=ALONE) if named is None else tuple(named)
     coarse = _functions(source, references, channels, wanted, averaging, span, progress)
@@ -286,7 +286,7 @@ def _functions(
     names, notes = motions_of_one_unit(response.responses, named=channels is not None)
     chosen = response.select(names)
     told = _end_of_hammer(chosen) if anywhere else ()
-    return replace(chosen, provenance=chosen.provenance.with_notes(*notes, *told))
+    return over_hit_points(replace(chosen, provenance=chosen.provenance.with_notes(*notes, *told)))
 
 
 def _end_of_hammer(response: FrequencyResponse) -> tuple[str, ...]:
@@ -303,15 +303,10 @@ def _modal_averaging(response: FrequencyResponse, averaging: Averaging) -> Avera
 
     A fit averages over lines itself, but can't part modes that the window has smeared into one.
     """
-    account = response.provenance
-    if averaging != Averaging() or account.averaging != "linear":
+    longest_s = longest_modal_segment_s(response)
+    if averaging != Averaging() or longest_s <= response.provenance.segment_s:
         return averaging
-    hop_s = account.segment_s * (1 - account.overlap)
-    duration_s = account.segment_s + (account.averages - 1) * hop_s
-    segments = SEGMENTS + SEGMENTS_A_REFERENCE * (len(response.references) - 1)
-    rate_hz = 2 * float(response.frequency_hz[-1])
-    longest_s = min(duration_s / segments, LONGEST_SEGMENT / rate_hz)
-    return averaging if longest_s <= account.segment_s else replace(averaging, resolution_hz=1 / longest_s)
+    return replace(averaging, resolution_hz=1 / longest_s)
 
 
 def _from_samples(

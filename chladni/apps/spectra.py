@@ -13,14 +13,18 @@ from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.provenance import Provenance
 from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.wording import rounded_up
 from chladni.spectral.adaptive import adaptive_cross_spectra
-from chladni.spectral.bands import total_rms
+from chladni.spectral.bands import band_rms, total_rms
 from chladni.spectral.blocks import Source
 from chladni.spectral.excitation import HAMMER_RANGE
 from chladni.spectral.frequency_response import Estimator, frequency_response
+from chladni.spectral.peaks import judged_above_hz
 from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.response_advice import longest_segment_s
 from chladni.spectral.windows import Window
 
 # A tenth of the variance is half a decibel: less than that is lost at the ends of any record.
@@ -283,31 +287,45 @@ def _require_moving(watched: Watched, references: Sequence[str]) -> None:
 
 def _density(source: TimeSeries | Watched, averaging: Averaging) -> PowerSpectralDensity:
     spectra = averaging.spectra(source, None)
-    if not isinstance(source, Watched):
-        return power_spectral_density(spectra)
-    density = power_spectral_density(_without_constant(spectra, source, keep=()))
-    return replace(density, provenance=density.provenance.with_notes(*_missing_variance(density, source)))
+    if isinstance(source, Watched):
+        density = power_spectral_density(_without_constant(spectra, source, keep=()))
+        # Segments that were skipped hold variance, too, and that is told.
+        whole = [0.0 if density.provenance.skipped else source.variance(one.name) for one in density.channels]
+    else:
+        density = power_spectral_density(spectra)
+        whole = [0.0] * len(density.channels)
+    return replace(density, provenance=density.provenance.with_notes(*_slow_variance(density, whole)))
 
 
-def _missing_variance(density: PowerSpectralDensity, watched: Watched) -> tuple[str, ...]:
-    """Say so when much of a signal is slower than the segments: its levels and peaks leave that out."""
-    account = density.provenance
-    # Whole periods and hits leave out on purpose, skipped segments for another reason, which is told.
-    if account.averaging != "linear" or account.skipped:
+def _slow_variance(density: PowerSpectralDensity, whole: Sequence[float]) -> tuple[str, ...]:
+    """Say so when much of a signal is slower than what peaks are looked for in: it may be drift, or a tone.
+
+    ``whole[channel]`` is the variance of the samples, 0 where that isn't known.
+    """
+    low_hz = judged_above_hz(density)
+    # Whole periods and hits leave nothing out.
+    if not low_hz:
         return ()
-    within = np.square(total_rms(density).rms[:, 0])
-    whole = np.array([watched.variance(channel.name) for channel in density.channels])
-    share = 1 - within / np.maximum(whole, np.finfo(float).tiny)
-    missing = [channel.name for channel, one in zip(density.channels, share, strict=True) if one > MISSING_TOLD]
-    if not missing:
+    judged = np.square(band_rms(density, bands_hz=[(low_hz, float(density.frequency_hz[-1]))]).rms[:, 0])
+    total = np.maximum(np.square(total_rms(density).rms[:, 0]), np.asarray(whole))
+    share = 1 - judged / np.maximum(total, np.finfo(float).tiny)
+    slow = [channel.name for channel, one in zip(density.channels, share, strict=True) if one > MISSING_TOLD]
+    if not slow:
         return ()
-    spacing_hz = float(density.frequency_hz[1] - density.frequency_hz[0])
     note = (
-        f"{some_of(missing)}: up to {share.max():.0%} of the variance isn't in the spectrum: it is slower than the "
-        f"segments of {account.segment_s:.4g} s, or at the ends of the record; if it isn't drift, ask for finer than "
-        f"{spacing_hz:.3g} Hz"
+        f"{some_of(slow)}: up to {share.max():.0%} of the variance is slower than {low_hz:.3g} Hz, where a trend "
+        "leaks and no peak is looked for, or at the ends of the record; if it isn't drift, "
+        f"{_finest(density.provenance)}"
     )
     return (note,)
+
+
+def _finest(account: Provenance) -> str:
+    """Ask for the finest lines that the record allows, or for a longer record."""
+    longest_s = longest_segment_s(account)
+    if longest_s <= account.segment_s:
+        return "measure longer"
+    return f"ask for a resolution of {rounded_up(1 / longest_s, digits=2)} Hz"
 
 
 def _of_series(series: TimeSeries, names: Sequence[str] | None, span: Span) -> TimeSeries:

@@ -101,17 +101,20 @@ def _print_account(out: Output, response: "FrequencyResponse") -> None:
 
 
 def _print_peaks(out: Output, response: "FrequencyResponse", peaks: "tuple[Peak, ...]") -> None:
-    if not peaks:
-        out.line("No peak stands out of the scatter on the excited lines.")
-        return
-    from chladni.spectral.peaks import MOST_PEAKS
+    from chladni.spectral.peaks import MOST_PEAKS, judged_above_hz
 
+    low_hz = judged_above_hz(response)
+    judged = f", above {number(low_hz)} Hz" if low_hz else ""
+    if not peaks:
+        out.line(f"No peak stands out of the scatter on the excited lines{judged}.")
+        return
     functions = [peak.channels for peak in peaks]
     cut = f", {MOST_PEAKS} a function at most" if max(map(functions.count, functions)) == MOST_PEAKS else ""
     # A single reference is the same in every row, and its place is the title.
     alone = len(response.references) == 1
+    over = f" over {response.references[0].name}" if alone else ""
     out.table(
-        f"Peaks of the magnitude{f' over {response.references[0].name}' if alone else ''}, the highest first{cut}",
+        f"Peaks of the magnitude{over}, the highest first{cut}{judged}",
         [
             "response" if alone else "response / reference",
             "frequency [Hz]",

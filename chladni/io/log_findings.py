@@ -9,7 +9,7 @@ from chladni.io.loss import Loss
 from chladni.io.placement import Placement
 from chladni.io.sample_monitor import SampleMonitor
 from chladni.signals.channel import Channel
-from chladni.signals.sensor_quality import SensorFault
+from chladni.signals.sensor_quality import SensorFault, moments
 from chladni.signals.wording import counted
 
 MOST_LOSSES_TOLD = 3
@@ -140,7 +140,8 @@ def _faults_together(faults: Sequence[SensorFault]) -> Iterator[str]:
             continue
         low, high = min(fault.count for fault in group), max(fault.count for fault in group)
         often = counted(low, "sample") if low == high else f"{low} to {counted(high, 'sample')}"
-        told = what if kind == "coarse" else f"{what} in {often} each"
+        when = moments(min(fault.first_s for fault in group), max(fault.last_s for fault in group))
+        told = what if kind == "coarse" else f"{what} in {often} each {when}"
         yield f"{some_of([fault.channel for fault in group])}: {told}; {remedy}"
 
 

@@ -26,7 +26,7 @@ def survey(container: McapContainer, content: Catalog, lost: LostMessages) -> Lo
     Stamps and log times are kept (some 20 bytes a message), samples only as long as they're being judged.
     """
     streams = content.streams(content.channels)
-    monitors = [SampleMonitor(gathering=Gathering(stream=stream)) for stream in streams]
+    monitors = [SampleMonitor(gathering=Gathering(stream=stream), start_ns=content.start_ns) for stream in streams]
     pass_lost = LostMessages()
     for index, piece in windowed(streams, read_pieces(container, streams), pass_lost, window_ns=(None, None)):
         monitors[index].watch(piece)
@@ -113,8 +113,8 @@ def survey_file(
     bases = contents.time_bases or (None,) * len(contents.series)
     channels, missing = [], []
     for part, base in zip(contents.series, bases, strict=True):
-        lost = _judged(part, faults)
         offset_s = (part.start_time_ns - begin_ns) / NS_PER_S
+        lost = _judged(part, faults, offset_s)
         channels += _file_channels(part, base, kind, lost, faults, offset_s)
         missing += [
             (channel.name, missing_sentence(count, part.samples))
@@ -144,7 +144,7 @@ def _end_ns(series: TimeSeries) -> int:
     return series.start_time_ns + round(series.duration_s * NS_PER_S)
 
 
-def _judged(series: TimeSeries, faults: Faults) -> NDArray[np.int64]:
+def _judged(series: TimeSeries, faults: Faults, offset_s: float) -> NDArray[np.int64]:
     """Judge the samples in stretches, and count those of each channel that are missing."""
     lost = np.zeros(len(series.channels), np.int64)
     length = max(1, STRETCH_VALUES // max(1, len(series.channels)))
@@ -153,7 +153,11 @@ def _judged(series: TimeSeries, faults: Faults) -> NDArray[np.int64]:
         if series.valid is not None:
             valid = series.valid[:, first : first + length]
             values = np.where(valid, values, np.nan)
-        lost += judge_samples(series.channels, values, faults)
+
+        def seconds(places: NDArray[np.int64], first: int = first) -> NDArray[np.float64]:
+            return offset_s + (first + places) / series.sample_rate_hz
+
+        lost += judge_samples(series.channels, values, faults, seconds)
     return lost
 
 

@@ -202,11 +202,36 @@ def test_variance_slower_than_the_segments_is_told(tmp_path):
     with log_of(tmp_path, rows) as log:
         (coarse,), (fine,) = densities(log), densities(log, averaging=Averaging(resolution_hz=0.1))
     (note,) = coarse.provenance.notes
-    within = coarse.values[0].sum() * coarse.frequency_hz[1]
+    # Lines 0.781 Hz apart, peaks from 1.17 Hz on: what lies above is leakage.
+    above = coarse.frequency_hz > 1.2
+    within = coarse.values[0, above].sum() * coarse.frequency_hz[1]
     assert note.startswith("/stroke.accel.linear.x: up to ")
-    assert f"{1 - within / rows['stroke'].var():.0%} of the variance" in note
-    assert "finer than 0.781 Hz" in note
+    share = float(note.split("up to ")[1].split("%")[0]) / 100
+    assert share == pytest.approx(1 - within / rows["stroke"].var(), abs=0.02)
+    assert "slower than 1.17 Hz" in note
+    assert "ask for a resolution of 0.18 Hz" in note
     assert not fine.provenance.notes
+
+
+def test_a_tone_in_lines_that_are_not_judged_is_told_with_what_shows_it():
+    # 5 s at 400 Hz have lines 6.25 Hz apart, of which those above 9.4 Hz are judged.
+    time_s = np.arange(2000) / 400
+
+    def tone(frequency_hz):
+        values = np.sin(2 * np.pi * frequency_hz * time_s)[np.newaxis]
+        return TimeSeries(values=values, sample_rate_hz=400.0, channels=(Channel(name="a", unit="m/s^2"),))
+
+    found = chladni.psd(tone(20.0))
+    assert found.provenance.notes == ()
+    (peak,) = chladni.find_peaks(found)
+    assert peak.frequency_hz == pytest.approx(20.0, abs=0.05)
+    below = chladni.psd(tone(6.0))
+    assert chladni.find_peaks(below) == ()
+    (note,) = below.provenance.notes
+    assert "slower than 9.38 Hz" in note
+    asked_hz = float(note.split("ask for a resolution of ")[1].split(" Hz")[0])
+    (followed,) = chladni.find_peaks(chladni.psd(tone(6.0), resolution_hz=asked_hz))
+    assert followed.frequency_hz == pytest.approx(6.0, abs=asked_hz / 2)
 
 
 def test_the_variance_of_a_large_log_is_watched_block_by_block(tmp_path, large):
@@ -235,9 +260,9 @@ def test_no_segment_between_gaps_says_which_resolution_would_do(tmp_path):
     valid[0, 7::50] = False
     rows = {"a": np.random.default_rng(3).standard_normal(4000)}
     with log_of(tmp_path, rows, rate_hz=100.0, valid=valid) as log:
-        with pytest.raises(EstimateError, match=r"/a\.accel.*ask for 2\.04 Hz or coarser"):
+        with pytest.raises(EstimateError, match=r"/a\.accel.*ask for 2\.05 Hz or coarser"):
             densities(log)
-        assert densities(log, averaging=Averaging(resolution_hz=2.04))
+        assert densities(log, averaging=Averaging(resolution_hz=2.05))
 
 
 def test_a_reference_that_never_changes_is_refused(tmp_path):

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from tests.arm import FORCE, TOOL, short_arm
+from tests.impact_file import write_functions
 from tests.io.files.uff_makers import response_set
+from tests.modal.truth import chain, mac
 
 KEYS = {"frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std", "mpc", "shape", "relative_motion"}
 
@@ -190,3 +192,44 @@ def test_options_of_samples_are_refused_for_functions(run, arm_log, tmp_path, op
     outcome = run("modes", tmp_path / "arm.uff", *option)
     assert outcome.code == 2
     assert words in outcome.err
+
+
+@pytest.mark.parametrize("damping", [1e-3, 2e-4])
+def test_a_file_of_resonances_narrower_than_its_lines_has_them_all(run, tmp_path, damping):
+    lines_hz, structure = np.arange(0.0, 400.0), chain(first_hz=51.3, damping=damping)
+    functions = structure.accelerance(lines_hz, (0,))
+    path = write_functions(tmp_path / "narrow.uff", functions, lines_hz, responses=range(1, 6), references=[1])
+    document = run("modes", path, "--json", "-").document
+    assert [mode["frequency_hz"] for mode in document["modes"]] == pytest.approx(structure.frequency_hz, rel=1e-6)
+    assert [mode["damping_ratio"] for mode in document["modes"]] == pytest.approx([damping] * 5, rel=1e-3)
+    told = " ".join(run("modes", path).out.split())
+    assert "take power in" in told
+    assert "average longer" not in told
+
+
+@pytest.mark.parametrize("fixed", [0, 4])
+def test_a_roving_hammer_gives_shapes_over_the_points_it_hit(run, tmp_path, fixed):
+    lines_hz, structure = np.arange(0.0, 8.0, 0.02), chain()
+    functions = structure.accelerance(lines_hz, range(5))[fixed : fixed + 1]
+    path = write_functions(tmp_path / "rove.uff", functions, lines_hz, responses=[fixed + 1], references=range(1, 6))
+    document = run("modes", path, "--json", "-").document
+    for mode, shape in zip(document["modes"], structure.shapes, strict=True):
+        assert [entry["point"] for entry in mode["shape"]] == ["1", "2", "3", "4", "5"]
+        found = np.array([entry["real"] + 1j * entry["imag"] for entry in mode["shape"]])
+        assert mac(found, shape) == pytest.approx(1, abs=1e-6)
+        assert mode["mpc"] == pytest.approx(1, abs=1e-6)
+        # Unit mass: 1/phi_max^2 kg.
+        assert mode["modal_mass"] == pytest.approx(1 / np.abs(shape).max() ** 2, rel=1e-3)
+    assert document["references"] == [f"{fixed + 1}:+3 (reference)"]
+    assert any("5 hit points taken as responses" in note for note in document["notes"])
+
+
+def test_modes_of_one_channel_have_no_phase_collinearity(run, tmp_path):
+    lines_hz = np.arange(0.0, 8.0, 0.02)
+    functions = chain().accelerance(lines_hz, (0,))[:1]
+    path = write_functions(tmp_path / "one.uff", functions, lines_hz, responses=[1], references=[1])
+    outcome = run("modes", path, "--json", "-")
+    modes = outcome.document["modes"]
+    assert len(modes) == 5
+    assert [(mode["mpc"], mode["mpd_deg"], mode["mean_phase_deg"]) for mode in modes] == [(None, None, None)] * 5
+    assert "1.000" not in run("modes", path).out

@@ -246,7 +246,7 @@ def test_not_a_number_counts_as_missing(tmp_path: Path) -> None:
         assert np.isnan(series.values[2, 9])
         told = log.info().findings
         assert f"{AXES[1]}: 1 of 300 samples not a number; they count as missing" in told
-        assert any(finding.startswith(f"{AXES[2]}: is no number in 1 sample; ") for finding in told)
+        assert any(finding.startswith(f"{AXES[2]}: is no number in 1 sample at ") for finding in told)
 
 
 def test_stamps_that_leap_for_days_take_no_memory(tmp_path: Path) -> None:

@@ -339,6 +339,15 @@ def held(values, spacing_hz=0.5):
     )
 
 
+def as_in_a_file(response):
+    return replace(
+        response,
+        std=np.full(response.std.shape, np.inf),
+        coherence=np.full(response.coherence.shape, np.nan),
+        provenance=Provenance(estimator="as in the file"),
+    )
+
+
 def accelerance(frequency_hz, natural_hz, damping_ratio):
     ratio = frequency_hz / natural_hz
     return -(ratio**2) / (1 - ratio**2 + 2j * damping_ratio * ratio)
@@ -362,3 +371,30 @@ def test_noise_without_error_bars_gives_no_peak():
     alarms = sum(bool(find_response_peaks(held(row), false_alarm=0.05)) for row in rows)
     # 3 are allowed in the mean; a binomial count exceeds 9 with a chance of 0.1 %.
     assert alarms <= 9
+
+
+def test_functions_of_a_file_have_their_peaks_without_std_coherence_and_averages():
+    response = oscillators(lambda f: np.ones(f.size, dtype=bool))
+    peaks, known = find_response_peaks(as_in_a_file(response)), find_response_peaks(response)
+    assert [peak.channels for peak in peaks] == [peak.channels for peak in known]
+    np.testing.assert_allclose([p.frequency_hz for p in peaks], [p.frequency_hz for p in known], atol=0.01)
+
+
+def test_noise_in_a_file_has_no_peaks():
+    response = as_in_a_file(oscillators(lambda f: np.ones(f.size, dtype=bool)))
+    # One in a hundred functions may have one by chance; so have 3 or more of 40 once in 100 times.
+    found = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        noise = rng.standard_normal(response.values.shape) + 1j * rng.standard_normal(response.values.shape)
+        found += len(find_response_peaks(replace(response, values=noise)))
+    assert found <= 2
+
+
+def test_a_single_hit_has_its_peaks_and_a_single_segment_none():
+    response = oscillators(lambda f: np.ones(f.size, dtype=bool))
+    one = replace(as_in_a_file(response), coherence=np.ones(response.coherence.shape))
+    hit = Provenance(averaging="impact", averages=1, effective_averages=1.0)
+    assert len(find_response_peaks(replace(one, provenance=hit))) == 4
+    segment = Provenance(averages=1, effective_averages=1.0)
+    assert find_response_peaks(replace(one, provenance=segment)) == ()

@@ -16,6 +16,7 @@ from chladni.signals.wording import counted
 from chladni.spectral.forms import MOTION_ORDER, convert_form
 from chladni.spectral.peaks import find_response_peaks
 from chladni.spectral.response_advice import half_power_lines
+from chladni.spectral.uncertainty import std_or_scatter
 
 DrivingPointVerdict = Literal["sound", "reversed", "not a driving point", "phase error", "undecided"]
 Floats = NDArray[np.float64]
@@ -266,11 +267,13 @@ def _judged(function: FrequencyResponse, sign: int, false_alarm: float) -> Drivi
 
 def _mobility(function: FrequencyResponse, sign: int, false_alarm: float) -> _Mobility:
     mobility = convert_form(function, "mobility")
-    values, std = mobility.values[0, 0], mobility.std[0, 0]
-    usable = mobility.excited & np.isfinite(values) & np.isfinite(std) & (mobility.frequency_hz > 0)
+    values = mobility.values[0, 0]
+    usable = mobility.excited & np.isfinite(values) & (mobility.frequency_hz > 0)
+    std = std_or_scatter(values[usable], mobility.std[0, 0, usable])
+    usable[usable] = np.isfinite(std)
     frequency_hz = mobility.frequency_hz[usable]
     # A function without any scatter, from a model, is as sure as its rounding.
-    std = np.maximum(std[usable], 1e-12 * np.abs(values[usable]).max(initial=0.0))
+    std = np.maximum(std[np.isfinite(std)], 1e-12 * np.abs(values[usable]).max(initial=0.0))
     # Without error bars of its own a function has peaks, and no line whose sign is sure.
     found = find_response_peaks(function, count=PEAKS_JUDGED) if frequency_hz.size else ()
     peaks = sorted({int(np.argmin(np.abs(frequency_hz - peak.frequency_hz))) for peak in found})
@@ -304,9 +307,11 @@ def _antiresonances(mobility: _Mobility) -> tuple[int, tuple[tuple[float, float]
         low, high = int(peaks[first]), int(peaks[first + 1])
         # h/2 at a mode's own half-power point against h' b'/(2 delta) of its neighbour's flank, twice for safety.
         flanks = 2 * heights[first : first + 2] * widths[first : first + 2] / (high - low)
-        if not flanks[0] < heights[first + 1] or not flanks[1] < heights[first]:
+        if high - low < 2 or not flanks[0] < heights[first + 1] or not flanks[1] < heights[first]:
             continue
-        reactive = mobility.values.imag[low : high + 1] / mobility.std[low : high + 1]
+        # A resonance narrower than a line may lie on either side of its own highest line.
+        between = slice(low + 1, high)
+        reactive = mobility.values.imag[between] / mobility.std[between]
         lowest, highest = int(np.argmin(reactive)), int(np.argmax(reactive))
         if reactive[lowest] > -mobility.sure and reactive[highest] < mobility.sure:
             continue

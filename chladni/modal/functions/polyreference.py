@@ -27,8 +27,8 @@ CLOSER_LOOKS = 3
 
 
 def _generous() -> SelectionRules:
-    # What follows tests each mode against the data, so that few orders are enough for a candidate.
-    return SelectionRules(share=0.15)
+    # What follows tests each mode against the data, so that few orders are enough for a candidate, and any damping.
+    return SelectionRules(share=0.15, damping=(0.0, 0.2))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
