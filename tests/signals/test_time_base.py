@@ -30,7 +30,8 @@ def test_an_ideal_clock_is_told_to_a_billionth(rate_hz: float, samples: int) -> 
     assert base.verdict == "regular"
     assert base.advice == "the clock is sound"
     assert base.jitter_s <= 0.5e-9, "rounding to nanoseconds is uniform within half of one"
-    assert (base.gaps, base.missing, base.duplicates, base.out_of_order, base.jumps) == ((), 0, 0, 0, ())
+    assert (base.gaps, base.missing, base.duplicates, base.out_of_order, base.clock.count) == ((), 0, 0, 0, 0)
+    assert base.longest_stretch_s == pytest.approx(samples / rate_hz)
     assert base.uniform
     assert base.moving
     assert base.samples == samples
@@ -156,14 +157,14 @@ def test_swapped_neighbours_are_counted_and_put_in_order() -> None:
     base = fit_time_base(swapped)
     assert base.rate_hz == 100.0
     assert base.out_of_order == places.size
-    assert base.jumps == ()
+    assert base.clock.count == 0
     assert base.jitter_s < 1e-9
 
 
 def test_one_message_that_comes_very_late_is_no_clock_jump() -> None:
     late = np.delete(np.insert(grid(100.0, 2000), 1501, grid(100.0, 2000)[500]), 500)
     base = fit_time_base(late)
-    assert base.jumps == ()
+    assert base.clock.count == 0
     assert base.out_of_order == 1
     assert base.missing == 0
 
@@ -175,10 +176,12 @@ def test_a_clock_that_is_set_keeps_its_rate(step_s: float) -> None:
     base = fit_time_base(stamps(times + 4000))
     assert base.rate_hz == 100.0
     assert base.out_of_order == 0
-    assert [jump.step_s for jump in base.jumps] == [pytest.approx(step_s + 0.01)]
-    # Backward, a missing sample marks the cut; forward it may as well be a pause, so it's a gap of that length.
-    assert base.gap_count == 1
-    assert base.missing == (360_000 if step_s > 0 else 1)
+    assert base.longest_stretch_s == pytest.approx(25.0)
+    # Backward, a sample is left out and time runs on; forward it may as well be a pause, so it's a gap of that length.
+    back = step_s < 0
+    assert base.clock.sizes_s.tolist() == ([pytest.approx(step_s + 0.01)] if back else [])
+    assert (base.gap_count, base.missing) == ((0, 0) if back else (1, 360_000))
+    np.testing.assert_allclose(base.breaks_s, [[14.99, 15.01 if back else 3615.0]], atol=1e-9)
 
 
 def test_a_clock_that_starts_in_1970_is_a_jump_and_no_gap_of_years() -> None:
@@ -186,10 +189,10 @@ def test_a_clock_that_starts_in_1970_is_a_jump_and_no_gap_of_years() -> None:
     when[:1500] -= START_NS
     base = fit_time_base(when)
     assert base.rate_hz == 100.0
-    assert len(base.jumps) == 1
-    assert base.jumps[0].step_s > 1.6e9
-    assert base.missing == 1
-    assert base.out_of_order == 0
+    assert base.clock.count == 1
+    assert base.clock.sizes_s[0] > 1.6e9
+    assert (base.missing, base.gap_count, base.out_of_order) == (0, 0, 0)
+    np.testing.assert_allclose(base.breaks_s, [[14.99, 15.01]], atol=1e-9)
 
 
 def test_a_first_stamp_of_zero_spoils_nothing() -> None:
@@ -197,7 +200,7 @@ def test_a_first_stamp_of_zero_spoils_nothing() -> None:
     when[0] = 0
     base = fit_time_base(when)
     assert base.rate_hz == 100.0
-    assert len(base.jumps) == 1
+    assert base.clock.count == 1
 
 
 def test_stamps_over_more_than_thirty_years_are_no_clock() -> None:
@@ -495,6 +498,6 @@ def test_advice_names_everything_that_was_put_right() -> None:
     when = np.insert(when, 2000, when[2000])
     advice = fit_time_base(np.delete(when, [400, 401])).advice
     assert advice == (
-        "the clock was set (1 step); 3 samples missing in 2 gaps, averages leave out what touches them; "
+        "the clock was set (1 step); 2 samples missing in 1 gap, averages leave out what touches them; "
         "1 repeated stamp, the first message of each is kept; 1 message late, put in order"
     )

@@ -1,0 +1,199 @@
+"""Stamps that are coarser than the sampling: a clock that ticks every 10 ms beside a sensor of 104 Hz."""
+
+from math import lgamma, log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.clock_check import HELD_UP
+from chladni.signals.clock_fit import Clock, fit_clock
+from chladni.signals.sample_count import SAMPLE, Count, count_by_order, count_in_stretches
+from chladni.signals.stamp_order import Untangled
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+# Stamps of doubles and of whole microseconds are off their tick by as much.
+_ROUNDING_NS = 1000.0
+# Ticks of a smaller share of a period tell each sample's place by themselves.
+_FINE = 0.125
+# Different intervals that ticks may make; more are no ticks.
+_MOST_SIZES = 64
+# Logs in which messages share stamps by accident, beside those in which ticks are near, but not at, the sampling.
+_SHARED_BY_ACCIDENT = 0.01
+# As many logs have lost messages; and ten to one is asked for, since a loss is told and a wrong rate isn't seen.
+_LOST_BY_ACCIDENT = 10.0
+# Hidden losses are looked for in ever shorter stretches, of this many samples at least.
+_SHORTEST = 16
+_ROUNDS = 24
+# Messages of a stretch of which one may be off by more.
+_TRIMMED = 200
+# Jitter that is allowed for, in periods. Once samples are known to be lost, a rate that is a little off would hide
+# more of them in it.
+_SLACKS = (0.5, 0.1)
+# With more samples a tick than this, single ones that are lost hide in it.
+_MANY = 2.0
+
+
+def stamp_quantum(steps: Ints, period_ns: float) -> float:
+    """Find the ticks of a clock: the largest step of which all others are multiples.
+
+    Parameters
+    ----------
+    steps
+        ``[interval]`` nanoseconds between messages, none negative.
+    period_ns
+        Mean interval of the samples.
+
+    Returns
+    -------
+    float
+        Nanoseconds; 0 when there are no ticks, or they are finer than an eighth of a period.
+
+    Examples
+    --------
+    >>> stamp_quantum(np.array([10, 10, 0, 20, 10]) * 1_000_000, 8e6)
+    10000000.0
+    >>> stamp_quantum(np.array([9_999_100, 10_001_300, 10_007_000, 9_990_000]), 1e7)
+    0.0
+    """
+    some = steps[:: max(1, steps.size // SAMPLE)]
+    # Pauses tell nothing more, and the error of the ticks would add up over them.
+    sizes, often = np.unique(some[(some > 0) & (some < _MOST_SIZES * period_ns)], return_counts=True)
+    if not sizes.size or sizes.size > 4 * _MOST_SIZES:
+        return 0.0
+    quantum = 0.0
+    for size in sizes.tolist():
+        quantum = _common(quantum, float(size))
+        if quantum < max(_FINE * period_ns, 20 * _ROUNDING_NS):
+            return 0.0
+    ticks = np.rint(sizes / quantum)
+    quantum = float(np.sum(ticks * sizes * often) / np.sum(ticks * ticks * often))
+    return quantum if np.all(np.abs(sizes - ticks * quantum) <= _ROUNDING_NS) else 0.0
+
+
+def _common(one: float, other: float) -> float:
+    """Greatest common divisor of two lengths that are known to a rounding."""
+    while one > 2 * _ROUNDING_NS:
+        one, other = abs(other - round(other / one) * one), one
+    return other
+
+
+def few_ticks(steps: Ints, quantum_ns: float, period_ns: float) -> bool:
+    """Whether intervals are those of even samples, give or take a tick: else messages come in bursts."""
+    return int(np.count_nonzero(steps > period_ns + 2.5 * quantum_ns)) <= 0.01 * steps.size
+
+
+def count_ticks(
+    tangled: Untangled, quantum_ns: float, period_ns: float, *, proven: bool = True
+) -> Count | None:
+    """Count samples in order, with gaps where an interval is longer than a tick explains.
+
+    The true time of a sample lies within the tick of its stamp. So times over index stay in a strip of one tick in
+    every stretch, half a sample of jitter allowed for. One that is wider has hidden losses, and is cut where its
+    middle steps (the extreme of the cumulative sum), until all are narrow.
+
+    Samples that are lost or doubled, of a clock which ticks as it samples, also make intervals of whole ticks, though
+    not as evenly: k uneven intervals of a stretch all lie as evenly as that by chance in ``k!/k^k`` of all cases, more
+    by the jitter, and each cut is chosen among all samples. On the other side, ticks that are as near to the
+    sampling as that are as rare as uneven intervals are among all. Hidden losses prove nothing where several samples
+    share a tick: more may be hidden.
+
+    Parameters
+    ----------
+    tangled
+        Stamps.
+    quantum_ns, period_ns
+        Ticks and mean interval, see `stamp_quantum`.
+    proven
+        Whether evenness has to prove the ticks.
+
+    Returns
+    -------
+    Count or None
+        None when ticks don't explain the stamps.
+    """
+    ones = np.ones_like(tangled.time_ns)
+    count: Count | None = count_by_order(
+        tangled.time_ns, tangled.steps, ones, period_ns, tangled.clock.message, pause_ns=0.0, quantum_ns=quantum_ns
+    )
+    gaps = count.resumed
+    for slack in _SLACKS:
+        count = _narrowed(tangled, count, gaps, quantum_ns, period_ns, slack)
+        if count is None or count.resumed.size == gaps.size:
+            break
+    if count is None or not proven:
+        return count
+    cuts = count.resumed.size - gaps.size
+    if cuts and quantum_ns > _MANY * period_ns:
+        return None
+    uneven = _uneven(np.rint(tangled.steps / quantum_ns).astype(np.int64), count.resumed)
+    chance = _log_chance(uneven, 1 + slack * period_ns / quantum_ns) + cuts * log(ones.size)
+    chance += log(_LOST_BY_ACCIDENT if tangled.steps.all() else _SHARED_BY_ACCIDENT)
+    return count if chance < log(max(1, uneven.sum()) / ones.size) else None
+
+
+def _narrowed(
+    tangled: Untangled, count: Count, gaps: Ints, quantum_ns: float, period_ns: float, slack: float
+) -> Count | None:
+    """Cut stretches until all are as narrow as a tick and `slack` of a period; None when no cuts make them so."""
+    for _ in range(_ROUNDS):
+        clock = fit_clock(count, period_ns)
+        if clock is None:
+            return None
+        wide = _wide(count, clock, quantum_ns + slack * clock.period_ns)
+        if not wide.size:
+            # Cuts that turn out to leave nothing out were made while the rate was still off, or because of jitter.
+            idle = np.append(False, np.diff(clock.shift) == 0) & ~np.isin(count.resumed, gaps)
+            joined = _cut_at(tangled, count.resumed[~idle])
+            clock = fit_clock(joined, period_ns)
+            fits = clock is not None and not _wide(joined, clock, quantum_ns + slack * clock.period_ns).size
+            return joined if fits or joined.resumed.size == gaps.size else count
+        resumed = np.union1d(count.resumed, _steps_up(count, clock, wide))
+        if resumed.size > gaps.size + tangled.time_ns.size // _SHORTEST:
+            return None
+        count = _cut_at(tangled, resumed)
+    return None
+
+
+def _cut_at(tangled: Untangled, resumed: Ints) -> Count:
+    ones = np.ones_like(tangled.time_ns)
+    return count_in_stretches(tangled.time_ns, ones, resumed, np.searchsorted(resumed, tangled.clock.message))
+
+
+def _uneven(ticks: Ints, resumed: Ints) -> Ints:
+    """Count the intervals of each stretch that aren't as long as most are."""
+    uneven = (ticks != np.argmax(np.bincount(np.minimum(ticks, _MOST_SIZES)))).astype(np.int64)
+    # What lies between stretches is a gap by itself.
+    uneven[resumed[1:] - 1] = 0
+    return np.add.reduceat(uneven, np.minimum(resumed, uneven.size - 1))
+
+
+def _log_chance(uneven: Ints, width: float) -> float:
+    """Logarithm of the chance that events of each stretch all lie in a strip that is `width` of them wide."""
+    return sum(one * (log(width) - log(one)) + lgamma(one + 1) for one in uneven[uneven > 0].tolist())
+
+
+def _wide(count: Count, clock: Clock, allowed_ns: float) -> Ints:
+    """Stretches whose times over index don't fit into a strip, one message in two hundred left out."""
+    first = np.searchsorted(count.stretch, np.arange(count.resumed.size + 1))
+    residual = clock.residual_ns
+    width = np.maximum.reduceat(residual, first[:-1]) - np.minimum.reduceat(residual, first[:-1])
+    for stretch in np.flatnonzero((width > allowed_ns) & (np.diff(first) >= _TRIMMED)):
+        part = residual[first[stretch] : first[stretch + 1]]
+        low, high = np.quantile(part, [0.5 * HELD_UP, 1 - 0.5 * HELD_UP])
+        width[stretch] = high - low
+    return np.flatnonzero(width > allowed_ns)
+
+
+def _steps_up(count: Count, clock: Clock, stretches: Ints) -> Ints:
+    """Messages at which the middle of each stretch steps most."""
+    first = np.searchsorted(count.stretch, np.arange(count.resumed.size + 1))
+    found = []
+    for stretch in stretches.tolist():
+        part = clock.residual_ns[first[stretch] : first[stretch + 1]]
+        sums = np.abs(np.cumsum(part - part.mean()))[:-1]
+        if sums.size:
+            item = first[stretch] + int(np.argmax(sums)) + 1
+            found.append(int(count.place[item]))
+    return np.array(found, dtype=np.int64)
