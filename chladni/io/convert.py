@@ -145,7 +145,8 @@ def _read_log(
     from chladni.io.log import open_log
 
     with _call(open_log, source, options) as log:
-        series = tuple(log.read_groups(channels, start_s=start_s, end_s=end_s))
+        one_clock = sample_rate_hz is not None
+        series = tuple(log.read_groups(channels, start_s=start_s, end_s=end_s, one_clock=one_clock))
         notes = tuple(f"{source}: {loss.what}" for loss in log.damage)
         if sample_rate_hz is None:
             return FileContents(series=series, notes=notes)

@@ -1,6 +1,7 @@
 """A log: its channels, and their samples on a uniform grid."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from types import TracebackType
@@ -10,6 +11,7 @@ from weakref import finalize
 from chladni.io.catalog import Catalog, read_catalog
 from chladni.io.channel_source import ChannelSource
 from chladni.io.gathering import LostMessages
+from chladni.io.log_clocks import LogClocks
 from chladni.io.log_info import LogInfo
 from chladni.io.log_reader import FirstPass, LogReader, SampleGrid, Window, several_grids
 from chladni.io.log_survey import survey
@@ -20,7 +22,7 @@ from chladni.io.setup import Setup, load_setup
 from chladni.io.stamps import StampRequest
 from chladni.io.stream import Stream
 from chladni.signals.channel import Channel
-from chladni.signals.errors import LogError
+from chladni.signals.errors import LogError, SetupError
 from chladni.signals.geometry import Geometry
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
@@ -35,6 +37,7 @@ def open_log(
     setup: Setup | Path | str | None = None,
     stamp: StampRequest = "auto",
     limits: Limits | None = None,
+    sample_rate_hz: float | None = None,
 ) -> "Log":
     """Open an MCAP log; no sample is read yet.
 
@@ -49,6 +52,9 @@ def open_log(
         stamp where messages have one that moves, else the publish time, else the log time.
     limits
         How much memory the log may ask for.
+    sample_rate_hz
+        True rate of the samples, for what the stamps leave open. It changes no rate that they tell; to bring channels
+        to another rate, give one to `Log.read`.
 
     Raises
     ------
@@ -64,8 +70,10 @@ def open_log(
     """
     if isinstance(setup, Path | str):
         setup = load_setup(setup)
+    if sample_rate_hz is not None and not (isfinite(sample_rate_hz) and sample_rate_hz > 0):
+        raise SetupError(f"sample rate {sample_rate_hz} Hz must be finite and positive")
     container = McapContainer.open(path, limits=limits)
-    log = Log(container, setup=setup or Setup(), stamp=stamp)
+    log = Log(container, setup=setup or Setup(), stamp=stamp, sample_rate_hz=sample_rate_hz)
     if setup is not None:
         # A setup file that doesn't fit the log is better told now than after an hour of averaging.
         try:
@@ -82,10 +90,19 @@ class Log:
     Times in seconds count from `start_time_ns`, the earliest sample of all channels.
     """
 
-    def __init__(self, container: McapContainer, *, setup: Setup, stamp: StampRequest) -> None:
+    def __init__(
+        self,
+        container: McapContainer,
+        *,
+        setup: Setup,
+        stamp: StampRequest,
+        sample_rate_hz: float | None = None,
+    ) -> None:
         self._container = container
         self._setup = setup
         self._stamp = stamp
+        self._rate_hz = sample_rate_hz
+        self._clocks: LogClocks | None = None
         self._catalog: Catalog | None = None
         self._lost = LostMessages()
         self._close = finalize(self, container.close)
@@ -151,9 +168,9 @@ class Log:
         ------
         LogError
             When there is no such channel, its samples are events rather than a uniform series, channels don't share
-            a grid and no rate is given, or the window holds no sample.
+            a grid and no rate is given, their clocks were set at different times, or the window holds no sample.
         """
-        groups = self.read_groups(paths, start_s=start_s, end_s=end_s)
+        groups = self.read_groups(paths, start_s=start_s, end_s=end_s, one_clock=True)
         if sample_rate_hz is not None:
             return _on_one_grid(groups, sample_rate_hz, list(dict.fromkeys(paths)) if paths is not None else None)
         if len(groups) > 1:
@@ -162,16 +179,29 @@ class Log:
         return groups[0]
 
     def read_groups(
-        self, paths: Sequence[str] | None = None, *, start_s: float | None = None, end_s: float | None = None
+        self,
+        paths: Sequence[str] | None = None,
+        *,
+        start_s: float | None = None,
+        end_s: float | None = None,
+        one_clock: bool = False,
     ) -> tuple[TimeSeries, ...]:
         """Read channels, one series for each sampling grid; see `read`.
+
+        Parameters
+        ----------
+        paths, start_s, end_s
+            As for `read`.
+        one_clock
+            Whether the series are to be brought together, so that their clocks mustn't have been set at different
+            times.
 
         Raises
         ------
         LogError
             As `read` does, but not when channels have different grids.
         """
-        return self._reader(paths, start_s, end_s).series()
+        return self._reader(paths, start_s, end_s).series(one_clock=one_clock)
 
     def blocks(
         self,
@@ -225,7 +255,7 @@ class Log:
             Rates, jitter, gaps, clipped samples of every channel, events included; damage; findings as sentences.
         """
         if self._info is None:
-            self._info = survey(self._container, self._content, self._lost)
+            self._info = survey(self._container, self._content, self._lost, rate_hz=self._rate_hz)
         return self._info
 
     def close(self) -> None:
@@ -271,13 +301,22 @@ class Log:
     def _reader(self, paths: Sequence[str] | None, start_s: float | None, end_s: float | None) -> LogReader:
         sources = self._sources(paths)
         streams = self._content.streams(sources)
+        if self._clocks is None:
+            listed = self._content.streams(self._content.channels)
+            self._clocks = LogClocks(self._container, listed, self._content.lags_ns)
+        window = self._window(streams, start_s, end_s)
+        known = self._clocks.before(streams, window)
         return LogReader(
             container=self._container,
             streams=streams,
             order=tuple(source.channel for source in sources),
-            window=self._window(streams, start_s, end_s),
+            # Log times may have been set back as well.
+            window=replace(window, log_start_ns=None, log_end_ns=None) if known else window,
             lost=self._lost,
             required=paths is not None,
+            clocks=self._clocks.of,
+            known_clocks=known,
+            rate_hz=self._rate_hz,
         )
 
     def _window(self, streams: Sequence[Stream], start_s: float | None, end_s: float | None) -> Window:

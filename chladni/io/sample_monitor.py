@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.gathering import Gathering
+from chladni.io.placement import digests_of
 from chladni.io.stream import Piece
 from chladni.signals.sensor_quality import SensorFault, sensor_quality
+from chladni.signals.stamp_order import arrival_order
 from chladni.signals.time_series import TimeSeries
 
 STRETCH_VALUES: Final = 1 << 24
@@ -41,6 +43,8 @@ class SampleMonitor:
     def watch(self, piece: Piece) -> None:
         """Take the next piece."""
         self.gathering.add(piece, with_values=False)
+        if piece.counts is None:
+            self.gathering.digests.append(digests_of(piece.values))
         self._waiting.append(piece)
         self._waiting_values += piece.values.size
         if self._waiting_values >= STRETCH_VALUES:
@@ -78,9 +82,9 @@ def _in_order(pieces: list[Piece]) -> NDArray[np.floating[Any]]:
     """Samples in the order of their stamps: a late message between two others would look like a spike."""
     values = np.concatenate([piece.values for piece in pieces], axis=1)
     stamps = np.concatenate([piece.stamps_ns for piece in pieces])
-    if np.all(stamps[1:] >= stamps[:-1]):
+    order = arrival_order(stamps)
+    if order is None:
         return values
-    order = np.argsort(stamps, kind="stable")
     if pieces[0].counts is None:
         return values[:, order]
     counts = np.concatenate([piece.counts for piece in pieces if piece.counts is not None])

@@ -35,6 +35,10 @@ class Piece:
         ``[channel, sample]``, SI, messages one after another; NaN where a message doesn't hold the channel.
     lost
         Messages that are not in it, by the reason why.
+    logged_ns
+        ``[message]``, log times beside stamps of another clock; None when these are the stamps.
+    eras
+        ``[message]``, how often the clock had been set before, where that is known and `stamps_ns` run on; else None.
     """
 
     stamps_ns: NDArray[np.int64]
@@ -42,6 +46,8 @@ class Piece:
     period_s: float
     values: NDArray[np.floating[Any]]
     lost: Mapping[str, int]
+    logged_ns: NDArray[np.int64] | None = None
+    eras: NDArray[np.int32] | None = None
 
     def within(self, start_ns: int | None, end_ns: int | None) -> "Piece":
         """Give the messages that have a sample with ``start_ns <= time < end_ns``."""
@@ -63,7 +69,14 @@ class Piece:
             return self
         samples = keep if self.counts is None else np.repeat(keep, self.counts)
         counts = None if self.counts is None else self.counts[keep]
-        return replace(self, stamps_ns=self.stamps_ns[keep], counts=counts, values=self.values[:, samples])
+        return replace(
+            self,
+            stamps_ns=self.stamps_ns[keep],
+            counts=counts,
+            values=self.values[:, samples],
+            logged_ns=None if self.logged_ns is None else self.logged_ns[keep],
+            eras=None if self.eras is None else self.eras[keep],
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -126,9 +139,11 @@ class Stream:
         unstamped = int(np.count_nonzero(~usable & ~decoded.bad))
         if unstamped:
             lost[f"{self.choice.label} is no time between 1970 and 2116"] = unstamped
+        logged_ns = None if self.choice.kind == "log" else batch.log_time_ns
         if self.layout is not None:
-            return self._blocks(decoded, stamps_ns, usable, lost, with_values=with_values)
-        piece = self._single_samples(decoded, stamps_ns, kept_messages(decoded, self.filters) & usable, lost)
+            return self._blocks(decoded, stamps_ns, logged_ns, usable, lost, with_values=with_values)
+        wanted = kept_messages(decoded, self.filters) & usable
+        piece = self._single_samples(decoded, stamps_ns, logged_ns, wanted, lost)
         return piece if with_values else replace(piece, values=piece.values[:0])
 
     def without(self, messages: int, reason: str) -> Piece:
@@ -151,7 +166,12 @@ class Stream:
         return stamps_ns, usable & plausible(stamps_ns)
 
     def _single_samples(
-        self, decoded: Decoded, stamps_ns: NDArray[np.int64], keep: NDArray[np.bool_], lost: dict[str, int]
+        self,
+        decoded: Decoded,
+        stamps_ns: NDArray[np.int64],
+        logged_ns: NDArray[np.int64] | None,
+        keep: NDArray[np.bool_],
+        lost: dict[str, int],
     ) -> Piece:
         columns = [_column(decoded, source) for source in self.sources]
         somewhere = [present for _, present in columns if present is not None]
@@ -163,13 +183,19 @@ class Stream:
             wanted = numbers if present is None else np.where(present, numbers, np.nan)
             values[row] = wanted if whole else wanted[keep]
         return Piece(
-            stamps_ns=stamps_ns if whole else stamps_ns[keep], counts=None, period_s=0.0, values=values, lost=lost
+            stamps_ns=stamps_ns if whole else stamps_ns[keep],
+            counts=None,
+            period_s=0.0,
+            values=values,
+            lost=lost,
+            logged_ns=logged_ns if whole or logged_ns is None else logged_ns[keep],
         )
 
     def _blocks(
         self,
         decoded: Decoded,
         stamps_ns: NDArray[np.int64],
+        logged_ns: NDArray[np.int64] | None,
         usable: NDArray[np.bool_],
         lost: dict[str, int],
         *,
@@ -197,6 +223,7 @@ class Stream:
             period_s=float(np.median(periods_s)) if periods_s.size else 0.0,
             values=values,
             lost=lost,
+            logged_ns=None if logged_ns is None else logged_ns[keep],
         )
         return piece.kept(plausible(piece.stamps_ns))
 

@@ -64,11 +64,11 @@ def count_messages(tangled: Untangled, *, proven: bool = True) -> Iterator[Count
 
     Ticks that the stamps leave open count only when they needn't be `proven`, and then at the end.
     """
-    time_ns, steps, cuts = tangled.time_ns, tangled.steps, tangled.clock.message
-    if 0 < steps[0] == steps.min() == steps.max():
-        yield Counted(count=count_even(time_ns), item_size=1, period_ns=float(steps[0]), in_order=False)
+    if 0 < tangled.steps[0] == tangled.steps.min() == tangled.steps.max():
+        period_ns = float(tangled.steps[0])
+        yield Counted(count=count_even(tangled.time_ns), item_size=1, period_ns=period_ns, in_order=False)
         return
-    mean_ns = typical_period(time_ns)
+    steps, mean_ns = tangled.within(), typical_period(tangled)
     quantum_ns = stamp_quantum(steps, mean_ns)
     bursts = int(np.count_nonzero(steps < 0.25 * mean_ns)) > _BURST_SHARE * steps.size
     # As many messages for every stamp were most likely sent together.
@@ -85,8 +85,8 @@ def count_messages(tangled: Untangled, *, proven: bool = True) -> Iterator[Count
 def count_stated(tangled: Untangled, period_ns: float) -> tuple[Counted, Clock]:
     """Count messages in order at a period that isn't theirs to tell; gaps are as long as the stamps say."""
     time_ns, steps, cuts = tangled.time_ns, tangled.steps, tangled.clock.message
-    mean_ns = typical_period(time_ns)
-    quantum_ns = stamp_quantum(steps, mean_ns)
+    mean_ns = typical_period(tangled)
+    quantum_ns = stamp_quantum(tangled.within(), mean_ns)
     count = count_by_order(time_ns, steps, np.ones_like(time_ns), mean_ns, cuts, quantum_ns=quantum_ns)
     lost = np.maximum(0, np.rint(steps[count.resumed[1:] - 1] / period_ns).astype(np.int64) - 1)
     # How long a step of the clock took is unknown.

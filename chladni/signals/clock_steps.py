@@ -24,6 +24,8 @@ _LEVEL = 7
 _FEWEST = 3
 # Messages that a network may hold up together; also how long a reader waits for late ones.
 _HELD_UP = 64
+# Messages that show how soon others were logged: more than a queue holds, and few enough for two clocks not to drift.
+_EARLIER = 512
 # Messages between the ends of an interval: enough to average bursts.
 _LAG = 32
 _SAMPLE = 50_000
@@ -78,6 +80,12 @@ class ClockSteps(Value):
         lengths = np.diff(cuts, prepend=0, append=stamps_ns.size)
         return stamps_ns + np.repeat(np.append(0, self.shift_ns), lengths)
 
+    def eras(self, messages: int) -> NDArray[np.int32]:
+        """Count the steps before each of so many messages, in the order of arrival."""
+        return np.repeat(
+            np.arange(self.count + 1, dtype=np.int32), np.diff(self.message, prepend=0, append=messages)
+        )
+
     def moved(self, by_ns: Ints) -> Self:
         """Add to the shift after each step."""
         return type(self)(
@@ -88,8 +96,10 @@ class ClockSteps(Value):
         )
 
 
-def find_clock_steps(stamps_ns: Ints, before: Ints | None = None) -> ClockSteps:
-    """Find where a clock was set back, or leapt ahead by more than eleven days.
+def find_clock_steps(
+    stamps_ns: Ints, before: Ints | None = None, *, logged_ns: Ints | None = None
+) -> ClockSteps:
+    """Find where a clock was set back, leapt ahead by more than eleven days, or was set ahead as another clock tells.
 
     A message that goes back is *late* when the others go on from where they were: the run of messages behind ends in
     a leap, and those in it fill a hole or are three at most. The clock was *set* when those that follow stay behind:
@@ -102,25 +112,64 @@ def find_clock_steps(stamps_ns: Ints, before: Ints | None = None) -> ClockSteps:
         ``[message]`` in the order of arrival.
     before
         ``[message]`` samples that came before each; None when every message is one sample.
+    logged_ns
+        ``[message]`` times of another clock, that of the log; None without.
 
     Returns
     -------
     ClockSteps
         With shifts that leave out one sample or two at each step.
     """
-    back = np.flatnonzero(np.diff(stamps_ns) < 0) + 1
-    ahead = np.flatnonzero(np.diff(stamps_ns) > LEAP_NS) + 1
-    if not back.size and not ahead.size:
+    steps = np.diff(stamps_ns)
+    back = np.flatnonzero(steps < 0) + 1
+    leaps = np.flatnonzero(steps > LEAP_NS) + 1
+    witnessed = logged_ns is not None and logged_ns.size > 2 * _LEVEL and bool(np.all(np.diff(logged_ns) >= 0))
+    if not back.size and not leaps.size and not witnessed:
         return ClockSteps()
-    forward = np.diff(stamps_ns)[:: max(1, stamps_ns.size // _SAMPLE)]
-    forward = forward[forward > 0]
-    # Means of many intervals are right for bursts and ticks, single ones where stretches are short.
-    single_ns = float(np.median(forward)) if forward.size and before is None else inf
-    period_ns = min(sample_period(stamps_ns, before, back), single_ns)
+    period_ns = sample_period(stamps_ns, before, back)
     if before is None:
+        forward = steps[:: max(1, stamps_ns.size // _SAMPLE)]
+        forward = forward[forward > 0]
+        # Means of many intervals are right for bursts and ticks, single ones where stretches are short.
+        period_ns = min(period_ns, float(np.median(forward)) if forward.size else inf)
         before = np.arange(stamps_ns.size)
-    message = _set_at(stamps_ns, before, np.sort(np.concatenate((_unclear(stamps_ns, back, period_ns), ahead))), period_ns)
+    message = _none()
+    if back.size or leaps.size:
+        candidates = np.sort(np.concatenate((_unclear(stamps_ns, back, period_ns), leaps)))
+        message = _set_at(stamps_ns, before, candidates, period_ns)
+    if witnessed and logged_ns is not None:
+        message = np.union1d(message, _set_ahead(stamps_ns, logged_ns, message, period_ns))
     return _running_on(stamps_ns, message, round(2 * period_ns))
+
+
+def _set_ahead(stamps_ns: Ints, logged_ns: Ints, set_back: Ints, period_ns: float) -> Ints:
+    """Messages before which the clock was set ahead, by the times at which they were logged."""
+    steps, logged = np.diff(stamps_ns), np.diff(logged_ns)
+    some = steps[:: max(1, steps.size // _SAMPLE)]
+    going = some > 0
+    # A simulator's time may run faster or slower than the log's.
+    pace = float(np.median(logged[:: max(1, steps.size // _SAMPLE)][going] / some[going])) if going.any() else 0.0
+    if pace <= 0:
+        return _none()
+    ahead = np.flatnonzero((steps > 2.5 * period_ns) & (logged < 0.5 * pace * steps)) + 1
+    found = [
+        place
+        for place in ahead[:MAX_CANDIDATES].tolist()
+        if _logged_sooner(stamps_ns, logged_ns, set_back, place, pace)
+    ]
+    return np.array(found, dtype=np.int64)
+
+
+def _logged_sooner(stamps_ns: Ints, logged_ns: Ints, set_back: Ints, place: int, pace: float) -> bool:
+    start = int(set_back[np.searchsorted(set_back, place, "right") - 1]) if set_back.size and set_back[0] <= place else 0
+    later = set_back[np.searchsorted(set_back, place, "right") :]
+    first, end = max(start, place - _EARLIER), min(int(later[0]) if later.size else stamps_ns.size, place + _LEVEL)
+    if place - first < _FEWEST or end - place < _FEWEST:
+        return False
+    part = slice(first, end)
+    lag = (logged_ns[part] - logged_ns[place]) - pace * (stamps_ns[part] - stamps_ns[place])
+    step = pace * float(stamps_ns[place] - stamps_ns[place - 1])
+    return float(np.median(lag[place - first :])) < float(lag[: place - first].min()) - 0.5 * step
 
 
 def sample_period(stamps_ns: Ints, before: Ints | None, back: Ints) -> float:

@@ -140,7 +140,7 @@ def with_nominal(base: "TimeBase", nominal_hz: float) -> "TimeBase":
     if abs(off) <= max(3 * base.rate_std_hz, 1e-9 * nominal_hz):
         return replace(base, rate_hz=nominal_hz, snapped=True)
     told = f"a rate of {nominal_hz:.9g} Hz is stated, but the stamps advance at {base.rate_hz:.9g} Hz, which is used"
-    return replace(base, advice=f"{told}; {base.advice}")
+    return replace(base, advice=told)
 
 
 def with_round_rate(base: "TimeBase") -> "TimeBase":

@@ -38,6 +38,10 @@ class Untangled:
     out_of_order: int
     duplicates: int
 
+    def within(self) -> NDArray[np.int64]:
+        """Steps from message to message, without those across a step of the clock."""
+        return np.delete(self.steps, self.clock.message - 1) if self.clock.count else self.steps
+
     def moved(self, by_ns: NDArray[np.int64]) -> Self:
         """Move the stretch after each step of the clock, by so much in all."""
         if not by_ns.any():
@@ -58,7 +62,11 @@ def require_stamps(stamps_ns: NDArray[Any]) -> NDArray[np.int64]:
 
 
 def untangle(
-    stamps_ns: NDArray[np.int64], before: NDArray[np.int64] | None = None, known: ClockSteps | None = None
+    stamps_ns: NDArray[np.int64],
+    before: NDArray[np.int64] | None = None,
+    *,
+    known: ClockSteps | None = None,
+    logged_ns: NDArray[np.int64] | None = None,
 ) -> Untangled:
     """Undo steps of the clock, sort what came late, and count both.
 
@@ -70,15 +78,20 @@ def untangle(
         ``[message]`` samples that came before each; None when every message is one sample.
     known
         Steps of the clock; None looks for them.
+    logged_ns
+        As for `find_clock_steps`.
     """
-    # The usual log passes here without a copy.
     steps = np.diff(stamps_ns)
-    if not (known is not None and known.count) and (steps.size == 0 or (steps.min() >= 0 and steps.max() < LEAP_NS)):
+    rises = steps.size == 0 or (steps.min() >= 0 and steps.max() < LEAP_NS)
+    if known is None and (not rises or logged_ns is not None):
+        known = find_clock_steps(stamps_ns, before, logged_ns=logged_ns)
+    # The usual log passes here without a copy.
+    if rises and (known is None or not known.count):
         repeats = steps.size - int(np.count_nonzero(steps))
         return Untangled(
             time_ns=stamps_ns, steps=steps, order=None, clock=ClockSteps(), out_of_order=0, duplicates=repeats
         )
-    clock = find_clock_steps(stamps_ns, before) if known is None else known
+    clock = ClockSteps() if known is None else known
     time_ns = clock.run_on(stamps_ns)
     late = int(np.count_nonzero(np.diff(time_ns) < 0))
     order = np.argsort(time_ns, kind="stable") if late else None
@@ -99,6 +112,6 @@ def arrival_order(stamps_ns: NDArray[np.int64]) -> NDArray[np.int64] | None:
     return untangle(stamps_ns).order if stamps_ns.size else None
 
 
-def typical_period(time_ns: NDArray[np.int64]) -> float:
+def typical_period(tangled: Untangled) -> float:
     """Median over the log of the mean interval of 32 messages: right for bursts, at least 1 ns."""
-    return sample_period(time_ns, None, np.empty(0, dtype=np.int64))
+    return sample_period(tangled.time_ns, None, tangled.clock.message)

@@ -141,7 +141,11 @@ class TimeBase(Value):
 
 
 def fit_time_base(
-    stamps_ns: NDArray[Any], *, nominal_rate_hz: float | None = None, clock: ClockSteps | None = None
+    stamps_ns: NDArray[Any],
+    *,
+    nominal_rate_hz: float | None = None,
+    clock: ClockSteps | None = None,
+    logged_ns: NDArray[np.int64] | None = None,
 ) -> TimeBase:
     """Fit rate and start to message stamps, ignoring jitter, ticks, gaps, disorder, steps of the clock and bursts.
 
@@ -159,6 +163,8 @@ def fit_time_base(
         three sigma; otherwise the fitted rate stands, and `advice` says so.
     clock
         Where the clock was set, when that is known from elsewhere; None looks for it.
+    logged_ns
+        ``[message]`` times of another clock, which tells steps ahead from pauses; None without.
 
     Raises
     ------
@@ -172,7 +178,7 @@ def fit_time_base(
     """
     stamps = require_stamps(stamps_ns)
     _require_rate(nominal_rate_hz)
-    return _fit(stamps, None, nominal_rate_hz, clock)
+    return _fit(stamps, None, nominal_rate_hz, clock, logged_ns)
 
 
 def fit_batch_time_base(
@@ -181,6 +187,7 @@ def fit_batch_time_base(
     *,
     nominal_rate_hz: float | None = None,
     clock: ClockSteps | None = None,
+    logged_ns: NDArray[np.int64] | None = None,
 ) -> TimeBase:
     """Fit the sample rate to batch messages.
 
@@ -193,7 +200,7 @@ def fit_batch_time_base(
     nominal_rate_hz
         Rate that the messages, or a user, state. Taken when the stamps agree with it within three sigma or when there
         are too few to judge; otherwise the fitted rate stands, and `advice` says so.
-    clock
+    clock, logged_ns
         As for `fit_time_base`.
     """
     stamps = require_stamps(stamps_ns)
@@ -201,7 +208,7 @@ def fit_batch_time_base(
     if sizes.shape != stamps.shape or sizes.dtype.kind not in "iu" or (sizes.size and sizes.min() < 1):
         raise EstimateError("counts must be one whole number of samples, at least 1, for each stamp")
     _require_rate(nominal_rate_hz)
-    return _fit(stamps, sizes.astype(np.int64, copy=False), nominal_rate_hz, clock)
+    return _fit(stamps, sizes.astype(np.int64, copy=False), nominal_rate_hz, clock, logged_ns)
 
 
 def _require_rate(rate_hz: float | None) -> None:
@@ -210,12 +217,17 @@ def _require_rate(rate_hz: float | None) -> None:
 
 
 def _fit(
-    stamps: NDArray[np.int64], counts: NDArray[np.int64] | None, nominal_hz: float | None, known: ClockSteps | None
+    stamps: NDArray[np.int64],
+    counts: NDArray[np.int64] | None,
+    nominal_hz: float | None,
+    known: ClockSteps | None,
+    logged_ns: NDArray[np.int64] | None,
 ) -> TimeBase:
     samples = stamps.size if counts is None else int(counts.sum())
     if stamps.size < 2:
         return _short(stamps, samples, nominal_hz)
-    tangled = untangle(stamps, None if counts is None else np.cumsum(counts) - counts, known)
+    before = None if counts is None else np.cumsum(counts) - counts
+    tangled = untangle(stamps, before, known=known, logged_ns=logged_ns)
     # A single 1 stands for all messages: ten million ones would only cost memory.
     sizes = np.ones(1, dtype=np.int64) if counts is None else counts
     if counts is not None and tangled.order is not None:
@@ -236,7 +248,8 @@ def _fit(
         return replace(base, samples=samples)
     if still:
         return _still(stamps, samples)
-    return _irregular(tangled, samples, ticking(tangled.steps) or (uneven(tangled.steps) if tried else EVENTS))
+    told = ticking(tangled.within()) or (uneven(tangled.within()) if tried else EVENTS)
+    return _irregular(tangled, samples, told)
 
 
 def _best(
@@ -270,12 +283,11 @@ def _on_grid(
         tangled, counted, clock = _running_on(tangled, counted, clock)
     base = _measured(tangled, counted, clock)
     base = _in_order(base, tangled, sizes, counted, clock) if counted.in_order else _by_phase(base, tangled)
-    base = replace(base, advice=advice(base))
     # Over a long gap even a small step of the rate would move what comes after.
     nearest = with_round_rate(base) if nominal_hz is None else with_nominal(base, nominal_hz)
     for one in (nearest, base):
         if grid_agrees(one, tangled.time_ns, sizes):
-            return one
+            return replace(one, advice="; ".join(filter(None, (one.advice, advice(one)))))
     return None
 
 
