@@ -36,6 +36,7 @@ def frf(
     end: options.End = None,
     setup: options.Setup = None,
     stamp: options.Stamp = "auto",
+    rate: options.Rate = None,
     json: options.Json = None,
     figures: options.Figures = None,
     report: options.Report = None,
@@ -51,7 +52,7 @@ def frf(
 
     require_places(reads=[log, setup], writes={"--json": json, "--report": report}, folders={"--figures": figures})
     out = Output(json)
-    with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name) as progress:
+    with open_log(log, setup=setup, stamp=stamp, sample_rate_hz=rate) as opened, out.progress(log.name) as progress:
         found = transfer(
             opened,
             reference,

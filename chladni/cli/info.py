@@ -14,6 +14,7 @@ def info(
     *,
     setup: options.Setup = None,
     stamp: options.Stamp = "auto",
+    rate: options.Rate = None,
     json: options.Json = None,
 ) -> None:
     """Channels, rates, duration, time base and damage of a log."""
@@ -21,7 +22,7 @@ def info(
 
     require_places(reads=[log, setup], writes={"--json": json})
     out = Output(json)
-    with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name):
+    with open_log(log, setup=setup, stamp=stamp, sample_rate_hz=rate) as opened, out.progress(log.name):
         found = opened.info()
     content = found.to_json()
     out.table(

@@ -58,6 +58,7 @@ def modes(
     end: options.End = None,
     setup: options.Setup = None,
     stamp: options.Stamp = "auto",
+    rate: options.Rate = None,
     json: options.Json = None,
     uff: Annotated[
         Path | None,
@@ -96,7 +97,7 @@ def modes(
         )  # fmt: skip
         found = universal_file_study(log, method=method, wanted=wanted)
     else:
-        with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name) as progress:
+        with open_log(log, setup=setup, stamp=stamp, sample_rate_hz=rate) as opened, out.progress(log.name) as progress:
             found = modal_study(
                 opened,
                 references=reference,

@@ -14,6 +14,10 @@ Stamp = Annotated[
     Literal["auto", "header", "publish", "log"],
     typer.Option(help="Which time of a message is its sample time: its own stamp, when published, when logged."),
 ]
+Rate = Annotated[
+    float | None,
+    typer.Option(metavar="HZ", help="True rate of the samples, for what the stamps leave open.", show_default=False),
+]
 Json = Annotated[
     str | None,
     typer.Option(

@@ -24,6 +24,7 @@ def psd(
     end: options.End = None,
     setup: options.Setup = None,
     stamp: options.Stamp = "auto",
+    rate: options.Rate = None,
     json: options.Json = None,
     figures: options.Figures = None,
     report: options.Report = None,
@@ -39,7 +40,7 @@ def psd(
 
     require_places(reads=[log, setup], writes={"--json": json, "--report": report}, folders={"--figures": figures})
     out = Output(json)
-    with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name) as progress:
+    with open_log(log, setup=setup, stamp=stamp, sample_rate_hz=rate) as opened, out.progress(log.name) as progress:
         found = densities(
             opened,
             channels=channel,

@@ -28,6 +28,7 @@ def view(
     end: options.End = None,
     setup: options.Setup = None,
     stamp: options.Stamp = "auto",
+    rate: options.Rate = None,
     save: Annotated[
         Path | None,
         typer.Option(metavar="OUT.rrd", help="Write a recording instead of opening a viewer.", show_default=False),
@@ -53,7 +54,7 @@ def view(
     out = Output(json)
     studies = []
     for log in logs:
-        with open_log(log, setup=setup, stamp=stamp) as opened, out.progress(log.name) as progress:
+        with open_log(log, setup=setup, stamp=stamp, sample_rate_hz=rate) as opened, out.progress(log.name) as progress:
             studies.append(
                 analyse(
                     opened,

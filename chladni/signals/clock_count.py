@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.clock_fit import Clock
-from chladni.signals.coarse_stamps import count_ticks, few_ticks, stamp_quantum
+from chladni.signals.coarse_stamps import count_by_ticks, count_ticks, few_ticks, phase_period, stamp_quantum
 from chladni.signals.sample_count import SAMPLE, Count, count_by_order, count_by_phase, count_even, order_fano
 from chladni.signals.stamp_order import Untangled, typical_period
 from chladni.signals.time_series import NS_PER_S
@@ -41,6 +41,8 @@ class Counted:
         First message of each burst; None when messages weren't pooled.
     quantum_ns
         Ticks of the stamps, where they are coarser than an eighth of a period; else 0.
+    period_std_ns
+        One sigma of it at least, where it isn't the count's to tell.
     proven
         False for a way that the stamps allow but don't ask for.
     """
@@ -51,6 +53,7 @@ class Counted:
     in_order: bool
     burst_starts: NDArray[np.int64] | None = None
     quantum_ns: float = 0.0
+    period_std_ns: float = 0.0
     proven: bool = True
 
     @property
@@ -83,15 +86,24 @@ def count_messages(tangled: Untangled, *, proven: bool = True) -> Iterator[Count
 
 
 def count_stated(tangled: Untangled, period_ns: float) -> tuple[Counted, Clock]:
-    """Count messages in order at a period that isn't theirs to tell; gaps are as long as the stamps say."""
+    """Count messages at a period that their stamps don't tell.
+
+    Ticks tell where each sample lies, give or take one; other stamps that tell no period are late by any time, so
+    there samples are counted in order, with gaps as long as the stamps say.
+    """
     time_ns, steps, cuts = tangled.time_ns, tangled.steps, tangled.clock.message
-    mean_ns = typical_period(tangled)
+    mean_ns, ones = typical_period(tangled), np.ones_like(time_ns)
     quantum_ns = stamp_quantum(tangled.within(), mean_ns)
-    count = count_by_order(time_ns, steps, np.ones_like(time_ns), mean_ns, cuts, quantum_ns=quantum_ns)
-    lost = np.maximum(0, np.rint(steps[count.resumed[1:] - 1] / period_ns).astype(np.int64) - 1)
-    # How long a step of the clock took is unknown.
-    lost[count.cuts - 1] = 1
-    shift = np.append(0, np.cumsum(lost))
+    in_order = not (quantum_ns and few_ticks(steps, quantum_ns, mean_ns))
+    if in_order:
+        count = count_by_order(time_ns, steps, ones, mean_ns, cuts)
+        lost = np.maximum(0, np.rint(steps[count.resumed[1:] - 1] / period_ns).astype(np.int64) - 1)
+        # How long a step of the clock took is unknown.
+        lost[count.cuts - 1] = 1
+        shift = np.append(0, np.cumsum(lost))
+    else:
+        count = count_by_ticks(tangled, period_ns)
+        shift = np.rint(count.time[count.resumed] / period_ns).astype(np.int64)
     residual = count.time - (count.index + shift[count.stretch]) * period_ns
     start_ns = float(np.median(residual))
     clock = Clock(
@@ -101,7 +113,8 @@ def count_stated(tangled: Untangled, period_ns: float) -> tuple[Counted, Clock]:
         shift=shift,
         residual_ns=residual - start_ns,
     )
-    return Counted(count=count, item_size=1, period_ns=period_ns, in_order=True), clock
+    counted = Counted(count=count, item_size=1, period_ns=period_ns, in_order=in_order, quantum_ns=quantum_ns)
+    return counted, clock
 
 
 def count_batches(tangled: Untangled, sizes: NDArray[np.int64], nominal_hz: float | None) -> Counted:
@@ -145,7 +158,20 @@ def _count_untold(
 def _count_ticks(
     tangled: Untangled, mean_ns: float, quantum_ns: float, *, proven: bool = True
 ) -> Iterator[Counted]:
-    count = count_ticks(tangled, quantum_ns, mean_ns, proven=proven)
+    """Count in order where ticks explain all intervals; where samples are lost, by phase, else as order shows them."""
+    count, hidden = count_ticks(tangled, quantum_ns, mean_ns, proven=proven)
+    told = phase_period(tangled, quantum_ns, mean_ns) if count is None or hidden else None
+    if told is not None:
+        period_ns, std_ns = told
+        by_phase = count_by_ticks(tangled, period_ns)
+        yield Counted(
+            count=by_phase,
+            item_size=1,
+            period_ns=period_ns,
+            period_std_ns=std_ns,
+            in_order=False,
+            quantum_ns=quantum_ns,
+        )
     if count is not None:
         yield Counted(
             count=count, item_size=1, period_ns=mean_ns, in_order=True, quantum_ns=quantum_ns, proven=proven

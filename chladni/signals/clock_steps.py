@@ -24,6 +24,8 @@ _LEVEL = 7
 _FEWEST = 3
 # Messages that a network may hold up together; also how long a reader waits for late ones.
 _HELD_UP = 64
+# Periods that a step ahead takes at least: one message may be lost, and stamps scatter.
+_AHEAD = 2.5
 # Messages that show how soon others were logged: more than a queue holds, and few enough for two clocks not to drift.
 _EARLIER = 512
 # Messages between the ends of an interval: enough to average bursts.
@@ -123,15 +125,16 @@ def find_clock_steps(
     steps = np.diff(stamps_ns)
     back = np.flatnonzero(steps < 0) + 1
     leaps = np.flatnonzero(steps > LEAP_NS) + 1
-    witnessed = logged_ns is not None and logged_ns.size > 2 * _LEVEL and bool(np.all(np.diff(logged_ns) >= 0))
+    some = steps[:: max(1, steps.size // _SAMPLE)]
+    # The usual log is done here; steps of the clock are longer than any interval is.
+    usual_ns = float(np.median(some[some > 0])) if some.any() else 0.0
+    witnessed = logged_ns is not None and usual_ns > 0 and int(steps.max()) > _AHEAD * usual_ns
     if not back.size and not leaps.size and not witnessed:
         return ClockSteps()
     period_ns = sample_period(stamps_ns, before, back)
     if before is None:
-        forward = steps[:: max(1, stamps_ns.size // _SAMPLE)]
-        forward = forward[forward > 0]
         # Means of many intervals are right for bursts and ticks, single ones where stretches are short.
-        period_ns = min(period_ns, float(np.median(forward)) if forward.size else inf)
+        period_ns = min(period_ns, usual_ns or inf)
         before = np.arange(stamps_ns.size)
     message = _none()
     if back.size or leaps.size:
@@ -145,13 +148,16 @@ def find_clock_steps(
 def _set_ahead(stamps_ns: Ints, logged_ns: Ints, set_back: Ints, period_ns: float) -> Ints:
     """Messages before which the clock was set ahead, by the times at which they were logged."""
     steps, logged = np.diff(stamps_ns), np.diff(logged_ns)
+    # A clock that was set itself tells nothing of another.
+    if logged.min() < 0:
+        return _none()
     some = steps[:: max(1, steps.size // _SAMPLE)]
     going = some > 0
     # A simulator's time may run faster or slower than the log's.
     pace = float(np.median(logged[:: max(1, steps.size // _SAMPLE)][going] / some[going])) if going.any() else 0.0
     if pace <= 0:
         return _none()
-    ahead = np.flatnonzero((steps > 2.5 * period_ns) & (logged < 0.5 * pace * steps)) + 1
+    ahead = np.flatnonzero((steps > _AHEAD * period_ns) & (logged < 0.5 * pace * steps)) + 1
     found = [
         place
         for place in ahead[:MAX_CANDIDATES].tolist()

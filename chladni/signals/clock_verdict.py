@@ -43,7 +43,7 @@ def advice(base: "TimeBase") -> str:
             "shifts those after it; log the sensor's own stamps"
         )
     if base.verdict == "stated":
-        return "; ".join((f"samples are counted in order at {base.rate_hz:.9g} Hz, as stated", *_remarks(base)))
+        return "; ".join((f"samples are counted at {base.rate_hz:.9g} Hz, as stated", *_remarks(base)))
     if base.verdict == "coarse":
         told = f"{base.rate_hz:.9g} Hz, give or take {base.rate_std_hz:.2g} Hz" if isfinite(base.rate_std_hz) else ""
         told = (

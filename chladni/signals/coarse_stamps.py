@@ -1,13 +1,21 @@
 """Stamps that are coarser than the sampling: a clock that ticks every 10 ms beside a sensor of 104 Hz."""
 
-from math import lgamma, log
+from dataclasses import replace
+from math import floor, lgamma, log
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.clock_check import HELD_UP
 from chladni.signals.clock_fit import Clock, fit_clock
-from chladni.signals.sample_count import SAMPLE, Count, count_by_order, count_in_stretches
+from chladni.signals.sample_count import (
+    SAMPLE,
+    WINDOW,
+    Count,
+    count_by_order,
+    count_in_stretches,
+    refined_period,
+)
 from chladni.signals.stamp_order import Untangled
 
 Ints = NDArray[np.int64]
@@ -23,9 +31,15 @@ _MOST_SIZES = 64
 _SHARED_BY_ACCIDENT = 0.01
 # As many logs have lost messages; and ten to one is asked for, since a loss is told and a wrong rate isn't seen.
 _LOST_BY_ACCIDENT = 10.0
-# Hidden losses are looked for in ever shorter stretches, of this many samples at least.
-_SHORTEST = 16
+# Hidden losses are looked for in ever shorter stretches, and found as long as these are this long in the mean; in
+# shorter ones more of them hide.
+_SHORTEST, _LONG_ENOUGH = 64, 256
 _ROUNDS = 24
+# Share of samples that may be lost for the phases of the rest to be looked for.
+_MOST_LOST = 0.1
+# Power of phases, relative to random ones, that a hundred trials on eight blocks don't reach by chance: its logarithm
+# is -8 (r - 1 - ln r), Chernoff's bound of the sum of eight exponentials.
+_PHASES_AGREE = 4.0
 # Messages of a stretch of which one may be off by more.
 _TRIMMED = 200
 # Jitter that is allowed for, in periods. Once samples are known to be lost, a rate that is a little off would hide
@@ -86,7 +100,7 @@ def few_ticks(steps: Ints, quantum_ns: float, period_ns: float) -> bool:
 
 def count_ticks(
     tangled: Untangled, quantum_ns: float, period_ns: float, *, proven: bool = True
-) -> Count | None:
+) -> tuple[Count | None, int]:
     """Count samples in order, with gaps where an interval is longer than a tick explains.
 
     The true time of a sample lies within the tick of its stamp. So times over index stay in a strip of one tick in
@@ -110,27 +124,70 @@ def count_ticks(
 
     Returns
     -------
-    Count or None
-        None when ticks don't explain the stamps.
+    Count or None, int
+        None when ticks don't explain the stamps; and how many hidden losses were found.
     """
     ones = np.ones_like(tangled.time_ns)
-    count: Count | None = count_by_order(
+    count = count_by_order(
         tangled.time_ns, tangled.steps, ones, period_ns, tangled.clock.message, pause_ns=0.0, quantum_ns=quantum_ns
     )
     gaps = count.resumed
-    for slack in _SLACKS:
-        count = _narrowed(tangled, count, gaps, quantum_ns, period_ns, slack)
-        if count is None or count.resumed.size == gaps.size:
+    slack: float | None = None
+    for allowed in _SLACKS:
+        narrowed = _narrowed(tangled, count, gaps, quantum_ns, period_ns, allowed)
+        if narrowed is None:
             break
-    if count is None or not proven:
-        return count
+        count, slack = narrowed, allowed
+        if count.resumed.size == gaps.size:
+            break
+    if slack is None:
+        return None, 0
     cuts = count.resumed.size - gaps.size
-    if cuts and quantum_ns > _MANY * period_ns:
-        return None
+    if not proven:
+        return count, cuts
+    if cuts > ones.size // _LONG_ENOUGH or (cuts and quantum_ns > _MANY * period_ns):
+        return None, cuts
     uneven = _uneven(np.rint(tangled.steps / quantum_ns).astype(np.int64), count.resumed)
     chance = _log_chance(uneven, 1 + slack * period_ns / quantum_ns) + cuts * log(ones.size)
     chance += log(_LOST_BY_ACCIDENT if tangled.steps.all() else _SHARED_BY_ACCIDENT)
-    return count if chance < log(max(1, uneven.sum()) / ones.size) else None
+    return (count if chance < log(max(1, uneven.sum()) / ones.size) else None), cuts
+
+
+def phase_period(tangled: Untangled, quantum_ns: float, period_ns: float) -> tuple[float, float] | None:
+    """Find the period that stamps tell by their phase although they are coarse and some samples are lost.
+
+    A true time is uniform within its tick, so phases of the period agree by ``sinc(q/T)``, whatever is lost. They
+    always agree for the ticks themselves, and with a period also for its mirror image at half of their frequency: near
+    a whole or a half number of samples a tick nothing can be told.
+
+    Returns
+    -------
+    period_ns, period_std_ns : float
+        Or None where phases don't tell.
+    """
+    low, high = (1 - _MOST_LOST) * period_ns, 1.02 * period_ns
+    if floor(2.06 * quantum_ns / low) > floor(1.94 * quantum_ns / high):
+        return None
+    centre, reach, block = 0.5 * (low + high), (high - low) / (high + low), WINDOW
+    period, power = refined_period(tangled.time_ns, centre, reach, tangled.clock.message, block=block)
+    if power < _PHASES_AGREE:
+        return None
+    while block < tangled.time_ns.size:
+        reach, block = 0.5 / block, 4 * block
+        period, _ = refined_period(tangled.time_ns, period, reach, tangled.clock.message, block=block)
+    # The best of trials a quarter of a turn apart over a block is uniform within half of that.
+    return period, period / (8 * min(block, tangled.time_ns.size) * 3**0.5)
+
+
+def count_by_ticks(tangled: Untangled, period_ns: float) -> Count:
+    """Give each stamp the index nearest to it, at a known period, in stretches that begin where the clock was set."""
+    time_ns, resumed = tangled.time_ns, np.append(0, tangled.clock.message)
+    count = count_in_stretches(time_ns, np.ones_like(time_ns), resumed, np.arange(1, resumed.size))
+    begun = (time_ns[resumed] - time_ns[0]).astype(np.float64)
+    index = np.rint((count.time - begun[count.stretch]) / period_ns).astype(np.int64)
+    last = np.append(resumed[1:], time_ns.size) - 1
+    ends = np.rint((time_ns[last] - time_ns[0] - begun) / period_ns).astype(np.int64) + 1
+    return replace(count, index=index, firsts=np.zeros_like(resumed), ends=ends)
 
 
 def _narrowed(
@@ -145,10 +202,7 @@ def _narrowed(
         if not wide.size:
             # Cuts that turn out to leave nothing out were made while the rate was still off, or because of jitter.
             idle = np.append(False, np.diff(clock.shift) == 0) & ~np.isin(count.resumed, gaps)
-            joined = _cut_at(tangled, count.resumed[~idle])
-            clock = fit_clock(joined, period_ns)
-            fits = clock is not None and not _wide(joined, clock, quantum_ns + slack * clock.period_ns).size
-            return joined if fits or joined.resumed.size == gaps.size else count
+            return _cut_at(tangled, count.resumed[~idle])
         resumed = np.union1d(count.resumed, _steps_up(count, clock, wide))
         if resumed.size > gaps.size + tangled.time_ns.size // _SHORTEST:
             return None

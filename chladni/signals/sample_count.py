@@ -116,12 +116,12 @@ def count_by_phase(time_ns: Ints, steps: Ints, period_ns: float, cuts: Ints) -> 
     # Reach: the median's own error, a bias of missing samples under scatter, and rounding to whole nanoseconds.
     reach = min(0.08, 4 * scatter / np.sqrt(time_ns.size) + 0.1 * scatter + 2 / period_ns)
     # Short blocks first: their broad maximum takes few trials to find, and leaves few for the long ones.
-    period = _refined_period(time_ns, period_ns, reach, cuts, block=WINDOW)
-    period = _refined_period(time_ns, period, min(reach, 0.5 / WINDOW), cuts, block=_BLOCK)
+    period, _ = refined_period(time_ns, period_ns, reach, cuts, block=WINDOW)
+    period, _ = refined_period(time_ns, period, min(reach, 0.5 / WINDOW), cuts, block=_BLOCK)
     every = -(-time_ns.size // MAX_ITEMS)
     if every > 1:
         # Windows of every n-th stamp are longer, so the period must be known better.
-        period = _refined_period(
+        period, _ = refined_period(
             time_ns[::every], period, min(reach, 0.5 / _BLOCK), -(-cuts // every), block=_BLOCK, every=every
         )
     resumed, cut_stretches = _resumed(steps > (3.5 if scatter < _TIGHT else 64) * period, cuts)
@@ -240,17 +240,37 @@ def robust_std(values: Floats) -> float:
     return float(1.4826 * np.median(np.abs(part - np.median(part)))) if part.size else 0.0
 
 
-def _refined_period(
+def refined_period(
     time_ns: Ints, period_ns: float, reach: float, cuts: Ints, *, block: int, every: int = 1
-) -> float:
-    """Find the period whose phases agree best over blocks of stamps, one every n periods, near the guess."""
+) -> tuple[float, float]:
+    """Find the period whose phases agree best over blocks of stamps, one every n periods, near the guess.
+
+    Parameters
+    ----------
+    time_ns
+        ``[message]`` rising.
+    period_ns, reach
+        Guess, and how far off it may be, relative.
+    cuts
+        Messages before which the clock was set.
+    block
+        Stamps of a block; eight of them, spread over the log, are looked at.
+    every
+        Periods from stamp to stamp.
+
+    Returns
+    -------
+    period_ns, power : float
+        And the power of its phases, relative to that of random ones.
+    """
     block = min(block, time_ns.size)
     step = 1 / (4 * block * every)
     half = int(np.ceil(reach / step))
     trial = 1 + np.arange(-half, half + 1) * step
     # Powers of separate blocks add, so that a gap or a step between blocks does no harm.
     power = np.zeros(trial.size)
-    for start in np.unique(np.linspace(0, time_ns.size - block, 8).astype(np.int64)):
+    starts = np.unique(np.linspace(0, time_ns.size - block, 8).astype(np.int64))
+    for start in starts:
         part = time_ns[start : start + block]
         # A clock that was set has another phase, so its stretches have powers of their own, too.
         inside = cuts[(cuts > start) & (cuts < start + block)] - start
@@ -258,7 +278,8 @@ def _refined_period(
             _phasors(np.outer((part - part[0]) / period_ns, trial)), np.unique(np.append(0, inside)), axis=0
         )
         power += (np.abs(sums) ** 2).sum(axis=0)
-    return period_ns / float(trial[np.argmax(power)])
+    best = int(np.argmax(power))
+    return period_ns / float(trial[best]), float(power[best]) / (starts.size * block)
 
 
 def _phasors(cycles: Floats) -> NDArray[np.complex64]:

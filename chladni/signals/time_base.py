@@ -278,6 +278,7 @@ def _on_grid(
     clock = fit_clock(counted.count, counted.period_ns)
     if clock is None:
         return None
+    clock = replace(clock, period_std_ns=max(clock.period_std_ns, counted.period_std_ns))
     # Steps of the clock that are known from elsewhere are as long as is known there.
     if tangled.clock.count and not settled:
         tangled, counted, clock = _running_on(tangled, counted, clock)
@@ -292,11 +293,16 @@ def _on_grid(
 
 
 def _stated(tangled: Untangled, rate_hz: float) -> TimeBase:
-    """Count in order at a rate that the stamps don't tell."""
+    """Count at a rate that the stamps don't tell."""
     counted, clock = count_stated(tangled, NS_PER_S / rate_hz)
+    if tangled.clock.count:
+        tangled, counted, clock = _running_on(tangled, counted, clock)
     # How the stamps depart from a rate that they don't keep is no wander.
     base = replace(_measured(tangled, counted, clock), verdict="stated", snapped=True, rate_std_hz=inf, wander_s=0.0)
-    base = _in_order(base, tangled, np.ones(1, dtype=np.int64), counted, clock)
+    if counted.in_order:
+        base = _in_order(base, tangled, np.ones(1, dtype=np.int64), counted, clock)
+    else:
+        base = _by_phase(base, tangled)
     return replace(base, rate_hz=rate_hz, advice=advice(base))
 
 
@@ -335,7 +341,7 @@ def _measured(tangled: Untangled, counted: Counted, clock: Clock) -> TimeBase:
         wander_s=wander.span_ns / NS_PER_S,
         quantum_s=counted.quantum_ns / NS_PER_S,
         clock=tangled.clock,
-        duplicates=0 if counted.in_order else tangled.duplicates,
+        duplicates=0 if counted.in_order or counted.quantum_ns else tangled.duplicates,
         out_of_order=tangled.out_of_order,
         burst_size=counted.burst_size,
         knots_ns=knots_ns,
