@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from chladni.signals.clock_fit import Clock
 from chladni.signals.coarse_stamps import count_by_ticks, count_ticks, few_ticks, phase_period, stamp_quantum
 from chladni.signals.sample_count import SAMPLE, Count, count_by_order, count_by_phase, count_even, order_fano
+from chladni.signals.stamp_gaps import LEAP_S
 from chladni.signals.stamp_order import Untangled, typical_period
 from chladni.signals.time_series import NS_PER_S
 
@@ -179,6 +180,7 @@ def _count_ticks(
 
 
 def _count_bursts(tangled: Untangled, mean_ns: float, quantum_ns: float) -> Iterator[Counted]:
+    """Count samples that are held back and sent together, a minute of them at most: records lie further apart."""
     starts = np.union1d(np.append(0, np.flatnonzero(tangled.steps >= 0.5 * mean_ns) + 1), tangled.clock.message)
     if starts.size < 2:
         return
@@ -186,6 +188,8 @@ def _count_bursts(tangled: Untangled, mean_ns: float, quantum_ns: float) -> Iter
     first = tangled.time_ns[starts]
     between = np.diff(first)
     period_ns = float(np.median(between / sizes[:-1]))
+    if np.median(between) > LEAP_S * NS_PER_S:
+        return
     cuts = np.searchsorted(starts, tangled.clock.message)
     # The last sample of a burst is there by its tick: a whole one more without any is a gap.
     ticks_ns = max(0.0, quantum_ns - 0.5 * period_ns)

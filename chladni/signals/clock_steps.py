@@ -126,8 +126,9 @@ def find_clock_steps(
     back = np.flatnonzero(steps < 0) + 1
     leaps = np.flatnonzero(steps > LEAP_NS) + 1
     some = steps[:: max(1, steps.size // _SAMPLE)]
+    some = some[some > 0]
     # The usual log is done here; steps of the clock are longer than any interval is.
-    usual_ns = float(np.median(some[some > 0])) if some.any() else 0.0
+    usual_ns = float(np.median(some)) if some.size else 0.0
     witnessed = logged_ns is not None and usual_ns > 0 and int(steps.max()) > _AHEAD * usual_ns
     if not back.size and not leaps.size and not witnessed:
         return ClockSteps()

@@ -9,8 +9,8 @@ from chladni.signals.time_series import NS_PER_S
 
 #: Gaps that are listed one by one, the longest chosen; all are counted.
 MAX_GAPS = 1000
-# A pause of more than a minute that outlasts all that was recorded.
-_LEAP_S = 60.0
+#: A pause longer than this, and than all that was recorded, may as well be a clock that was set.
+LEAP_S = 60.0
 
 Spans = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def list_gaps(spans_s: Spans, recorded_s: float) -> Gaps:
     return Gaps(
         longest=tuple((start, end) for start, end in spans_s[chosen].tolist()),
         count=lengths.size,
-        leaps=spans_s[lengths > max(_LEAP_S, recorded_s)],
+        leaps=spans_s[lengths > max(LEAP_S, recorded_s)],
     )
 
 

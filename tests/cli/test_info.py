@@ -4,7 +4,7 @@ import pytest
 
 CHANNEL_KEYS = {
     "name", "unit", "encoding", "rate_hz", "samples", "stamp", "stamp_reason", "jitter_s",
-    "gaps", "duplicates", "clipped",
+    "gaps", "duplicates", "clipped", "rate_std_hz", "breaks", "longest_stretch_s",
 }  # fmt: skip
 
 
