@@ -276,8 +276,8 @@ def _running_on(stamps_ns: Ints, message: Ints, gap_ns: int) -> ClockSteps:
         return ClockSteps()
     starts = np.append(0, message)
     lowest, highest = np.minimum.reduceat(stamps_ns, starts), np.maximum.reduceat(stamps_ns, starts)
-    # Shifts of garbage could add up to more than 64 bits hold.
-    if np.abs(np.cumsum((highest[:-1] - lowest[1:]).astype(np.float64))).max() > 4 * LONGEST_NS:
+    # Stretches of garbage, one after another, could be longer than 64 bits hold.
+    if float(np.sum((highest - lowest).astype(np.float64)) + gap_ns * message.size) > 4 * LONGEST_NS:
         return ClockSteps()
     return ClockSteps(
         message=message,

@@ -40,6 +40,8 @@ _MOST_LOST = 0.1
 # Power of phases, relative to random ones, that a hundred trials on eight blocks don't reach by chance: its logarithm
 # is -8 (r - 1 - ln r), Chernoff's bound of the sum of eight exponentials.
 _PHASES_AGREE = 4.0
+# Messages whose mean tells where a stretch lies, within a quarter of a tick.
+_SURE = 8
 # Messages of a stretch of which one may be off by more.
 _TRIMMED = 200
 # Jitter that is allowed for, in periods. Once samples are known to be lost, a rate that is a little off would hide
@@ -128,8 +130,10 @@ def count_ticks(
         None when ticks don't explain the stamps; and how many hidden losses were found.
     """
     ones = np.ones_like(tangled.time_ns)
+    # Jitter makes an interval longer, too; what is lost in so short a gap is found as hidden losses are.
+    explained_ns, set_at = quantum_ns + _SLACKS[0] * period_ns, tangled.clock.message
     count = count_by_order(
-        tangled.time_ns, tangled.steps, ones, period_ns, tangled.clock.message, pause_ns=0.0, quantum_ns=quantum_ns
+        tangled.time_ns, tangled.steps, ones, period_ns, set_at, pause_ns=0.0, quantum_ns=explained_ns
     )
     gaps = count.resumed
     slack: float | None = None
@@ -147,7 +151,12 @@ def count_ticks(
         return count, cuts
     if cuts > ones.size // _LONG_ENOUGH or (cuts and quantum_ns > _MANY * period_ns):
         return None, cuts
-    uneven = _uneven(np.rint(tangled.steps / quantum_ns).astype(np.int64), count.resumed)
+    ticks = np.rint(tangled.steps / quantum_ns).astype(np.int64)
+    usual = int(np.argmax(np.bincount(np.minimum(ticks, _MOST_SIZES))))
+    if usual > 1 and np.count_nonzero(ticks % usual) > 0.5 * np.count_nonzero(ticks != usual):
+        # Nothing that was lost or doubled makes an interval of three ticks where two are usual.
+        return count, cuts
+    uneven = _uneven(ticks, usual, count.resumed)
     chance = _log_chance(uneven, 1 + slack * period_ns / quantum_ns) + cuts * log(ones.size)
     chance += log(_LOST_BY_ACCIDENT if tangled.steps.all() else _SHARED_BY_ACCIDENT)
     return (count if chance < log(max(1, uneven.sum()) / ones.size) else None), cuts
@@ -215,9 +224,9 @@ def _cut_at(tangled: Untangled, resumed: Ints) -> Count:
     return count_in_stretches(tangled.time_ns, ones, resumed, np.searchsorted(resumed, tangled.clock.message))
 
 
-def _uneven(ticks: Ints, resumed: Ints) -> Ints:
+def _uneven(ticks: Ints, usual: int, resumed: Ints) -> Ints:
     """Count the intervals of each stretch that aren't as long as most are."""
-    uneven = (ticks != np.argmax(np.bincount(np.minimum(ticks, _MOST_SIZES)))).astype(np.int64)
+    uneven = (ticks != usual).astype(np.int64)
     # What lies between stretches is a gap by itself.
     uneven[resumed[1:] - 1] = 0
     return np.add.reduceat(uneven, np.minimum(resumed, uneven.size - 1))
@@ -229,7 +238,10 @@ def _log_chance(uneven: Ints, width: float) -> float:
 
 
 def _wide(count: Count, clock: Clock, allowed_ns: float) -> Ints:
-    """Stretches whose times over index don't fit into a strip, one message in two hundred left out."""
+    """Stretches whose times over index don't fit into a strip, one message in two hundred left out.
+
+    Short ones are let be: where they lie against the others is too uncertain to find a sample lost.
+    """
     first = np.searchsorted(count.stretch, np.arange(count.resumed.size + 1))
     residual = clock.residual_ns
     width = np.maximum.reduceat(residual, first[:-1]) - np.minimum.reduceat(residual, first[:-1])
@@ -237,7 +249,7 @@ def _wide(count: Count, clock: Clock, allowed_ns: float) -> Ints:
         part = residual[first[stretch] : first[stretch + 1]]
         low, high = np.quantile(part, [0.5 * HELD_UP, 1 - 0.5 * HELD_UP])
         width[stretch] = high - low
-    return np.flatnonzero(width > allowed_ns)
+    return np.flatnonzero((width > allowed_ns) & (np.diff(first) > 4 * _SURE))
 
 
 def _steps_up(count: Count, clock: Clock, stretches: Ints) -> Ints:
@@ -246,8 +258,6 @@ def _steps_up(count: Count, clock: Clock, stretches: Ints) -> Ints:
     found = []
     for stretch in stretches.tolist():
         part = clock.residual_ns[first[stretch] : first[stretch + 1]]
-        sums = np.abs(np.cumsum(part - part.mean()))[:-1]
-        if sums.size:
-            item = first[stretch] + int(np.argmax(sums)) + 1
-            found.append(int(count.place[item]))
+        sums = np.abs(np.cumsum(part - part.mean()))[_SURE - 1 : -_SURE]
+        found.append(int(count.place[first[stretch] + _SURE + int(np.argmax(sums))]))
     return np.array(found, dtype=np.int64)

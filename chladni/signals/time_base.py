@@ -233,7 +233,7 @@ def _fit(
     if counts is not None and tangled.order is not None:
         sizes = counts[tangled.order]
     still, tried, base = _stands_still(tangled.steps), False, None
-    if not still and tangled.time_ns[-1] - tangled.time_ns[0] > LONGEST_NS:
+    if not still and int(tangled.time_ns[-1]) - int(tangled.time_ns[0]) > LONGEST_NS:
         return _irregular(tangled, samples, EVENTS)
     if not still:
         ways = (
