@@ -1,13 +1,13 @@
 """Choice of how to count samples: by phase, in order, by ticks, by bursts or by batches."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.clock_fit import Clock
+from chladni.signals.clock_fit import Clock, fit_clock
 from chladni.signals.coarse_stamps import count_by_ticks, count_ticks, few_ticks, phase_period, stamp_quantum
 from chladni.signals.sample_count import SAMPLE, Count, count_by_order, count_by_phase, count_even, order_fano
 from chladni.signals.stamp_gaps import LEAP_S
@@ -46,6 +46,8 @@ class Counted:
         One sigma of it at least, where it isn't the count's to tell.
     proven
         False for a way that the stamps allow but don't ask for.
+    unless_hz
+        Rate if no sample was lost or doubled, where that can't be told; else 0.
     """
 
     count: Count
@@ -56,6 +58,7 @@ class Counted:
     quantum_ns: float = 0.0
     period_std_ns: float = 0.0
     proven: bool = True
+    unless_hz: float = 0.0
 
     @property
     def burst_size(self) -> int:
@@ -63,10 +66,10 @@ class Counted:
         return 1 if self.burst_starts is None else round(self.item_size)
 
 
-def count_messages(tangled: Untangled, *, proven: bool = True) -> Iterator[Counted]:
+def count_messages(tangled: Untangled) -> Iterator[Counted]:
     """Count messages of one sample each in the ways that may tell their places, the likeliest first.
 
-    Ticks that the stamps leave open count only when they needn't be `proven`, and then at the end.
+    A way that the stamps allow but don't ask for comes last; it's for rates that someone states.
     """
     if 0 < tangled.steps[0] == tangled.steps.min() == tangled.steps.max():
         period_ns = float(tangled.steps[0])
@@ -76,14 +79,32 @@ def count_messages(tangled: Untangled, *, proven: bool = True) -> Iterator[Count
     quantum_ns = stamp_quantum(steps, mean_ns)
     bursts = int(np.count_nonzero(steps < 0.25 * mean_ns)) > _BURST_SHARE * steps.size
     # As many messages for every stamp were most likely sent together.
-    ticking = quantum_ns > 0 and few_ticks(steps, quantum_ns, mean_ns) and not (bursts and _equally_shared(steps))
-    if ticking:
-        yield from _count_ticks(tangled, mean_ns, quantum_ns)
-    # Places told by a stamp that others have too would be those of the ticks.
-    if not ticking or int(np.count_nonzero(steps == 0)) <= _SHARED * steps.size:
+    if not quantum_ns or not few_ticks(steps, quantum_ns, mean_ns) or (bursts and _equally_shared(steps)):
         yield from _count_untold(tangled, mean_ns, quantum_ns, bursts=bursts)
-    if ticking and not proven:
-        yield from _count_ticks(tangled, mean_ns, quantum_ns, proven=False)
+        return
+    ticks = count_ticks(tangled, quantum_ns, mean_ns)
+    if ticks is None or ticks.hidden:
+        yield from _count_phases_of_ticks(tangled, mean_ns, quantum_ns)
+    in_order = None
+    if ticks is not None:
+        in_order = Counted(
+            count=ticks.count,
+            item_size=1,
+            period_ns=mean_ns,
+            in_order=True,
+            quantum_ns=quantum_ns,
+            proven=ticks.proven,
+        )
+    if in_order is not None and in_order.proven:
+        yield in_order
+    # Places told by a stamp that others have too would be those of the ticks.
+    if int(np.count_nonzero(steps == 0)) <= _SHARED * steps.size:
+        unless = None if ticks is None or ticks.hidden or ticks.proven else fit_clock(ticks.count, mean_ns)
+        unless_hz = 0.0 if unless is None else NS_PER_S / unless.period_ns
+        for counted in _count_untold(tangled, mean_ns, quantum_ns, bursts=bursts):
+            yield replace(counted, unless_hz=unless_hz)
+    if in_order is not None and not in_order.proven:
+        yield in_order
 
 
 def count_stated(tangled: Untangled, period_ns: float) -> tuple[Counted, Clock]:
@@ -156,26 +177,16 @@ def _count_untold(
         yield Counted(count=by_order, item_size=1, period_ns=mean_ns, in_order=True)
 
 
-def _count_ticks(
-    tangled: Untangled, mean_ns: float, quantum_ns: float, *, proven: bool = True
-) -> Iterator[Counted]:
-    """Count in order where ticks explain all intervals; where samples are lost, by phase, else as order shows them."""
-    count, hidden = count_ticks(tangled, quantum_ns, mean_ns, proven=proven)
-    told = phase_period(tangled, quantum_ns, mean_ns) if count is None or hidden else None
+def _count_phases_of_ticks(tangled: Untangled, mean_ns: float, quantum_ns: float) -> Iterator[Counted]:
+    told = phase_period(tangled, quantum_ns, mean_ns)
     if told is not None:
-        period_ns, std_ns = told
-        by_phase = count_by_ticks(tangled, period_ns)
         yield Counted(
-            count=by_phase,
+            count=count_by_ticks(tangled, told[0]),
             item_size=1,
-            period_ns=period_ns,
-            period_std_ns=std_ns,
+            period_ns=told[0],
+            period_std_ns=told[1],
             in_order=False,
             quantum_ns=quantum_ns,
-        )
-    if count is not None:
-        yield Counted(
-            count=count, item_size=1, period_ns=mean_ns, in_order=True, quantum_ns=quantum_ns, proven=proven
         )
 
 

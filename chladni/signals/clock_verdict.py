@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 JITTERED = 0.05
 # Ticks, relative to the period, above which a sample's stamp may be nearer to another one's place.
 COARSE = 0.5
+# As many gaps at chance intervals don't look like the ticks of a coarse clock.
+_FEW = 2
 #: Advice where nothing speaks for a clock.
 EVENTS = "messages come at events and not on a grid; a spectrum needs uniform samples"
 
@@ -33,8 +35,11 @@ def verdict(counted: Counted, *, relative_jitter: float) -> "Verdict":
     return "jittered" if relative_jitter > JITTERED else "regular"
 
 
-def advice(base: "TimeBase") -> str:
-    """Give one sentence on what the verdict means for spectra."""
+def advice(base: "TimeBase", unless_hz: float = 0.0) -> str:
+    """Give one sentence on what the verdict means for spectra; `unless_hz` is the rate if no sample was lost."""
+    if unless_hz and (base.gap_count > _FEW or base.duplicates > _FEW):
+        told = f"unless none was lost or repeated, and the rate is {unless_hz:.5g} Hz: then state it (--rate HZ)"
+        return f"{advice(base)}, {told}"
     if base.verdict == "short":
         return f"{counted(base.samples, 'sample')}: too few to judge the clock by; state the rate if you know it"
     if base.verdict == "bursts":

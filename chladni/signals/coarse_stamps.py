@@ -1,6 +1,6 @@
 """Stamps that are coarser than the sampling: a clock that ticks every 10 ms beside a sensor of 104 Hz."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import floor, lgamma, log
 
 import numpy as np
@@ -100,9 +100,26 @@ def few_ticks(steps: Ints, quantum_ns: float, period_ns: float) -> bool:
     return int(np.count_nonzero(steps > period_ns + 2.5 * quantum_ns)) <= 0.01 * steps.size
 
 
-def count_ticks(
-    tangled: Untangled, quantum_ns: float, period_ns: float, *, proven: bool = True
-) -> tuple[Count | None, int]:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TickCount:
+    """Samples counted in order, as ticks explain their stamps.
+
+    Attributes
+    ----------
+    count
+        With gaps where an interval is longer than a tick explains.
+    hidden
+        Losses that no interval shows.
+    proven
+        Whether intervals are too even for another explanation.
+    """
+
+    count: Count
+    hidden: int
+    proven: bool
+
+
+def count_ticks(tangled: Untangled, quantum_ns: float, period_ns: float) -> TickCount | None:
     """Count samples in order, with gaps where an interval is longer than a tick explains.
 
     The true time of a sample lies within the tick of its stamp. So times over index stay in a strip of one tick in
@@ -121,17 +138,15 @@ def count_ticks(
         Stamps.
     quantum_ns, period_ns
         Ticks and mean interval, see `stamp_quantum`.
-    proven
-        Whether evenness has to prove the ticks.
 
     Returns
     -------
-    Count or None, int
-        None when ticks don't explain the stamps; and how many hidden losses were found.
+    TickCount or None
+        None when ticks don't explain the stamps.
     """
-    ones = np.ones_like(tangled.time_ns)
     # Jitter makes an interval longer, too; what is lost in so short a gap is found as hidden losses are.
     explained_ns, set_at = quantum_ns + _SLACKS[0] * period_ns, tangled.clock.message
+    ones = np.ones_like(tangled.time_ns)
     count = count_by_order(
         tangled.time_ns, tangled.steps, ones, period_ns, set_at, pause_ns=0.0, quantum_ns=explained_ns
     )
@@ -145,21 +160,27 @@ def count_ticks(
         if count.resumed.size == gaps.size:
             break
     if slack is None:
-        return None, 0
-    cuts = count.resumed.size - gaps.size
-    if not proven:
-        return count, cuts
-    if cuts > ones.size // _LONG_ENOUGH or (cuts and quantum_ns > _MANY * period_ns):
-        return None, cuts
-    ticks = np.rint(tangled.steps / quantum_ns).astype(np.int64)
+        return None
+    hidden = count.resumed.size - gaps.size
+    told = hidden <= ones.size // _LONG_ENOUGH and (not hidden or quantum_ns <= _MANY * period_ns)
+    proven = told and _proven(tangled.steps, count, quantum_ns, 1 + slack * period_ns / quantum_ns, hidden)
+    return TickCount(count=count, hidden=hidden, proven=proven)
+
+
+def _proven(steps: Ints, count: Count, quantum_ns: float, width: float, hidden: int) -> bool:
+    """Whether uneven intervals are so even that ticks explain them rather than accidents; see `count_ticks`."""
+    ticks = np.rint(steps / quantum_ns).astype(np.int64)
     usual = int(np.argmax(np.bincount(np.minimum(ticks, _MOST_SIZES))))
-    if usual > 1 and np.count_nonzero(ticks % usual) > 0.5 * np.count_nonzero(ticks != usual):
+    uneven = (ticks != usual).astype(np.int64)
+    # What lies between stretches is a gap by itself.
+    uneven[count.resumed[1:] - 1] = 0
+    if usual > 1 and 2 * np.count_nonzero(uneven[ticks % usual != 0]) > uneven.sum():
         # Nothing that was lost or doubled makes an interval of three ticks where two are usual.
-        return count, cuts
-    uneven = _uneven(ticks, usual, count.resumed)
-    chance = _log_chance(uneven, 1 + slack * period_ns / quantum_ns) + cuts * log(ones.size)
-    chance += log(_LOST_BY_ACCIDENT if tangled.steps.all() else _SHARED_BY_ACCIDENT)
-    return (count if chance < log(max(1, uneven.sum()) / ones.size) else None), cuts
+        return True
+    of_stretch = np.add.reduceat(uneven, np.minimum(count.resumed, uneven.size - 1))
+    chance = sum(one * (log(width) - log(one)) + lgamma(one + 1) for one in of_stretch[of_stretch > 0].tolist())
+    accidents = _LOST_BY_ACCIDENT if steps.all() else _SHARED_BY_ACCIDENT
+    return chance + hidden * log(steps.size) + log(accidents) < log(max(1, uneven.sum()) / steps.size)
 
 
 def phase_period(tangled: Untangled, quantum_ns: float, period_ns: float) -> tuple[float, float] | None:
@@ -222,19 +243,6 @@ def _narrowed(
 def _cut_at(tangled: Untangled, resumed: Ints) -> Count:
     ones = np.ones_like(tangled.time_ns)
     return count_in_stretches(tangled.time_ns, ones, resumed, np.searchsorted(resumed, tangled.clock.message))
-
-
-def _uneven(ticks: Ints, usual: int, resumed: Ints) -> Ints:
-    """Count the intervals of each stretch that aren't as long as most are."""
-    uneven = (ticks != usual).astype(np.int64)
-    # What lies between stretches is a gap by itself.
-    uneven[resumed[1:] - 1] = 0
-    return np.add.reduceat(uneven, np.minimum(resumed, uneven.size - 1))
-
-
-def _log_chance(uneven: Ints, width: float) -> float:
-    """Logarithm of the chance that events of each stretch all lie in a strip that is `width` of them wide."""
-    return sum(one * (log(width) - log(one)) + lgamma(one + 1) for one in uneven[uneven > 0].tolist())
 
 
 def _wide(count: Count, clock: Clock, allowed_ns: float) -> Ints:

@@ -236,11 +236,7 @@ def _fit(
     if not still and int(tangled.time_ns[-1]) - int(tangled.time_ns[0]) > LONGEST_NS:
         return _irregular(tangled, samples, EVENTS)
     if not still:
-        ways = (
-            count_messages(tangled, proven=nominal_hz is None)
-            if counts is None
-            else iter((count_batches(tangled, sizes, nominal_hz),))
-        )
+        ways = count_messages(tangled) if counts is None else iter((count_batches(tangled, sizes, nominal_hz),))
         base, tried = _best(tangled, sizes, ways, nominal_hz, settled=known is not None)
     if base is None and nominal_hz is not None and counts is None:
         base = _stated(tangled, nominal_hz)
@@ -265,7 +261,7 @@ def _best(
     for counted in ways:
         tried = True
         base = _on_grid(tangled, sizes, counted, nominal_hz, settled=settled)
-        if base is not None and nominal_hz in (None, base.rate_hz):
+        if base is not None and (counted.proven if nominal_hz is None else base.rate_hz == nominal_hz):
             return base, True
         first = first or (base if counted.proven else None)
     return first, tried
@@ -288,7 +284,7 @@ def _on_grid(
     nearest = with_round_rate(base) if nominal_hz is None else with_nominal(base, nominal_hz)
     for one in (nearest, base):
         if grid_agrees(one, tangled.time_ns, sizes):
-            return replace(one, advice="; ".join(filter(None, (one.advice, advice(one)))))
+            return replace(one, advice="; ".join(filter(None, (one.advice, advice(one, counted.unless_hz)))))
     return None
 
 
