@@ -1,8 +1,8 @@
 """Put clock histories with known truth through ``chladni info`` and ``psd``: right, refused or silently wrong.
 
-Right is a rate within a thousandth (or three of the sigmas that are told), the number of breaks, the longest stretch to
-a sample, and a highest peak within half a line of the tone with no other one above a hundredth of it. Refused is an
-answer that says so; what it tells to do is done, and must lead to what is right.
+Right is a rate within a thousandth (or three of the sigmas that are told), the number of breaks, the longest
+stretch to a sample, and a highest peak within half a line of the tone with no other above a hundredth of it.
+Refused is an answer that says so; what it tells to do is done, and must lead to what is right.
 """
 
 import argparse
@@ -81,8 +81,13 @@ def judge_info(history: History, answer: Answer) -> tuple[str, str]:
         wrong.append("rate")
     if breaks is None or len(breaks) != history.breaks:
         wrong.append("breaks")
-    if history.longest_s and history.longest_s > 0 and (
-        longest_s is None or abs(longest_s - history.longest_s) > 1.01 / history.rate_hz + RATE * history.longest_s
+    if (
+        history.longest_s
+        and history.longest_s > 0
+        and (
+            longest_s is None
+            or abs(longest_s - history.longest_s) > 1.01 / history.rate_hz + RATE * history.longest_s
+        )
     ):
         wrong.append("stretch")
     return ("wrong " + "+".join(wrong) if wrong else "right"), told
@@ -126,7 +131,12 @@ def judge(history: History, folder: Path) -> Judged:
         return Judged(history, "refused without a remedy", info_told, psd_told)
     again = run("psd", str(path), *options)
     psd_is, psd_told = judge_psd(history, again)
-    for_info = [one for pair in zip(options[::2], options[1::2], strict=True) if pair[0] in ("--rate", "--stamp") for one in pair]
+    for_info = [
+        one
+        for pair in zip(options[::2], options[1::2], strict=True)
+        if pair[0] in ("--rate", "--stamp")
+        for one in pair
+    ]
     info_is, info_told = judge_info(history, run("info", str(path), *for_info)) if for_info else (info_is, info_told)
     works = psd_is == "right" and info_is in ("right", "refused")
     verdict = f"refused; {' '.join(options)} {'works' if works else f'FAILS (info {info_is}, psd {psd_is})'}"

@@ -1,13 +1,13 @@
 """Clock histories with known truth: what stamps look like that a log really holds, with a tone in noise."""
 
-from collections.abc import Callable, Iterator, Sequence
+import struct
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-import struct
 
 import numpy as np
-from numpy.typing import NDArray
 from mcap.writer import CompressionType, Writer
+from numpy.typing import NDArray
 
 START_NS = 1_700_000_000_000_000_000
 OWN_STAMPS = b"""std_msgs/Header header

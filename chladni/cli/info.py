@@ -36,7 +36,12 @@ def info(
 
 def _row(channel: dict[str, Any]) -> list[str]:
     # One column for what is mostly nothing: three of zeros took the room that names need.
-    trouble = {"breaks": len(channel["breaks"]), "gaps": len(channel["gaps"]), "duplicates": channel["duplicates"], "clipped": channel["clipped"]}
+    trouble = {
+        "breaks": len(channel["breaks"]),
+        "gaps": len(channel["gaps"]),
+        "duplicates": channel["duplicates"],
+        "clipped": channel["clipped"],
+    }
     return [
         channel["name"],
         unit(channel["unit"]),

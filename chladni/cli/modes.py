@@ -97,7 +97,10 @@ def modes(
         )  # fmt: skip
         found = universal_file_study(log, method=method, wanted=wanted)
     else:
-        with open_log(log, setup=setup, stamp=stamp, sample_rate_hz=rate) as opened, out.progress(log.name) as progress:
+        with (
+            open_log(log, setup=setup, stamp=stamp, sample_rate_hz=rate) as opened,
+            out.progress(log.name) as progress,
+        ):
             found = modal_study(
                 opened,
                 references=reference,

@@ -54,7 +54,10 @@ def view(
     out = Output(json)
     studies = []
     for log in logs:
-        with open_log(log, setup=setup, stamp=stamp, sample_rate_hz=rate) as opened, out.progress(log.name) as progress:
+        with (
+            open_log(log, setup=setup, stamp=stamp, sample_rate_hz=rate) as opened,
+            out.progress(log.name) as progress,
+        ):
             studies.append(
                 analyse(
                     opened,

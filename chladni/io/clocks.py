@@ -58,9 +58,7 @@ class Stamped:
     def extents(self) -> NDArray[np.int64]:
         """``[2, stretch]`` earliest and latest stamp between two steps of the clock."""
         starts = np.append(0, self.base.clock.message)
-        return np.stack(
-            (np.minimum.reduceat(self.stamps_ns, starts), np.maximum.reduceat(self.stamps_ns, starts))
-        )
+        return np.stack((np.minimum.reduceat(self.stamps_ns, starts), np.maximum.reduceat(self.stamps_ns, starts)))
 
 
 def clocks_of(streams: Sequence[Stamped]) -> dict[Key, StreamClock]:
@@ -104,7 +102,9 @@ def _same_clock(one: Stamped, other: Stamped) -> bool:
     (low, high), (other_low, other_high) = one.extents(), other.extents()
     overlap = np.minimum(high, other_high) - np.maximum(low, other_low)
     # A slow stream has its first and last messages up to a period from those of a fast one.
-    reach = 2 * max(_period_ns(one.base), _period_ns(other.base)) + 0.5 * np.minimum(high - low, other_high - other_low)
+    reach = 2 * max(_period_ns(one.base), _period_ns(other.base)) + 0.5 * np.minimum(
+        high - low, other_high - other_low
+    )
     apart = np.maximum(np.abs(low - other_low), np.abs(high - other_high))
     return bool(np.all((overlap >= 0) & (apart <= reach)))
 

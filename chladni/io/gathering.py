@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.clocks import Key, Stamped, StreamClock, clocks_of
+from chladni.io.clocks import Key, Stamped, StreamClock
 from chladni.io.placement import Placement, StatedRate, digests_of, place_stream
 from chladni.io.stream import Piece, Stream
 from chladni.signals.clock_steps import ClockSteps
@@ -148,9 +148,7 @@ def place_all(
     known = clocks([one.stamped(placement.time_base) for one, placement in both])
     # Before any clock was set, all of them may be one.
     set_here = {known[one.stream.key].number for one in gatherings if one.set_before and one.stream.key in known}
-    return tuple(
-        _on_clock(one, placement, known.get(one.stream.key), set_here, stated) for one, placement in both
-    )
+    return tuple(_on_clock(one, placement, known.get(one.stream.key), set_here, stated) for one, placement in both)
 
 
 def _on_clock(

@@ -73,7 +73,7 @@ def _channels(
 
 
 def _duration_s(content: Catalog, placements: Sequence[Placement]) -> float:
-    """From the log's start to the end of its last sample, without what lies in the breaks of the stream that has it."""
+    """From the log's start to the end of its last sample, without the breaks of the stream that has it."""
     return max((_lasts_s(one, content.start_ns) for one in placements), default=0.0)
 
 

@@ -184,9 +184,10 @@ class _Seen:
     def kept(self, kept: NDArray[np.bool_]) -> "_Seen":
         """Give the same for some of the messages."""
         clock, logged_ns = self.clock, self.logged_ns
+        number = np.cumsum(kept, dtype=np.int64)
         return replace(
             self,
-            clock=None if clock is None else replace(clock, message=np.cumsum(kept)[clock.message - 1]),
+            clock=None if clock is None else replace(clock, message=number[clock.message - 1]),
             logged_ns=None if logged_ns is None else logged_ns[kept],
         )
 
@@ -246,7 +247,7 @@ class Repeats:
 
 
 def repeats_of(stamps_ns: NDArray[np.int64], digests: NDArray[np.uint64]) -> Repeats | None:
-    """Tell messages that were sent or stored twice from samples that were stamped by a coarse clock; None: no such."""
+    """Tell messages that were sent or stored twice from samples stamped by a coarse clock; None for no such."""
     tangled = untangle(stamps_ns)
     order = np.arange(stamps_ns.size) if tangled.order is None else tangled.order
     same = tangled.steps == 0

@@ -154,9 +154,7 @@ def count_batches(tangled: Untangled, sizes: NDArray[np.int64], nominal_hz: floa
     return Counted(count=count, item_size=float(np.median(sizes)), period_ns=period_ns, in_order=True)
 
 
-def _count_untold(
-    tangled: Untangled, mean_ns: float, quantum_ns: float, *, bursts: bool
-) -> Iterator[Counted]:
+def _count_untold(tangled: Untangled, mean_ns: float, quantum_ns: float, *, bursts: bool) -> Iterator[Counted]:
     """Count in bursts, by phase, or by the order alone."""
     time_ns, steps, cuts = tangled.time_ns, tangled.steps, tangled.clock.message
     if bursts:

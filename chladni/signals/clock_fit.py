@@ -105,7 +105,8 @@ def cut_by_one(count: Count, clock: Clock) -> Floats:
     first = np.minimum.reduceat(count.firsts + within, era)
     end = np.maximum.reduceat(count.ends + within, era)
     index = np.append(0, np.cumsum(end[:-1] + 1 - first[1:]))
-    return clock.starts_ns[0] + index * clock.period_ns - clock.starts_ns[era]
+    by_ns: Floats = clock.starts_ns[0] + index * clock.period_ns - clock.starts_ns[era]
+    return by_ns
 
 
 def measure_wander(count: Count, clock: Clock) -> Wander:

@@ -26,7 +26,7 @@ _FEWEST = 3
 _HELD_UP = 64
 # Periods that a step ahead takes at least: one message may be lost, and stamps scatter.
 _AHEAD = 2.5
-# Messages that show how soon others were logged: more than a queue holds, and few enough for two clocks not to drift.
+# Messages before one that tell of it: more than a queue holds, and few enough for two clocks not to drift.
 _EARLIER = 512
 # Messages between the ends of an interval: enough to average bursts.
 _LAG = 32
@@ -71,8 +71,7 @@ class ClockSteps(Value):
     @property
     def sizes_s(self) -> NDArray[np.float64]:
         """``[step]`` seconds by which the clock was off the next message; negative when it was set back."""
-        sizes: NDArray[np.float64] = (self.after_ns - self.before_ns) * 1e-9
-        return sizes
+        return np.asarray(self.after_ns - self.before_ns, dtype=np.float64) * 1e-9
 
     def run_on(self, stamps_ns: Ints, *, first: int = 0) -> Ints:
         """Undo the steps in the stamps of the messages from number `first` on, in the order of arrival."""
@@ -80,13 +79,12 @@ class ClockSteps(Value):
             return stamps_ns
         cuts = np.clip(self.message - first, 0, stamps_ns.size)
         lengths = np.diff(cuts, prepend=0, append=stamps_ns.size)
-        return stamps_ns + np.repeat(np.append(0, self.shift_ns), lengths)
+        time_ns: Ints = stamps_ns + np.repeat(np.append(0, self.shift_ns), lengths)
+        return time_ns
 
     def eras(self, messages: int) -> NDArray[np.int32]:
         """Count the steps before each of so many messages, in the order of arrival."""
-        return np.repeat(
-            np.arange(self.count + 1, dtype=np.int32), np.diff(self.message, prepend=0, append=messages)
-        )
+        return np.repeat(np.arange(self.count + 1, dtype=np.int32), np.diff(self.message, prepend=0, append=messages))
 
     def moved(self, by_ns: Ints) -> Self:
         """Add to the shift after each step."""
@@ -98,9 +96,7 @@ class ClockSteps(Value):
         )
 
 
-def find_clock_steps(
-    stamps_ns: Ints, before: Ints | None = None, *, logged_ns: Ints | None = None
-) -> ClockSteps:
+def find_clock_steps(stamps_ns: Ints, before: Ints | None = None, *, logged_ns: Ints | None = None) -> ClockSteps:
     """Find where a clock was set back, leapt ahead by more than eleven days, or was set ahead as another clock tells.
 
     A message that goes back is *late* when the others go on from where they were: the run of messages behind ends in
@@ -168,7 +164,9 @@ def _set_ahead(stamps_ns: Ints, logged_ns: Ints, set_back: Ints, period_ns: floa
 
 
 def _logged_sooner(stamps_ns: Ints, logged_ns: Ints, set_back: Ints, place: int, pace: float) -> bool:
-    start = int(set_back[np.searchsorted(set_back, place, "right") - 1]) if set_back.size and set_back[0] <= place else 0
+    start = (
+        int(set_back[np.searchsorted(set_back, place, "right") - 1]) if set_back.size and set_back[0] <= place else 0
+    )
     later = set_back[np.searchsorted(set_back, place, "right") :]
     first, end = max(start, place - _EARLIER), min(int(later[0]) if later.size else stamps_ns.size, place + _LEVEL)
     if place - first < _FEWEST or end - place < _FEWEST:
@@ -235,11 +233,11 @@ def _is_set(stamps_ns: Ints, before: Ints, start: int, place: int, period_ns: fl
     earlier, later = levels[: place - first], levels[place - first :]
     level, level_later = median(earlier), median(later)
     if stamps_ns[place] > stamps_ns[place - 1]:
-        return level_later - level > 0.5 * LEAP_NS
+        return bool(level_later - level > 0.5 * LEAP_NS)
     if _late(stamps_ns, start, place, first, period_ns):
         return False
     scatter = 1.4826 * median([*(abs(one - level) for one in earlier), *(abs(one - level_later) for one in later)])
-    return level - level_later > 1.02 * period_ns + 3 * scatter
+    return bool(level - level_later > 1.02 * period_ns + 3 * scatter)
 
 
 def _late(stamps_ns: Ints, start: int, place: int, first: int, period_ns: float) -> bool:
@@ -253,7 +251,7 @@ def _late(stamps_ns: Ints, start: int, place: int, first: int, period_ns: float)
     # Who was set back grows to where the others were, and doesn't leap there.
     if following[run.size] - run[-1] <= 1.5 * period_ns:
         return False
-    return run.size <= _FEWEST or _fills_a_hole(run, stamps_ns[max(start, place - _SAMPLE) : place], period_ns)
+    return run.size <= _FEWEST or _fills_a_hole(run, stamps_ns[max(start, place - _EARLIER) : place], period_ns)
 
 
 def _fills_a_hole(run: Ints, known_ns: Ints, period_ns: float) -> bool:

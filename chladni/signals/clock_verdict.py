@@ -82,8 +82,8 @@ def ticking(steps_ns: NDArray[np.int64]) -> str:
     if quantum_ns <= COARSE * mean_ns or not few_ticks(steps_ns, quantum_ns, mean_ns):
         return ""
     return (
-        f"stamps come in ticks of {quantum_ns * 1e-6:.4g} ms, coarser than the sampling, and not as evenly as samples "
-        "do, so some are lost or doubled and their rate can't be told; state it: --rate HZ, in Python sample_rate_hz"
+        f"stamps come in ticks of {quantum_ns * 1e-6:.4g} ms, coarser than the sampling, less evenly than samples "
+        "do: some are lost or doubled, so the rate can't be told; state it: --rate HZ, in Python sample_rate_hz"
     )
 
 

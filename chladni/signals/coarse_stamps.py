@@ -127,8 +127,8 @@ def count_ticks(tangled: Untangled, quantum_ns: float, period_ns: float) -> Tick
     middle steps (the extreme of the cumulative sum), until all are narrow.
 
     Samples that are lost or doubled, of a clock which ticks as it samples, also make intervals of whole ticks, though
-    not as evenly: k uneven intervals of a stretch all lie as evenly as that by chance in ``k!/k^k`` of all cases, more
-    by the jitter, and each cut is chosen among all samples. On the other side, ticks that are as near to the
+    not as evenly: k uneven intervals of a stretch all lie as evenly as that by chance in ``k!/k^k`` of all cases, in
+    more by the jitter, and each cut is chosen among all samples. On the other side, ticks that are as near to the
     sampling as that are as rare as uneven intervals are among all. Hidden losses prove nothing where several samples
     share a tick: more may be hidden.
 
@@ -180,15 +180,15 @@ def _proven(steps: Ints, count: Count, quantum_ns: float, width: float, hidden: 
     of_stretch = np.add.reduceat(uneven, np.minimum(count.resumed, uneven.size - 1))
     chance = sum(one * (log(width) - log(one)) + lgamma(one + 1) for one in of_stretch[of_stretch > 0].tolist())
     accidents = _LOST_BY_ACCIDENT if steps.all() else _SHARED_BY_ACCIDENT
-    return chance + hidden * log(steps.size) + log(accidents) < log(max(1, uneven.sum()) / steps.size)
+    return bool(chance + hidden * log(steps.size) + log(accidents) < log(max(1, uneven.sum()) / steps.size))
 
 
 def phase_period(tangled: Untangled, quantum_ns: float, period_ns: float) -> tuple[float, float] | None:
     """Find the period that stamps tell by their phase although they are coarse and some samples are lost.
 
     A true time is uniform within its tick, so phases of the period agree by ``sinc(q/T)``, whatever is lost. They
-    always agree for the ticks themselves, and with a period also for its mirror image at half of their frequency: near
-    a whole or a half number of samples a tick nothing can be told.
+    always agree for the ticks themselves, and with a period also for its mirror image at half of their frequency:
+    near a whole or a half number of samples a tick nothing can be told.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Logs whose clocks were set, or tick coarsely: one time for all topics of a clock, in reads, windows, blocks, info."""
+"""Logs whose clocks were set, or tick coarsely: one time for all topics of a clock, however it's read."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,6 @@ from chladni.io.placement import digests_of, repeats_of
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.testing import assert_close
 from chladni.signals.time_base import fit_time_base
-from chladni.signals.time_series import TimeSeries
 from tests.io.test_log import together
 from tests.make_logs import START_NS, LogMaker, header, write_scalars
 from tests.signals.stamp_makers import stamps
@@ -54,7 +53,9 @@ def write(path: Path, topics: Mapping[str, Topic], *, chunk_size: int = 4096, st
             channel = maker.ros2(name, "test_msgs/msg/Sample", SAMPLE)
             logged = START_NS + np.rint((topic.true_s + 0.002) * 1e9).astype(np.int64)
             told = np.rint((topic.told_s + start_s) * 1e9).astype(np.int64)
-            rows += [(*row, channel) for row in zip(logged.tolist(), told.tolist(), topic.values.tolist(), strict=True)]
+            rows += [
+                (*row, channel) for row in zip(logged.tolist(), told.tolist(), topic.values.tolist(), strict=True)
+            ]
         for logged_ns, told_ns, value, channel in sorted(rows, key=lambda row: row[0]):
             maker.write(channel, {"header": header(told_ns), "x": value}, logged_ns)
 
@@ -130,9 +131,7 @@ def test_a_restart_is_no_spike_and_no_dropout_of_the_sensor(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(("start_s", "end_s"), [(0.3, 0.9), (1.0, None), (None, 0.55), (0.66, 0.71), (0.0, 5.0)])
-def test_a_window_is_one_of_the_time_that_runs_on(
-    tmp_path: Path, start_s: float | None, end_s: float | None
-) -> None:
+def test_a_window_is_one_of_the_time_that_runs_on(tmp_path: Path, start_s: float | None, end_s: float | None) -> None:
     write(tmp_path / "a.mcap", {"/a": episodes(100.0, LENGTHS_S), "/b": episodes(100.0, LENGTHS_S)})
     with open_log(tmp_path / "a.mcap") as log:
         whole = log.read(names("/a", "/b"))
@@ -352,7 +351,6 @@ def test_series_of_a_broken_log_survive_conversion(tmp_path: Path) -> None:
     write(tmp_path / "a.mcap", {"/a": episodes(100.0, LENGTHS_S)})
     convert(tmp_path / "a.mcap", tmp_path / "b.mcap")
     with open_log(tmp_path / "a.mcap") as one, open_log(tmp_path / "b.mcap") as other:
-        before: TimeSeries = one.read()
-        after = other.read()
+        before, after = one.read(), other.read()
         np.testing.assert_allclose(after.values, before.values)
         assert after.sample_rate_hz == before.sample_rate_hz

@@ -181,7 +181,7 @@ def test_a_clock_that_is_set_keeps_its_rate(step_s: float) -> None:
     assert base.rate_hz == 100.0
     assert base.out_of_order == 0
     assert base.longest_stretch_s == pytest.approx(25.0)
-    # Backward, a sample is left out and time runs on; forward it may as well be a pause, so it's a gap of that length.
+    # Backward, a sample is left out and time runs on; forward it may as well be a pause, so it's a gap as long.
     back = step_s < 0
     assert base.clock.sizes_s.tolist() == ([pytest.approx(step_s + 0.01)] if back else [])
     assert (base.gap_count, base.missing) == ((0, 0) if back else (1, 360_000))
