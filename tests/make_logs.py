@@ -274,6 +274,14 @@ def two_sensors(path: Path, *, offset_s: float, joins_at: int = 0, seconds: int 
     write_numbers(path, times[order], values[order], channel=owner[order].tolist(), **options)
 
 
+def write_stored(path: Path, log_ns: np.ndarray, values: np.ndarray, **options: Any) -> None:
+    """Write a std_msgs/Float64 topic ``/s`` in the order given, which needn't be that of the log times."""
+    with LogMaker(path, **options) as log:
+        channel = log.ros2("/s", "std_msgs/msg/Float64", FLOAT64)
+        for time_ns, value in zip(log_ns.tolist(), values.tolist(), strict=True):
+            log.write(channel, {"data": value}, time_ns)
+
+
 def protobuf_log(path: Path, values: Iterable[float], *, rate_hz: float = 100.0) -> None:
     """Write a protobuf topic ``/sensor`` with google.protobuf.Timestamp and a double, encoded by hand."""
     from google.protobuf import descriptor_pb2, timestamp_pb2

@@ -58,7 +58,12 @@ def _function_row(function: dict[str, Any]) -> list[str]:
 
 def _row(channel: dict[str, Any]) -> list[str]:
     # One column for what is mostly nothing: three of zeros took the room that names need.
-    trouble = {"gaps": len(channel["gaps"]), "duplicates": channel["duplicates"], "clipped": channel["clipped"]}
+    trouble = {
+        "breaks": len(channel["breaks"]),
+        "gaps": len(channel["gaps"]),
+        "duplicates": channel["duplicates"],
+        "clipped": channel["clipped"],
+    }
     return [
         channel["name"],
         unit(channel["unit"]),

@@ -9,6 +9,10 @@ Log = Annotated[
     Path,
     typer.Argument(metavar="LOG", help="An MCAP log, or a data file of any kind that is read.", show_default=False),
 ]
+Rate = Annotated[
+    float | None,
+    typer.Option(metavar="HZ", help="True rate of the samples, for what the stamps leave open.", show_default=False),
+]
 Json = Annotated[
     str | None,
     typer.Option(

@@ -137,7 +137,7 @@ def _read(
     join: "JoinMethod",
 ) -> tuple[tuple[TimeSeries, ...], tuple[str, ...]]:
     """Give the series, and sentences on what was inferred or lost."""
-    series = log.read_groups(channels, start_s=start_s, end_s=end_s)
+    series = log.read_groups(channels, start_s=start_s, end_s=end_s, one_clock=resample_hz is not None)
     notes = (*(loss.what for loss in log.damage), *log.notes)
     if resample_hz is None:
         return series, notes

@@ -107,7 +107,12 @@ class FileLog(Log):
         return self._contents.modes
 
     def read_groups(
-        self, paths: Sequence[str] | None = None, *, start_s: float | None = None, end_s: float | None = None
+        self,
+        paths: Sequence[str] | None = None,
+        *,
+        start_s: float | None = None,
+        end_s: float | None = None,
+        one_clock: bool = False,  # noqa: ARG002  # a data file has one
     ) -> tuple[TimeSeries, ...]:
         """Give channels, one series for each sampling grid; see `Log.read_groups`."""
         window = self._window_ns(start_s, end_s)

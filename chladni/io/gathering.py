@@ -1,6 +1,6 @@
 """Streams of a log, read into memory: stamps of every message, and their samples if wanted."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.arrival import Arrivals, arrival_order, stored_late
-from chladni.io.placement import Placement, place_stream, without_grid
+from chladni.io.clocks import Key, Stamped, StreamClock
+from chladni.io.placement import Placement, StatedRate, digests_of, place_stream, without_grid
 from chladni.io.publishers import at_once, count_by_stamps, evenly_in_turn, told_apart
 from chladni.io.stream import Piece, Stream
 from chladni.io.untimed import SLACK_NS, untimed
-from chladni.signals.stamp_order import LEAP_NS
+from chladni.signals.clock_steps import LEAP_NS, ClockSteps
+from chladni.signals.time_base import TimeBase
 
 
 @dataclass(slots=True, kw_only=True)
@@ -52,6 +54,10 @@ class Gathering:
         The stream.
     stamps_ns, counts, values, arrivals
         As in `Piece`, one entry a piece; `values` stays empty when only stamps are wanted.
+    digests
+        As `digests_of` gives them, one entry a piece; may stay empty where `values` are kept, or no stamps are alike.
+    eras
+        As in `Piece`, one entry a piece; empty where no clock is known to have been set.
     period_s
         Time between samples as the first message said; 0 when each message has one.
     dtype
@@ -65,9 +71,12 @@ class Gathering:
     counts: list[NDArray[np.int64]] = field(default_factory=list)
     values: list[NDArray[np.floating[Any]]] = field(default_factory=list)
     arrivals: list[Arrivals] = field(default_factory=list)
+    digests: list[NDArray[np.uint64]] = field(default_factory=list)
+    eras: list[NDArray[np.int32]] = field(default_factory=list)
     period_s: float = 0.0
     dtype: np.dtype[Any] = field(default_factory=lambda: np.dtype(np.float32))
     untimed: int = 0
+    chosen: NDArray[np.int64] | None = None
 
     def add(self, piece: Piece, *, with_values: bool) -> None:
         """Append a piece."""
@@ -76,17 +85,36 @@ class Gathering:
         self.untimed += piece.untimed
         if piece.counts is not None:
             self.counts.append(piece.counts)
+        if piece.eras is not None:
+            self.eras.append(piece.eras)
         if with_values:
             self.values.append(piece.values)
         self.period_s = self.period_s or piece.period_s
         self.dtype = np.result_type(self.dtype, piece.values.dtype)
 
-    def place(self) -> Placement:
-        """Fit the time base to the messages that have a time, in the order in which they came, and place them."""
+    @property
+    def stamps_alike(self) -> bool:
+        """Whether two messages in a row have the same stamp."""
         stamps_ns = _concatenated(self.stamps_ns)
-        counts = _concatenated(self.counts) if self.stream.layout is not None else None
+        return self.stream.layout is None and bool(np.any(stamps_ns[1:] == stamps_ns[:-1]))
+
+    @property
+    def set_before(self) -> bool:
+        """Whether the clock was set before any of the messages; true where that isn't known."""
+        return not self.eras or any(bool(one.any()) for one in self.eras)
+
+    def stamped(self, base: TimeBase) -> Stamped:
+        """Give the stamps with the time base that was fitted to them."""
+        return Stamped(key=self.stream.key, stamps_ns=_concatenated(self.stamps_ns), base=base, chosen=self.chosen)
+
+    def place(self, *, stated: StatedRate | None = None, clock: ClockSteps | None = None) -> Placement:
+        """Fit the time base to the messages that have a time, in the order in which they came, and place them.
+
+        A clock is given where it's known to have been set; a rate where the user states one.
+        """
+        stamps_ns = _concatenated(self.stamps_ns)
         if self._in_order(stamps_ns):
-            return _of_one_publisher(place_stream(self.stream, stamps_ns, counts, self.period_s), stamps_ns)
+            return _of_one_publisher(self._placed(stamps_ns, stated, clock), stamps_ns)
         arrivals = Arrivals.joined(self.arrivals)
         away = untimed(stamps_ns, None if self.stream.choice.kind == "log" else arrivals.log_ns)
         chosen = np.arange(stamps_ns.size) if away is None else np.flatnonzero(~away)
@@ -98,11 +126,37 @@ class Gathering:
         if self.stream.publisher is not None:
             own = _published_by(self.stream.publisher, stamps_ns[chosen])
             chosen, arrivals = chosen[own], arrivals.kept(own)
-        placement = place_stream(self.stream, stamps_ns, counts, self.period_s, chosen=chosen)
+        self.chosen = None if order is None and chosen.size == stamps_ns.size else chosen
+        placement = self._placed(stamps_ns, stated, clock)
         return replace(
             _of_one_publisher(placement, stamps_ns[chosen], arrivals.channel),
             untimed=0 if away is None else int(np.count_nonzero(away)),
             stored_late=late,
+        )
+
+    def _placed(self, stamps_ns: NDArray[np.int64], stated: StatedRate | None, clock: ClockSteps | None) -> Placement:
+        counts = _concatenated(self.counts) if self.stream.layout is not None else None
+        digests = self.digests
+        if not digests and self.values and self.stamps_alike:
+            digests = [digests_of(values) for values in self.values]
+        if self.eras:
+            eras = np.concatenate(self.eras)
+            clock = (
+                _set_before(stamps_ns, eras)
+                if self.chosen is None
+                else _set_before(stamps_ns[self.chosen], eras[self.chosen])
+            )
+        own_clock = self.stream.choice.kind != "log"
+        return place_stream(
+            self.stream,
+            stamps_ns,
+            counts,
+            self.period_s,
+            chosen=self.chosen,
+            digests=np.concatenate(digests) if digests and counts is None else None,
+            stated=stated,
+            clock=clock,
+            logged_ns=np.concatenate([one.log_ns for one in self.arrivals]) if own_clock and self.arrivals else None,
         )
 
     def _in_order(self, stamps_ns: NDArray[np.int64]) -> bool:
@@ -155,6 +209,59 @@ def _publishers(
     return tuple(f"@publisher=={number}" for number in range(1, count + 1))
 
 
+def _set_before(time_ns: NDArray[np.int64], eras: NDArray[np.int32]) -> ClockSteps:
+    """Steps of a clock whose stamps run on already."""
+    message = np.flatnonzero(np.diff(eras)) + 1
+    return ClockSteps(
+        message=message,
+        before_ns=time_ns[message - 1],
+        after_ns=time_ns[message],
+        shift_ns=np.zeros_like(message),
+    )
+
+
+def place_all(
+    gatherings: Sequence[Gathering],
+    clocks: Callable[[Sequence[Stamped]], Mapping[Key, StreamClock]],
+    *,
+    stated: StatedRate | None = None,
+) -> tuple[Placement, ...]:
+    """Place streams; those whose clock was set on time that runs on for all streams of the clock together.
+
+    Parameters
+    ----------
+    gatherings
+        What was read.
+    clocks
+        Finds the clocks of the log; called when stamps show that one was set, with what they tell.
+    stated
+        Rate that the user states.
+    """
+    placements = tuple(one.place(stated=stated) for one in gatherings)
+    both = tuple(zip(gatherings, placements, strict=True))
+    if not any(len(one.eras) or placement.time_base.clock.count for one, placement in both):
+        return placements
+    known = clocks([one.stamped(placement.time_base) for one, placement in both])
+    # Before any clock was set, all of them may be one.
+    set_here = {known[one.stream.key].number for one in gatherings if one.set_before and one.stream.key in known}
+    return tuple(_on_clock(one, placement, known.get(one.stream.key), set_here, stated) for one, placement in both)
+
+
+def _on_clock(
+    gathering: Gathering,
+    placement: Placement,
+    clock: StreamClock | None,
+    set_here: Collection[int],
+    stated: StatedRate | None,
+) -> Placement:
+    if clock is None or clock.number not in set_here:
+        return placement
+    steps = clock.steps
+    if not gathering.eras and not np.array_equal(steps.shift_ns, placement.time_base.clock.shift_ns):
+        placement = gathering.place(stated=stated, clock=steps)
+    return replace(placement, clock=clock.number)
+
+
 def gather(streams: Sequence[Stream], pieces: Iterable[tuple[int, Piece]], *, with_values: bool) -> list[Gathering]:
     """Read all pieces.
 
@@ -171,6 +278,23 @@ def gather(streams: Sequence[Stream], pieces: Iterable[tuple[int, Piece]], *, wi
     for index, piece in pieces:
         gatherings[index].add(piece, with_values=with_values)
     return gatherings
+
+
+def running_on(
+    streams: Sequence[Stream], pieces: Iterable[tuple[int, Piece]], clocks: Mapping[Key, StreamClock]
+) -> Iterator[tuple[int, Piece]]:
+    """Give all pieces of a log with stamps that run on where their clock is known to have been set."""
+    known = [clocks.get(stream.key) for stream in streams]
+    eras = [None if one is None else one.eras() for one in known]
+    read = [0] * len(streams)
+    for index, piece in pieces:
+        clock, era = known[index], eras[index]
+        part = slice(read[index], read[index] + piece.stamps_ns.size)
+        read[index] = part.stop
+        if clock is not None and era is not None:
+            shifts_ns = np.append(0, clock.steps.shift_ns)
+            piece = replace(piece, stamps_ns=piece.stamps_ns + shifts_ns[era[part]], eras=era[part])
+        yield index, piece
 
 
 def windowed(

@@ -189,9 +189,9 @@ class Log(ABC):
         ------
         LogError
             When there is no such channel, its samples are events rather than a uniform series, channels don't share
-            a grid and no rate is given, or the window holds no sample.
+            a grid and no rate is given, their clocks were set at different times, or the window holds no sample.
         """
-        groups = self.read_groups(paths, start_s=start_s, end_s=end_s)
+        groups = self.read_groups(paths, start_s=start_s, end_s=end_s, one_clock=True)
         if sample_rate_hz is not None or (join is not None and len(groups) > 1):
             # Resampling brings in scipy's filters, which a plain read does without.
             from chladni.signals.resampling import join as on_one_grid
@@ -205,9 +205,22 @@ class Log(ABC):
 
     @abstractmethod
     def read_groups(
-        self, paths: Sequence[str] | None = None, *, start_s: float | None = None, end_s: float | None = None
+        self,
+        paths: Sequence[str] | None = None,
+        *,
+        start_s: float | None = None,
+        end_s: float | None = None,
+        one_clock: bool = False,
     ) -> tuple[TimeSeries, ...]:
         """Read channels, one series for each sampling grid; see `read`.
+
+        Parameters
+        ----------
+        paths, start_s, end_s
+            As for `read`.
+        one_clock
+            Whether the series are to be brought together, so that their clocks mustn't have been set at different
+            times.
 
         Raises
         ------

@@ -10,6 +10,7 @@ from chladni.io.placement import Placement
 from chladni.io.sample_monitor import SampleMonitor
 from chladni.signals.channel import Channel
 from chladni.signals.sensor_quality import SensorFault, moments
+from chladni.signals.time_base import TimeBase
 from chladni.signals.wording import counted
 
 MOST_LOSSES_TOLD = 3
@@ -100,17 +101,31 @@ def _clock_findings(placement: Placement) -> Iterator[tuple[str, str]]:
             label,
             f"{counted(placement.stored_late, 'message')} stored behind later ones, read in the order of time",
         )
-    if base.verdict != "regular" or base.gap_count or base.jumps or base.wander_s * base.rate_hz > 1:
+    if base.verdict != "regular" or base.gap_count or base.wander_s * base.rate_hz > 1:
         yield label, base.advice
-    if base.jumps:
-        steps = ", ".join(f"{jump.step_s:.3g} s" for jump in base.jumps[:3])
-        yield label, f"the clock jumps {counted(len(base.jumps), 'time')} ({steps})"
+    if len(base.breaks_s):
+        yield label, _breaks(base)
     if base.duplicates:
         yield label, f"{counted(base.duplicates, 'message')} with the stamp of another"
     if placement.left_out:
         yield label, f"{counted(placement.left_out, 'sample')} left out: an earlier one has the place on the grid"
     if base.out_of_order:
         yield label, f"{counted(base.out_of_order, 'message')} came after later ones, and were put in order"
+
+
+def _breaks(base: TimeBase) -> str:
+    """Say how often and by how much the clock was set, and what that leaves."""
+    told = []
+    if base.clock.count:
+        sizes_s = base.clock.sizes_s
+        some = ", ".join(f"{size:.3g} s" for size in sizes_s[:3]) + (", ..." if sizes_s.size > 3 else "")
+        told.append(f"the clock was set {counted(base.clock.count, 'time')} ({some}); time runs on from each")
+    leaps = len(base.breaks_s) - base.clock.count
+    if leaps:
+        told.append(f"it leaps ahead {counted(leaps, 'time')} by more than was recorded: it was set, or paused")
+    if base.longest_stretch_s:
+        told.append(f"no average crosses a break, and the longest stretch is {base.longest_stretch_s:.4g} s")
+    return "; ".join(told)
 
 
 # --- of channels -------------------------------------------------------------------------------------------------

@@ -36,6 +36,9 @@ class ChannelInfo:
         What the stamps say about the clock.
     gaps
         (start, end) in seconds from the log's start: last sample before and first one after; the longest ones.
+    breaks_s
+        Seconds from the log's start at which a stretch begins that doesn't follow on the one before: the clock was
+        set, or leapt ahead.
     clipped
         Samples at the sensor's limit.
     untimed
@@ -51,6 +54,7 @@ class ChannelInfo:
     stamp_reason: str
     time_base: TimeBase
     gaps: tuple[tuple[float, float], ...]
+    breaks_s: tuple[float, ...]
     clipped: int
     untimed: int = 0
     publishers: int = 1
@@ -62,11 +66,14 @@ class ChannelInfo:
             "unit": self.channel.unit,
             "encoding": self.encoding,
             "rate_hz": _positive(self.time_base.rate_hz),
+            "rate_std_hz": self.time_base.rate_std_hz if isfinite(self.time_base.rate_std_hz) else None,
             "samples": self.samples,
             "stamp": self.stamp,
             "stamp_reason": self.stamp_reason,
             "jitter_s": self.time_base.jitter_s if isfinite(self.time_base.jitter_s) else None,
             "gaps": [list(gap) for gap in self.gaps],
+            "breaks": list(self.breaks_s),
+            "longest_stretch_s": _positive(self.time_base.longest_stretch_s),
             "duplicates": self.time_base.duplicates,
             "clipped": self.clipped,
             "untimed": self.untimed,
@@ -85,7 +92,7 @@ class LogInfo:
     start_time_ns
         Time of the earliest sample, nanoseconds since the Unix epoch.
     duration_s
-        From there to the end of the last sample; of a log without samples that of its messages.
+        From there to the end of the last sample, without breaks; of a log without samples that of its messages.
     channels
         In the order of the file.
     damage

@@ -1,22 +1,33 @@
 """Reading of chosen channels of a log: stamps first, then samples, whole or block by block."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.gathering import Gathering, LostMessages, gather, windowed
+from chladni.io.clocks import Key, Stamped, StreamClock
+from chladni.io.gathering import Gathering, LostMessages, gather, place_all, running_on, windowed
 from chladni.io.grid_blocks import BlockGrid, PlacedPiece, blocks_of, complete
 from chladni.io.grid_buffer import GridBuffer, grid_rows
 from chladni.io.mcap.container import McapContainer
-from chladni.io.placement import ALIGNED, NOWHERE, Group, Placement, group_placements, lowest_index
+from chladni.io.placement import (
+    ALIGNED,
+    NOWHERE,
+    Group,
+    Placement,
+    StatedRate,
+    digests_of,
+    group_placements,
+    lowest_index,
+)
 from chladni.io.stream import Piece, Stream, read_pieces
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.wording import counted
 
 #: A grid may be this much longer than the samples on it, and this many times as long.
 EMPTY_GRID = 1 << 24
@@ -104,6 +115,12 @@ class LogReader:
         Counts messages that can't be used.
     required
         Whether every channel was asked for by name, so that one that isn't uniform is an error.
+    clocks
+        Finds the clocks of the log that were set, and the streams stamped by each, those given among others.
+    known_clocks
+        Those clocks, where they have to be known before a window of time can be read; else empty.
+    rate_hz
+        Sampling rate that the user states, None without.
     """
 
     container: McapContainer
@@ -112,6 +129,9 @@ class LogReader:
     window: Window
     lost: LostMessages
     required: bool
+    clocks: Callable[[Sequence[Stream]], Mapping[Key, StreamClock]]
+    known_clocks: Mapping[Key, StreamClock] = field(default_factory=dict)
+    rate_hz: float | None = None
 
     def pieces(self, *, with_values: bool = True) -> Iterator[tuple[int, Piece]]:
         """What each batch of messages holds of each stream, inside the window, in the order of the file."""
@@ -122,16 +142,20 @@ class LogReader:
             end_ns=self.window.log_end_ns,
             with_values=with_values,
         )
+        if self.known_clocks:
+            found = running_on(self.streams, found, self.known_clocks)
         lost = LostMessages()
         try:
             yield from windowed(self.streams, found, lost, window_ns=(self.window.start_ns, self.window.end_ns))
         finally:
             self.lost.merge(lost)
 
-    def series(self) -> tuple[TimeSeries, ...]:
-        """Everything, one series for each grid."""
+    def series(self, *, one_clock: bool = False) -> tuple[TimeSeries, ...]:
+        """Everything, one series for each grid; `LogError` where they are to have one clock and don't."""
         gatherings = gather(self.streams, self.pieces(), with_values=True)
         groups = self.groups(self._placements(gatherings))
+        if one_clock:
+            self._require_one_clock(groups)
         by_stream = {id(one.stream): one for one in gatherings}
         series = [self._laid_out(group, by_stream) for group in groups]
         return self._some([one for one in series if one is not None])
@@ -140,6 +164,12 @@ class LogReader:
         """Read stamps alone and fit the time bases: all that must be known before blocks can be given."""
         sizes: list[tuple[int, int]] = []
         gatherings = gather(self.streams, _sized(self.pieces(with_values=False), sizes), with_values=False)
+        alike = {number for number, one in enumerate(gatherings) if one.stamps_alike}
+        if alike:
+            # Whether their samples are alike, too, takes reading them; a log with such stamps is rare.
+            for number, piece in self.pieces():
+                if number in alike:
+                    gatherings[number].digests.append(digests_of(piece.values))
         return FirstPass(
             placements=self._placements(gatherings),
             sizes=tuple(sizes),
@@ -147,7 +177,11 @@ class LogReader:
         )
 
     def _placements(self, gatherings: Sequence[Gathering]) -> tuple[Placement, ...]:
-        placements = tuple(one.place() for one in gatherings)
+        def clocks(_: Sequence[Stamped]) -> Mapping[Key, StreamClock]:
+            return self.known_clocks or self.clocks(self.streams)
+
+        stated = None if self.rate_hz is None else StatedRate(hz=self.rate_hz, named=self.required)
+        placements = place_all(gatherings, clocks, stated=stated)
         lost = LostMessages()
         lost.add_untimed(placements)
         self.lost.merge(lost)
@@ -223,10 +257,23 @@ class LogReader:
         LogError
             When there are several.
         """
+        self._require_one_clock(groups)
         if len(groups) > 1:
             told = [(grid_rows(group, self.order).channels, group.rate_hz, group.start_ns) for group in groups]
             raise LogError(f"{several_grids(self.container.path.name, told)}, or read channels that share one")
         return groups[0]
+
+    def _require_one_clock(self, groups: Sequence[Group]) -> None:
+        first = groups[0].placements[0]
+        for other in groups[1:]:
+            placement = other.placements[0]
+            if placement.clock != first.clock:
+                often = [f"{counted(one.time_base.clock.count, 'time')}" for one in (first, placement)]
+                raise LogError(
+                    f"{self.container.path.name}: the clock of {first.stream.label} was set {often[0]} and that of "
+                    f"{placement.stream.label} {often[1]}, so it isn't known which samples belong together: take one "
+                    "after the other, a part before the first time (--end S), or all by the log's times (--stamp log)"
+                )
 
     def _nothing_uniform(self, placements: Sequence[Placement]) -> str:
         reasons = [

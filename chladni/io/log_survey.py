@@ -7,23 +7,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.catalog import Catalog
+from chladni.io.clocks import clocks_of
 from chladni.io.files.contents import FileContents
-from chladni.io.gathering import Gathering, LostMessages, windowed
+from chladni.io.gathering import Gathering, LostMessages, place_all, windowed
 from chladni.io.log_findings import fault_findings, log_findings, missing_sentence, together, unit_findings
 from chladni.io.log_info import ChannelInfo, LogInfo, oddities, unread_sentences
 from chladni.io.loss import Unread, losses
 from chladni.io.mcap.container import McapContainer
-from chladni.io.placement import Placement
+from chladni.io.placement import Placement, StatedRate
 from chladni.io.sample_monitor import STRETCH_VALUES, Faults, SampleMonitor, clipped_samples, judge_samples
 from chladni.io.stream import read_pieces
 from chladni.signals.time_base import TimeBase
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 
-def survey(container: McapContainer, content: Catalog, lost: LostMessages) -> LogInfo:
-    """Read every channel listed once.
+def survey(
+    container: McapContainer, content: Catalog, lost: LostMessages, *, rate_hz: float | None = None
+) -> LogInfo:
+    """Read every channel listed once; `rate_hz` is a sampling rate that the user states.
 
-    Stamps and log times are kept (some 20 bytes a message), samples only as long as they're being judged.
+    Stamps and log times are kept (some 20 bytes a message, and 8 to compare samples by), samples only as long as
+    they're being judged.
     """
     streams = content.streams(content.channels)
     monitors = [SampleMonitor(gathering=Gathering(stream=stream), start_ns=content.start_ns) for stream in streams]
@@ -32,7 +36,8 @@ def survey(container: McapContainer, content: Catalog, lost: LostMessages) -> Lo
         monitors[index].watch(piece)
     for monitor in monitors:
         monitor.judge()
-    placements = [monitor.gathering.place() for monitor in monitors]
+    stated = None if rate_hz is None else StatedRate(hz=rate_hz, named=False)
+    placements = place_all([monitor.gathering for monitor in monitors], clocks_of, stated=stated)
     pass_lost.add_untimed(placements)
     lost.merge(pass_lost)
     found = dict(_channels(content, monitors, placements))
@@ -67,6 +72,7 @@ def _channels(
                     stamp_reason=stream.choice.reason,
                     time_base=base,
                     gaps=gaps,
+                    breaks_s=tuple((base.breaks_s[:, 1] + offset_s).tolist()),
                     clipped=monitor.clipped(channel.name),
                     publishers=max(placement.publishers, content.publishing_with(stream.topic.name)),
                     untimed=placement.untimed + monitor.gathering.untimed,
@@ -75,9 +81,18 @@ def _channels(
 
 
 def _duration_s(content: Catalog, placements: Sequence[Placement]) -> float:
-    """From the log's start to the end of its last sample."""
-    ends = [placement.end_ns for placement in placements if placement.end_ns is not None]
-    return max(0, max(ends, default=content.start_ns) - content.start_ns) / NS_PER_S
+    """From the log's start to the end of its last sample, without the breaks of the stream that has it."""
+    return max((_lasts_s(one, content.start_ns) for one in placements), default=0.0)
+
+
+def _lasts_s(placement: Placement, start_ns: int) -> float:
+    if placement.end_ns is None:
+        return 0.0
+    base = placement.time_base
+    # From the last sample to the first after a break, one is as long as ever.
+    period_s = 1 / base.rate_hz if base.rate_hz > 0 else 0.0
+    broken_s = float((np.diff(base.breaks_s)[:, 0] - period_s).sum())
+    return max(0.0, (placement.end_ns - start_ns) / NS_PER_S - broken_s)
 
 
 def _logged_s(container: McapContainer) -> float:
@@ -175,6 +190,7 @@ def _file_channels(
             stamp_reason=reason,
             time_base=clock,
             gaps=tuple((start + offset_s, end + offset_s) for start, end in clock.gaps),
+            breaks_s=tuple((clock.breaks_s[:, 1] + offset_s).tolist()),
             clipped=clipped_samples(faults, channel.name),
         )
         for channel, count in zip(series.channels, lost.tolist(), strict=True)

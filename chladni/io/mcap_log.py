@@ -1,6 +1,7 @@
 """An MCAP log: channels decoded as they are asked for, in memory that doesn't grow with the log."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from chladni.io.catalog import Catalog, read_catalog
 from chladni.io.channel_source import ChannelSource
 from chladni.io.gathering import LostMessages
 from chladni.io.log import Log
+from chladni.io.log_clocks import LogClocks
 from chladni.io.log_info import LogInfo, oddities, unread_sentences
 from chladni.io.log_reader import FirstPass, LogReader, SampleGrid, Window
 from chladni.io.log_survey import survey
@@ -39,15 +41,12 @@ def open_mcap(
     options: Mapping[str, Any],
 ) -> "McapLog":
     """Open an MCAP log; no sample is read yet. See `chladni.io.log.open`."""
-    if sample_rate_hz is not None:
-        raise SetupError(
-            f"{path}: the stamps of its messages say the rate; leave the sample rate out, or bring channels to "
-            "another rate with chladni convert --resample HZ"
-        )
+    if sample_rate_hz is not None and not (isfinite(sample_rate_hz) and sample_rate_hz > 0):
+        raise SetupError(f"sample rate {sample_rate_hz} Hz must be finite and positive")
     for name in options:
         raise SetupError(f"{path}: {name} is for data files; messages of an MCAP log say their times and names")
     container = McapContainer.open(path, limits=limits)
-    log = McapLog(container, setup=setup, stamp=stamp)
+    log = McapLog(container, setup=setup, stamp=stamp, sample_rate_hz=sample_rate_hz)
     if setup.channels or setup.batches:
         # A setup file that doesn't fit the log is better told now than after an hour of averaging.
         try:
@@ -61,10 +60,14 @@ def open_mcap(
 class McapLog(Log):
     """Channels of one MCAP log, decoded as they are asked for; made by `chladni.io.log.open`."""
 
-    def __init__(self, container: McapContainer, *, setup: Setup, stamp: StampRequest) -> None:
+    def __init__(
+        self, container: McapContainer, *, setup: Setup, stamp: StampRequest, sample_rate_hz: float | None = None
+    ) -> None:
         self._container = container
         self._setup = setup
         self._stamp = stamp
+        self._rate_hz = sample_rate_hz
+        self._clocks: LogClocks | None = None
         self._catalog: Catalog | None = None
         self._lost = LostMessages()
         self._close = finalize(self, container.close)
@@ -118,10 +121,15 @@ class McapLog(Log):
         return self._catalog
 
     def read_groups(
-        self, paths: Sequence[str] | None = None, *, start_s: float | None = None, end_s: float | None = None
+        self,
+        paths: Sequence[str] | None = None,
+        *,
+        start_s: float | None = None,
+        end_s: float | None = None,
+        one_clock: bool = False,
     ) -> tuple[TimeSeries, ...]:
         """Read channels, one series for each sampling grid; see `Log.read_groups`."""
-        return self._reader(paths, start_s, end_s).series()
+        return self._reader(paths, start_s, end_s).series(one_clock=one_clock)
 
     def blocks(
         self,
@@ -155,7 +163,7 @@ class McapLog(Log):
     def info(self) -> LogInfo:
         """Read all of the log once and tell whether it's sound."""
         if self._info is None:
-            self._info = survey(self._container, self._content, self._lost)
+            self._info = survey(self._container, self._content, self._lost, rate_hz=self._rate_hz)
         return self._info
 
     def close(self) -> None:
@@ -190,13 +198,22 @@ class McapLog(Log):
     def _reader(self, paths: Sequence[str] | None, start_s: float | None, end_s: float | None) -> LogReader:
         sources = self._sources(paths)
         streams = self._content.streams(sources)
+        if self._clocks is None:
+            listed = self._content.streams(self._content.channels)
+            self._clocks = LogClocks(self._container, listed, self._content.lags_ns)
+        window = self._window(streams, start_s, end_s)
+        known = self._clocks.before(streams, window)
         return LogReader(
             container=self._container,
             streams=streams,
             order=tuple(source.channel for source in sources),
-            window=self._window(streams, start_s, end_s),
+            # Log times may have been set back as well.
+            window=replace(window, log_start_ns=None, log_end_ns=None) if known else window,
             lost=self._lost,
             required=paths is not None,
+            clocks=self._clocks.of,
+            known_clocks=known,
+            rate_hz=self._rate_hz,
         )
 
     def _window(self, streams: Sequence[Stream], start_s: float | None, end_s: float | None) -> Window:

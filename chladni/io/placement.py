@@ -2,12 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.stream import Stream
+from chladni.signals.clock_steps import ClockSteps
+from chladni.signals.stamp_order import untangle
 from chladni.signals.time_base import TimeBase, fit_batch_time_base, fit_time_base
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.uniform import message_index
@@ -15,6 +19,10 @@ from chladni.signals.uniform import message_index
 #: Index of samples that have no place on the grid.
 NOWHERE = -(1 << 62)
 
+#: A rate that is stated is for stamps that tell it within this share.
+STATED_NEAR = 0.05
+#: ... or, where they tell none, for messages that come as often within this share.
+STATED_ABOUT = 0.2
 #: Two grids are one when their points are never farther apart than this share of a period: 1.8 degrees at Nyquist.
 ALIGNED = 0.01
 #: ... or than their stamps' scatter can tell, up to this share.
@@ -40,13 +48,17 @@ class Placement:
         ``[message]``, samples at its start that are left out because an earlier message has their place; None when
         there are none.
     first_ns, end_ns
-        First stamp in the order of arrival, and the end of the last sample; None when there is none.
+        First stamp in the order of arrival, and the end of the last sample, where the clock was set on time that runs
+        on; None when there is none.
     untimed
         Messages left out because their stamps are no times beside the others.
     stored_late
         Messages that the file holds behind later ones.
     publishers
         How many publish at once, by their stamps alone.
+    clock
+        Number of the clock, where clocks of the log were set at different times: streams of different numbers share
+        no time. None for stamps of one stretch.
     """
 
     stream: Stream
@@ -59,6 +71,7 @@ class Placement:
     untimed: int = 0
     stored_late: int = 0
     publishers: int = 1
+    clock: int | None = None
 
     @property
     def first(self) -> int:
@@ -102,6 +115,27 @@ def lowest_index(index: NDArray[np.int64], otherwise: int) -> int:
     return lowest if lowest < -NOWHERE else otherwise
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StatedRate:
+    """A sampling rate that the user states, for what the stamps leave open.
+
+    Attributes
+    ----------
+    hz
+        The rate.
+    named
+        Whether the channels were named; else it's for those whose messages come about as often.
+    """
+
+    hz: float
+    named: bool
+
+    def settles(self, base: TimeBase) -> bool:
+        """Whether to fit again with the rate: it's near what the stamps tell, or they tell none."""
+        near = abs(base.rate_hz / self.hz - 1)
+        return near < STATED_NEAR if base.uniform else self.named or near < STATED_ABOUT or not base.moving
+
+
 def place_stream(
     stream: Stream,
     stamps_ns: NDArray[np.int64],
@@ -109,6 +143,10 @@ def place_stream(
     period_s: float,
     *,
     chosen: NDArray[np.int64] | None = None,
+    digests: NDArray[np.uint64] | None = None,
+    stated: StatedRate | None = None,
+    clock: ClockSteps | None = None,
+    logged_ns: NDArray[np.int64] | None = None,
 ) -> Placement:
     """Fit the time base of a stream and give each message its place.
 
@@ -124,30 +162,32 @@ def place_stream(
         Time between the samples of a batch message, as it says itself.
     chosen
         Indices of the messages that have a time, in the order in which they came; None for all in file order.
+    digests
+        ``[message]``, of its samples, equal where they are; None when no two messages have the same stamp.
+    stated
+        Rate that the user states.
+    clock
+        Where the clock was set, when that is known; None looks for it.
+    logged_ns
+        ``[message]``, log times beside stamps of another clock; None when these are the stamps.
     """
-    timed_ns = stamps_ns if chosen is None else stamps_ns[chosen]
-    sizes = counts if counts is None or chosen is None else counts[chosen]
-    if sizes is None:
-        base = fit_time_base(timed_ns)
-    else:
-        base = fit_batch_time_base(timed_ns, sizes, nominal_rate_hz=1 / period_s if period_s > 0 else None)
-    placement = Placement(
-        stream=stream,
-        time_base=base,
-        index=np.zeros(0, np.int64),
-        counts=counts,
-        first_ns=int(timed_ns[0]) if timed_ns.size else None,
-        end_ns=_end_ns(timed_ns, sizes, base.rate_hz),
-    )
-    if not (base.uniform and timed_ns.size):
-        return placement
-    index = message_index(timed_ns, base, counts=sizes)
-    taken = _taken(timed_ns, index, sizes)
     if chosen is None:
-        return replace(placement, index=index, taken=taken)
+        return _placed(stream, stamps_ns, counts, period_s, digests, seen=_Seen(stated, clock, logged_ns))
+    placement = _placed(
+        stream,
+        stamps_ns[chosen],
+        None if counts is None else counts[chosen],
+        period_s,
+        None if digests is None else digests[chosen],
+        seen=_Seen(stated, clock, None if logged_ns is None else logged_ns[chosen]),
+    )
+    if not placement.index.size:
+        return replace(placement, counts=counts)
+    taken = placement.taken
     return replace(
         placement,
-        index=_in_file(index, chosen, stamps_ns.size, otherwise=NOWHERE),
+        counts=counts,
+        index=_in_file(placement.index, chosen, stamps_ns.size, otherwise=NOWHERE),
         taken=None if taken is None else _in_file(taken, chosen, stamps_ns.size, otherwise=0),
     )
 
@@ -176,14 +216,135 @@ def _in_file(
     return spread
 
 
-def _end_ns(stamps_ns: NDArray[np.int64], counts: NDArray[np.int64] | None, rate_hz: float) -> int | None:
-    """End of the last sample, at least its stamp."""
+def _placed(
+    stream: Stream,
+    stamps_ns: NDArray[np.int64],
+    counts: NDArray[np.int64] | None,
+    period_s: float,
+    digests: NDArray[np.uint64] | None,
+    *,
+    seen: "_Seen",
+) -> Placement:
+    """Do the work of `place_stream` for messages in the order of their arrival."""
+    twins = None
+    if counts is not None:
+        base = seen.fit_batches(stamps_ns, counts, period_s)
+    else:
+        twins, base = _fit_messages(stamps_ns, digests, seen)
+    kept = None if twins is None else np.flatnonzero(twins == np.arange(twins.size))
+    chosen_ns = stamps_ns if kept is None else stamps_ns[kept]
+    placement = Placement(stream=stream, time_base=base, index=np.zeros(0, np.int64), counts=counts)
     if not stamps_ns.size:
-        return None
+        return placement
+    placement = replace(
+        placement, first_ns=int(chosen_ns[0]), end_ns=_end_ns(base.clock.run_on(chosen_ns), counts, base.rate_hz)
+    )
+    if not base.uniform:
+        return placement
+    index = message_index(chosen_ns, base, counts=counts)
+    if kept is not None and twins is not None:
+        index = index[np.searchsorted(kept, twins)]
+        steps = replace(base.clock, message=kept[base.clock.message])
+        placement = replace(placement, time_base=replace(base, clock=steps))
+    return replace(placement, index=index, taken=_taken(stamps_ns, index, counts))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """What is known of a stream beside its stamps, as for `place_stream`."""
+
+    stated: StatedRate | None
+    clock: ClockSteps | None
+    logged_ns: NDArray[np.int64] | None
+
+    def kept(self, kept: NDArray[np.bool_]) -> "_Seen":
+        """Give the same for some of the messages."""
+        clock, logged_ns = self.clock, self.logged_ns
+        number = np.cumsum(kept, dtype=np.int64)
+        return replace(
+            self,
+            clock=None if clock is None else replace(clock, message=number[clock.message - 1]),
+            logged_ns=None if logged_ns is None else logged_ns[kept],
+        )
+
+    def fit(self, stamps_ns: NDArray[np.int64]) -> TimeBase:
+        """Fit to messages of one sample each."""
+        fit = partial(fit_time_base, stamps_ns, clock=self.clock, logged_ns=self.logged_ns)
+        base = fit()
+        return base if self.stated is None or not self.stated.settles(base) else fit(nominal_rate_hz=self.stated.hz)
+
+    def fit_batches(self, stamps_ns: NDArray[np.int64], counts: NDArray[np.int64], period_s: float) -> TimeBase:
+        """Fit to messages of many samples each."""
+        fit = partial(fit_batch_time_base, stamps_ns, counts, clock=self.clock, logged_ns=self.logged_ns)
+        base = fit(nominal_rate_hz=1 / period_s if period_s > 0 else None)
+        return base if self.stated is None or not self.stated.settles(base) else fit(nominal_rate_hz=self.stated.hz)
+
+
+def _fit_messages(
+    stamps_ns: NDArray[np.int64], digests: NDArray[np.uint64] | None, seen: _Seen
+) -> tuple[NDArray[np.int64] | None, TimeBase]:
+    """Fit, and say which message each one repeats, itself if none; None when none repeats another."""
+    repeats = None if digests is None else repeats_of(stamps_ns, digests)
+    if repeats is None:
+        return None, seen.fit(stamps_ns)
+    if repeats.differ:
+        # Messages of one stamp that differ are samples; then those that don't may be, too.
+        base = seen.fit(stamps_ns)
+        if base.uniform and not base.duplicates:
+            return None, base
+    kept = repeats.twin == np.arange(stamps_ns.size)
+    base = seen.kept(kept).fit(stamps_ns[kept])
+    again = int(np.count_nonzero(~kept))
+    return repeats.twin, replace(base, samples=stamps_ns.size, duplicates=base.duplicates + again)
+
+
+def _end_ns(time_ns: NDArray[np.int64], counts: NDArray[np.int64] | None, rate_hz: float) -> int:
+    """End of the last sample, at least its stamp."""
     period_ns = NS_PER_S / rate_hz if rate_hz > 0 else 0.0
     if counts is None:
-        return int(stamps_ns.max()) + round(period_ns)
-    return int((stamps_ns + np.rint(counts * period_ns)).max())
+        return int(time_ns.max()) + round(period_ns)
+    return int((time_ns + np.rint(counts * period_ns).astype(np.int64)).max())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Repeats:
+    """Messages of a stream with the same stamp.
+
+    Attributes
+    ----------
+    twin
+        ``[message]``, an earlier message with the same stamp and samples, or itself.
+    differ
+        Whether others have the stamp of an earlier message, but samples of their own.
+    """
+
+    twin: NDArray[np.int64]
+    differ: bool
+
+
+def repeats_of(stamps_ns: NDArray[np.int64], digests: NDArray[np.uint64]) -> Repeats | None:
+    """Tell messages that were sent or stored twice from samples stamped by a coarse clock; None for no such."""
+    tangled = untangle(stamps_ns)
+    order = np.arange(stamps_ns.size) if tangled.order is None else tangled.order
+    same = tangled.steps == 0
+    alike = same & (digests[order[:-1]] == digests[order[1:]])
+    if not alike.any():
+        return None
+    first = np.where(np.append(False, alike), 0, np.arange(order.size))
+    twin = np.empty_like(order)
+    twin[order] = order[np.maximum.accumulate(first)]
+    return Repeats(twin=twin, differ=bool(np.any(same & ~alike)))
+
+
+def digests_of(values: NDArray[np.floating[Any]]) -> NDArray[np.uint64]:
+    """Give ``[sample]`` numbers that are equal where all channels of ``[channel, sample]`` are."""
+    bits = values.view(np.uint32 if values.dtype == np.float32 else np.uint64)
+    digests = np.zeros(values.shape[1], np.uint64)
+    for row in bits:
+        # An odd multiplier loses no bit, and what is added before tells the channels apart (Knuth, TAOCP 3, 6.4).
+        digests = (digests ^ row) * np.uint64(0x9E3779B97F4A7C15)
+        digests ^= digests >> np.uint64(32)
+    return digests
 
 
 def _taken(
@@ -258,6 +419,8 @@ def group_placements(placements: Sequence[Placement]) -> tuple[Group, ...]:
 def _joined(group: Group, placement: Placement) -> Group | None:
     """The group with one more stream, or None when its grid is another."""
     ours, theirs = group.placements[0].time_base, placement.time_base
+    if group.placements[0].clock != placement.clock:
+        return None
     if abs(ours.rate_hz - theirs.rate_hz) > 0.01 * ours.rate_hz:
         return None
     times_ns = _common_times(ours, theirs)

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.gathering import Gathering
+from chladni.io.placement import digests_of
 from chladni.io.stream import Piece
 from chladni.signals.channel import Channel
 from chladni.signals.sensor_quality import SensorFault, sensor_quality
+from chladni.signals.stamp_order import arrival_order, untangle
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 STRETCH_VALUES: Final = 1 << 24
@@ -49,6 +51,8 @@ class SampleMonitor:
     def watch(self, piece: Piece) -> None:
         """Take the next piece."""
         self.gathering.add(piece, with_values=False)
+        if piece.counts is None:
+            self.gathering.digests.append(digests_of(piece.values))
         self._waiting.append(piece)
         self._waiting_values += piece.values.size
         if self._waiting_values >= STRETCH_VALUES:
@@ -114,24 +118,24 @@ def clipped_samples(faults: Faults, channel: str) -> int:
 
 
 def _stamps_of(pieces: list[Piece], places: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Stamps of samples that are counted in the order of stamps."""
-    stamps = np.concatenate([piece.stamps_ns for piece in pieces])
-    order = np.argsort(stamps, kind="stable")
+    """Stamps of samples that are counted in the order of time, on a clock that runs on where it was set."""
+    tangled = untangle(np.concatenate([piece.stamps_ns for piece in pieces]))
     if pieces[0].counts is None:
-        return np.asarray(stamps[order][places])
-    counts = np.concatenate([piece.counts for piece in pieces if piece.counts is not None])[order]
+        return np.asarray(tangled.time_ns[places])
+    counts = np.concatenate([piece.counts for piece in pieces if piece.counts is not None])
+    counts = counts if tangled.order is None else counts[tangled.order]
     message = np.searchsorted(np.cumsum(counts), places, side="right")
     later = places - (np.cumsum(counts) - counts)[message]
-    return np.asarray(stamps[order][message] + np.rint(later * pieces[0].period_s * NS_PER_S).astype(np.int64))
+    return np.asarray(tangled.time_ns[message] + np.rint(later * pieces[0].period_s * NS_PER_S).astype(np.int64))
 
 
 def _in_order(pieces: list[Piece]) -> NDArray[np.floating[Any]]:
     """Samples in the order of their stamps: a late message between two others would look like a spike."""
     values = np.concatenate([piece.values for piece in pieces], axis=1)
     stamps = np.concatenate([piece.stamps_ns for piece in pieces])
-    if np.all(stamps[1:] >= stamps[:-1]):
+    order = arrival_order(stamps)
+    if order is None:
         return values
-    order = np.argsort(stamps, kind="stable")
     if pieces[0].counts is None:
         return values[:, order]
     counts = np.concatenate([piece.counts for piece in pieces if piece.counts is not None])

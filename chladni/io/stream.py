@@ -42,6 +42,8 @@ class Piece:
         ``[message]``, when they were logged, and more that the log says of each.
     untimed
         Messages that are not in it because their stamp is no time; counted in `lost`, too.
+    eras
+        ``[message]``, how often the clock had been set before, where that is known and `stamps_ns` run on; else None.
     """
 
     stamps_ns: NDArray[np.int64]
@@ -52,6 +54,7 @@ class Piece:
     arrivals: Arrivals
     untimed: int = 0
     told: Mapping[str, int] = field(default_factory=dict)
+    eras: NDArray[np.int32] | None = None
 
     def within(self, start_ns: int | None, end_ns: int | None) -> "Piece":
         """Give the messages that have a sample with ``start_ns <= time < end_ns``."""
@@ -79,6 +82,7 @@ class Piece:
             counts=counts,
             values=self.values[:, samples],
             arrivals=self.arrivals.kept(keep),
+            eras=None if self.eras is None else self.eras[keep],
         )
 
 

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.stamp_order import LEAP_NS
+from chladni.signals.clock_steps import LEAP_NS
 
 #: A message may be logged this much later than its sample, beside what the others show.
 SLACK_NS: Final = 30_000_000_000

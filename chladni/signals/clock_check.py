@@ -45,7 +45,7 @@ def grid_agrees(base: "TimeBase", time_ns: Ints, sizes: Ints) -> bool:
     base
         A time base that has a grid.
     time_ns
-        ``[message]`` rising stamps, jumps undone, at least two.
+        ``[message]`` rising stamps, steps of the clock undone, at least two.
     sizes
         ``[message]`` samples of each, or a single number for all.
     """
@@ -77,8 +77,10 @@ def _indices(base: "TimeBase", time_ns: Ints, sizes: Ints) -> tuple[Ints, Ints]:
         knots_index=base.knots_index,
         rate_hz=base.rate_hz,
         smoothing=base.smoothing,
-        resumed_ns=base.resumed_ns,
+        resumed=base.resumed,
         resumed_shift=base.resumed_shift,
+        cut_order=base.clock.message if sizes.size == 1 else None,
+        cuts=base.cuts,
     )
     return chosen, index
 

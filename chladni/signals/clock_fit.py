@@ -3,7 +3,8 @@
 Each stretch between gaps has an intercept of its own, because a source that paused rarely resumes on the old grid.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,8 @@ class Clock:
     ----------
     period_ns, period_std_ns
         Slope and one sigma of it, with the correlation of the scatter over time; infinite when nothing bounds it.
-    start_ns
-        Time of index 0, since the first stamp.
+    starts_ns
+        ``[stretch]`` time of a stretch's index 0, since the first stamp.
     shift
         ``[stretch]`` what to add to a stretch's indices so that all share one grid, 0 for the first.
     residual_ns
@@ -29,9 +30,15 @@ class Clock:
 
     period_ns: float
     period_std_ns: float
-    start_ns: float
+    starts_ns: Floats
     shift: Ints
     residual_ns: Floats
+
+    def on_grid(self, starts_ns: Floats) -> Self:
+        """Give the same clock with stretches that start elsewhere."""
+        # Stretches share one grid to the nearest index; what is left of a period stays as an error of the placing.
+        shift = np.rint((starts_ns - starts_ns[0]) / self.period_ns).astype(np.int64)
+        return replace(self, starts_ns=starts_ns, shift=shift)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,15 +77,36 @@ def fit_clock(count: Count, period_ns: float) -> Clock | None:
         slope, starts, residual = _fit_stretches(count, kept, slope)
     if not 0.5 * period_ns < slope < 2 * period_ns:
         return None
-    # Stretches share one grid to the nearest index; what is left of a period stays as an error of the placing.
-    shift = np.rint((starts - starts[0]) / slope).astype(np.int64)
     return Clock(
         period_ns=slope,
         period_std_ns=_slope_std(count, residual * kept),
-        start_ns=float(starts[0]),
-        shift=shift,
+        starts_ns=starts,
+        shift=np.zeros(starts.size, dtype=np.int64),
         residual_ns=residual,
-    )
+    ).on_grid(starts)
+
+
+def cut_by_one(count: Count, clock: Clock) -> Floats:
+    """Say how far to move the stretches so that one sample is left out where the clock was set, and grids agree.
+
+    Parameters
+    ----------
+    count, clock
+        Items, and the line through them.
+
+    Returns
+    -------
+    float64 array ``[1 + cut]``
+        Nanoseconds by which to move what comes after each cut, 0 before the first one.
+    """
+    era = np.append(0, count.cuts)
+    # Within an era gaps are as long as the stamps say.
+    within = np.rint((clock.starts_ns - count.cut(clock.starts_ns[era])) / clock.period_ns).astype(np.int64)
+    first = np.minimum.reduceat(count.firsts + within, era)
+    end = np.maximum.reduceat(count.ends + within, era)
+    index = np.append(0, np.cumsum(end[:-1] + 1 - first[1:]))
+    by_ns: Floats = clock.starts_ns[0] + index * clock.period_ns - clock.starts_ns[era]
+    return by_ns
 
 
 def measure_wander(count: Count, clock: Clock) -> Wander:

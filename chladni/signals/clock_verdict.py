@@ -1,13 +1,14 @@
 """What a time base is worth: a word for it, a sentence of advice, and the rate it may be rounded to."""
 
 from dataclasses import replace
-from math import floor, log10, pi
+from math import floor, isfinite, log10, pi
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.clock_count import SHORT, Counted
+from chladni.signals.coarse_stamps import few_ticks, stamp_quantum
 from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
 
 # Scatter, relative to the period, above which samples placed on a grid deserve a warning.
 JITTERED = 0.05
+# Ticks, relative to the period, above which a sample's stamp may be nearer to another one's place.
+COARSE = 0.5
+# As many gaps at chance intervals don't look like the ticks of a coarse clock.
+_FEW = 2
 #: Advice where nothing speaks for a clock.
 EVENTS = "messages come at events and not on a grid; a spectrum needs uniform samples"
 
@@ -25,11 +30,16 @@ def verdict(counted: Counted, *, relative_jitter: float) -> "Verdict":
         return "bursts"
     if counted.count.time.size < SHORT and counted.item_size == 1:
         return "short"
+    if counted.quantum_ns > COARSE * counted.period_ns:
+        return "coarse"
     return "jittered" if relative_jitter > JITTERED else "regular"
 
 
-def advice(base: "TimeBase") -> str:
-    """Give one sentence on what the verdict means for spectra."""
+def advice(base: "TimeBase", unless_hz: float = 0.0) -> str:
+    """Give one sentence on what the verdict means for spectra; `unless_hz` is the rate if no sample was lost."""
+    if unless_hz and (base.gap_count > _FEW or base.duplicates > _FEW):
+        told = f"unless none was lost or repeated, and the rate is {unless_hz:.5g} Hz: then state it (--rate HZ)"
+        return f"{advice(base)}, {told}"
     if base.verdict == "short":
         return f"{counted(base.samples, 'sample')}: too few to judge the clock by; state the rate if you know it"
     if base.verdict == "bursts":
@@ -37,6 +47,15 @@ def advice(base: "TimeBase") -> str:
             f"messages come in bursts of about {base.burst_size}, so samples are counted in order and a lost one "
             "shifts those after it; log the sensor's own stamps"
         )
+    if base.verdict == "stated":
+        return "; ".join((f"samples are counted at {base.rate_hz:.9g} Hz, as stated", *_remarks(base)))
+    if base.verdict == "coarse":
+        told = f"{base.rate_hz:.9g} Hz, give or take {base.rate_std_hz:.2g} Hz" if isfinite(base.rate_std_hz) else ""
+        told = (
+            f"stamps come in ticks of {base.quantum_s * 1e3:.4g} ms, coarser than the sampling, so samples are "
+            f"counted in order; their rate is {told or 'uncertain'}"
+        )
+        return "; ".join((told, *_remarks(base)))
     if base.verdict == "jittered":
         limit_hz = 0.1 / (2 * pi * base.jitter_s)
         return (
@@ -56,13 +75,25 @@ def uneven(steps_ns: NDArray[np.int64]) -> str:
     )
 
 
+def ticking(steps_ns: NDArray[np.int64]) -> str:
+    """Give the advice for stamps with ticks that don't tell how many samples were lost; empty for others."""
+    mean_ns = float(steps_ns.mean())
+    quantum_ns = stamp_quantum(steps_ns, mean_ns)
+    if quantum_ns <= COARSE * mean_ns or not few_ticks(steps_ns, quantum_ns, mean_ns):
+        return ""
+    return (
+        f"stamps come in ticks of {quantum_ns * 1e-6:.4g} ms, coarser than the sampling, less evenly than samples "
+        "do: some are lost or doubled, so the rate can't be told; state it: --rate HZ, in Python sample_rate_hz"
+    )
+
+
 def _remarks(base: "TimeBase") -> list[str]:
     remarks = []
     # A sine wanders out of its line when its phase does: one period of the clock is where that may begin to show.
     if base.wander_s * base.rate_hz > 1:
         remarks.append(f"the clock wanders by {base.wander_s * 1e3:.3g} ms, so long averages smear sharp peaks")
-    if base.jumps:
-        remarks.append(f"the clock was set ({counted(len(base.jumps), 'step')})")
+    if base.clock.count:
+        remarks.append(f"the clock was set ({counted(base.clock.count, 'step')})")
     if base.gap_count:
         lost = f"{counted(base.missing, 'sample')} missing in {counted(base.gap_count, 'gap')}"
         remarks.append(f"{lost}, averages leave out what touches them")
@@ -113,8 +144,8 @@ def with_nominal(base: "TimeBase", nominal_hz: float) -> "TimeBase":
     # A state that the fit can't tell from its own is the better one: it carries no noise from log to log.
     if abs(off) <= max(3 * base.rate_std_hz, 1e-9 * nominal_hz):
         return replace(base, rate_hz=nominal_hz, snapped=True)
-    told = f"messages state {nominal_hz:.9g} Hz but their stamps advance at {base.rate_hz:.9g} Hz, which is used"
-    return replace(base, advice=f"{told}; {base.advice}")
+    told = f"a rate of {nominal_hz:.9g} Hz is stated, but the stamps advance at {base.rate_hz:.9g} Hz, which is used"
+    return replace(base, advice=told)
 
 
 def with_round_rate(base: "TimeBase") -> "TimeBase":

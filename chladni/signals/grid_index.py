@@ -24,25 +24,29 @@ def grid_index(
     knots_index: NDArray[np.float64],
     rate_hz: float,
     smoothing: int = 1,
-    resumed_ns: Ints | None = None,
+    resumed: Ints | None = None,
     resumed_shift: Ints | None = None,
+    cut_order: Ints | None = None,
+    cuts: Ints | None = None,
 ) -> Ints:
     """Give the grid index of each item (message, or first sample of a batch).
 
     Parameters
     ----------
     time_ns
-        ``[item]`` rising stamps, jumps undone.
+        ``[item]`` rising stamps, steps of the clock undone.
     order
         ``[item]`` samples that came before the item.
-    knots_ns, knots_index, rate_hz, smoothing, resumed_ns, resumed_shift
+    knots_ns, knots_index, rate_hz, smoothing, resumed, resumed_shift, cuts
         As in `TimeBase`. With stretches that resume, the index is the order plus the shift of the stretch. Else it
         is what the stamp says; with a smoothing above 1, the order plus a running median of how far stamps are ahead
         of the order, so that scatter moves no sample and a gap still does.
+    cut_order
+        ``[step]`` samples before each place where the clock was set. Nothing is smoothed across, and scatter puts no
+        sample where one is left out.
     """
-    if resumed_ns is not None and resumed_shift is not None and resumed_ns.size:
-        stretch = np.searchsorted(resumed_ns, time_ns, side="right") - 1
-        counted: Ints = order + resumed_shift[np.maximum(stretch, 0)]
+    if resumed is not None and resumed_shift is not None and resumed.size:
+        counted: Ints = order + resumed_shift[np.searchsorted(resumed, order, side="right") - 1]
         return counted
     knots = (knots_ns - knots_ns[0]).astype(np.float64)
     nearest = np.empty(time_ns.shape, np.int64)
@@ -54,14 +58,25 @@ def grid_index(
         index += np.minimum(elapsed, 0.0) * (rate_hz * 1e-9)
         index += np.maximum(elapsed - knots[-1], 0.0) * (rate_hz * 1e-9)
         nearest[part] = np.rint(index, out=index)
-    if smoothing == 1:
-        return nearest
+    if cut_order is None or cuts is None or not cut_order.size:
+        return nearest if smoothing == 1 else _smoothed(nearest, order, smoothing)
+    places = np.searchsorted(order, cut_order)
+    if smoothing > 1:
+        parts = np.unique(np.clip(places, 0, order.size))
+        pairs = zip(np.split(nearest, parts), np.split(order, parts), strict=True)
+        nearest = np.concatenate([_smoothed(near, part, smoothing) for near, part in pairs if part.size])
+    lengths = np.diff(places, prepend=0, append=order.size)
+    low = np.repeat(np.append(np.iinfo(np.int64).min, cuts[:, 1]), lengths)
+    high = np.repeat(np.append(cuts[:, 0] - 1, np.iinfo(np.int64).max), lengths)
+    return np.clip(nearest, low, high)
+
+
+def _smoothed(nearest: Ints, order: Ints, smoothing: int) -> Ints:
     # Imported here because a log with sound stamps never needs it.
     from scipy.ndimage import median_filter
 
-    ahead = median_filter(nearest - order, size=smoothing, mode="nearest")
-    smoothed: Ints = ahead + order
-    return smoothed
+    ahead: Ints = median_filter(nearest - order, size=smoothing, mode="nearest")
+    return ahead + order
 
 
 def choose_smoothing(time_ns: Ints, clock: Callable[..., Ints], *, repeats: int) -> int:

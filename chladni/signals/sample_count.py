@@ -5,11 +5,13 @@ sample's index by itself, whatever is missing (`count_by_phase`). Where messages
 periods, only their order tells, and gaps are what exceeds the scatter (`count_by_order`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+ScalarT = TypeVar("ScalarT", bound=np.generic)
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -34,6 +36,8 @@ class Count:
         ``[item]`` nanoseconds since the first item, rising.
     index
         ``[item]`` whole index, on a grid that is common within a stretch.
+    place
+        ``[item]`` where it stands in the list counted, of which the items may be only a part.
     stretch
         ``[item]`` number of the stretch between gaps, from 0, rising.
     window
@@ -41,19 +45,35 @@ class Count:
     starts, sizes
         ``[window]`` first item and number of items.
     resumed
-        ``[stretch]`` where each stretch begins in the list counted, of which `time` may hold only a part.
+        ``[stretch]`` where each stretch begins in the list counted.
+    firsts, ends
+        ``[stretch]`` lowest index in each, and one more than the last sample's.
+    cuts
+        Numbers of the stretches that begin where the clock was set.
     coherence
         0 to 1: how well the stamps agree with a grid of the period; 1 when counted by order.
     """
 
     time: Floats
     index: Ints
+    place: Ints
     stretch: Ints
     window: Ints
     starts: Ints
     sizes: Ints
     resumed: Ints
+    firsts: Ints
+    ends: Ints
+    cuts: Ints
     coherence: float = 1.0
+
+    def moved(self, by_ns: Floats) -> Self:
+        """Give the items with the times of each ``[stretch]`` moved."""
+        return replace(self, time=self.time + by_ns[self.stretch])
+
+    def cut(self, per_cut: NDArray[ScalarT]) -> NDArray[ScalarT]:
+        """Give ``[stretch]`` what each has since the last cut, of ``[1 + cut]``."""
+        return np.repeat(per_cut, np.diff(self.cuts, prepend=0, append=self.resumed.size))
 
 
 def count_even(time_ns: Ints) -> Count:
@@ -68,15 +88,19 @@ def count_even(time_ns: Ints) -> Count:
     return Count(
         time=(time_ns[item] - time_ns[0]).astype(np.float64),
         index=item,
+        place=item,
         stretch=np.zeros_like(item),
         window=np.zeros_like(item),
         starts=np.zeros(1, dtype=np.int64),
         sizes=np.array([item.size]),
         resumed=np.zeros(1, dtype=np.int64),
+        firsts=np.zeros(1, dtype=np.int64),
+        ends=np.array([time_ns.size]),
+        cuts=np.zeros(0, dtype=np.int64),
     )
 
 
-def count_by_phase(time_ns: Ints, steps: Ints, period_ns: float) -> Count:
+def count_by_phase(time_ns: Ints, steps: Ints, period_ns: float, cuts: Ints) -> Count:
     """Give each stamp the index that its phase tells.
 
     Parameters
@@ -85,18 +109,22 @@ def count_by_phase(time_ns: Ints, steps: Ints, period_ns: float) -> Count:
         ``[message]`` rising, at least 2; and their differences.
     period_ns
         First guess: the median interval.
+    cuts
+        Messages before which the clock was set, rising.
     """
     scatter = _phase_scatter(steps, period_ns)
     # Reach: the median's own error, a bias of missing samples under scatter, and rounding to whole nanoseconds.
     reach = min(0.08, 4 * scatter / np.sqrt(time_ns.size) + 0.1 * scatter + 2 / period_ns)
     # Short blocks first: their broad maximum takes few trials to find, and leaves few for the long ones.
-    period = _refined_period(time_ns, period_ns, reach, block=WINDOW)
-    period = _refined_period(time_ns, period, min(reach, 0.5 / WINDOW), block=_BLOCK)
+    period, _ = refined_period(time_ns, period_ns, reach, cuts, block=WINDOW)
+    period, _ = refined_period(time_ns, period, min(reach, 0.5 / WINDOW), cuts, block=_BLOCK)
     every = -(-time_ns.size // MAX_ITEMS)
     if every > 1:
         # Windows of every n-th stamp are longer, so the period must be known better.
-        period = _refined_period(time_ns[::every], period, min(reach, 0.5 / _BLOCK), block=_BLOCK, every=every)
-    resumed = _resumed(steps > (3.5 if scatter < _TIGHT else 64) * period)
+        period, _ = refined_period(
+            time_ns[::every], period, min(reach, 0.5 / _BLOCK), -(-cuts // every), block=_BLOCK, every=every
+        )
+    resumed, cut_stretches = _resumed(steps > (3.5 if scatter < _TIGHT else 64) * period, cuts)
     item, stretch = _chosen(time_ns.size, resumed)
     window, starts = _windows(stretch)
     # Relative to the first, where a double holds nanoseconds exactly for 100 days.
@@ -104,20 +132,33 @@ def count_by_phase(time_ns: Ints, steps: Ints, period_ns: float) -> Count:
     cycles = time / period
     sums = np.add.reduceat(_phasors(cycles), starts)
     offset = np.unwrap(np.angle(sums)) / (2 * np.pi)
+    index = np.rint(cycles - offset[window]).astype(np.int64)
+    first_item = np.searchsorted(stretch, np.arange(resumed.size))
     return Count(
         time=time,
-        index=np.rint(cycles - offset[window]).astype(np.int64),
+        index=index,
+        place=item,
         stretch=stretch,
         window=window,
         starts=starts,
         sizes=np.diff(starts, append=time.size),
         resumed=resumed,
+        firsts=np.minimum.reduceat(index, first_item),
+        ends=np.maximum.reduceat(index, first_item) + 1,
+        cuts=cut_stretches,
         coherence=float(np.abs(sums).sum() / time.size),
     )
 
 
 def count_by_order(
-    time_ns: Ints, steps: Ints, counts: Ints, period_ns: float, *, pause_ns: float | None = None
+    time_ns: Ints,
+    steps: Ints,
+    counts: Ints,
+    period_ns: float,
+    cuts: Ints,
+    *,
+    pause_ns: float | None = None,
+    quantum_ns: float = 0.0,
 ) -> Count:
     """Number samples in the order in which they came; an interval far beyond the scatter is a gap.
 
@@ -129,8 +170,12 @@ def count_by_order(
         ``[item]`` samples of each item, at least 1.
     period_ns
         First guess; at most a few percent off.
+    cuts
+        Items before which the clock was set, rising.
     pause_ns
         What an interval must exceed its samples by to be a gap; by default eight times the scatter.
+    quantum_ns
+        What an interval may read too much because of the stamps' ticks.
     """
     excess = steps - counts[:-1] * period_ns
     centre = float(np.median(excess))
@@ -138,28 +183,50 @@ def count_by_order(
     if abs(centre) < 0.1 * float(np.median(counts)) * period_ns:
         excess -= centre
     pause = 8 * robust_std(excess) if pause_ns is None else pause_ns
-    resumed = _resumed(excess > max(0.5 * period_ns, pause))
+    # A tick is known to a rounding.
+    resumed, cut_stretches = _resumed(excess > max(0.5 * period_ns, pause, 1.005 * quantum_ns), cuts)
+    return count_in_stretches(time_ns, counts, resumed, cut_stretches)
+
+
+def count_in_stretches(time_ns: Ints, counts: Ints, resumed: Ints, cut_stretches: Ints) -> Count:
+    """Number samples in the order in which they came; what lies between the stretches is for a fit to find.
+
+    Parameters
+    ----------
+    time_ns, counts
+        As in `count_by_order`.
+    resumed, cut_stretches
+        `resumed` and `cuts` of the `Count`.
+    """
     item, stretch = _chosen(time_ns.size, resumed)
     window, starts = _windows(stretch)
+    after = np.cumsum(counts)
     return Count(
         time=(time_ns[item] - time_ns[0]).astype(np.float64),
-        index=(np.cumsum(counts) - counts)[item],
+        index=(after - counts)[item],
+        place=item,
         stretch=stretch,
         window=window,
         starts=starts,
         sizes=np.diff(starts, append=item.size),
         resumed=resumed,
+        firsts=(after - counts)[resumed],
+        ends=after[np.append(resumed[1:], counts.size) - 1],
+        cuts=cut_stretches,
     )
 
 
 def order_fano(count: Count, period_ns: float) -> float:
-    """Variance of the time that many items take, over that of as many random arrivals: 1 is chance, 0 a clock."""
+    """Variance of the time that many items take, over that of as many random arrivals: 1 is chance, 0 a clock.
+
+    Infinite when no stretch is long enough to tell.
+    """
     items = count.time.size
     # Many windows for a robust scatter, each long enough to average delivery out.
     lag = int(np.clip(items // 16, 1, 512))
     same = np.flatnonzero(count.stretch[lag:] == count.stretch[:-lag])
     if not same.size:
-        return 0.0
+        return np.inf
     late = count.time - period_ns * count.index
     mean = float(count.time[-1] - count.time[0]) / (items - 1)
     interval = max(float(np.median(np.diff(count.time))), 0.5 * mean)
@@ -173,18 +240,46 @@ def robust_std(values: Floats) -> float:
     return float(1.4826 * np.median(np.abs(part - np.median(part)))) if part.size else 0.0
 
 
-def _refined_period(time_ns: Ints, period_ns: float, reach: float, *, block: int, every: int = 1) -> float:
-    """Find the period whose phases agree best over blocks of stamps, one every n periods, near the guess."""
+def refined_period(
+    time_ns: Ints, period_ns: float, reach: float, cuts: Ints, *, block: int, every: int = 1
+) -> tuple[float, float]:
+    """Find the period whose phases agree best over blocks of stamps, one every n periods, near the guess.
+
+    Parameters
+    ----------
+    time_ns
+        ``[message]`` rising.
+    period_ns, reach
+        Guess, and how far off it may be, relative.
+    cuts
+        Messages before which the clock was set.
+    block
+        Stamps of a block; eight of them, spread over the log, are looked at.
+    every
+        Periods from stamp to stamp.
+
+    Returns
+    -------
+    period_ns, power : float
+        And the power of its phases, relative to that of random ones.
+    """
     block = min(block, time_ns.size)
     step = 1 / (4 * block * every)
     half = int(np.ceil(reach / step))
     trial = 1 + np.arange(-half, half + 1) * step
     # Powers of separate blocks add, so that a gap or a step between blocks does no harm.
     power = np.zeros(trial.size)
-    for start in np.unique(np.linspace(0, time_ns.size - block, 8).astype(np.int64)):
+    starts = np.unique(np.linspace(0, time_ns.size - block, 8).astype(np.int64))
+    for start in starts:
         part = time_ns[start : start + block]
-        power += np.abs(_phasors(np.outer((part - part[0]) / period_ns, trial)).sum(axis=0)) ** 2
-    return period_ns / float(trial[np.argmax(power)])
+        # A clock that was set has another phase, so its stretches have powers of their own, too.
+        inside = cuts[(cuts > start) & (cuts < start + block)] - start
+        sums = np.add.reduceat(
+            _phasors(np.outer((part - part[0]) / period_ns, trial)), np.unique(np.append(0, inside)), axis=0
+        )
+        power += (np.abs(sums) ** 2).sum(axis=0)
+    best = int(np.argmax(power))
+    return period_ns / float(trial[best]), float(power[best]) / (starts.size * block)
 
 
 def _phasors(cycles: Floats) -> NDArray[np.complex64]:
@@ -204,8 +299,12 @@ def _phase_scatter(steps: Ints, period_ns: float) -> float:
     return robust_std(turns - np.rint(turns))
 
 
-def _resumed(gaps: NDArray[np.bool_]) -> Ints:
-    return np.concatenate((np.zeros(1, dtype=np.int64), np.flatnonzero(gaps) + 1))
+def _resumed(gaps: NDArray[np.bool_], cuts: Ints) -> tuple[Ints, Ints]:
+    """First items of the stretches, and the numbers of those that begin at a cut."""
+    if cuts.size:
+        gaps[cuts - 1] = True
+    resumed = np.append(0, np.flatnonzero(gaps) + 1)
+    return resumed, np.searchsorted(resumed, cuts)
 
 
 def _chosen(items: int, resumed: Ints) -> tuple[Ints, Ints]:

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.stamp_order import ClockJump
 from chladni.signals.time_series import NS_PER_S
 
 #: Gaps that are listed one by one, the longest chosen; all are counted.
 MAX_GAPS = 1000
-# A pause of more than a minute that outlasts all the rest of the log.
-_LEAP_S = 60.0
+#: A pause longer than this, and than all that was recorded, may as well be a clock that was set.
+LEAP_S = 60.0
+
+Spans = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,40 +26,49 @@ class Gaps:
     count
         All of them.
     leaps
-        Those longer than a minute and than all the rest of the log: set clocks rather than pauses.
+        ``[leap, 2]`` those longer than a minute and than all that was recorded: set clocks rather than pauses.
     """
 
     longest: tuple[tuple[float, float], ...]
     count: int
-    leaps: tuple[ClockJump, ...]
+    leaps: Spans
 
 
-def list_gaps(
-    stamps_ns: NDArray[np.int64], before: NDArray[np.int64], sizes: NDArray[np.int64], period_ns: float
-) -> Gaps:
-    """List the gaps after the messages `before`.
+def list_gaps(spans_s: Spans, recorded_s: float) -> Gaps:
+    """List gaps.
+
+    Parameters
+    ----------
+    spans_s
+        ``[gap, 2]`` time of the last sample before and of the first after each, in order of time.
+    recorded_s
+        Time that all samples cover.
+    """
+    lengths = spans_s[:, 1] - spans_s[:, 0]
+    chosen = np.sort(np.argsort(lengths)[-MAX_GAPS:])
+    return Gaps(
+        longest=tuple((start, end) for start, end in spans_s[chosen].tolist()),
+        count=lengths.size,
+        leaps=spans_s[lengths > max(LEAP_S, recorded_s)],
+    )
+
+
+def spans_between(
+    stamps_ns: NDArray[np.int64], after: NDArray[np.int64], sizes: NDArray[np.int64], period_ns: float
+) -> Spans:
+    """Give ``[gap, 2]`` seconds from the first stamp: the last sample before, and the first one after.
 
     Parameters
     ----------
     stamps_ns
         ``[message]`` rising stamps.
-    before, sizes
-        ``[gap]`` the last message before each gap, and its samples.
-    period_ns
-        Of the samples in a batch.
+    after
+        ``[gap]`` the first message after each gap.
+    sizes, period_ns
+        ``[message]`` samples of each, or a single number for all; and the time between them.
     """
-    first, span = int(stamps_ns[0]), int(stamps_ns[-1] - stamps_ns[0])
-    lengths = stamps_ns[before + 1] - stamps_ns[before]
-    chosen = np.sort(np.argsort(lengths)[-MAX_GAPS:])
+    first = int(stamps_ns[0])
+    before = np.broadcast_to(sizes, stamps_ns.shape)[after - 1]
     # A gap begins with the last sample before it, which in a batch comes after the stamp.
-    starts_s = (stamps_ns[before] - first + (sizes - 1) * period_ns) / NS_PER_S
-    ends_s = (stamps_ns[before + 1] - first) / NS_PER_S
-    leaping = chosen[lengths[chosen] > np.maximum(_LEAP_S * NS_PER_S, span - lengths[chosen])]
-    return Gaps(
-        longest=tuple(zip(starts_s[chosen].tolist(), ends_s[chosen].tolist(), strict=True)),
-        count=before.size,
-        leaps=tuple(
-            ClockJump(before_ns=int(stamps_ns[before[gap]]), after_ns=int(stamps_ns[before[gap] + 1]), shift_ns=0)
-            for gap in leaping
-        ),
-    )
+    starts_s = (stamps_ns[after - 1] - first + (before - 1) * period_ns) / NS_PER_S
+    return np.stack((starts_s, (stamps_ns[after] - first) / NS_PER_S), axis=1)

@@ -1,46 +1,13 @@
-"""Untangling of message stamps: clock jumps undone, order restored, repeats counted."""
+"""Untangling of message stamps: steps of the clock undone, order restored, repeats counted."""
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.clock_steps import LEAP_NS, ClockSteps, find_clock_steps, sample_period
 from chladni.signals.errors import EstimateError
-
-# A message later than this many periods that the others don't follow is late; when they do, the clock was set back.
-NEIGHBOURS = 16
-# A log with more candidates than this has no clock worth untangling.
-MAX_CANDIDATES = 1000
-#: A step forward that nobody waits for: eleven days, in a log of seconds to hours. Clocks that start in 1970 do it.
-LEAP_NS = 1_000_000_000_000_000
-#: Thirty years: no log lasts as long, so stamps that span more are garbage.
-LONGEST_NS = 1_000_000_000_000_000_000
-_SAMPLE = 50_000
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ClockJump:
-    """A step of the clock between two neighbouring messages.
-
-    How long it took is unknown; one missing sample marks it, so that nothing is averaged across.
-
-    Attributes
-    ----------
-    before_ns, after_ns
-        Stamps on either side.
-    shift_ns
-        What to add to every later stamp so that time runs on; 0 for a step forward that may as well be a pause.
-    """
-
-    before_ns: int
-    after_ns: int
-    shift_ns: int
-
-    @property
-    def step_s(self) -> float:
-        """Size of the step, negative when the clock was set back."""
-        return (self.after_ns - self.before_ns) * 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,13 +17,14 @@ class Untangled:
     Attributes
     ----------
     time_ns
-        ``[message]`` stamps in rising order, jumps undone.
+        ``[message]`` stamps in rising order, steps of the clock undone.
     steps
         Differences of `time_ns`.
     order
         ``[message]`` place of arrival of each, None when none came late.
-    jumps
-        Steps back, and leaps forward of more than eleven days, that were undone.
+    clock
+        Where the clock was set. Messages don't change places across such a step, so that each stretch between two
+        begins at the same number in `time_ns` as in the order of arrival.
     out_of_order
         Messages that came after a later one.
     duplicates
@@ -66,9 +34,20 @@ class Untangled:
     time_ns: NDArray[np.int64]
     steps: NDArray[np.int64]
     order: NDArray[np.int64] | None
-    jumps: tuple[ClockJump, ...]
+    clock: ClockSteps
     out_of_order: int
     duplicates: int
+
+    def within(self) -> NDArray[np.int64]:
+        """Steps from message to message, without those across a step of the clock."""
+        return np.delete(self.steps, self.clock.message - 1) if self.clock.count else self.steps
+
+    def moved(self, by_ns: NDArray[np.int64]) -> Self:
+        """Move the stretch after each step of the clock, by so much in all."""
+        if not by_ns.any():
+            return self
+        time_ns = replace(self.clock, shift_ns=by_ns).run_on(self.time_ns)
+        return replace(self, time_ns=time_ns, steps=np.diff(time_ns), clock=self.clock.moved(by_ns))
 
 
 def require_stamps(stamps_ns: NDArray[Any]) -> NDArray[np.int64]:
@@ -82,84 +61,57 @@ def require_stamps(stamps_ns: NDArray[Any]) -> NDArray[np.int64]:
     return stamps_ns.astype(np.int64, copy=False)
 
 
-def untangle(stamps_ns: NDArray[np.int64]) -> Untangled:
-    """Undo steps back of the clock, sort what came late, and count both.
+def untangle(
+    stamps_ns: NDArray[np.int64],
+    before: NDArray[np.int64] | None = None,
+    *,
+    known: ClockSteps | None = None,
+    logged_ns: NDArray[np.int64] | None = None,
+) -> Untangled:
+    """Undo steps of the clock, sort what came late, and count both.
 
     Parameters
     ----------
     stamps_ns
         ``[message]`` int64 nanoseconds, in the order of arrival, at least one.
+    before
+        ``[message]`` samples that came before each; None when every message is one sample.
+    known
+        Steps of the clock; None looks for them.
+    logged_ns
+        As for `find_clock_steps`.
     """
+    steps = np.diff(stamps_ns)
+    rises = steps.size == 0 or (steps.min() >= 0 and steps.max() < LEAP_NS)
+    if known is None and (not rises or logged_ns is not None):
+        known = find_clock_steps(stamps_ns, before, logged_ns=logged_ns)
     # The usual log passes here without a copy.
-    time_ns, steps = stamps_ns, np.diff(stamps_ns)
-    if steps.size == 0 or (steps.min() >= 0 and steps.max() < LEAP_NS):
+    if rises and (known is None or not known.count):
         repeats = steps.size - int(np.count_nonzero(steps))
-        return Untangled(time_ns=stamps_ns, steps=steps, order=None, jumps=(), out_of_order=0, duplicates=repeats)
-    backward = int(np.count_nonzero(steps < 0))
-    jumps = find_jumps(stamps_ns)
-    if jumps:
-        time_ns, _ = run_on(stamps_ns, jumps)
-    order = np.argsort(time_ns, kind="stable")
-    time_ns = time_ns[order]
+        return Untangled(
+            time_ns=stamps_ns, steps=steps, order=None, clock=ClockSteps(), out_of_order=0, duplicates=repeats
+        )
+    clock = ClockSteps() if known is None else known
+    time_ns = clock.run_on(stamps_ns)
+    late = int(np.count_nonzero(np.diff(time_ns) < 0))
+    order = np.argsort(time_ns, kind="stable") if late else None
+    time_ns = time_ns if order is None else time_ns[order]
     steps = np.diff(time_ns)
     return Untangled(
         time_ns=time_ns,
         steps=steps,
         order=order,
-        jumps=jumps,
-        out_of_order=backward - sum(jump.shift_ns > 0 for jump in jumps),
+        clock=clock,
+        out_of_order=late,
         duplicates=steps.size - int(np.count_nonzero(steps)),
     )
 
 
-def find_jumps(stamps_ns: NDArray[np.int64]) -> tuple[ClockJump, ...]:
-    """Find where the clock was set: the messages after stay behind, or ages ahead of, those before."""
-    period_ns = typical_period(stamps_ns)
-    steps = np.diff(stamps_ns)
-    candidates = np.flatnonzero((steps < -NEIGHBOURS * period_ns) | (steps > LEAP_NS))
-    if candidates.size > MAX_CANDIDATES:
-        return ()
-    jumps = []
-    for last in candidates:
-        before = stamps_ns[max(0, last + 1 - NEIGHBOURS) : last + 1]
-        after = stamps_ns[last + 1 : last + 1 + NEIGHBOURS]
-        # One or two messages at an end can't show whether the clock was set back or they were late.
-        moved = float(np.median(after - before[0]) - np.median(before - before[0]))
-        set_back = moved < 0 and min(before.size, after.size) > 2
-        if set_back or (moved > 0.5 * LEAP_NS and after.size > 2):
-            at, to = int(stamps_ns[last]), int(stamps_ns[last + 1])
-            jumps.append(ClockJump(before_ns=at, after_ns=to, shift_ns=at - to + round(2 * period_ns)))
-    # Shifts of garbage could add up to more than 64 bits hold.
-    return tuple(jumps) if sum(abs(jump.shift_ns) for jump in jumps) < 4 * LONGEST_NS else ()
+def arrival_order(stamps_ns: NDArray[np.int64]) -> NDArray[np.int64] | None:
+    """Places of arrival in the order of time, steps of the clock undone; None when all came in order."""
+    return untangle(stamps_ns).order if stamps_ns.size else None
 
 
-def run_on(
-    stamps_ns: NDArray[np.int64], jumps: tuple[ClockJump, ...], *, done: int = 0
-) -> tuple[NDArray[np.int64], int]:
-    """Add the shifts of the jumps that occur among the stamps, and of the `done` first ones before them.
-
-    Returns
-    -------
-    time_ns, done
-        Stamps on a clock that runs on, and how many jumps lie behind it.
-    """
-    # The pair of stamps tells a jump; its number would depend on where reading began.
-    if not jumps:
-        return stamps_ns, done
-    time_ns = stamps_ns + sum(jump.shift_ns for jump in jumps[:done])
-    place = 0
-    for jump in jumps[done:]:
-        here = np.flatnonzero((stamps_ns[place:-1] == jump.before_ns) & (stamps_ns[place + 1 :] == jump.after_ns))
-        if not here.size:
-            break
-        place += int(here[0]) + 1
-        time_ns[place:] += jump.shift_ns
-        done += 1
-    return time_ns, done
-
-
-def typical_period(time_ns: NDArray[np.int64]) -> float:
+def typical_period(tangled: Untangled) -> float:
     """Median over the log of the mean interval of 32 messages: right for bursts, at least 1 ns."""
-    lag = max(1, min(2 * NEIGHBOURS, (time_ns.size - 1) // 2))
-    starts = np.arange(0, time_ns.size - lag, max(1, time_ns.size // _SAMPLE))
-    return max(1.0, float(np.median(np.abs(time_ns[starts + lag] - time_ns[starts]))) / lag)
+    return sample_period(tangled.time_ns, None, tangled.clock.message)

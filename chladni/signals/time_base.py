@@ -1,6 +1,6 @@
 """Time base: rate, start and soundness of a clock, from the stamps of messages."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf, isfinite, pi
@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.clock_check import grid_agrees
-from chladni.signals.clock_count import Counted, count_batches, count_late_messages, count_messages
-from chladni.signals.clock_fit import Clock, fit_clock, measure_wander
-from chladni.signals.clock_verdict import EVENTS, advice, uneven, verdict, with_nominal, with_round_rate
+from chladni.signals.clock_count import Counted, count_batches, count_messages, count_stated
+from chladni.signals.clock_fit import Clock, cut_by_one, fit_clock, measure_wander
+from chladni.signals.clock_steps import LONGEST_NS, ClockSteps
+from chladni.signals.clock_verdict import EVENTS, advice, ticking, uneven, verdict, with_nominal, with_round_rate
 from chladni.signals.errors import EstimateError
 from chladni.signals.grid_index import choose_smoothing, grid_index
-from chladni.signals.stamp_gaps import list_gaps
-from chladni.signals.stamp_order import LONGEST_NS, ClockJump, Untangled, require_stamps, untangle
+from chladni.signals.stamp_gaps import list_gaps, spans_between
+from chladni.signals.stamp_order import Untangled, require_stamps, untangle
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.value import Value, require_shape
 
@@ -25,16 +26,19 @@ _AT_ONCE = 0.05
 # Share of the messages that may find no free point; with more, the source was faster than the grid for a while.
 _CROWD = 0.01
 
-Verdict = Literal["regular", "jittered", "bursts", "irregular", "still", "short"]
+Verdict = Literal["regular", "jittered", "coarse", "bursts", "irregular", "still", "short", "stated"]
 
 
-def _no_stretches() -> NDArray[np.int64]:
+def _none() -> NDArray[np.int64]:
     return np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TimeBase(Value):
     """What the stamps of one topic say about its clock.
+
+    Its time runs on: where the clock was set, what comes after is moved so that one sample is left out there. Grid
+    times, gaps and breaks are of that time; until the clock is first set it's that of the stamps.
 
     Attributes
     ----------
@@ -47,9 +51,10 @@ class TimeBase(Value):
     samples
         Samples (messages, or all samples of batch messages) that the stamps stand for.
     verdict
-        ``regular``; ``jittered`` (scatter above 5 % of a period); ``bursts`` (several messages nearly at once, then
-        silence: samples are counted in order); ``irregular`` (events, or no one rate: no grid); ``still`` (stamps
-        don't move); ``short`` (fewer than eight, too few to judge).
+        ``regular``; ``jittered`` (scatter above 5 % of a period); ``coarse`` (the stamps' ticks are longer than half
+        a period) and ``bursts`` (several messages nearly at once, then silence), where samples are counted in order;
+        ``irregular`` (events, or no one rate: no grid); ``still`` (stamps don't move); ``short`` (fewer than eight,
+        too few to judge); ``stated`` (counted in order at a rate that someone states, since the stamps tell none).
     advice
         One sentence on what that means for spectra.
     snapped
@@ -58,24 +63,35 @@ class TimeBase(Value):
         Root mean square of the stamps about the fitted grid.
     wander_s
         Largest departure of the clock from constant rate, means of 256 messages, peak to peak.
+    quantum_s
+        Ticks of the stamps, where they are longer than an eighth of a period; else 0.
     gaps
         (last sample before, first after) in seconds from the first stamp; at most the 1000 longest.
     gap_count, missing
-        All gaps, and the grid points without a sample.
+        All gaps, and the grid points without a sample in them.
+    clock
+        Where the clock was set, and what makes it run on.
+    breaks_s
+        ``[break, 2]`` last sample before and first after, in seconds from the first stamp, of every place where
+        samples don't follow each other in time: where the clock was set, and where it leapt ahead by more than a
+        minute and than all that was recorded (which may also be a pause, and is a gap too).
+    longest_stretch_s
+        Longest time that samples cover without a gap or a break; 0 without a grid.
     duplicates, out_of_order
-        Messages with the stamp of another one, or too near it to have a grid point of their own; messages that came
+        Messages that have no place of their own, since another one has their stamp, or nearly so; messages that came
         after a later one.
-    jumps
-        Steps of the clock: back, and implausibly far forward (which may also be a pause, and is a gap too).
     burst_size
         Messages that typically arrive at once; 1 when they come one by one.
     knots_ns, knots_index
-        ``[knot]`` times (jumps undone) and the grid index there; between knots the clock runs evenly.
+        ``[knot]`` times and the grid index there; between knots the clock runs evenly.
     smoothing
         Messages over which the index is smoothed when placing (running median); 1 when stamps are trusted singly.
-    resumed_ns, resumed_shift
-        ``[stretch]`` when samples are counted in order (bursts, batches, late delivery): the first stamp of each
-        stretch between gaps, and what its samples' order lacks to the grid index. Empty when stamps tell the index.
+    resumed, resumed_shift
+        ``[stretch]`` when samples are counted in order (bursts, ticks, batches, late delivery): the samples before
+        each stretch between gaps, and what its samples' order lacks to the grid index. Empty when stamps tell the
+        index.
+    cuts
+        ``[step, 2]`` where the clock was set: the first grid index that is left out, and the first one after.
     """
 
     rate_hz: float
@@ -87,28 +103,32 @@ class TimeBase(Value):
     snapped: bool = False
     jitter_s: float = 0.0
     wander_s: float = 0.0
+    quantum_s: float = 0.0
     gaps: tuple[tuple[float, float], ...] = ()
     gap_count: int = 0
     missing: int = 0
+    clock: ClockSteps = field(default_factory=ClockSteps)
+    breaks_s: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    longest_stretch_s: float = 0.0
     duplicates: int = 0
     out_of_order: int = 0
-    jumps: tuple[ClockJump, ...] = ()
     burst_size: int = 1
     knots_ns: NDArray[np.int64]
     knots_index: NDArray[np.float64]
     smoothing: int = 1
-    resumed_ns: NDArray[np.int64] = field(default_factory=_no_stretches)
-    resumed_shift: NDArray[np.int64] = field(default_factory=_no_stretches)
+    resumed: NDArray[np.int64] = field(default_factory=_none)
+    resumed_shift: NDArray[np.int64] = field(default_factory=_none)
+    cuts: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
 
     def __post_init__(self) -> None:
         require_shape("knots_index", self.knots_index, self.knots_ns.shape, "knots_ns")
-        require_shape("resumed_shift", self.resumed_shift, self.resumed_ns.shape, "resumed_ns")
+        require_shape("resumed_shift", self.resumed_shift, self.resumed.shape, "resumed")
         self._freeze()
 
     @property
     def uniform(self) -> bool:
         """Whether samples can be placed on a grid."""
-        return self.verdict in {"regular", "jittered", "bursts"} or (self.verdict == "short" and self.rate_hz > 0)
+        return self.verdict not in {"irregular", "still", "short"} or (self.verdict == "short" and self.rate_hz > 0)
 
     @property
     def moving(self) -> bool:
@@ -120,8 +140,17 @@ class TimeBase(Value):
         return 2 * pi * frequency_hz * self.jitter_s
 
 
-def fit_time_base(stamps_ns: NDArray[Any]) -> TimeBase:
-    """Fit rate and start to message stamps, ignoring jitter, gaps, repeats, disorder, clock steps and bursts.
+def fit_time_base(
+    stamps_ns: NDArray[Any],
+    *,
+    nominal_rate_hz: float | None = None,
+    clock: ClockSteps | None = None,
+    logged_ns: NDArray[np.int64] | None = None,
+) -> TimeBase:
+    """Fit rate and start to message stamps, ignoring jitter, ticks, gaps, disorder, steps of the clock and bursts.
+
+    Messages with the same stamp are samples, as a clock makes them that ticks more slowly than they are taken, when
+    that explains all of the stamps; else they are repeats. Who knows that they are repeats leaves them out.
 
     A grid that would contradict the stamps is not given: see `chladni.signals.clock_check.grid_agrees`.
 
@@ -129,6 +158,13 @@ def fit_time_base(stamps_ns: NDArray[Any]) -> TimeBase:
     ----------
     stamps_ns
         ``[message]`` integer nanoseconds, in the order of arrival; one sample a message. May be empty.
+    nominal_rate_hz
+        Rate that someone states. It settles what the stamps leave open, and is taken when they agree with it within
+        three sigma; otherwise the fitted rate stands, and `advice` says so.
+    clock
+        Where the clock was set, when that is known from elsewhere; None looks for it.
+    logged_ns
+        ``[message]`` times of another clock, which tells steps ahead from pauses; None without.
 
     Raises
     ------
@@ -141,11 +177,17 @@ def fit_time_base(stamps_ns: NDArray[Any]) -> TimeBase:
     100.0
     """
     stamps = require_stamps(stamps_ns)
-    return _fit(stamps, None, None)
+    _require_rate(nominal_rate_hz)
+    return _fit(stamps, None, nominal_rate_hz, clock, logged_ns)
 
 
 def fit_batch_time_base(
-    stamps_ns: NDArray[Any], counts: NDArray[Any], *, nominal_rate_hz: float | None = None
+    stamps_ns: NDArray[Any],
+    counts: NDArray[Any],
+    *,
+    nominal_rate_hz: float | None = None,
+    clock: ClockSteps | None = None,
+    logged_ns: NDArray[np.int64] | None = None,
 ) -> TimeBase:
     """Fit the sample rate to batch messages.
 
@@ -156,148 +198,260 @@ def fit_batch_time_base(
     counts
         ``[batch]`` samples of each batch, at least 1.
     nominal_rate_hz
-        Rate that the messages state. Taken when the stamps agree with it within three sigma or when there are too
-        few to judge; otherwise the fitted rate stands, and `advice` says so.
+        Rate that the messages, or a user, state. Taken when the stamps agree with it within three sigma or when there
+        are too few to judge; otherwise the fitted rate stands, and `advice` says so.
+    clock, logged_ns
+        As for `fit_time_base`.
     """
     stamps = require_stamps(stamps_ns)
     sizes = np.asarray(counts)
     if sizes.shape != stamps.shape or sizes.dtype.kind not in "iu" or (sizes.size and sizes.min() < 1):
         raise EstimateError("counts must be one whole number of samples, at least 1, for each stamp")
-    if nominal_rate_hz is not None and not (isfinite(nominal_rate_hz) and nominal_rate_hz > 0):
-        raise EstimateError(f"nominal rate {nominal_rate_hz} Hz must be finite and positive")
-    return _fit(stamps, sizes.astype(np.int64, copy=False), nominal_rate_hz)
+    _require_rate(nominal_rate_hz)
+    return _fit(stamps, sizes.astype(np.int64, copy=False), nominal_rate_hz, clock, logged_ns)
 
 
-def _fit(stamps: NDArray[np.int64], counts: NDArray[np.int64] | None, nominal_hz: float | None) -> TimeBase:
+def _require_rate(rate_hz: float | None) -> None:
+    if rate_hz is not None and not (isfinite(rate_hz) and rate_hz > 0):
+        raise EstimateError(f"nominal rate {rate_hz} Hz must be finite and positive")
+
+
+def _fit(
+    stamps: NDArray[np.int64],
+    counts: NDArray[np.int64] | None,
+    nominal_hz: float | None,
+    known: ClockSteps | None,
+    logged_ns: NDArray[np.int64] | None,
+) -> TimeBase:
     samples = stamps.size if counts is None else int(counts.sum())
     if stamps.size < 2:
         return _short(stamps, samples, nominal_hz)
-    tangled = untangle(stamps)
-    if _stands_still(tangled.steps):
-        return _still(stamps, samples)
-    if tangled.time_ns[-1] - tangled.time_ns[0] > LONGEST_NS:
-        return _irregular(tangled, samples)
+    before = None if counts is None else np.cumsum(counts) - counts
+    tangled = untangle(stamps, before, known=known, logged_ns=logged_ns)
     # A single 1 stands for all messages: ten million ones would only cost memory.
     sizes = np.ones(1, dtype=np.int64) if counts is None else counts
     if counts is not None and tangled.order is not None:
         sizes = counts[tangled.order]
-    counted = count_messages(tangled) if counts is None else count_batches(tangled.time_ns, sizes, nominal_hz)
-    base = _on_grid(tangled, sizes, counted, samples, nominal_hz)
-    if base is None and counts is None and counted is not None and not counted.in_order:
-        # Phases that only seemed to agree: the order may still tell.
-        base = _on_grid(tangled, sizes, count_late_messages(tangled), samples, nominal_hz)
+    still, tried, base = _stands_still(tangled.steps), False, None
+    if not still and int(tangled.time_ns[-1]) - int(tangled.time_ns[0]) > LONGEST_NS:
+        return _irregular(tangled, samples, EVENTS)
+    if not still:
+        ways = count_messages(tangled) if counts is None else iter((count_batches(tangled, sizes, nominal_hz),))
+        base, tried = _best(tangled, sizes, ways, nominal_hz, settled=known is not None)
+    if base is None and nominal_hz is not None and counts is None:
+        base = _stated(tangled, nominal_hz)
     if base is not None:
-        return base
-    return _irregular(tangled, samples, EVENTS if counted is None else uneven(tangled.steps))
+        return replace(base, samples=samples)
+    if still:
+        return _still(stamps, samples)
+    told = ticking(tangled.within()) or (uneven(tangled.within()) if tried else EVENTS)
+    return _irregular(tangled, samples, told)
+
+
+def _best(
+    tangled: Untangled,
+    sizes: NDArray[np.int64],
+    ways: Iterator[Counted],
+    nominal_hz: float | None,
+    *,
+    settled: bool,
+) -> tuple[TimeBase | None, bool]:
+    """Give the first way of counting that makes a grid, of the stated rate if one does; and whether any was tried."""
+    first, tried = None, False
+    for counted in ways:
+        tried = True
+        base = _on_grid(tangled, sizes, counted, nominal_hz, settled=settled)
+        if base is not None and (counted.proven if nominal_hz is None else base.rate_hz == nominal_hz):
+            return base, True
+        first = first or (base if counted.proven else None)
+    return first, tried
 
 
 def _on_grid(
-    tangled: Untangled, sizes: NDArray[np.int64], counted: Counted | None, samples: int, nominal_hz: float | None
+    tangled: Untangled, sizes: NDArray[np.int64], counted: Counted, nominal_hz: float | None, *, settled: bool
 ) -> TimeBase | None:
     """Fit a grid to what was counted; None when there is none, or it tells another time than the stamps."""
-    clock = None if counted is None else fit_clock(counted.count, counted.period_ns)
-    if counted is None or clock is None:
+    clock = fit_clock(counted.count, counted.period_ns)
+    if clock is None:
         return None
-    base = _measured(tangled, counted, clock, samples)
-    base = _in_order(base, tangled.time_ns, sizes, counted, clock) if counted.in_order else _by_phase(base, tangled)
-    base = replace(base, advice=advice(base))
+    clock = replace(clock, period_std_ns=max(clock.period_std_ns, counted.period_std_ns))
+    # Steps of the clock that are known from elsewhere are as long as is known there.
+    if tangled.clock.count and not settled:
+        tangled, counted, clock = _running_on(tangled, counted, clock)
+    base = _measured(tangled, counted, clock)
+    base = _in_order(base, tangled, sizes, counted, clock) if counted.in_order else _by_phase(base, tangled)
     # Over a long gap even a small step of the rate would move what comes after.
-    settled = with_round_rate(base) if nominal_hz is None else with_nominal(base, nominal_hz)
-    for one in (settled, base):
+    nearest = with_round_rate(base) if nominal_hz is None else with_nominal(base, nominal_hz)
+    for one in (nearest, base):
         if grid_agrees(one, tangled.time_ns, sizes):
-            return one
+            return replace(one, advice="; ".join(filter(None, (one.advice, advice(one, counted.unless_hz)))))
     return None
 
 
-def _measured(tangled: Untangled, counted: Counted, clock: Clock, samples: int) -> TimeBase:
-    wander = measure_wander(counted.count, clock)
+def _stated(tangled: Untangled, rate_hz: float) -> TimeBase:
+    """Count at a rate that the stamps don't tell."""
+    counted, clock = count_stated(tangled, NS_PER_S / rate_hz)
+    if tangled.clock.count:
+        tangled, counted, clock = _running_on(tangled, counted, clock)
+    # How the stamps depart from a rate that they don't keep is no wander.
+    base = replace(_measured(tangled, counted, clock), verdict="stated", snapped=True, rate_std_hz=inf, wander_s=0.0)
+    if counted.in_order:
+        base = _in_order(base, tangled, np.ones(1, dtype=np.int64), counted, clock)
+    else:
+        base = _by_phase(base, tangled)
+    return replace(base, rate_hz=rate_hz, advice=advice(base))
+
+
+def _running_on(tangled: Untangled, counted: Counted, clock: Clock) -> tuple[Untangled, Counted, Clock]:
+    """Move what comes after each step of the clock so that one sample is left out there and the grid goes on."""
+    by_ns = cut_by_one(counted.count, clock)
+    of_stretch = counted.count.cut(by_ns)
+    return (
+        tangled.moved(np.rint(by_ns[1:]).astype(np.int64)),
+        replace(counted, count=counted.count.moved(of_stretch)),
+        clock.on_grid(clock.starts_ns + of_stretch),
+    )
+
+
+def _measured(tangled: Untangled, counted: Counted, clock: Clock) -> TimeBase:
+    count = counted.count
+    wander = measure_wander(count, clock)
     first_ns = int(tangled.time_ns[0])
-    index = counted.count.index + clock.shift[counted.count.stretch]
+    index = count.index + clock.shift[count.stretch]
     # Messages of a burst are late, none is early: the last one of a burst is the most punctual.
     early_ns = (counted.burst_size - 1) * clock.period_ns
     knots_ns, knots_index = _knots(wander.line_ns - early_ns, index - index[0], wander.pieces, first_ns)
     # Late by a tenth of a batch is little, though it be many samples.
     relative_jitter = wander.jitter_ns / (clock.period_ns * counted.item_size)
+    # Where the clock was set: the first index that is left out, and the first one after.
+    cuts = np.stack((count.ends[count.cuts - 1], count.firsts[count.cuts]), axis=1)
+    cuts += np.stack((clock.shift[count.cuts - 1], clock.shift[count.cuts]), axis=1) - index[0]
     return TimeBase(
         rate_hz=NS_PER_S / clock.period_ns,
         rate_std_hz=NS_PER_S * clock.period_std_ns / clock.period_ns**2,
-        start_ns=first_ns + round(clock.start_ns + int(index[0]) * clock.period_ns - early_ns),
-        samples=samples,
+        start_ns=first_ns + round(float(clock.starts_ns[0]) + int(index[0]) * clock.period_ns - early_ns),
+        samples=tangled.time_ns.size,
         verdict=verdict(counted, relative_jitter=relative_jitter),
         advice="",
         jitter_s=wander.jitter_ns / NS_PER_S,
         wander_s=wander.span_ns / NS_PER_S,
-        duplicates=0 if counted.burst_size > 1 else tangled.duplicates,
+        quantum_s=counted.quantum_ns / NS_PER_S,
+        clock=tangled.clock,
+        duplicates=0 if counted.in_order or counted.quantum_ns else tangled.duplicates,
         out_of_order=tangled.out_of_order,
-        jumps=tangled.jumps,
         burst_size=counted.burst_size,
         knots_ns=knots_ns,
         knots_index=knots_index,
+        cuts=cuts,
     )
 
 
 def _in_order(
-    base: TimeBase, rising_ns: NDArray[np.int64], sizes: NDArray[np.int64], counted: Counted, clock: Clock
+    base: TimeBase, tangled: Untangled, sizes: NDArray[np.int64], counted: Counted, clock: Clock
 ) -> TimeBase:
     """Add the stretches and the gaps between them."""
-    first = counted.count.resumed if counted.burst_starts is None else counted.burst_starts[counted.count.resumed]
-    resumed_ns = rising_ns[first]
+    first = counted.count.resumed
+    if counted.burst_starts is not None:
+        first = counted.burst_starts[first]
+    samples = first if sizes.size == 1 else np.append(0, np.cumsum(sizes))[first]
+    total = tangled.time_ns.size if sizes.size == 1 else int(sizes.sum())
     # A stretch that seems to begin before the one before has ended is late delivery, not time running back.
     shift = np.maximum.accumulate(clock.shift)
-    lost = np.diff(shift)
-    before = first[1:][lost > 0] - 1
-    gaps = list_gaps(rising_ns, before, np.broadcast_to(sizes, rising_ns.shape)[before], clock.period_ns)
-    return replace(
-        base,
-        gaps=gaps.longest,
-        gap_count=gaps.count,
-        missing=int(shift[-1]),
-        jumps=base.jumps + gaps.leaps,
-        resumed_ns=resumed_ns,
-        resumed_shift=shift,
-    )
+    base = replace(base, resumed=samples, resumed_shift=shift)
+    gap = np.flatnonzero(np.diff(shift) > 0) + 1
+    begin, end = samples[gap] + shift[gap], samples[gap] + shift[gap - 1]
+    return _with_gaps(base, tangled, sizes, first[gap], begin, end, total + int(shift[-1]))
 
 
 def _by_phase(base: TimeBase, tangled: Untangled) -> TimeBase:
     """Add the smoothing and the gaps that remain with it."""
     rising_ns = tangled.time_ns
-    clock = partial(grid_index, knots_ns=base.knots_ns, knots_index=base.knots_index, rate_hz=base.rate_hz)
+    clock = partial(
+        grid_index,
+        knots_ns=base.knots_ns,
+        knots_index=base.knots_index,
+        rate_hz=base.rate_hz,
+        cut_order=tangled.clock.message,
+        cuts=base.cuts,
+    )
     smoothing = choose_smoothing(rising_ns, clock, repeats=base.duplicates)
-    lost = _points_lost(rising_ns, clock, smoothing)
+    lost = _points_lost(base, rising_ns, clock, smoothing)
     if smoothing > 1 and lost < 0:
         # Two messages for one point of the grid, though not with the very same stamp, are a repeat as well.
         repeats = int(np.count_nonzero(tangled.steps < _AT_ONCE * NS_PER_S / base.rate_hz))
         if repeats > base.duplicates and repeats + lost >= 0:
             base = replace(base, duplicates=repeats)
             smoothing = choose_smoothing(rising_ns, clock, repeats=repeats)
-            lost = _points_lost(rising_ns, clock, smoothing)
-    long = np.flatnonzero(tangled.steps > 1.5 * NS_PER_S / base.rate_hz)
+            lost = _points_lost(base, rising_ns, clock, smoothing)
     crowded = -lost > max(1, _CROWD * rising_ns.size)
+    one, set_at = np.ones(1, dtype=np.int64), tangled.clock.message
     if smoothing > 1 and (crowded or -1 <= lost <= 0) and not base.duplicates:
         # As many samples as grid points: their order tells their places better than scattered stamps. With a few
         # more they follow the stamps and leave those out; with many more this is no grid, as the check will find.
-        return replace(base, resumed_ns=rising_ns[:1], resumed_shift=np.zeros(1, dtype=np.int64))
+        shift = np.append(0, np.cumsum(base.cuts[:, 1] - base.cuts[:, 0]))
+        base = replace(base, resumed=np.append(0, set_at), resumed_shift=shift)
+        begin, end = set_at + shift[1:], set_at + shift[:-1]
+        return _with_gaps(base, tangled, one, set_at, begin, end, rising_ns.size + int(shift[-1]))
+    after = np.union1d(np.flatnonzero(tangled.steps > 1.5 * NS_PER_S / base.rate_hz) + 1, set_at)
     if smoothing == 1:
-        after, before = (clock(rising_ns[place], place) for place in (long + 1, long))
+        begin, end = (clock(rising_ns[place], place) for place in (after, after - 1))
     else:
         index = clock(rising_ns, np.arange(rising_ns.size), smoothing=smoothing)
-        after, before = index[long + 1], index[long]
-    long = long[after - before > 1]
-    gaps = list_gaps(rising_ns, long, np.ones_like(long), 0.0)
+        begin, end = index[after], index[after - 1]
+    gap = begin - end > 1
+    last = rising_ns.size + lost + _cut_out(base)
+    base = _with_gaps(base, tangled, one, after[gap], begin[gap], end[gap] + 1, last)
+    return replace(base, missing=max(0, lost + base.duplicates), smoothing=smoothing)
+
+
+def _with_gaps(
+    base: TimeBase,
+    tangled: Untangled,
+    sizes: NDArray[np.int64],
+    message: NDArray[np.int64],
+    begin: NDArray[np.int64],
+    end: NDArray[np.int64],
+    last: int,
+) -> TimeBase:
+    """Add gaps, breaks and the longest stretch between them.
+
+    Parameters
+    ----------
+    base, tangled, sizes
+        What is known; samples of each message, or a single number for all.
+    message
+        First message after each place where samples don't follow each other.
+    begin, end
+        Grid index of its first sample, and one more than that of the last sample before.
+    last
+        One more than the last index of all.
+    """
+    spans_s = spans_between(tangled.time_ns, message, sizes, NS_PER_S / base.rate_hz)
+    cut = np.isin(message, tangled.clock.message)
+    lengths = np.append(end, last) - np.append(0, begin)
+    gaps = list_gaps(spans_s[~cut], float(lengths.sum()) / base.rate_hz)
+    breaks_s = np.concatenate((spans_s[cut], gaps.leaps))
     return replace(
         base,
         gaps=gaps.longest,
         gap_count=gaps.count,
-        missing=max(0, lost + base.duplicates),
-        jumps=base.jumps + gaps.leaps,
-        smoothing=smoothing,
+        missing=int((begin - end)[~cut].sum()),
+        breaks_s=breaks_s[np.argsort(breaks_s[:, 0], kind="stable")],
+        longest_stretch_s=float(lengths.max()) / base.rate_hz,
     )
 
 
-def _points_lost(rising_ns: NDArray[np.int64], clock: Callable[..., NDArray[np.int64]], smoothing: int) -> int:
-    """Grid points that no message has; negative when there are more messages than points."""
+def _cut_out(base: TimeBase) -> int:
+    """Grid points left out where the clock was set."""
+    return int((base.cuts[:, 1] - base.cuts[:, 0]).sum())
+
+
+def _points_lost(
+    base: TimeBase, rising_ns: NDArray[np.int64], clock: Callable[..., NDArray[np.int64]], smoothing: int
+) -> int:
+    """Grid points that no message has, beside those left out on purpose; negative with more messages than points."""
     end = np.arange(max(0, rising_ns.size - 4 * smoothing), rising_ns.size)
-    return int(clock(rising_ns[end], end, smoothing=smoothing)[-1]) + 1 - rising_ns.size
+    return int(clock(rising_ns[end], end, smoothing=smoothing)[-1]) + 1 - rising_ns.size - _cut_out(base)
 
 
 def _knots(
@@ -353,9 +507,10 @@ def _irregular(tangled: Untangled, samples: int, told: str = EVENTS) -> TimeBase
         samples=samples,
         verdict="irregular",
         advice=told,
+        clock=tangled.clock,
+        breaks_s=spans_between(tangled.time_ns, tangled.clock.message, np.ones(1, dtype=np.int64), 0.0),
         duplicates=tangled.duplicates,
         out_of_order=tangled.out_of_order,
-        jumps=tangled.jumps,
         knots_ns=np.empty(0, dtype=np.int64),
         knots_index=np.empty(0),
     )

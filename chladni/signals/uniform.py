@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.grid_index import grid_index
-from chladni.signals.stamp_order import ClockJump, require_stamps, run_on
+from chladni.signals.stamp_order import require_stamps
 from chladni.signals.time_base import TimeBase
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
@@ -84,7 +84,7 @@ def message_index(
         When the time base has no grid.
     """
     clock = _clock(time_base)
-    time_ns, _ = run_on(require_stamps(stamps_ns), _steps_undone(time_base))
+    time_ns = time_base.clock.run_on(require_stamps(stamps_ns))
     sizes = None if counts is None else np.asarray(counts, dtype=np.int64)
     # The usual log needs no sorting, which takes as long as all the rest.
     if np.all(time_ns[1:] >= time_ns[:-1]):
@@ -125,9 +125,7 @@ class Placer:
         self._channels = tuple(channels)
         self._max_samples = max_samples
         self._hold = max(_HELD, time_base.smoothing)
-        self._jumps = _steps_undone(time_base)
-        self._jumps_done = 0
-        self._last_stamp = np.empty(0, dtype=np.int64)
+        self._messages = 0
         self._waiting = _Messages.none(len(self._channels))
         # Placed already, but still weighing in the running median of those that wait.
         self._behind = _Messages.none(0)
@@ -157,21 +155,15 @@ class Placer:
             )
         # Whole numbers can't say "missing".
         floating = values if values.dtype.kind == "f" else values.astype(np.float64)
-        self._waiting = self._waiting.followed_by(_Messages(self._run_on(stamps), sizes, floating)).in_order()
+        time_ns = self._base.clock.run_on(stamps, first=self._messages)
+        self._messages += stamps.size
+        self._waiting = self._waiting.followed_by(_Messages(time_ns, sizes, floating)).in_order()
         ready = self._waiting.time_ns.size - (0 if last else self._hold)
         return self._release(ready) if ready > 0 else None
 
     def finish(self) -> TimeSeries | None:
         """Give what was held back."""
-        return self.push(self._last_stamp[:0], self._waiting.values[:, :0], last=True)
-
-    def _run_on(self, stamps: NDArray[np.int64]) -> NDArray[np.int64]:
-        # The last stamp before comes along, because a jump may lie between two blocks.
-        known = self._last_stamp.size
-        joined = np.concatenate((self._last_stamp, stamps))
-        time_ns, self._jumps_done = run_on(joined, self._jumps, done=self._jumps_done)
-        self._last_stamp = joined[-1:]
-        return time_ns[known:]
+        return self.push(np.empty(0, dtype=np.int64), self._waiting.values[:, :0], last=True)
 
     def _release(self, ready: int) -> TimeSeries | None:
         now, self._waiting = self._waiting.split(ready)
@@ -216,7 +208,7 @@ class Placer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Messages:
-    """Messages with their times (jumps undone), samples of each, and the samples."""
+    """Messages with their times (steps of the clock undone), samples of each, and the samples."""
 
     time_ns: NDArray[np.int64]
     sizes: NDArray[np.int64]
@@ -269,10 +261,8 @@ def _clock(base: TimeBase) -> Callable[[NDArray[np.int64], NDArray[np.int64]], N
         knots_index=base.knots_index,
         rate_hz=base.rate_hz,
         smoothing=base.smoothing,
-        resumed_ns=base.resumed_ns,
+        resumed=base.resumed,
         resumed_shift=base.resumed_shift,
+        cut_order=None if base.resumed.size else base.clock.message,
+        cuts=base.cuts,
     )
-
-
-def _steps_undone(base: TimeBase) -> tuple[ClockJump, ...]:
-    return tuple(jump for jump in base.jumps if jump.shift_ns)

@@ -4,6 +4,7 @@ from chladni.signals.cross_spectra import CrossSpectra
 from chladni.spectral.accumulator import CrossSpectraAccumulator, SegmentAveraging
 from chladni.spectral.blocks import Source, leading_part, samples_known
 from chladni.spectral.segmentation import SAMPLES_TO_CHOOSE_FROM, Detrend, plan_segmentation
+from chladni.spectral.stretches import run_lengths
 from chladni.spectral.windows import Window
 
 
@@ -68,6 +69,7 @@ def cross_spectra(
     plan = plan_segmentation(
         first.sample_rate_hz,
         samples_available=samples_known(source, lead, SAMPLES_TO_CHOOSE_FROM),
+        runs=run_lengths(lead),
         resolution_hz=resolution_hz,
         window=window,
         overlap=overlap,

@@ -1,5 +1,6 @@
 """How a record is cut into segments: from seconds and hertz to sample counts."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import floor, isfinite, log2
 from typing import Literal
@@ -74,6 +75,7 @@ def plan_segmentation(
     sample_rate_hz: float,
     *,
     samples_available: int | None,
+    runs: Sequence[int] = (),
     resolution_hz: float | None = None,
     window: Window = "hann",
     overlap: float = 0.5,
@@ -87,10 +89,13 @@ def plan_segmentation(
         Samples a second.
     samples_available
         Length of the record; None for a stream of at least `SAMPLES_TO_CHOOSE_FROM`, where more changes nothing.
+    runs
+        Lengths of its unbroken runs of samples, where it has gaps or its clock was set.
     resolution_hz
         Spacing of the spectral lines, rate over segment length. Met exactly when the rate is a multiple of it, else
         to half a sample. None chooses a power of two of at most 8192 samples and a 16th of the record, so that at
-        least 31 half-overlapping segments are averaged (fewer only when less than 64 samples are there).
+        least 31 half-overlapping segments are averaged (fewer only when less than 64 samples are there). Where the
+        runs hold no 16 of such segments, it is halved until they do.
     window, overlap, detrend
         See `Segmentation`; ``0 <= overlap < 1``.
 
@@ -112,11 +117,21 @@ def plan_segmentation(
         raise SetupError(f"overlap {overlap} must be at least 0 and below 1")
     if resolution_hz is None:
         samples = _default_samples(samples_available)
+        while runs and samples > SHORTEST_SEGMENT and _segments_in(runs, samples, overlap) < DEFAULT_DIVISIONS:
+            samples //= 2
     else:
         samples = _samples_for(resolution_hz, sample_rate_hz, samples_available)
+    return Segmentation(samples=samples, hop=_hop(samples, overlap), window=window, detrend=detrend)
+
+
+def _hop(samples: int, overlap: float) -> int:
     # The small allowance keeps 0.7 * 10 = 7.000000000000001 or 6.999999999999999 from moving the hop by a sample.
-    hop = samples - floor(samples * overlap + 1e-9)
-    return Segmentation(samples=samples, hop=max(hop, 1), window=window, detrend=detrend)
+    return max(1, samples - floor(samples * overlap + 1e-9))
+
+
+def _segments_in(runs: Sequence[int], samples: int, overlap: float) -> int:
+    plan = Segmentation(samples=samples, hop=_hop(samples, overlap))
+    return sum(plan.count(run) for run in runs)
 
 
 def _default_samples(samples_available: int | None) -> int:

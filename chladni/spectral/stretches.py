@@ -25,6 +25,24 @@ def valid_runs(block: TimeSeries) -> list[Run]:
     return [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
 
 
+def run_lengths(blocks: Sequence[TimeSeries]) -> list[int]:
+    """Lengths of the runs of samples that are valid in all channels, over the seams of consecutive blocks."""
+    lengths: list[int] = []
+    end_ns, open_end = None, False
+    for block in blocks:
+        runs = valid_runs(block)
+        late_s = 0.0 if end_ns is None else abs(block.start_time_ns - end_ns) / NS_PER_S
+        goes_on = open_end and late_s <= 0.5 / block.sample_rate_hz
+        for first, last in runs:
+            if first == 0 and goes_on:
+                lengths[-1] += last
+            else:
+                lengths.append(last - first)
+        end_ns = block.start_time_ns + round(block.samples / block.sample_rate_hz * NS_PER_S)
+        open_end = bool(runs) and runs[-1][1] == block.samples
+    return lengths
+
+
 class Stretch:
     """Book of the samples seen: continuity of time, and segments lost to invalid samples.
 

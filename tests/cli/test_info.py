@@ -1,12 +1,13 @@
 import json
 
+import numpy as np
 import pytest
 
-from tests.make_logs import with_strange_topics
+from tests.make_logs import START_NS, with_strange_topics, write_stored
 
 CHANNEL_KEYS = {
     "name", "unit", "encoding", "rate_hz", "samples", "stamp", "stamp_reason", "jitter_s",
-    "gaps", "duplicates", "clipped", "untimed", "publishers",
+    "gaps", "duplicates", "clipped", "untimed", "publishers", "rate_std_hz", "breaks", "longest_stretch_s",
 }  # fmt: skip
 
 
@@ -93,3 +94,41 @@ def test_topics_without_channels_are_in_the_table_and_in_the_document(run, tmp_p
     assert any(line.startswith("/bad ") and line.endswith("100 messages, not read") for line in table)
     assert any(line.startswith("/text ") and line.endswith("100 messages, no signal") for line in table)
     assert any(line.startswith("- /bad (100 messages): can't be decoded: ") for line in table)
+
+
+def test_breaks_of_the_clock_are_counted_and_the_longest_stretch_is_told(run, tmp_path):
+    number = np.arange(720)
+    write_stored(tmp_path / "a.mcap", (number % 12 + 1) * 100_000_000, np.sin(0.2 * np.pi * number))
+    outcome = run("info", tmp_path / "a.mcap", "--json", "-")
+    (channel,) = outcome.document["channels"]
+    assert len(channel["breaks"]) == 59
+    # Twelve samples, one that is left out where the clock was set, and the next stretch begins.
+    assert channel["breaks"][:2] == [pytest.approx(1.3), pytest.approx(2.6)]
+    assert (channel["rate_hz"], channel["longest_stretch_s"]) == (10.0, pytest.approx(1.2))
+    assert (channel["gaps"], channel["duplicates"], channel["jitter_s"]) == ([], 0, pytest.approx(0.0, abs=1e-9))
+    assert outcome.document["duration_s"] == pytest.approx(72.0)
+    assert "59 breaks" in outcome.err
+    assert "the longest stretch is 1.2 s" in outcome.err
+
+
+def test_ticks_coarser_than_the_sampling_cost_no_sample(run, tmp_path):
+    number = np.arange(6240)
+    when = START_NS + np.floor(number / 1.04).astype(np.int64) * 10_000_000
+    write_stored(tmp_path / "a.mcap", when, np.sin(2 * np.pi * 10 / 104 * number))
+    outcome = run("info", tmp_path / "a.mcap", "--json", "-")
+    (channel,) = outcome.document["channels"]
+    assert (channel["rate_hz"], channel["duplicates"], channel["samples"]) == (104.0, 0, 6240)
+    # A tick of 10 ms, white over 6240 samples.
+    assert channel["rate_std_hz"] == pytest.approx(104**2 * 0.01 / 6240**1.5, rel=0.2)
+    assert "their rate is 104 Hz, give or take" in outcome.err
+
+
+def test_a_rate_that_stamps_dont_tell_can_be_stated(run, tmp_path):
+    lost = np.flatnonzero(np.random.default_rng(1).random(5000) > 0.02)
+    write_stored(tmp_path / "a.mcap", START_NS + lost // 10 * 10_000_000, lost * 1.0)
+    refused = run("info", tmp_path / "a.mcap", "--json", "-")
+    assert refused.document["channels"][0]["longest_stretch_s"] is None
+    assert "--rate HZ" in refused.err
+    stated = run("info", tmp_path / "a.mcap", "--rate", 1000, "--json", "-")
+    assert stated.document["channels"][0]["rate_hz"] == 1000.0
+    assert run("info", tmp_path / "a.mcap", "--rate", -3).code == 2

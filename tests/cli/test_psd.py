@@ -5,7 +5,7 @@ from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 from tests.arm import TOOL, WRIST, short_arm
-from tests.make_logs import two_sensors, with_strange_topics
+from tests.make_logs import START_NS, two_sensors, with_strange_topics, write_stored
 
 
 def tool_samples():
@@ -117,3 +117,33 @@ def test_a_topic_that_cannot_be_decoded_is_told_and_the_rest_is_averaged(run, tm
     # Text holds nothing that could be averaged, and who names a channel knows what is left out.
     assert "/text" not in outcome.err
     assert "/bad" not in run("psd", log, "--channel", "/good.x", "--json", "-").err
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "tick_ns", "samples"),
+    [(104, 10**7, 6240), (1344, 10**6, 4032), (1660, 10**6, 4980), (96, 10**7, 6000)],
+)
+def test_a_clock_that_ticks_coarsely_makes_no_false_peaks(run, tmp_path, rate_hz, tick_ns, samples):
+    number = np.arange(samples)
+    when = START_NS + np.floor(number / rate_hz * 1e9 / tick_ns).astype(np.int64) * tick_ns
+    tone = np.sin(2 * np.pi * 0.1 * number) + 0.01 * np.random.default_rng(1).standard_normal(samples)
+    write_stored(tmp_path / "a.mcap", when, tone)
+    (channel,) = run("psd", tmp_path / "a.mcap", "--json", "-").document["channels"]
+    assert [peak["frequency_hz"] for peak in channel["peaks"]] == [pytest.approx(0.1 * rate_hz, rel=1e-3)]
+
+
+@pytest.mark.parametrize("longest", [12, 60, 400])
+def test_no_average_crosses_a_restart(run, tmp_path, longest):
+    # A tone at a quarter of the rate, by another phase in each episode: averaged across, it would be no line.
+    rng = np.random.default_rng(longest)
+    lengths = rng.integers(max(8, longest // 8), longest + 1, 60)
+    number = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    tone = np.sin(0.5 * np.pi * number + np.repeat(rng.uniform(0, 6, 60), lengths))
+    write_stored(tmp_path / "a.mcap", (number + 1) * 10_000_000, tone)
+    document = run("psd", tmp_path / "a.mcap", "--json", "-").document
+    frequency_hz, psd = np.array(document["frequency_hz"]), np.array(document["channels"][0]["psd"])
+    assert 1 / frequency_hz[1] <= lengths.max() / 100
+    assert frequency_hz[np.argmax(psd)] == pytest.approx(25.0, abs=0.51 * frequency_hz[1])
+    # Hann's main lobe holds all of a tone whose phase doesn't leap.
+    outside = np.abs(frequency_hz - 25.0) > 2.5 * frequency_hz[1]
+    assert psd[outside].max(initial=0.0) < 1e-3 * psd.max()

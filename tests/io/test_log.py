@@ -179,12 +179,12 @@ def test_nothing_asked_for(imu_log: tuple[Log, NDArray[np.float64]]) -> None:
 
 
 def scattered_log(path: Path, order: NDArray[np.int64], values: NDArray[np.float64]) -> None:
-    """Messages of a 100 Hz grid, written (and logged) in the order given; some may be missing or repeated."""
+    """Messages of a 100 Hz grid, written in the order given, as they're logged; some may be missing or repeated."""
     with LogMaker(path, chunk_size=2048) as log:
         channel = log.ros2("/imu", "sensor_msgs/msg/Imu", IMU)
-        for late, index in enumerate(order.tolist()):
+        for index, reached in zip(order.tolist(), np.maximum.accumulate(order).tolist(), strict=True):
             stamp_ns = START_NS + index * 10_000_000
-            log.write(channel, imu(stamp_ns, (values[index], 0, 0)), START_NS + late * 10_000_000 + 5_000_000)
+            log.write(channel, imu(stamp_ns, (values[index], 0, 0)), START_NS + reached * 10_000_000 + 5_000_000)
 
 
 def test_gaps_are_marked_and_never_bridged(tmp_path: Path) -> None:
@@ -216,22 +216,38 @@ def test_late_messages_are_put_in_order(tmp_path: Path) -> None:
         assert any("came after later ones" in finding for finding in log.info().findings)
 
 
-def test_of_repeated_stamps_the_first_stays(tmp_path: Path) -> None:
-    values = noise(1, 400)[0]
-    with LogMaker(tmp_path / "a.mcap", chunk_size=2048) as maker:
+def doubled_log(path: Path, values: np.ndarray, doubled: Sequence[int], second: float | None) -> None:
+    """Write 100 Hz, some messages twice; the second time with another value, if one is given."""
+    with LogMaker(path, chunk_size=2048) as maker:
         channel = maker.ros2("/imu", "sensor_msgs/msg/Imu", IMU)
-        for index in range(400):
+        for index, value in enumerate(values.tolist()):
             stamp_ns = START_NS + index * 10_000_000
-            maker.write(channel, imu(stamp_ns, (values[index], 0, 0)), stamp_ns)
-            if index % 100 == 50:
-                maker.write(channel, imu(stamp_ns, (99.0, 0, 0)), stamp_ns)
+            for sample in (value, value if second is None else second)[: 2 if index in doubled else 1]:
+                maker.write(channel, imu(stamp_ns, (sample, 0, 0)), stamp_ns)
+
+
+@pytest.mark.parametrize("doubled", [(50, 150, 250, 350), (3, 4, 99)])
+def test_a_message_that_was_sent_twice_is_one_sample(tmp_path: Path, doubled: Sequence[int]) -> None:
+    values = noise(1, 400)[0]
+    doubled_log(tmp_path / "a.mcap", values, doubled, None)
+    with open_log(tmp_path / "a.mcap") as log:
+        series = log.read([AXES[0]])
+        assert series.sample_rate_hz == 100.0
+        np.testing.assert_array_equal(series.values[0], values)
+        assert_close(together(list(log.blocks([AXES[0]], seconds=0.07))), series, rtol=0, atol=0)
+        info = log.info()
+        assert info.channels[-3].time_base.duplicates == len(doubled)
+        assert any(f"{len(doubled)} samples left out" in finding for finding in info.findings)
+
+
+def test_of_stamps_that_repeat_unevenly_the_first_sample_stays_and_the_others_are_told(tmp_path: Path) -> None:
+    values = noise(1, 400)[0]
+    doubled_log(tmp_path / "a.mcap", values, (3, 4, 99), 99.0)
     with open_log(tmp_path / "a.mcap") as log:
         series = log.read([AXES[0]])
         np.testing.assert_array_equal(series.values[0], values)
         assert_close(together(list(log.blocks([AXES[0]], seconds=0.07))), series, rtol=0, atol=0)
-        info = log.info()
-        assert info.channels[-3].time_base.duplicates == 4
-        assert any("4 samples left out" in finding for finding in info.findings)
+        assert any("3 samples left out" in finding for finding in log.info().findings)
 
 
 def test_not_a_number_counts_as_missing(tmp_path: Path) -> None:

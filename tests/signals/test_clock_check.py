@@ -130,7 +130,7 @@ def test_each_rule_refuses_what_it_is_for() -> None:
     when = grid(100.0, 2000)
     base = fit_time_base(when)
     assert grid_agrees(base, when, ONE_EACH)
-    in_order = replace(base, resumed_ns=when[:1], resumed_shift=np.zeros(1, dtype=np.int64))
+    in_order = replace(base, resumed=np.zeros(1, dtype=np.int64), resumed_shift=np.zeros(1, dtype=np.int64))
     assert grid_agrees(in_order, when, ONE_EACH)
     # A sample is off: up to half a percent may be held up, not more.
     held_up = when.copy()
@@ -157,7 +157,7 @@ def test_batches_are_checked_at_their_first_sample() -> None:
 def test_long_logs_are_checked_to_their_last_message() -> None:
     when = grid(1000.0, 120_001)
     base = fit_time_base(when)
-    late = replace(base, resumed_ns=when[:1], resumed_shift=np.zeros(1, dtype=np.int64))
+    late = replace(base, resumed=np.zeros(1, dtype=np.int64), resumed_shift=np.zeros(1, dtype=np.int64))
     assert grid_agrees(late, when, ONE_EACH)
     assert not grid_agrees(replace(late, rate_hz=1000.05), when, ONE_EACH)
 

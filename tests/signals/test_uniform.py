@@ -80,6 +80,40 @@ def set_back() -> Case:
     return stamps(times), number
 
 
+def restarted() -> Case:
+    # Simulated time that starts anew with each episode, of 8 to 60 samples.
+    lengths = np.random.default_rng(6).integers(8, 61, 60)
+    episode = np.repeat(np.arange(60), lengths)
+    first = (np.cumsum(lengths) - lengths)[episode]
+    number = np.arange(episode.size)
+    return stamps((number - first) / 100 + 0.25), number + episode
+
+
+def restarted_and_scattered() -> Case:
+    when, number = restarted()
+    scatter = 0.08e7 * np.random.default_rng(7).normal(size=when.size).clip(-3, 3)
+    return when + np.rint(scatter).astype(np.int64), number
+
+
+def restarted_and_late() -> Case:
+    when, number = restarted()
+    places = np.flatnonzero(np.diff(number, prepend=0) > 1)[1::4] + 4
+    for values in (when, number):
+        values[places], values[places + 1] = values[places + 1].copy(), values[places].copy()
+    return when, number
+
+
+def ticking() -> Case:
+    number = np.arange(3000)
+    return stamps(np.floor(number / 1.04) / 100), number
+
+
+def ticking_and_restarted() -> Case:
+    number = np.arange(3000)
+    episode = number // 300
+    return stamps(np.floor((number % 300) / 1.66) / 1000 + 0.25), number + episode
+
+
 def from_1970() -> Case:
     when, number = grid(100.0, 2000), np.arange(2000)
     when[:300] -= START_NS
@@ -102,6 +136,11 @@ CASES: list[Callable[[], Case]] = [
     paused,
     swapped,
     set_back,
+    restarted,
+    restarted_and_scattered,
+    restarted_and_late,
+    ticking,
+    ticking_and_restarted,
     from_1970,
     wandering,
 ]
@@ -140,7 +179,7 @@ def test_every_sample_is_in_its_place_and_what_is_missing_is_marked(case: Callab
         assert series.valid is None
     assert series.sample_rate_hz == base.rate_hz
     assert series.start_time_ns == base.start_ns
-    assert np.count_nonzero(np.isnan(series.values[0])) == base.missing
+    assert np.count_nonzero(np.isnan(series.values[0])) == base.missing + base.clock.count
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -166,7 +205,9 @@ def test_message_index_is_the_place(case: Callable[[], Case]) -> None:
 
 
 def test_of_repeated_samples_the_first_stays() -> None:
-    when = np.repeat(grid(100.0, 100), np.where(np.arange(100) % 10 == 0, 2, 1))
+    # Unevenly: every tenth would be the ticks of a clock coarser than the sampling.
+    again = np.isin(np.arange(1000), [3, 4, 5, 90, 400, 401, 402, 403, 700, 990])
+    when = np.repeat(grid(100.0, 1000), np.where(again, 2, 1))
     number = (when - START_NS) // 10_000_000
     values = np.stack((number, np.arange(when.size)))
     base = fit_time_base(when)
@@ -174,8 +215,8 @@ def test_of_repeated_samples_the_first_stays() -> None:
     series = placer.push(when, values, last=True)
     assert series is not None
     assert placer.left_out == 10
-    np.testing.assert_array_equal(series.values[0], np.arange(100))
-    assert series.values[1, 0] == 0, "the repeat at arrival 1 is left out"
+    np.testing.assert_array_equal(series.values[0], np.arange(1000))
+    assert series.values[1, 3] == 3, "the repeat at arrival 4 is left out"
     assert series.valid is None
 
 

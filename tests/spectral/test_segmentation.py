@@ -84,3 +84,23 @@ def test_too_few_samples_and_bad_hops_are_refused():
         Segmentation(samples=3, hop=1)
     with pytest.raises(SetupError, match="hop 9"):
         Segmentation(samples=8, hop=9)
+
+
+@pytest.mark.parametrize("runs", [[12] * 60, [8, 60, 31, 40] * 20, [3000, 40_000], [100] * 3 + [10] * 400])
+def test_the_default_fits_into_the_runs_of_a_record_with_gaps(runs):
+    plan = plan_segmentation(10.0, samples_available=sum(runs) + len(runs), runs=runs)
+    whole = plan_segmentation(10.0, samples_available=sum(runs) + len(runs))
+    inside = sum(plan.count(run) for run in runs)
+    assert inside >= 16
+    # No shorter than it has to be.
+    twice = plan_segmentation(10.0, samples_available=None, resolution_hz=10.0 / (2 * plan.samples))
+    assert plan == whole or sum(twice.count(run) for run in runs) < 16
+
+
+def test_unbroken_records_and_wishes_are_left_alone():
+    assert plan_segmentation(1.0, samples_available=5000, runs=[5000]) == plan_segmentation(
+        1.0, samples_available=5000
+    )
+    assert plan_segmentation(1.0, samples_available=720, runs=[12] * 60, resolution_hz=0.01).samples == 100
+    # Where no segments fit at all the shortest are tried, and what is missing is told by who averages.
+    assert plan_segmentation(1.0, samples_available=900, runs=[3] * 300).samples == 4

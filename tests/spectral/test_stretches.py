@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from chladni.signals.errors import EstimateError
 from chladni.spectral.segmentation import Segmentation
-from chladni.spectral.stretches import Stretch, valid_runs
+from chladni.spectral.stretches import Stretch, run_lengths, valid_runs
 from tests.spectral.made_signals import blocks, noise, part, series
 
 PLAN = Segmentation(samples=8, hop=4)
@@ -61,3 +61,17 @@ def test_a_break_closes_the_stretch_and_merging_adds_what_was_lost():
     assert first.skipped == 2 * lost
     with pytest.raises(EstimateError, match="time order only"):
         second.require_before(first)
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=200), st.lists(st.integers(1, 50), min_size=1, max_size=20))
+def test_runs_go_on_over_the_seams_of_blocks(good, lengths):
+    whole = with_valid(np.array(good, dtype=bool))
+    expected = [last - first for first, last in valid_runs(whole)]
+    assert run_lengths(list(blocks(whole, lengths))) == expected
+
+
+def test_a_break_in_time_ends_a_run():
+    whole = series(noise(1, 30))
+    assert run_lengths([part(whole, 0, 10), part(whole, 10, 20)]) == [20]
+    assert run_lengths([part(whole, 0, 10), part(whole, 15, 30)]) == [10, 15]
+    assert run_lengths([]) == []

@@ -1,6 +1,7 @@
 """An MCAP log as channels and batches of still encoded messages."""
 
 from collections.abc import Collection, Iterator, Mapping
+from itertools import accumulate
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import Self
@@ -134,6 +135,14 @@ class McapContainer:
     def time_range_ns(self) -> tuple[int, int] | None:
         """Log time of the first and of the last message in ns, None when the log doesn't tell."""
         return self._time_range_ns
+
+    def log_times_rise(self, *, within_ns: int) -> bool:
+        """Whether the summary says that no chunk begins more than so long before an earlier one ends."""
+        chunks = self._end.chunk_indexes
+        ends = accumulate((chunk.end_time_ns for chunk in chunks), max)
+        return bool(chunks) and all(
+            chunk.start_time_ns >= end - within_ns for chunk, end in zip(chunks[1:], ends, strict=False)
+        )
 
     def message_counts(self) -> Mapping[int, int] | None:
         """Return how many messages each channel has.
