@@ -234,6 +234,9 @@ def uff_exponents() -> list[Case]:
     tiny = Function(values=np.where(np.arange(300) % 5 == 2, 1.5e-120, OFFSET_WAVE), double=True)
     complex_function = response_functions(_functions()[1], 0.25)
 
+    # A zero before the point takes one of six digits.
+    five_digits = np.array([float(f"{one:.4e}") for one in OFFSET_WAVE])
+
     def lower(number: float, width: int, digits: int) -> str:
         return d_notation(number, width, digits).lower()
 
@@ -257,7 +260,7 @@ def uff_exponents() -> list[Case]:
         ("fortran_d", given(kind, "fortran_d.uff"), _check_series(OFFSET_WAVE)),
         ("double_d", _exponents(double, d_notation), _check_series(OFFSET_WAVE)),
         ("lower_case_d", _exponents(single, lower), _check_series(OFFSET_WAVE)),
-        ("leading_zero", _exponents(single, leading_zero_notation), _check_series(OFFSET_WAVE)),
+        ("leading_zero", _exponents(single, leading_zero_notation), _check_series(five_digits)),
         ("three_digits_without_letter", _exponents(tiny, short_notation), _check_series(tiny.values)),
         ("crlf", crlf, _check_series(OFFSET_WAVE)),
         ("d_in_the_head_too", head_in_d, _check_series(OFFSET_WAVE)),

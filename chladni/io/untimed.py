@@ -37,8 +37,8 @@ def untimed(stamps_ns: NDArray[np.int64], log_ns: NDArray[np.int64] | None) -> N
 
     Examples
     --------
-    >>> untimed(np.array([5, 5, 0, 5, 5]) * 10**17, None)
-    array([False, False,  True, False, False])
+    >>> untimed(np.array([10**18, 10**18 + 10**7, 0, 10**18 + 2 * 10**7]), None)
+    array([False, False,  True, False])
     >>> untimed(np.array([0, 1, 2, 3, 4]) * 10**7, None) is None
     True
     """

@@ -20,7 +20,6 @@ def test_the_document_holds_what_was_promised(run, arm_log):
         "channels",
         "damage",
         "findings",
-        "functions",
         "unread",
     }
     assert document["format"] == "chladni.info/1"

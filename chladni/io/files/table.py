@@ -11,6 +11,7 @@ from chladni.io.files.columns import Column, channels_of, distinct, with_units
 from chladni.io.files.contents import FileContents, joined, placed_rows, series_of_rows
 from chladni.io.files.time_column import find_times, is_row_number, rises
 from chladni.io.files.time_reading import NO_TIMES, TimeOptions, Times
+from chladni.io.untimed import untimed
 from chladni.signals.channel import Channel
 from chladni.signals.errors import ChladniError, LogError, SetupError
 from chladni.signals.time_series import NS_PER_S
@@ -231,6 +232,10 @@ def _placed(rows: Rows, channels: list[Channel], times: Times, options: TimeOpti
         unknown = int(np.count_nonzero(~times.known))
         notes.append(f"{where}: {counted(unknown, 'row')} without a time left out.")
         stamps_ns, rows = stamps_ns[times.known], [row[times.known] for row in rows]
+    away = untimed(stamps_ns, None)
+    if away is not None:
+        notes.append(f"{where}: {counted(int(np.count_nonzero(away)), 'row')} left out, whose time is no time.")
+        stamps_ns, rows = stamps_ns[~away], [row[~away] for row in rows]
     placed = _at_rate(stamps_ns, rows, channels, options, where)
     found_hz, stated_hz = placed.series[0].sample_rate_hz, options.stated_rate_hz
     if stated_hz is not None and abs(found_hz / stated_hz - 1) > _SAME_RATE:
