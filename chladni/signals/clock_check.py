@@ -1,6 +1,6 @@
 """Final check of a time base: the grid must tell the same time as the stamps that it stands for."""
 
-from math import sqrt
+from math import ceil, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,8 +37,8 @@ def grid_agrees(base: "TimeBase", time_ns: Ints, sizes: Ints) -> bool:
     1. 99.5 % of the messages have ``abs(off) <= T + 6 jitter + wander``, in bursts ``burst_size T`` in place of T;
     2. the grid's span is the stamps' span: `off` at the two ends (medians of up to nine messages) differs by no more
        than that, with the scatter of neighbours in place of a larger jitter;
-    3. from one 64th of the log (64 messages or bursts at least) to the next, the median of `off` moves by less than 5 % of the
-       time between them: wander is slow, and two rates aren't one.
+    3. from one 64th of the log (64 messages, ticks or bursts at least) to the next, the median of `off` moves by less
+       than 5 % of the time between them: wander is slow, and two rates aren't one.
 
     Parameters
     ----------
@@ -59,7 +59,9 @@ def grid_agrees(base: "TimeBase", time_ns: Ints, sizes: Ints) -> bool:
     # A wrong rate counts as jitter of the whole log, but hardly as jitter from one message to the next.
     scatter_ns = float(np.std(np.diff(off_ns))) / sqrt(2)
     drifts = abs(drift_ns) > slack_ns + JITTERS * min(scatter_ns, NS_PER_S * base.jitter_s)
-    return far <= HELD_UP * off_ns.size and not drifts and _one_rate(stamp_ns, off_ns, base.burst_size)
+    # Samples that share a tick, or a burst, tell where the clock is only together.
+    together = max(base.burst_size, ceil(base.quantum_s * base.rate_hz))
+    return far <= HELD_UP * off_ns.size and not drifts and _one_rate(stamp_ns, off_ns, _PIECE * together)
 
 
 def _indices(base: "TimeBase", time_ns: Ints, sizes: Ints) -> tuple[Ints, Ints]:
@@ -85,9 +87,8 @@ def _indices(base: "TimeBase", time_ns: Ints, sizes: Ints) -> tuple[Ints, Ints]:
     return chosen, index
 
 
-def _one_rate(stamp_ns: NDArray[np.float64], off_ns: NDArray[np.float64], burst_size: int) -> bool:
-    # Within a burst the stamps stand still while the grid goes on: a piece has as many bursts as else messages.
-    pieces = min(_PIECES, stamp_ns.size // (_PIECE * burst_size))
+def _one_rate(stamp_ns: NDArray[np.float64], off_ns: NDArray[np.float64], least: int) -> bool:
+    pieces = min(_PIECES, stamp_ns.size // least)
     if pieces < 2:
         return True
     parts = np.array_split(np.stack((stamp_ns, off_ns)), pieces, axis=1)

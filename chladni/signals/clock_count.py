@@ -97,7 +97,7 @@ def count_messages(tangled: Untangled) -> Iterator[Counted]:
         )
     if in_order is not None and in_order.proven:
         yield in_order
-    # Places told by a stamp that others have too would be those of the ticks.
+    # Other ways would take samples that share a stamp for repeats, or for fewer than were taken.
     if int(np.count_nonzero(steps == 0)) <= _SHARED * steps.size:
         unless = None if ticks is None or ticks.hidden or ticks.proven else fit_clock(ticks.count, mean_ns)
         unless_hz = 0.0 if unless is None else NS_PER_S / unless.period_ns
@@ -159,6 +159,9 @@ def _count_untold(tangled: Untangled, mean_ns: float, quantum_ns: float, *, burs
     time_ns, steps, cuts = tangled.time_ns, tangled.steps, tangled.clock.message
     if bursts:
         yield from _count_bursts(tangled, mean_ns, quantum_ns)
+    # A stamp that others have too tells no sample's place.
+    if int(np.count_nonzero(steps == 0)) > _SHARED * steps.size:
+        return
     some = steps[:: max(1, steps.size // SAMPLE)]
     guess = float(np.median(some[some > 0]))
     by_phase = count_by_phase(time_ns, steps, guess, cuts)

@@ -187,9 +187,13 @@ def sample_period(stamps_ns: Ints, before: Ints | None, back: Ints) -> float:
     back
         Messages that go back: intervals across one are left out as far as there are enough others.
     """
-    lag = max(1, min(_LAG, (stamps_ns.size - 1) // 2))
+    every = max(1, stamps_ns.size // _SAMPLE)
+    moved = np.count_nonzero(stamps_ns[1::every] != stamps_ns[:-1:every])
+    # As many samples as share a stamp are one interval, and a few of them tell no mean.
+    shared = -(-stamps_ns.size // every) // max(1, moved)
+    lag = max(1, min(_LAG * shared, (stamps_ns.size - 1) // 2))
     while True:
-        starts = np.arange(0, stamps_ns.size - lag, max(1, stamps_ns.size // _SAMPLE))
+        starts = np.arange(0, stamps_ns.size - lag, every)
         whole = starts[np.searchsorted(back, starts, "right") == np.searchsorted(back, starts + lag, "right")]
         # A quarter of the intervals is enough, when they are chosen by nothing but where the clock was set.
         if 4 * whole.size >= starts.size or lag == 1:

@@ -74,8 +74,10 @@ def stamp_quantum(steps: Ints, period_ns: float) -> float:
     0.0
     """
     some = steps[:: max(1, steps.size // SAMPLE)]
+    some = some[some > 0]
     # Pauses tell nothing more, and the error of the ticks would add up over them.
-    sizes, often = np.unique(some[(some > 0) & (some < _MOST_SIZES * period_ns)], return_counts=True)
+    usual = max(period_ns, float(np.median(some))) if some.size else period_ns
+    sizes, often = np.unique(some[some < _MOST_SIZES * usual], return_counts=True)
     if not sizes.size or sizes.size > 4 * _MOST_SIZES:
         return 0.0
     quantum = 0.0

@@ -262,9 +262,12 @@ def test_no_segment_between_gaps_says_which_resolution_would_do(tmp_path):
     valid[0, lost[lost < 4000]] = False
     rows = {"a": np.random.default_rng(3).standard_normal(4000)}
     with log_of(tmp_path, rows, rate_hz=100.0, valid=valid) as log:
-        with pytest.raises(EstimateError, match=r"/a\.accel.*ask for 2\.05 Hz or coarser"):
-            densities(log)
-        assert densities(log, averaging=Averaging(resolution_hz=2.05))
+        with pytest.raises(EstimateError, match=r"/a\.accel.*ask for 2\.04 Hz or coarser"):
+            densities(log, averaging=Averaging(resolution_hz=1.0))
+        assert densities(log, averaging=Averaging(resolution_hz=2.04))
+        # Without a wish the segments are as long as fit: 32 of the 49 samples between gaps.
+        (density,) = densities(log)
+        assert density.frequency_hz[1] == pytest.approx(100 / 32)
 
 
 def test_a_reference_that_never_changes_is_refused(tmp_path):

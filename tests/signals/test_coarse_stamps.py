@@ -261,3 +261,14 @@ def test_what_ticks_dont_explain_is_no_count_of_them() -> None:
     events = untangle(ticked(np.cumsum(rng.exponential(0.01, 3000)), 0.01))
     ticks = count_ticks(events, 1e7, 1e7)
     assert ticks is None or not ticks.proven
+
+
+@pytest.mark.parametrize("per_tick", [50, 50.3, 37.7])
+def test_stamps_in_whole_seconds_of_a_fast_sensor(per_tick: float) -> None:
+    when = ticked((np.arange(3000) + 7) / per_tick, 1.0)
+    base = fit_time_base(when)
+    assert base.uniform
+    # A tick holds fifty samples, and sixty ticks tell the rate to a part of one.
+    assert base.rate_hz == pytest.approx(per_tick, rel=1e-3)
+    assert (base.missing, base.duplicates) == (0, 0)
+    np.testing.assert_array_equal(message_index(when, base), np.arange(3000))
