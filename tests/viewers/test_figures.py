@@ -81,6 +81,14 @@ def test_response_shows_excited_lines_only(figures: dict[str, Figure]) -> None:
     np.testing.assert_array_equal(drawn, response.coherence[0, response.excited])
 
 
+def test_functions_of_a_file_without_coherence_have_no_empty_axes_for_it() -> None:
+    response = synthetic.frequency_response()
+    unknown = replace(response, coherence=np.full(response.coherence.shape, np.nan))
+    drawn = response_figures(Study(title="file", response=unknown))[RESPONSE]
+    assert len(drawn.axes) == 2
+    assert drawn.axes[-1].get_xlabel() == "Frequency [Hz]"
+
+
 def test_a_band_that_is_left_out_is_not_bridged() -> None:
     response = synthetic.frequency_response()
     excited = response.excited & ~((response.frequency_hz > 40) & (response.frequency_hz < 50))
