@@ -258,13 +258,13 @@ def test_segments_that_a_gap_costs_are_told(tmp_path):
 def test_no_segment_between_gaps_says_which_resolution_would_do(tmp_path):
     valid = np.ones((1, 4000), dtype=bool)
     # At random, 49 samples apart at most: an even one in fifty is what a clock that ticks every 10 ms makes of 98 Hz.
-    lost = np.cumsum(np.append(50, np.random.default_rng(8).integers(3, 51, 300)))
+    lost = np.cumsum(np.append(49, np.random.default_rng(8).integers(3, 51, 300)))
     valid[0, lost[lost < 4000]] = False
     rows = {"a": np.random.default_rng(3).standard_normal(4000)}
     with log_of(tmp_path, rows, rate_hz=100.0, valid=valid) as log:
-        with pytest.raises(EstimateError, match=r"/a\.accel.*ask for 2\.04 Hz or coarser"):
+        with pytest.raises(EstimateError, match=r"/a\.accel.*ask for 2\.05 Hz or coarser"):
             densities(log, averaging=Averaging(resolution_hz=1.0))
-        assert densities(log, averaging=Averaging(resolution_hz=2.04))
+        assert densities(log, averaging=Averaging(resolution_hz=2.05))
         # Without a wish the segments are as long as fit: 32 of the 49 samples between gaps.
         (density,) = densities(log)
         assert density.frequency_hz[1] == pytest.approx(100 / 32)
