@@ -37,8 +37,8 @@ def grid_agrees(base: "TimeBase", time_ns: Ints, sizes: Ints) -> bool:
     1. 99.5 % of the messages have ``abs(off) <= T + 6 jitter + wander``, in bursts ``burst_size T`` in place of T;
     2. the grid's span is the stamps' span: `off` at the two ends (medians of up to nine messages) differs by no more
        than that, with the scatter of neighbours in place of a larger jitter;
-    3. from one 64th of the log (64 messages, ticks or bursts at least) to the next, the median of `off` moves by less than 5 % of the
-       time between them: wander is slow, and two rates aren't one.
+    3. from one 64th of the log (64 messages, ticks or bursts at least) to the next, the median of `off` moves by less
+       than 5 % of the time between them: wander is slow, and two rates aren't one.
 
     Parameters
     ----------

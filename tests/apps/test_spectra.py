@@ -185,7 +185,8 @@ def test_segments_that_a_gap_costs_are_told(tmp_path):
 
 def test_no_segment_between_gaps_says_which_resolution_would_do(tmp_path):
     valid = np.ones((1, 4000), dtype=bool)
-    valid[0, 7::50] = False
+    # As even as every fiftieth would be the ticks of a clock that is coarser than the sampling.
+    valid[0, np.cumsum(np.append(50, np.random.default_rng(1).integers(20, 51, 100)))] = False
     rows = {"a": np.random.default_rng(3).standard_normal(4000)}
     with log_of(tmp_path, rows, rate_hz=100.0, valid=valid) as log:
         with pytest.raises(EstimateError, match=r"/a\.accel.*ask for 2\.04 Hz or coarser"):
