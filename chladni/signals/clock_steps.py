@@ -190,7 +190,7 @@ def sample_period(stamps_ns: Ints, before: Ints | None, back: Ints) -> float:
     every = max(1, stamps_ns.size // _SAMPLE)
     moved = int(np.count_nonzero(stamps_ns[1::every] != stamps_ns[:-1:every]))
     # As many samples as share a stamp are one interval, and a few of them tell no mean.
-    shared = -(-stamps_ns.size // every) // max(1, moved)
+    shared = -(-stamps_ns.size // every) // max(1, int(moved))
     lag = max(1, min(_LAG * shared, (stamps_ns.size - 1) // 2))
     while True:
         starts = np.arange(0, stamps_ns.size - lag, every)

@@ -55,6 +55,10 @@ def advice(base: "TimeBase", unless_hz: float = 0.0) -> str:
             f"stamps come in ticks of {base.quantum_s * 1e3:.4g} ms, coarser than the sampling, so samples are "
             f"counted in order; their rate is {told or 'uncertain'}"
         )
+        # One tick and sometimes two: losses that are as even have nothing else to be known by.
+        if COARSE < base.quantum_s * base.rate_hz < 1:
+            lost_hz = 1 / base.quantum_s
+            told += f", unless samples were lost as evenly and it is {lost_hz:.5g} Hz: then state it (--rate HZ)"
         return "; ".join((told, *_remarks(base)))
     if base.verdict == "jittered":
         limit_hz = 0.1 / (2 * pi * base.jitter_s)

@@ -64,7 +64,7 @@ def tone_log(path, frequency_hz, *, seconds=5.0, gap_s=None):
     valid = None
     if gap_s is not None:
         valid = np.ones((1, time_s.size), bool)
-        # At random, as far apart at most: even losses are what a clock makes that ticks a little faster than the sensor.
+        # At random, as far apart at most: even losses are what a clock makes that ticks a little too fast.
         apart = np.random.default_rng(2).integers(round(200 * gap_s), round(400 * gap_s) + 1, time_s.size)
         valid[0, np.cumsum(apart[np.cumsum(apart) < time_s.size])] = False
     channels = (Channel(name="/imu.linear_acceleration.x", unit="m/s^2"),)

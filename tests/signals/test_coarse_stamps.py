@@ -125,6 +125,10 @@ def test_ticks_that_skip_evenly_are_slower_sampling() -> None:
     base = fit_time_base(sampled(96.0, 0.01, 1000))
     assert (base.verdict, base.gap_count) == ("coarse", 0)
     assert agrees(base, 96.0)
+    assert "unless samples were lost as evenly and it is 100 Hz: then state it" in base.advice
+    # What is told to do settles it.
+    stated = fit_time_base(sampled(96.0, 0.01, 1000), nominal_rate_hz=100.0)
+    assert (stated.rate_hz, stated.verdict, stated.missing) == (100.0, "regular", 41)
     # Four even skips may well be chance; then the samples are told to be missing.
     short = fit_time_base(sampled(96.0, 0.01, 100))
     assert (short.verdict, short.rate_hz, short.missing) == ("regular", 100.0, 4)
