@@ -2,7 +2,7 @@
 
 ::
 
-    log = chladni.open_log("arm.mcap")                          # lazy: nothing decoded yet
+    log = chladni.open("arm.mcap")                              # lazy: nothing decoded yet; data files, too
     frf = chladni.frf(log, reference="/hammer.wrench.force.x", resolution_hz=0.5)
     modes = chladni.identify_modes(frf, band_hz=(10, 400))
     chladni.show(log, frf, modes)                               # rerun
@@ -49,6 +49,7 @@ _HOME = {
     "write_model": "chladni.models.files.model_file",
     "Wish": "chladni.models.analysis.wish",
     "load_setup": "chladni.io.setup",
+    "open": "chladni.io.log",
     "open_log": "chladni.io.log",
     "write_mcap": "chladni.io.mcap.writer",
     "Channel": "chladni.signals.channel",
@@ -101,6 +102,7 @@ __all__ = [
     "load_setup",
     "locate_from_levels",
     "mac",
+    "open",
     "open_log",
     "optimise",
     "psd",
@@ -120,7 +122,7 @@ if TYPE_CHECKING:
     from chladni.apps.modes import identify_modes
     from chladni.apps.show import show
     from chladni.apps.spectra import frf, psd
-    from chladni.io.log import open_log
+    from chladni.io.log import open, open_log  # noqa: A004  # as chladni.open
     from chladni.io.mcap.writer import write_mcap
     from chladni.io.setup import load_setup
     from chladni.modal.functions.circle_fit import CircleFit

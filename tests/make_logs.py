@@ -11,6 +11,7 @@ from mcap.writer import CompressionType, Writer
 from mcap_ros2._dynamic import serialize_dynamic
 
 START_NS = 1_700_000_000_000_000_000
+RATE_HZ = 100.0
 
 _SEPARATOR = "=" * 80
 _HEADER = f"""{_SEPARATOR}
@@ -124,13 +125,22 @@ class LogMaker:
         self._encoders[channel] = bytes
         return channel
 
-    def write(self, channel: int, message: Any, log_time_ns: int, *, publish_time_ns: int | None = None) -> None:
+    def write(
+        self,
+        channel: int,
+        message: Any,
+        log_time_ns: int,
+        *,
+        publish_time_ns: int | None = None,
+        sequence: int = 0,
+    ) -> None:
         """Write one message: a mapping for ROS 2 and JSON, bytes for raw topics."""
         self._writer.add_message(
             channel,
             log_time_ns,
             self._encoders[channel](message),
             log_time_ns if publish_time_ns is None else publish_time_ns,
+            sequence,
         )
 
 
@@ -231,6 +241,39 @@ def write_scalars(path: Path, columns: Mapping[str, tuple[Iterable[int], Iterabl
             log.write(channel, {"data": value}, time_ns)
 
 
+def tone(number: np.ndarray, *, offset_s: float = 0.0, tone_hz: float = 5.0) -> np.ndarray:
+    """Samples of a sine by their numbers, at `RATE_HZ`."""
+    sine: np.ndarray = np.sin(2 * np.pi * tone_hz * (number / RATE_HZ + offset_s))
+    return sine
+
+
+def write_numbers(
+    path: Path,
+    times_ns: Iterable[int],
+    values: Iterable[float],
+    *,
+    channel: Sequence[int] | None = None,
+    **options: Any,
+) -> None:
+    """Write Float64 messages to ``/s`` in the order given, through one MCAP channel or several (from 0)."""
+    owners = [0] * len(list(times_ns)) if channel is None else list(channel)
+    with LogMaker(path, **options) as maker:
+        channels = [maker.ros2("/s", "std_msgs/msg/Float64", FLOAT64) for _ in range(1 + max(owners))]
+        for time_ns, value, owner in zip(times_ns, values, owners, strict=True):
+            maker.write(channels[owner], {"data": float(value)}, int(time_ns))
+
+
+def two_sensors(path: Path, *, offset_s: float, joins_at: int = 0, seconds: int = 4, **options: Any) -> None:
+    """Write a tone of 5 Hz by one publisher, and one of 7 Hz and three times the size by another, on ``/s``."""
+    number = np.arange(round(seconds * RATE_HZ))
+    second = number[joins_at:]
+    times = START_NS + np.rint(np.concatenate([number / RATE_HZ, second / RATE_HZ + offset_s]) * 1e9).astype(np.int64)
+    values = np.concatenate([tone(number), 3 * tone(second, offset_s=offset_s, tone_hz=7.0)])
+    owner = np.repeat([0, 1], [number.size, second.size])
+    order = np.argsort(times, kind="stable")
+    write_numbers(path, times[order], values[order], channel=owner[order].tolist(), **options)
+
+
 def write_stored(path: Path, log_ns: np.ndarray, values: np.ndarray, **options: Any) -> None:
     """Write a std_msgs/Float64 topic ``/s`` in the order given, which needn't be that of the log times."""
     with LogMaker(path, **options) as log:
@@ -259,3 +302,18 @@ def protobuf_log(path: Path, values: Iterable[float], *, rate_hz: float = 100.0)
             stamp = timestamp_pb2.Timestamp(seconds=stamp_ns // 10**9, nanos=stamp_ns % 10**9).SerializeToString()
             body = b"\x0a" + bytes([len(stamp)]) + stamp + b"\x11" + struct.pack("<d", value)
             log.write(channel, body, stamp_ns + 1_000_000)
+
+
+def with_strange_topics(path: Path) -> Path:
+    """A log at 100 Hz: noise in /good.x, messages that can't be decoded in /bad, and text in /text."""
+    values = np.random.default_rng(1).standard_normal(100)
+    with LogMaker(path) as maker:
+        topics = [
+            (maker.json("/good"), [{"x": value} for value in values.tolist()]),
+            (maker.raw("/bad", encoding="flatbuffer"), [b"????"] * 100),
+            (maker.json("/text"), [{"note": "all is well"}] * 100),
+        ]
+        for index in range(100):
+            for channel, messages in topics:
+                maker.write(channel, messages[index], START_NS + index * 10_000_000)
+    return path

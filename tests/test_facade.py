@@ -14,7 +14,7 @@ SURFACE = {
     "coherence", "cross_spectra", "diagnose_gap",
     "find_peaks", "find_response_peaks", "frf", "identify_modes", "influence", "load_model", "load_setup",
     "locate_from_levels", "mac",
-    "open_log", "optimise", "psd",
+    "open", "open_log", "optimise", "psd",
     "relative_motion", "show", "simulate", "validate", "waterfall", "write_mcap", "write_model",
 }  # fmt: skip
 HEAVY = {"numpy", "scipy", "rerun", "matplotlib", "pint", "pydantic", "mcap", "zstandard", "numba", "panel", "bokeh"}

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from chladni.apps.excitation import excitations
 from chladni.apps.findings import peak_sentence, response_sentences, soundness_sentences
 from chladni.apps.sources import Progress, Span, is_small, no_progress
 from chladni.apps.spectra import Averaging, densities, transfer
@@ -22,7 +23,6 @@ from chladni.spectral.waterfall import waterfall
 if TYPE_CHECKING:
     from chladni.signals.peak import Peak
 
-FORCE_UNITS = ("N", "N m")
 # Waveforms and waterfalls of a larger log are drawn for its beginning only; spectra always cover all of it.
 MOST_VALUES_DRAWN = 40_000_000
 
@@ -50,7 +50,7 @@ def analyse(
     Parameters
     ----------
     log
-        From `open_log`; its setup file tells points, units and references.
+        From `chladni.open`; its setup file tells points, units and references.
     channels
         Message paths; None for all channels that are uniform series and change at all.
     references
@@ -77,6 +77,11 @@ def analyse(
     averaging, span = Averaging(resolution_hz=resolution_hz), Span(start_s=start_s, end_s=end_s)
     soundness = soundness_sentences(log.info())
     progress(0.2)
+    if not log.channels and (log.functions is not None or log.modes is not None):
+        response = None
+        if log.functions is not None:
+            response = transfer(log, references, channels, estimator="H1", averaging=averaging, span=span)
+        return _study(log, (), response, _Shown(series=()), (), soundness)
     found = densities(log, channels=channels, averaging=averaging, span=span)
     progress(0.5)
     moving = [channel for density in found for channel in density.channels]
@@ -112,6 +117,7 @@ def _study(
         response=response,
         peaks=tuple(peak for named in peaks for group in named for peak in group.peaks),
         response_peaks=response_peaks,
+        modes=log.modes,
         geometry=log.geometry,
         findings=tuple(dict.fromkeys([*findings, *shown.notes])),
     )
@@ -127,7 +133,7 @@ def _response(
 ) -> FrequencyResponse | None:
     chosen = references or excitations(moving)
     if not chosen:
-        return None
+        return log.functions
     others = None if channels is None else [name for name in log.names(channels) if name not in log.names(chosen)]
     if others == []:
         return None
@@ -138,13 +144,6 @@ def _response(
         if references:
             raise
         return None
-
-
-def excitations(moving: Sequence[Channel]) -> tuple[str, ...]:
-    """Name the channels marked as reference, else the first force."""
-    marked = tuple(channel.name for channel in moving if channel.role == "reference")
-    forces = tuple(channel.name for channel in moving if channel.unit in FORCE_UNITS)
-    return marked or forces[:1]
 
 
 def _shown(log: Log, names: Sequence[str], span: Span) -> _Shown:

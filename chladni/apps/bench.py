@@ -1,6 +1,6 @@
 """The bench: pages of the virtual instruments, with everything that they can do."""
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,12 @@ if TYPE_CHECKING:
 
 
 def open_bench(
-    instruments: Iterable[Instrument], *, port: int = 0, log: Path | None = None, variants: Path | None = None
+    instruments: Iterable[Instrument],
+    *,
+    port: int = 0,
+    log: Path | None = None,
+    reading: Mapping[str, Any] | None = None,
+    variants: Path | None = None,
 ) -> "BenchServer":
     """Give a server of the pages of these instruments, bound to this computer only.
 
@@ -28,7 +33,9 @@ def open_bench(
     port
         0 takes a free one.
     log
-        MCAP log that every page holds beside its simulation.
+        Log or data file that every page holds beside its simulation.
+    reading
+        How it and those dropped on a page are read: options of `chladni.open`.
     variants
         CSV or TOML file of rows, each a variant; read again whenever it changes.
 
@@ -46,12 +53,17 @@ def open_bench(
     """
     if log is not None:
         # Told here, in the terminal, rather than on a page that has to be opened first.
-        OpenedLog(log, log.name, private=False).close()
-    return serve(instruments, tools(), port=port, log=log, variants=variants)
+        OpenedLog(log, log.name, private=False, reading=reading).close()
+    return serve(instruments, tools(reading), port=port, log=log, variants=variants)
 
 
 def notebook(
-    instrument: Instrument, *, log: Path | None = None, variants: Path | None = None, ground: "Ground" = "light"
+    instrument: Instrument,
+    *,
+    log: Path | None = None,
+    reading: Mapping[str, Any] | None = None,
+    variants: Path | None = None,
+    ground: "Ground" = "light",
 ) -> Any:
     """Give the page of an instrument as a Panel object, which a notebook shows when it's the last word of a cell.
 
@@ -60,7 +72,9 @@ def notebook(
     instrument
         Such as ``chladni.models.instruments.pneumatic_motor.INSTRUMENT``.
     log
-        MCAP log to hold beside the simulation.
+        Log or data file to hold beside the simulation.
+    reading
+        How it is read: options of `chladni.open`.
     variants
         CSV or TOML file of rows, each a variant.
     ground
@@ -71,16 +85,20 @@ def notebook(
     SetupError
         When Panel isn't installed.
     """
-    return instrument_panel(instrument, tools(), ground=ground, log=log, variants=variants)
+    return instrument_panel(instrument, tools(reading), ground=ground, log=log, variants=variants)
 
 
-def tools() -> Tools:
-    """Give what pages call."""
+def tools(reading: Mapping[str, Any] | None = None) -> Tools:
+    """Give what pages call; `reading` says how logs are opened."""
+
+    def open_log(path: Path, title: str, private: bool) -> MeasuredLog:
+        return OpenedLog(path, title, private=private, reading=reading)
+
     return Tools(
         read=_read,
         influence=_influence,
         watch=_watch,
-        open_log=_open_log,
+        open_log=open_log,
         terminals=terminals,
         assign=assign,
         compare=compare,
@@ -120,7 +138,3 @@ def _watch(instrument: Instrument, path: Path) -> Callable[[], Rows]:
         return Rows(variants=tuple(rows), mistake=state.mistake)
 
     return look
-
-
-def _open_log(path: Path, title: str, private: bool) -> MeasuredLog:
-    return OpenedLog(path, title, private=private)

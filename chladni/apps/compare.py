@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.apps.analyse import excitations
+from chladni.apps.excitation import excitations
 from chladni.apps.modes import identify_modes
 from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging, densities, transfer
@@ -60,7 +60,7 @@ def compare_logs(
     Parameters
     ----------
     before, after
-        From `open_log`; channels are matched by name.
+        From `chladni.open`; channels are matched by name.
     channels
         Message paths; None for all that both have and that change at all.
     references
@@ -81,11 +81,12 @@ def compare_logs(
     EstimateError
         When the logs share no channel at the same sample rate, or modes are asked for and can't be identified.
     """
-    pairs = _matched_densities(before, after, channels, resolution_hz)
+    ready_made = all(not log.channels and log.functions is not None for log in (before, after))
+    pairs = [] if ready_made else _matched_densities(before, after, channels, resolution_hz)
     progress(0.5)
     compared = tuple(compare_densities(old, new) for old, new in pairs)
     moving = [channel for comparison in compared for channel in comparison.channels]
-    chosen = tuple(references or excitations(moving))
+    chosen = references or (None if ready_made else excitations(moving))
     transferred = _responses(before, after, channels, chosen, resolution_hz)
     progress(0.7)
     changes: tuple[ModeChange, ...] | None = None
@@ -105,12 +106,12 @@ def compare_logs(
 def _modes(
     before: Log,
     after: Log,
-    references: Sequence[str],
+    references: Sequence[str] | None,
     channels: Sequence[str] | None,
     resolution_hz: float | None,
     operational: bool,
 ) -> tuple[tuple[ModeChange, ...], tuple[str, ...]]:
-    named = None if channels is None else [name for name in channels if name not in references]
+    named = None if channels is None else [name for name in channels if name not in (references or ())]
     old, new = (
         identify_modes(
             log,
@@ -188,10 +189,15 @@ class _Transferred:
 
 
 def _responses(
-    before: Log, after: Log, channels: Sequence[str] | None, references: Sequence[str], resolution_hz: float | None
+    before: Log,
+    after: Log,
+    channels: Sequence[str] | None,
+    references: Sequence[str] | None,
+    resolution_hz: float | None,
 ) -> _Transferred:
-    responses = None if channels is None else [name for name in channels if name not in references]
-    if not references or responses == []:
+    """Compare transfer functions; to `references`, or, for None, those that both files hold ready-made."""
+    responses = None if channels is None else [name for name in channels if name not in (references or ())]
+    if (references is not None and not references) or responses == []:
         return _Transferred()
     averaging = Averaging(resolution_hz=resolution_hz)
     try:
@@ -201,4 +207,5 @@ def _responses(
         )
         return _Transferred(comparison=compare_responses(old, new), accounts=((old.provenance, new.provenance),))
     except EstimateError as error:
-        return _Transferred(reasons=(f"transfer functions to {', '.join(references)} were not compared: {error}",))
+        to = f" to {', '.join(references)}" if references else ""
+        return _Transferred(reasons=(f"transfer functions{to} were not compared: {error}",))

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from chladni.apps.findings import damage_sentences
+from chladni.apps.findings import reading_sentences, require_channels
 from chladni.apps.gap_document import Document, gap_document
-from chladni.apps.sources import Span
+from chladni.apps.sources import Span, joined
 from chladni.gap.comparison.measuring import MatchedLog, matched_log
 from chladni.gap.records.diagnosis import Diagnosis
 from chladni.gap.records.log_use import LogUse
@@ -20,6 +20,7 @@ from chladni.models.effects.effect_kind import EffectKind
 from chladni.models.effects.wording import nearest
 from chladni.models.files.model_file import load_model
 from chladni.signals.errors import LogError, SetupError
+from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 StepProgress = Callable[[str, float], None]
@@ -37,6 +38,7 @@ def diagnose_gap(
     seed: int = 0,
     start_s: float | None = None,
     end_s: float | None = None,
+    join: JoinMethod = "auto",
     progress: StepProgress | None = None,
 ) -> Diagnosis:
     """Say where a model and the logs of its machine disagree, which unmodelled effect causes it, and what it closes.
@@ -46,7 +48,8 @@ def diagnose_gap(
     model
         What the simulation believes, or its file.
     logs
-        A log, or several: files, opened logs or series. Channels are those that the model's inputs and outputs name.
+        A log or data file, or several: their paths, opened, or series. Channels are those that the model's inputs and
+        outputs name.
     leave_out
         Words of effects that don't take part.
     own_effects
@@ -55,6 +58,8 @@ def diagnose_gap(
         Of everything random; the same input and seed give the same answer.
     start_s, end_s
         Only samples with ``start_s <= t < end_s``, seconds from each log's start.
+    join
+        How channels of several sampling grids become one, see `chladni.signals.resampling.join_resampled`.
     progress
         Called with the name of the step and the share done, 0 to 1.
 
@@ -86,7 +91,7 @@ def diagnose_gap(
     # Before anything is read: a misspelt word would leave nothing out, in silence.
     left_out = known_effects(leave_out, own_effects)
     chosen = load_model(model) if isinstance(model, Path | str) else model
-    read = list(_measured(chosen, _several(logs), Span(start_s=start_s, end_s=end_s)))
+    read = list(_measured(chosen, _several(logs), Span(start_s=start_s, end_s=end_s, join=join)))
     found = diagnose(
         chosen,
         [one.measurement for one in read],
@@ -149,29 +154,26 @@ def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
     # Only those: a log may hold a hundred other channels, at rates of their own.
     held = [channel.name for channel in log.channels]
     wanted = _listened_to(model)
-    if not held:
-        # The damage is known when all has been read, and nothing is left to read that would take long.
-        told = " ".join(damage_sentences(log.info().damage)) or "record at least one message with a number in it"
-        raise LogError(f"{name}: holds no channel that can be read; {told}")
+    require_channels(log, name)
     chosen = [channel for channel in held if channel in wanted]
     if not chosen:
         raise LogError(
             f"{name}: holds no channel that model {model.name!r} listens to; it holds "
             f"{some_of(held, count=NAMES_TOLD)}, the model listens to {some_of(sorted(wanted), count=NAMES_TOLD)}"
         )
-    series = log.read(chosen, start_s=span.start_s, end_s=span.end_s)
-    damage = damage_sentences(log.damage)
+    series, notes = joined(log, chosen, span)
+    damage = reading_sentences(log, everything=False)
     begins_s = (series.start_time_ns - log.start_time_ns) / NS_PER_S
     found = matched_log(model, series, log=name, held=held, begins_s=begins_s, damage=damage)
-    return _with_use(found, series, damage)
+    return _with_use(found, series, (*damage, *notes))
 
 
 def _of_series(model: Model, series: TimeSeries, name: str) -> _Read:
     return _with_use(matched_log(model, series, log=name), series)
 
 
-def _with_use(found: MatchedLog, series: TimeSeries, damage: tuple[str, ...] = ()) -> _Read:
-    seen, losses = found.measurement, (*damage, *found.losses)
+def _with_use(found: MatchedLog, series: TimeSeries, told: tuple[str, ...] = ()) -> _Read:
+    seen, losses = found.measurement, (*told, *found.losses)
     use = LogUse(
         log=seen.log,
         used_s=seen.duration_s,

@@ -13,7 +13,7 @@ from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.spectral.bands import total_rms
-from chladni.spectral.peaks import find_peaks
+from chladni.spectral.peaks import find_peaks, judged_above_hz
 
 if TYPE_CHECKING:
     from chladni.apps.compare import LogComparison
@@ -119,6 +119,7 @@ def _axis(estimate: PowerSpectralDensity | FrequencyResponse) -> Document:
         "window": account.window,
         "segment_s": account.segment_s,
         "averaging": account.averaging,
+        "judged_above_hz": judged_above_hz(estimate),
     }
 
 

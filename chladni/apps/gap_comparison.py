@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from chladni.apps.findings import damage_sentences
+from chladni.apps.findings import reading_sentences, require_channels
 from chladni.apps.gap_document import Document, distortion_document, where_document
-from chladni.apps.sources import Span
+from chladni.apps.sources import Span, joined
 from chladni.gap.comparison.distortion import Distortion
 from chladni.gap.comparison.linear_approximation import moving_inputs
 from chladni.gap.comparison.log_against_log import GapView, compare_logs
@@ -17,6 +17,7 @@ from chladni.gap.records.measurement import Measurement
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import LogError
+from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import counted
 from chladni.viewers.engineering import percent
@@ -71,7 +72,12 @@ class GapComparison:
 
 
 def compare_with_simulated(
-    measured: Log, simulated: Log, *, start_s: float | None = None, end_s: float | None = None
+    measured: Log,
+    simulated: Log,
+    *,
+    start_s: float | None = None,
+    end_s: float | None = None,
+    join: JoinMethod = "auto",
 ) -> GapComparison:
     """Say where two logs of one experiment disagree: one measured, one written by any simulator.
 
@@ -84,10 +90,12 @@ def compare_with_simulated(
         When a log can't be read, the logs share no channel that differs, rates or units differ, or samples are
         missing.
     """
-    span, logs = Span(start_s=start_s, end_s=end_s), (measured, simulated)
+    span, logs = Span(start_s=start_s, end_s=end_s, join=join), (measured, simulated)
+    for log in logs:
+        require_channels(log, log.path.name)
     # One list for both, so that rows are the same channels.
     names = _shared(measured, simulated)
-    first, second = (_read(log, names, span) for log in logs)
+    (first, our_notes), (second, their_notes) = (_read(log, names, span) for log in logs)
     inputs = _played_back(first, second)
     outputs = [name for name in names if name not in inputs]
     # Somebody compared a log with itself, or with a copy that holds inputs alone.
@@ -110,7 +118,8 @@ def compare_with_simulated(
         distortion=_shares(view.measured_split),
         simulated_distortion=_shares(view.simulated_split),
         remarks=(
-            *(told for log in logs for told in damage_sentences(log.damage)),
+            *(told for log in logs for told in reading_sentences(log, everything=False)),
+            *dict.fromkeys((*our_notes, *their_notes)),
             *view.remarks,
             *_split_remarks(view, moving_inputs(ours)),
         ),
@@ -159,11 +168,11 @@ def _shared(ours: Log, theirs: Log) -> list[str]:
     return names
 
 
-def _read(log: Log, names: Sequence[str], span: Span) -> TimeSeries:
-    series = log.read(names, start_s=span.start_s, end_s=span.end_s)
+def _read(log: Log, names: Sequence[str], span: Span) -> tuple[TimeSeries, tuple[str, ...]]:
+    series, notes = joined(log, names, span)
     if not (series.all_valid() and np.isfinite(series.values).all()):
         raise LogError(f"{log.path.name}: samples are missing; choose a part without gaps with --start and --end")
-    return series
+    return series, notes
 
 
 def _played_back(first: TimeSeries, second: TimeSeries) -> tuple[str, ...]:

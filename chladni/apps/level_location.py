@@ -53,7 +53,7 @@ def locate_from_levels(
     Parameters
     ----------
     logs
-        Two or more from `open_log`, excited by one periodic force of one period length at different levels.
+        Two or more from `chladni.open`, excited by one periodic force of one period length at different levels.
     force
         Its channel.
     sensors

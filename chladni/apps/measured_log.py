@@ -5,8 +5,9 @@ import weakref
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
-from chladni.apps.findings import damage_sentences
+from chladni.apps.findings import reading_sentences, require_channels
 from chladni.apps.measured_charts import comparison_charts, scores
 from chladni.io.log import open_log
 from chladni.models.core.model import Model
@@ -31,13 +32,13 @@ class OpenedLog:
         When it can't be read, or nothing in it.
     """
 
-    def __init__(self, path: Path, title: str, *, private: bool) -> None:
+    def __init__(self, path: Path, title: str, *, private: bool, reading: Mapping[str, Any] | None = None) -> None:
         self.title = title
         try:
-            self._log = open_log(path)
-        except LogError as error:
+            self._log = open_log(path, **(reading or {}))
+        except (LogError, SetupError) as error:
             # By the name that the user knows: a dropped log lies under another one.
-            raise LogError(str(error).replace(str(path), title)) from error
+            raise type(error)(str(error).replace(str(path), title)) from error
         # Also when the program ends before the page is closed.
         self._removal = weakref.finalize(self, _remove, path) if private else None
         with ExitStack() as closing:
@@ -46,14 +47,9 @@ class OpenedLog:
             self.channels: tuple[Channel, ...] = self._log.channels
             info = self._log.info()
             self.duration_s: float = info.duration_s
-            self.damage = damage_sentences(info.damage)
-            self._require_channels()
+            self.damage = reading_sentences(self._log, everything=True)
+            require_channels(self._log, title)
             closing.pop_all()
-
-    def _require_channels(self) -> None:
-        if not self.channels:
-            told = " ".join(self.damage) or "record at least one message with a number in it"
-            raise LogError(f"{self.title}: holds no channel that can be read; {told}")
 
     def read(self, names: Sequence[str], start_s: float, end_s: float) -> TimeSeries:
         """Give channels on their common grid."""

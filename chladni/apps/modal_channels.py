@@ -3,8 +3,8 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from chladni.apps.analyse import FORCE_UNITS, excitations
-from chladni.apps.sources import Progress, Span, Watched, no_progress, watched_grids
+from chladni.apps.excitation import FORCE_UNITS, constant_channels
+from chladni.apps.sources import Progress, Span, Watched, on_one_grid
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.channel import Channel
@@ -14,28 +14,6 @@ from chladni.signals.unit_text import in_unit
 from chladni.spectral.forms import MOTION_ORDER
 
 Chosen = tuple[tuple[str, ...], tuple[str, ...]]
-
-
-def excitation_names(source: Log | TimeSeries, span: Span) -> tuple[str, ...]:
-    """Name the excitations that the channels tell: those marked as reference, else the first force that changes.
-
-    Raises
-    ------
-    EstimateError
-        When there is none.
-    """
-    candidates = [one for one in source.channels if one.role == "reference" or one.unit in FORCE_UNITS]
-    found: tuple[str, ...] = ()
-    if candidates:
-        names = [channel.name for channel in candidates]
-        still = _constant(source, names, span)
-        found = excitations([channel for channel in candidates if channel.name not in still])
-    if not found:
-        raise EstimateError(
-            "no channel that changes is an excitation; name it as reference, or ask for modes from responses alone "
-            "(operational)"
-        )
-    return found
 
 
 def motions_of_one_unit(channels: Sequence[Channel], *, named: bool) -> Chosen:
@@ -91,7 +69,8 @@ def responses_alone(
     if isinstance(source, TimeSeries):
         return _of_series(source, channels, span)
     if channels is not None:
-        return _of_named(source, source.names(channels), span, progress), ()
+        grid = _of_named(source, source.names(channels), span, progress)
+        return grid, grid.notes
     return _of_log(source, span, progress)
 
 
@@ -100,7 +79,7 @@ def _of_series(series: TimeSeries, channels: Sequence[str] | None, span: Span) -
     if channels is not None:
         names, notes = motions_of_one_unit(part.select(list(channels)).channels, named=True)
     else:
-        still = _constant(part, [channel.name for channel in part.channels], Span())
+        still = constant_channels(part, [channel.name for channel in part.channels], Span())
         names, notes = _moving_motions(part.channels, still)
     if not names:
         raise EstimateError("the series holds no response that changes; nothing to identify modes from")
@@ -109,18 +88,13 @@ def _of_series(series: TimeSeries, channels: Sequence[str] | None, span: Span) -
 
 def _of_named(log: Log, names: tuple[str, ...], span: Span, progress: Progress) -> Watched:
     motions_of_one_unit([channel for channel in log.channels if channel.name in names], named=True)
-    for grid in watched_grids(log, names, span, progress=progress):
-        if set(names) <= set(grid.names):
-            return grid
-    # Not on one grid: the log's own error names the grids and the remedies.
-    log.read(list(names), start_s=span.start_s, end_s=span.end_s)
-    raise EstimateError(f"{log.path.name}: no sampling grid holds all of {', '.join(names)}")
+    return on_one_grid(log, names, span, progress=progress)
 
 
 def _of_log(log: Log, span: Span, progress: Progress) -> tuple[Watched, tuple[str, ...]]:
     known = {channel.name: channel for channel in log.channels}
     offers = [
-        _moving_motions([known[name] for name in grid.names], _constant(log, grid.names, span))
+        _moving_motions([known[name] for name in grid.names], constant_channels(log, grid.names, span))
         for grid in log.grids(start_s=span.start_s, end_s=span.end_s)
     ]
     names, notes = max(offers, key=lambda offer: len(offer[0]), default=((), ()))
@@ -138,19 +112,3 @@ def _moving_motions(channels: Sequence[Channel], constant: Sequence[str]) -> Cho
     names, notes = motions_of_one_unit([one for one in responses if one.name not in constant], named=False)
     still = [one.name for one in responses if one.name in constant]
     return names, (*notes, f"channels that never change are left out: {some_of(still)}") if still else notes
-
-
-def _constant(source: Log | TimeSeries, names: Sequence[str], span: Span) -> tuple[str, ...]:
-    """Name the channels among `names` that show one value only."""
-    if isinstance(source, TimeSeries):
-        chosen = source.select(list(names))
-        grids = [Watched(tuple(names), (chosen,), duration_s=chosen.duration_s, progress=no_progress)]
-    else:
-        grids = list(watched_grids(source, list(names), span))
-    found: list[str] = []
-    for grid in grids:
-        for _ in grid:
-            # Watching is all that is wanted.
-            pass
-        found += grid.constant()
-    return tuple(found)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from chladni.apps.modes import Method, Wanted, functions_and_modes, modes_of_response, modes_of_responses
+from chladni.apps.findings import reading_sentences
+from chladni.apps.modes import Method, Wanted, functions_and_modes, modes_of_responses
 from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging
-from chladni.io.files.uff_modes import read_uff_modes
 from chladni.io.log import Log
 from chladni.modal.checks.driving_point import check_driving_point
 from chladni.modal.checks.reciprocity import check_reciprocity
@@ -23,9 +23,8 @@ from chladni.modal.shapes.relative_motion import relative_motion
 from chladni.modal.shapes.shape_transmissibility import ShapeTransmissibility, shape_transmissibility
 from chladni.modal.shapes.summary import summarise
 from chladni.modal.shapes.validation import validate
-from chladni.signals.errors import EstimateError, LogError, SetupError
+from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
-from chladni.signals.geometry import Geometry
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.study import Study
@@ -40,7 +39,6 @@ METHODS: dict[MethodName, type[Method]] = {
     "fdd": FrequencyDomainDecomposition,
     "efdd": EnhancedFrequencyDomainDecomposition,
 }
-UNIVERSAL_FILES = (".uff", ".unv")
 FROM_RESPONSES: tuple[MethodName, ...] = ("ssi-cov", "fdd", "efdd")
 
 
@@ -71,7 +69,8 @@ def modal_study(
     Parameters
     ----------
     log
-        From `open_log`; its setup file tells points, directions, units, references and the wireframe.
+        From `chladni.open`; its setup file tells points, directions, units, references and the wireframe. Of a
+        universal file without time records the frequency responses are taken that it holds, else its modes.
     references, operational, channels, resolution_hz
         See `identify_modes`.
     method
@@ -106,7 +105,12 @@ def modal_study(
                 span=part,
                 progress=progress,
             )
-        return _study(log.path, log.geometry, found, None)
+        return _study(log, channels, found, None)
+    if not log.channels and log.functions is None and log.modes is not None:
+        told = (
+            "the modes are those that the file holds: there are no frequency responses in it to identify others from"
+        )
+        return _study(log, channels, log.modes, None, notes=(told,))
     with _told_of(log.path):
         response, found = functions_and_modes(
             log,
@@ -118,28 +122,7 @@ def modal_study(
             span=part,
             progress=progress,
         )
-    return _study(log.path, log.geometry, found, response, notes=_checks(response))
-
-
-def universal_file_study(path: Path, *, method: MethodName | None = None, wanted: Wanted | None = None) -> ModalStudy:
-    """Identify the modes of the frequency responses in a universal file; without any, take the modes that it holds.
-
-    Raises
-    ------
-    LogError
-        When the file can't be read, or holds neither frequency responses nor modes.
-    EstimateError
-        When there is too little to identify from.
-    """
-    held, chosen = read_uff_modes(path), None if method is None else METHODS[method]()
-    if held.response is not None:
-        with _told_of(path):
-            found = modes_of_response(held.response, method=chosen, wanted=wanted or Wanted())
-        return _study(path, held.geometry, found, held.response, notes=(*held.notes, *_checks(held.response)))
-    if held.modes is None:
-        raise LogError(f"{path}: holds neither frequency responses (dataset 58) nor modes (dataset 55)")
-    told = "the modes are those that the file holds: there are no frequency responses in it to identify others from"
-    return _study(path, held.geometry, held.modes, None, notes=(*held.notes, told))
+    return _study(log, channels, found, response, notes=_checks(response))
 
 
 @contextmanager
@@ -170,22 +153,24 @@ def _require_consistent(references: Sequence[str] | None, operational: bool, met
 
 
 def _study(
-    path: Path,
-    geometry: Geometry,
+    log: Log,
+    channels: Sequence[str] | None,
     modes: ModeSet,
     response: FrequencyResponse | None,
     *,
     notes: tuple[str, ...] = (),
 ) -> ModalStudy:
+    geometry = log.geometry
     validation, motions = validate(modes), relative_motion(modes, geometry)
+    told = (*reading_sentences(log, everything=channels is None), *notes)
     study = Study(
-        title=path.name,
+        title=log.path.name,
         response=response,
         modes=modes,
         validation=validation,
         relative_motion=motions,
         geometry=geometry,
-        findings=tuple(dict.fromkeys([*notes, *summarise(modes, validation, motions, geometry=geometry)])),
+        findings=tuple(dict.fromkeys([*told, *summarise(modes, validation, motions, geometry=geometry)])),
     )
     passed_on = shape_transmissibility(modes, geometry)
     return ModalStudy(modes=modes, validation=validation, transmissibility=passed_on, study=study)

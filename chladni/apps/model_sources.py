@@ -4,8 +4,8 @@ from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
-from chladni.apps.findings import damage_sentences
-from chladni.io.log import open_log
+from chladni.apps.findings import reading_sentences
+from chladni.io.log import Log
 from chladni.models.core.instrument import Instrument
 from chladni.models.core.model import Model
 from chladni.models.drives.drive_model import DriveModel
@@ -44,13 +44,13 @@ def _unit(model: Model, name: str) -> str | None:
     return next((terminal.unit for terminal in model.compile().inputs if terminal.name == name), None)
 
 
-def recording_for(model: Model, log: Path | str) -> tuple[TimeSeries, tuple[str, ...]]:
+def recording_for(model: Model, log: Log) -> tuple[TimeSeries, tuple[str, ...]]:
     """Read the channels that a model's inputs name from a log, and those of its outputs that the log holds too.
 
     Returns
     -------
     recording, damage
-        The samples, and sentences on what the log lost: a log that was cut off drives the model as far as it goes.
+        The samples, and sentences on what wasn't read: a log that was cut off drives the model as far as it goes.
 
     Raises
     ------
@@ -67,7 +67,6 @@ def recording_for(model: Model, log: Path | str) -> tuple[TimeSeries, tuple[str,
             'channel = "/hammer.wrench.force.x"'
         )
     measured = {terminal.channel for terminal in compiled.outputs if terminal.channel is not None}
-    with open_log(log) as opened:
-        held = [channel.name for channel in opened.channels if channel.name in measured]
-        recording = opened.read(list(dict.fromkeys([*driving, *held])))
-        return recording, damage_sentences(opened.damage)
+    held = [channel.name for channel in log.channels if channel.name in measured]
+    recording = log.read(list(dict.fromkeys([*driving, *held])))
+    return recording, reading_sentences(log, everything=False)

@@ -1,19 +1,23 @@
 """Natural modes of a log, a series or frequency responses, in one call."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
-from chladni.apps.modal_channels import excitation_names, motions_of_one_unit, responses_alone
+from chladni.apps.excitation import excitation_names, stored_functions
+from chladni.apps.modal_channels import motions_of_one_unit, responses_alone
 from chladni.apps.sources import Progress, Span, Watched, no_progress
 from chladni.apps.spectra import Averaging, transfer
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
+from chladni.modal.checks.roving import over_hit_points
 from chladni.modal.functions.bands import join_bands
 from chladni.modal.functions.circle_fit import CircleFit
 from chladni.modal.functions.half_power import HalfPower
+from chladni.modal.functions.line_spacing import longest_modal_segment_s
 from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
 from chladni.modal.responses.efdd import EnhancedFrequencyDomainDecomposition
 from chladni.modal.responses.fdd import FrequencyDomainDecomposition
@@ -26,6 +30,7 @@ from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.machine_harmonic import MachineHarmonic
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.unit_text import in_unit
 from chladni.signals.wording import counted
 from chladni.spectral.adaptive import adaptive_cross_spectra
 from chladni.spectral.blocks import leading_part
@@ -38,15 +43,12 @@ FromResponses = CovarianceDrivenSubspace | FrequencyDomainDecomposition | Enhanc
 FromFunctions = PolyReferenceLeastSquares | CircleFit | HalfPower
 Method = FromFunctions | FromResponses
 
-# Segments of a record, end to end, that modes are identified from: half as many as a spectrum for the eye has, twice
-# the lines in each peak. Each further reference takes some of the averages for itself.
-SEGMENTS, SEGMENTS_A_REFERENCE = 8, 4
-LONGEST_SEGMENT = 1 << 16
 # Machines are looked for in the beginning of a stream, in one piece.
 SAMPLES_FOR_MACHINES = 1 << 20
 # A hammer drives modes as far as its force stays within 20 dB (ISO 7626-5); beyond, side lobes of its pulse still
 # make coherent peaks, of which only who asks for them knows what they are worth.
 HAMMER_DRIVES = 1e-2
+ALONE = ", or ask for modes from responses alone (--operational)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +91,8 @@ def identify_modes(
     ----------
     source
         A log or a series, whose frequency responses are estimated first (or, with `operational`, whose responses
-        alone are used), frequency responses, or averaged cross-spectra of responses.
+        alone are used), frequency responses, or averaged cross-spectra of responses. Of a universal file without
+        time records the frequency responses are taken that it holds, else its modes.
     reference
         Channel of the excitation, or several; None takes those whose role is reference, else the first force.
     operational
@@ -115,7 +118,8 @@ def identify_modes(
     Returns
     -------
     ModeSet
-        Empty when there is no mode; its notes say why.
+        Empty when there is no mode; its notes say why. Shapes are over the responses, or, by reciprocity, over the
+        references where there are fewer responses than forces, as of a hammer that roved (see `over_hit_points`).
 
     Raises
     ------
@@ -132,9 +136,11 @@ def identify_modes(
     wanted = Wanted.of(bands_hz=_bands(band_hz), count=count, frequencies_hz=frequencies_hz)
     span, averaging = Span(start_s=start_s, end_s=end_s), Averaging(resolution_hz=resolution_hz)
     if isinstance(source, FrequencyResponse):
-        return modes_of_response(source, method=method, wanted=wanted)
+        return modes_of_response(over_hit_points(source), method=method, wanted=wanted)
     if isinstance(source, CrossSpectra):
         return modes_of_spectra(source, method=method, wanted=wanted)
+    if isinstance(source, Log) and not source.channels and source.functions is None and source.modes is not None:
+        return source.modes
     if operational or isinstance(method, FromResponses):
         return modes_of_responses(
             source, channels=channels, method=method, wanted=wanted, averaging=averaging, span=span
@@ -218,10 +224,13 @@ def functions_and_modes(
     EstimateError
         When no excitation is named and none can be told.
     """
-    if reference is None:
-        references = excitation_names(source, span)
-    else:
-        references = (reference,) if isinstance(reference, str) else tuple(reference)
+    named = (reference,) if isinstance(reference, str) else reference
+    stored = stored_functions(source, named, channels)
+    if stored is not None:
+        held = transfer(source, named, channels, estimator="H1", averaging=averaging, span=span)
+        response = over_hit_points(_of_one_form(held))
+        return response, modes_of_response(response, method=method, wanted=wanted)
+    references = excitation_names(source, span, otherwise=ALONE) if named is None else tuple(named)
     coarse = _functions(source, references, channels, wanted, averaging, span, progress)
     finer = _modal_averaging(coarse, averaging)
     if finer == averaging:
@@ -237,6 +246,21 @@ def functions_and_modes(
         "excitation, or average longer, for surer ones"
     )
     return coarse, replace(again, provenance=again.provenance.with_notes(told))
+
+
+def _of_one_form(response: FrequencyResponse) -> FrequencyResponse:
+    """Leave out responses that are no motion, or another than most, where there are such as are."""
+    orders = Counter(MOTION_ORDER[channel.unit] for channel in response.responses if channel.unit in MOTION_ORDER)
+    if not orders:
+        return response
+    (order, _), *_ = orders.most_common()
+    chosen = [channel for channel in response.responses if MOTION_ORDER.get(channel.unit) == order]
+    others = [f"{one.name} {in_unit(one.unit)}" for one in response.responses if one not in chosen]
+    if not others:
+        return response
+    told = f"modal vectors are of the responses {in_unit(chosen[0].unit)}; left out: {some_of(others)}"
+    kept = response.select([channel.name for channel in chosen])
+    return replace(kept, provenance=kept.provenance.with_notes(told))
 
 
 def _functions(
@@ -262,7 +286,7 @@ def _functions(
     names, notes = motions_of_one_unit(response.responses, named=channels is not None)
     chosen = response.select(names)
     told = _end_of_hammer(chosen) if anywhere else ()
-    return replace(chosen, provenance=chosen.provenance.with_notes(*notes, *told))
+    return over_hit_points(replace(chosen, provenance=chosen.provenance.with_notes(*notes, *told)))
 
 
 def _end_of_hammer(response: FrequencyResponse) -> tuple[str, ...]:
@@ -279,15 +303,10 @@ def _modal_averaging(response: FrequencyResponse, averaging: Averaging) -> Avera
 
     A fit averages over lines itself, but can't part modes that the window has smeared into one.
     """
-    account = response.provenance
-    if averaging != Averaging() or account.averaging != "linear":
+    longest_s = longest_modal_segment_s(response)
+    if averaging != Averaging() or longest_s <= response.provenance.segment_s:
         return averaging
-    hop_s = account.segment_s * (1 - account.overlap)
-    duration_s = account.segment_s + (account.averages - 1) * hop_s
-    segments = SEGMENTS + SEGMENTS_A_REFERENCE * (len(response.references) - 1)
-    rate_hz = 2 * float(response.frequency_hz[-1])
-    longest_s = min(duration_s / segments, LONGEST_SEGMENT / rate_hz)
-    return averaging if longest_s <= account.segment_s else replace(averaging, resolution_hz=1 / longest_s)
+    return replace(averaging, resolution_hz=1 / longest_s)
 
 
 def _from_samples(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.log import Log
+from chladni.signals.resampling import JoinMethod, join_note, join_resampled
 from chladni.signals.time_series import TimeSeries
 
 Progress = Callable[[float], None]
@@ -19,15 +20,16 @@ VALUES_IN_A_BLOCK = 1 << 21
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Span:
-    """Part of a log, in seconds from its start; None for its ends."""
+    """Part of a log, in seconds from its start (None for its ends), and how its sampling grids become one."""
 
     start_s: float | None = None
     end_s: float | None = None
+    join: JoinMethod = "auto"
 
 
 def is_small(log: Log) -> bool:
-    """Whether all samples of a log may be held in memory at once."""
-    return log.path.stat().st_size <= IN_MEMORY_BYTES
+    """Whether all samples of a log may be held in memory at once, once more where they are in memory already."""
+    return log.size_bytes <= IN_MEMORY_BYTES
 
 
 def no_progress(share: float) -> None:
@@ -38,9 +40,16 @@ class Watched:
     """Passes blocks on, and remembers which channels moved at all, by how much, and how far it is."""
 
     def __init__(
-        self, names: Sequence[str], blocks: Iterable[TimeSeries], *, duration_s: float, progress: Progress
+        self,
+        names: Sequence[str],
+        blocks: Iterable[TimeSeries],
+        *,
+        duration_s: float,
+        progress: Progress,
+        notes: tuple[str, ...] = (),
     ) -> None:
         self.names = tuple(names)
+        self.notes = notes
         self._blocks = blocks
         self._duration_s = duration_s
         self._progress = progress
@@ -103,3 +112,32 @@ def watched_grids(
         seconds = max(1.0, VALUES_IN_A_BLOCK / (len(grid.names) * grid.sample_rate_hz))
         blocks = log.blocks(grid.names, seconds=seconds, start_s=span.start_s, end_s=span.end_s)
         yield Watched(grid.names, blocks, duration_s=grid.duration_s, progress=progress)
+
+
+def on_one_grid(log: Log, names: Sequence[str], span: Span, *, progress: Progress = no_progress) -> Watched:
+    """Give named channels on the sampling grid that they share, or joined on one, with a note of how.
+
+    Raises
+    ------
+    LogError
+        When they don't share a grid and the log is too large to join in memory; the grids and remedies are named.
+    """
+    for grid in watched_grids(log, names, span, progress=progress):
+        if set(names) <= set(grid.names):
+            return grid
+    series, notes = joined(log, names, span)
+    return Watched(names, (series,), duration_s=series.duration_s, progress=progress, notes=notes)
+
+
+def joined(log: Log, names: Sequence[str], span: Span) -> tuple[TimeSeries, tuple[str, ...]]:
+    """Read named channels in memory, and join them where they have several sampling grids; a note says how."""
+    if not is_small(log):
+        return log.read(names, start_s=span.start_s, end_s=span.end_s), ()
+    groups = log.read_groups(names, start_s=span.start_s, end_s=span.end_s)
+    if len(groups) == 1:
+        return groups[0], ()
+    found = join_resampled(groups, method=span.join)
+    note = join_note(groups, found)
+    return found.series.select(list(names)), (
+        f"{len(groups)} sampling grids joined: {note}; --join chooses another way",
+    )

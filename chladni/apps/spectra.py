@@ -5,20 +5,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from chladni.apps.sources import Progress, Span, Watched, no_progress, watched_grids
+from chladni.apps.excitation import excitation_names, stored_functions
+from chladni.apps.sources import Progress, Span, Watched, no_progress, on_one_grid, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.provenance import Provenance
+from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.wording import rounded_up
 from chladni.spectral.adaptive import adaptive_cross_spectra
-from chladni.spectral.bands import total_rms
+from chladni.spectral.bands import band_rms, total_rms
 from chladni.spectral.blocks import Source
 from chladni.spectral.excitation import HAMMER_RANGE
 from chladni.spectral.frequency_response import Estimator, frequency_response
+from chladni.spectral.peaks import judged_above_hz
 from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.response_advice import longest_segment_s
 from chladni.spectral.windows import Window
 
 # A tenth of the variance is half a decibel: less than that is lost at the ends of any record.
@@ -139,7 +145,7 @@ def densities(
 def frf(
     source: Log | TimeSeries,
     *,
-    reference: str | Sequence[str],
+    reference: str | Sequence[str] | None = None,
     response: str | Sequence[str] | None = None,
     estimator: Estimator = "H1",
     resolution_hz: float | None = None,
@@ -147,18 +153,20 @@ def frf(
     overlap: float | None = None,
     start_s: float | None = None,
     end_s: float | None = None,
+    join: JoinMethod = "auto",
 ) -> FrequencyResponse:
     """Estimate transfer functions and coherence.
 
     A hammer test is recognised: its hits are cut out, overloads and double hits rejected with a note each. So is
-    periodic excitation, which is averaged over whole periods. Everything else is averaged after Welch.
+    periodic excitation, which is averaged over whole periods. Everything else is averaged after Welch. Of a universal
+    file without time records the functions that it holds are given.
 
     Parameters
     ----------
     source
         A log (read block by block when it's large) or a series.
     reference
-        Message path of the excitation, or several.
+        Message path of the excitation, or several; None takes those whose role is reference, else the first force.
     response
         Message paths of the responses; None for all other channels that share the reference's sampling grid and
         change at all.
@@ -166,6 +174,9 @@ def frf(
         ``H1``, ``H2`` or ``Hv``, see `frequency_response`.
     resolution_hz, window, overlap, start_s, end_s
         See `psd`. For a hammer test the resolution sets the length of a record.
+    join
+        How named channels of several sampling grids become one, see `chladni.signals.resampling.join_resampled`; a
+        note says how it was done.
 
     Returns
     -------
@@ -193,7 +204,7 @@ def frf(
     >>> response.unit(0, 0), float(abs(response.values[0, 0, 10]).round(12))
     ('(m/s^2)/N', 0.5)
     """
-    references = (reference,) if isinstance(reference, str) else tuple(reference)
+    references = (reference,) if isinstance(reference, str) else reference
     responses = (response,) if isinstance(response, str) else response
     averaging = Averaging(resolution_hz=resolution_hz, window=window, overlap=overlap)
     return transfer(
@@ -202,13 +213,13 @@ def frf(
         responses,
         estimator=estimator,
         averaging=averaging,
-        span=Span(start_s=start_s, end_s=end_s),
+        span=Span(start_s=start_s, end_s=end_s, join=join),
     )
 
 
 def transfer(
     source: Log | TimeSeries,
-    references: Sequence[str],
+    references: Sequence[str] | None,
     responses: Sequence[str] | None,
     *,
     estimator: Estimator,
@@ -218,8 +229,14 @@ def transfer(
     progress: Progress = no_progress,
 ) -> FrequencyResponse:
     """Do the work of `frf`, with progress; see `excited_lines` for `hammer_range`."""
-    if not references:
+    if references is not None and not references:
         raise EstimateError("no reference is given; name the channel of the excitation")
+    stored = stored_functions(source, references, responses)
+    if stored is not None:
+        _require_nothing_to_average(source, averaging, span)
+        return stored
+    if references is None:
+        references = _told_excitations(source, span)
     names = None if responses is None else tuple(dict.fromkeys((*references, *responses)))
     if isinstance(source, TimeSeries):
         spectra = averaging.spectra(_of_series(source, names, span), references)
@@ -236,6 +253,7 @@ def transfer(
     named = None if responses is None else source.names(responses)
     try:
         spectra = averaging.spectra(grid, references)
+        spectra = replace(spectra, provenance=spectra.provenance.with_notes(*grid.notes))
         _require_moving(grid, references)
         spectra = _without_constant(spectra, grid, keep=(*references, *(named or ())))
         return frequency_response(
@@ -243,6 +261,21 @@ def transfer(
         )
     except EstimateError as error:
         raise EstimateError(f"{source.path.name}: {error}") from error
+
+
+def _told_excitations(source: Log | TimeSeries, span: Span) -> tuple[str, ...]:
+    try:
+        return excitation_names(source, span)
+    except EstimateError as error:
+        raise EstimateError(f"{source.path.name}: {error}" if isinstance(source, Log) else str(error)) from error
+
+
+def _require_nothing_to_average(source: Log | TimeSeries, averaging: Averaging, span: Span) -> None:
+    if averaging != Averaging() or span != Span():
+        name = source.path.name if isinstance(source, Log) else "these functions"
+        raise EstimateError(
+            f"{name}: holds averaged functions already; leave out resolution, window, overlap, start and end"
+        )
 
 
 def _require_moving(watched: Watched, references: Sequence[str]) -> None:
@@ -254,31 +287,45 @@ def _require_moving(watched: Watched, references: Sequence[str]) -> None:
 
 def _density(source: TimeSeries | Watched, averaging: Averaging) -> PowerSpectralDensity:
     spectra = averaging.spectra(source, None)
-    if not isinstance(source, Watched):
-        return power_spectral_density(spectra)
-    density = power_spectral_density(_without_constant(spectra, source, keep=()))
-    return replace(density, provenance=density.provenance.with_notes(*_missing_variance(density, source)))
+    if isinstance(source, Watched):
+        density = power_spectral_density(_without_constant(spectra, source, keep=()))
+        # Segments that were skipped hold variance, too, and that is told.
+        whole = [0.0 if density.provenance.skipped else source.variance(one.name) for one in density.channels]
+    else:
+        density = power_spectral_density(spectra)
+        whole = [0.0] * len(density.channels)
+    return replace(density, provenance=density.provenance.with_notes(*_slow_variance(density, whole)))
 
 
-def _missing_variance(density: PowerSpectralDensity, watched: Watched) -> tuple[str, ...]:
-    """Say so when much of a signal is slower than the segments: its levels and peaks leave that out."""
-    account = density.provenance
-    # Whole periods and hits leave out on purpose, skipped segments for another reason, which is told.
-    if account.averaging != "linear" or account.skipped:
+def _slow_variance(density: PowerSpectralDensity, whole: Sequence[float]) -> tuple[str, ...]:
+    """Say so when much of a signal is slower than what peaks are looked for in: it may be drift, or a tone.
+
+    ``whole[channel]`` is the variance of the samples, 0 where that isn't known.
+    """
+    low_hz = judged_above_hz(density)
+    # Whole periods and hits leave nothing out.
+    if not low_hz:
         return ()
-    within = np.square(total_rms(density).rms[:, 0])
-    whole = np.array([watched.variance(channel.name) for channel in density.channels])
-    share = 1 - within / np.maximum(whole, np.finfo(float).tiny)
-    missing = [channel.name for channel, one in zip(density.channels, share, strict=True) if one > MISSING_TOLD]
-    if not missing:
+    judged = np.square(band_rms(density, bands_hz=[(low_hz, float(density.frequency_hz[-1]))]).rms[:, 0])
+    total = np.maximum(np.square(total_rms(density).rms[:, 0]), np.asarray(whole))
+    share = 1 - judged / np.maximum(total, np.finfo(float).tiny)
+    slow = [channel.name for channel, one in zip(density.channels, share, strict=True) if one > MISSING_TOLD]
+    if not slow:
         return ()
-    spacing_hz = float(density.frequency_hz[1] - density.frequency_hz[0])
     note = (
-        f"{some_of(missing)}: up to {share.max():.0%} of the variance isn't in the spectrum: it is slower than the "
-        f"segments of {account.segment_s:.4g} s, or at the ends of the record; if it isn't drift, ask for finer than "
-        f"{spacing_hz:.3g} Hz"
+        f"{some_of(slow)}: up to {share.max():.0%} of the variance is slower than {low_hz:.3g} Hz, where a trend "
+        "leaks and no peak is looked for, or at the ends of the record; if it isn't drift, "
+        f"{_finest(density.provenance)}"
     )
     return (note,)
+
+
+def _finest(account: Provenance) -> str:
+    """Ask for the finest lines that the record allows, or for a longer record."""
+    longest_s = longest_segment_s(account)
+    if longest_s <= account.segment_s:
+        return "measure longer"
+    return f"ask for a resolution of {rounded_up(1 / longest_s, digits=2)} Hz"
 
 
 def _of_series(series: TimeSeries, names: Sequence[str] | None, span: Span) -> TimeSeries:
@@ -296,9 +343,7 @@ def _grid_of(
     for grid in watched_grids(log, names, span, progress=progress):
         if wanted <= set(grid.names):
             return grid
-    # Not on one grid: the log's own error names the grids and the remedies.
-    log.read(sorted(wanted), start_s=span.start_s, end_s=span.end_s)
-    raise EstimateError(f"{log.path.name}: no sampling grid holds all of {', '.join(sorted(wanted))}")
+    return on_one_grid(log, sorted(wanted), span, progress=progress)
 
 
 def _without_constant(spectra: CrossSpectra, watched: Watched, *, keep: Sequence[str]) -> CrossSpectra:

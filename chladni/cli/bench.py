@@ -5,9 +5,11 @@ from typing import Annotated
 
 import typer
 
+from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 
 
+@opens_files
 def bench(
     instrument: Annotated[
         str | None,
@@ -19,8 +21,9 @@ def bench(
     port: Annotated[int, typer.Option(metavar="N", help="Port to serve at; 0 takes a free one.")] = 0,
     log: Annotated[
         Path | None,
-        typer.Option(metavar="LOG", help="MCAP log to hold beside the simulation.", show_default=False),
+        typer.Option(metavar="LOG", help="Log or data file to hold beside the simulation.", show_default=False),
     ] = None,
+    opener: Opener,
     variants: Annotated[
         Path | None,
         typer.Option(
@@ -46,7 +49,8 @@ def bench(
     # The others' pages stay a click away, unless the file of rows is of this one's parameters.
     others = INSTRUMENTS if variants is None else {}
     named = {} if chosen is None else {chosen.name: chosen}
-    server = open_bench({**named, **others, **named}.values(), port=port, log=log, variants=variants)
+    server = open_bench({**named, **others, **named}.values(), port=port, log=log, reading=opener.options(),
+                        variants=variants)  # fmt: skip
     address = server.address + ("" if chosen is None else chosen.name)
     out = Output()
 

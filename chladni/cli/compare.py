@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from chladni.cli import options
+from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.words import NOTHING, number, unit, with_error
@@ -22,8 +23,11 @@ MOST_ROWS = 25
 UNCHANGED = "nothing that scatter doesn't explain"
 
 
+@opens_files
 def compare(
-    before: Annotated[Path, typer.Argument(metavar="BEFORE", help="An MCAP log.", show_default=False)],
+    before: Annotated[
+        Path, typer.Argument(metavar="BEFORE", help="An MCAP log, or a data file.", show_default=False)
+    ],
     after: Annotated[Path, typer.Argument(metavar="AFTER", help="Another of the same channels.", show_default=False)],
     *,
     channel: options.Channels = None,
@@ -38,21 +42,20 @@ def compare(
     operational: Annotated[
         bool, typer.Option("--operational", help="The same from responses alone: the excitation wasn't measured.")
     ] = False,
-    setup: options.Setup = None,
-    stamp: options.Stamp = "auto",
+    opener: Opener,
     json: options.Json = None,
     figures: options.Figures = None,
 ) -> None:
     """Levels, spectra, transfer functions and modes of two logs side by side, with what is significant."""
     from chladni.apps.compare import compare_logs
     from chladni.apps.documents import comparison_document
-    from chladni.io.log import open_log
 
-    require_places(reads=[before, after, setup], writes={"--json": json}, folders={"--figures": figures})
+    require_places(reads=[before, after, opener.setup], writes={"--json": json}, folders={"--figures": figures})
     out = Output(json)
+    opening = opener.among([before, after])
     with (
-        open_log(before, setup=setup, stamp=stamp) as old,
-        open_log(after, setup=setup, stamp=stamp) as new,
+        opening(before) as old,
+        opening(after) as new,
         out.progress(f"{before.name}, {after.name}") as progress,
     ):
         found = compare_logs(

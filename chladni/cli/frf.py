@@ -5,22 +5,29 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from chladni.cli import options
+from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.words import number, unit, with_error
+from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
     from chladni.signals.frequency_response import FrequencyResponse
     from chladni.signals.peak import Peak
 
 
+@opens_files
 def frf(
     log: options.Log,
     *,
     reference: Annotated[
-        list[str],
-        typer.Option(metavar="PATH", help="Channel of the excitation; may be repeated.", show_default=False),
-    ],
+        list[str] | None,
+        typer.Option(
+            metavar="PATH",
+            help="Channel of the excitation; may be repeated. A force is taken if not given.",
+            show_default=False,
+        ),
+    ] = None,
     response: Annotated[
         list[str] | None,
         typer.Option(metavar="PATH", help="Only this response; may be repeated.", show_default=False),
@@ -34,40 +41,40 @@ def frf(
     overlap: options.Overlap = None,
     start: options.Start = None,
     end: options.End = None,
-    setup: options.Setup = None,
-    stamp: options.Stamp = "auto",
-    rate: options.Rate = None,
+    join: options.Join = "auto",
+    opener: Opener,
     json: options.Json = None,
     figures: options.Figures = None,
     report: options.Report = None,
 ) -> None:
     """Transfer functions and coherence, with their uncertainty."""
     from chladni.apps.documents import frf_document
-    from chladni.apps.findings import damage_sentences
+    from chladni.apps.findings import reading_sentences
     from chladni.apps.sources import Span
     from chladni.apps.spectra import Averaging, transfer
-    from chladni.io.log import open_log
     from chladni.signals.study import Study
     from chladni.spectral.peaks import find_response_peaks
 
-    require_places(reads=[log, setup], writes={"--json": json, "--report": report}, folders={"--figures": figures})
+    require_places(
+        reads=[log, opener.setup], writes={"--json": json, "--report": report}, folders={"--figures": figures}
+    )
     out = Output(json)
-    with open_log(log, setup=setup, stamp=stamp, sample_rate_hz=rate) as opened, out.progress(log.name) as progress:
+    with opener(log) as opened, out.progress(log.name) as progress:
         found = transfer(
             opened,
             reference,
             response,
             estimator=estimator,
             averaging=Averaging(resolution_hz=resolution, window=window, overlap=overlap),
-            span=Span(start_s=start, end_s=end),
+            span=Span(start_s=start, end_s=end, join=join),
             progress=progress,
         )
-        damage = damage_sentences(opened.damage)
+        told = reading_sentences(opened, everything=response is None)
         geometry = opened.geometry
     peaks = find_response_peaks(found)
     _print_account(out, found)
     _print_peaks(out, found, peaks)
-    findings = damage + found.provenance.notes
+    findings = told + found.provenance.notes
     out.lines(findings)
     study = Study(title=log.name, response=found, response_peaks=peaks, geometry=geometry, findings=findings)
     out.pictures(study, figures=figures, report=report)
@@ -77,6 +84,14 @@ def frf(
 def _print_account(out: Output, response: "FrequencyResponse") -> None:
     account = response.provenance
     spacing_hz = float(response.frequency_hz[1] - response.frequency_hz[0])
+    if not account.averages:
+        held = counted(len(response.responses) * len(response.references), "function")
+        first_hz, last_hz = (number(float(one)) for one in response.frequency_hz[[0, -1]])
+        out.line(
+            f"{held} as in the file, from {first_hz} to {last_hz} Hz, lines {number(spacing_hz)} Hz apart",
+            style="bold",
+        )
+        return
     how = {"periodic": "whole periods", "impact": "hits"}.get(account.averaging, "averages")
     out.line(
         f"{account.estimator}: {account.averages} {how} of {account.segment_s:.6g} s ("
@@ -86,17 +101,20 @@ def _print_account(out: Output, response: "FrequencyResponse") -> None:
 
 
 def _print_peaks(out: Output, response: "FrequencyResponse", peaks: "tuple[Peak, ...]") -> None:
-    if not peaks:
-        out.line("No peak stands out of the scatter on the excited lines.")
-        return
-    from chladni.spectral.peaks import MOST_PEAKS
+    from chladni.spectral.peaks import MOST_PEAKS, judged_above_hz
 
+    low_hz = judged_above_hz(response)
+    judged = f", above {number(low_hz)} Hz" if low_hz else ""
+    if not peaks:
+        out.line(f"No peak stands out of the scatter on the excited lines{judged}.")
+        return
     functions = [peak.channels for peak in peaks]
     cut = f", {MOST_PEAKS} a function at most" if max(map(functions.count, functions)) == MOST_PEAKS else ""
     # A single reference is the same in every row, and its place is the title.
     alone = len(response.references) == 1
+    over = f" over {response.references[0].name}" if alone else ""
     out.table(
-        f"Peaks of the magnitude{f' over {response.references[0].name}' if alone else ''}, the highest first{cut}",
+        f"Peaks of the magnitude{over}, the highest first{cut}{judged}",
         [
             "response" if alone else "response / reference",
             "frequency [Hz]",
@@ -119,5 +137,5 @@ def _at_peak(response: "FrequencyResponse", peak: "Peak") -> list[str]:
         with_error(peak.height, peak.height_std),
         unit(peak.unit),
         f"{np.angle(response.values[row, column, line], deg=True):.0f}",
-        f"{response.coherence[row, line]:.3f}",
+        number(float(response.coherence[row, line]), digits=3),
     ]

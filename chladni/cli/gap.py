@@ -9,6 +9,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.gap_rows import print_by_level, print_comparison, print_diagnosis
+from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from chladni.apps.gap_comparison import GapComparison
+    from chladni.apps.sources import Span
     from chladni.gap.records.diagnosis import Diagnosis
     from chladni.io.log import Log
     from chladni.models.core.model import Model
@@ -25,7 +27,7 @@ Files = Annotated[
     list[Path],
     typer.Argument(
         metavar="MODEL LOG...",
-        help="A model file, then logs of the machine; several levels tell more.",
+        help="A model file, then logs or data files of the machine; several levels tell more.",
         show_default=False,
     ),
 ]
@@ -67,6 +69,7 @@ ExplainedModel = Annotated[
 ]
 
 
+@opens_files
 def gap(
     files: Files,
     *,
@@ -75,8 +78,8 @@ def gap(
     seed: Seed = 0,
     start: options.Start = None,
     end: options.End = None,
-    setup: options.Setup = None,
-    stamp: options.Stamp = "auto",
+    join: options.Join = "auto",
+    opener: Opener,
     json: options.Json = None,
     report: Report = None,
     figure: Sheet = None,
@@ -85,25 +88,26 @@ def gap(
     write_model: ExplainedModel = None,
 ) -> None:
     """Where a model and a log disagree, which effect was left out, and how far the gap closes with it."""
-    from chladni.io.log import open_log
-
     wanted = _Wanted(json=json, report=report, figure=figure, figures=figures, save=save, write_model=write_model)
     # A diagnosis takes its time: it shouldn't be lost to a misspelt folder.
-    wanted.require_places([*files, *(simulated or ()), setup])
+    from chladni.apps.sources import Span
+
+    wanted.require_places([*files, *(simulated or ()), opener.setup])
     out = Output(json)
+    open_one = opener.among([*(files if simulated else files[1:]), *(simulated or ())])
     with ExitStack() as opened:
 
         def opening(path: Path) -> "Log":
-            return opened.enter_context(open_log(path, setup=setup, stamp=stamp))
+            return opened.enter_context(open_one(path))
 
         if simulated:
             _require_pairs(files, simulated, wanted, without)
             pairs = [(opening(ours), opening(theirs)) for ours, theirs in zip(files, simulated, strict=True)]
-            _compare(out, pairs, wanted, start_s=start, end_s=end)
+            _compare(out, pairs, wanted, Span(start_s=start, end_s=end, join=join))
             return
         model, logs = _model_and_logs(files)
         _diagnose(out, model, [opening(log) for log in logs], wanted, without=without or (), seed=seed,
-                  start_s=start, end_s=end)  # fmt: skip
+                  span=Span(start_s=start, end_s=end, join=join))  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,11 +143,12 @@ class _Wanted:
 
 def _model_and_logs(files: "Sequence[Path]") -> "tuple[Model, Sequence[Path]]":
     """Read the model; `SetupError` when there's no log beside it, or a log in its place."""
+    from chladni.io.files.formats import FILE_SUFFIXES, MCAP
     from chladni.models.files.model_file import load_model
     from chladni.signals.errors import SetupError
 
     first, *logs = files
-    if first.suffix.lower() == ".mcap":
+    if first.suffix.lower() in (MCAP, *FILE_SUFFIXES):
         raise SetupError(f"{first}: is a log; give a model file first, or --simulated {first} for a comparison alone")
     if not logs:
         raise SetupError(f"{first}: no log to hold against the model; give one behind it")
@@ -178,8 +183,7 @@ def _diagnose(
     *,
     without: "Sequence[str]",
     seed: int,
-    start_s: float | None,
-    end_s: float | None,
+    span: "Span",
 ) -> None:
     from chladni.apps.diagnose import diagnose_gap
     from chladni.apps.gap_document import gap_document
@@ -192,8 +196,9 @@ def _diagnose(
             logs,
             leave_out=without,
             seed=seed,
-            start_s=start_s,
-            end_s=end_s,
+            start_s=span.start_s,
+            end_s=span.end_s,
+            join=span.join,
             progress=lambda step, share: progress(share, step),
         )
     # First: what took so long to find isn't lost to a picture or a model that can't be written.
@@ -220,15 +225,16 @@ def _compare(
     out: Output,
     pairs: "Sequence[tuple[Log, Log]]",
     wanted: _Wanted,
-    *,
-    start_s: float | None,
-    end_s: float | None,
+    span: "Span",
 ) -> None:
     from chladni.apps.gap_by_level import by_level_document, gap_by_level
     from chladni.apps.gap_comparison import compare_with_simulated, comparison_document
 
     with out.progress(", ".join(simulated.path.name for _, simulated in pairs)):
-        found = [compare_with_simulated(ours, theirs, start_s=start_s, end_s=end_s) for ours, theirs in pairs]
+        found = [
+            compare_with_simulated(ours, theirs, start_s=span.start_s, end_s=span.end_s, join=span.join)
+            for ours, theirs in pairs
+        ]
         several = gap_by_level(found) if len(found) > 1 else None
     if several is None:
         print_comparison(out, found[0])

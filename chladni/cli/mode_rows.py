@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from chladni.cli.output import Output
-from chladni.cli.words import NOTHING, number, with_error
+from chladni.cli.words import NOTHING, fixed, number, with_error
 
 if TYPE_CHECKING:
     from chladni.signals.mode_set import ModeSet
@@ -28,7 +28,7 @@ def print_modes(out: Output, modes: "ModeSet", validation: "ModeValidation") -> 
                 str(row + 1),
                 with_error(float(modes.frequency_hz[row]), float(modes.frequency_std_hz[row])),
                 with_error(100 * float(modes.damping_ratio[row]), 100 * float(modes.damping_std[row])),
-                f"{validation.mpc[row]:.3f}",
+                fixed(float(validation.mpc[row]), places=3),
                 modes.channels[int(abs(modes.shapes[row]).argmax())].name,
                 *_scale_cell(modes, row),
             ]

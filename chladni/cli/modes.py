@@ -1,6 +1,5 @@
 """``chladni modes``: natural frequencies, damping, modal vectors, relative motion."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -8,6 +7,7 @@ import typer
 
 from chladni.cli import options
 from chladni.cli.mode_rows import print_modes, print_relative_motion
+from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 
@@ -17,13 +17,9 @@ if TYPE_CHECKING:
 MethodName = Literal["plscf", "circle-fit", "half-power", "ssi-cov", "fdd", "efdd"]
 
 
+@opens_files
 def modes(
-    log: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOG", help="An MCAP log, or a universal file (.uff) with functions.", show_default=False
-        ),
-    ],
+    log: options.Log,
     *,
     reference: Annotated[
         list[str] | None,
@@ -56,9 +52,8 @@ def modes(
     resolution: options.Resolution = None,
     start: options.Start = None,
     end: options.End = None,
-    setup: options.Setup = None,
-    stamp: options.Stamp = "auto",
-    rate: options.Rate = None,
+    join: options.Join = "auto",
+    opener: Opener,
     json: options.Json = None,
     uff: Annotated[
         Path | None,
@@ -74,62 +69,37 @@ def modes(
     report: options.Report = None,
 ) -> None:
     """Natural frequencies, damping ratios and modal vectors, with their uncertainty."""
-    from chladni.apps.findings import damage_sentences
-    from chladni.apps.modal_study import UNIVERSAL_FILES, modal_study, universal_file_study
+    from chladni.apps.modal_study import modal_study
     from chladni.apps.modes import Wanted
     from chladni.apps.modes_document import modes_document
     from chladni.apps.sources import Span
-    from chladni.io.log import open_log
 
     require_places(
-        reads=[log, setup],
+        reads=[log, opener.setup],
         writes={"--json": json, "--uff": uff, "--csv": csv, "--save": save, "--report": report},
         folders={"--figures": figures},
     )
     out = Output(json)
-    damage: tuple[str, ...] = ()
     wanted = Wanted.of(bands_hz=None if band is None else [band], count=count, frequencies_hz=frequency)
-    if log.suffix.lower() in UNIVERSAL_FILES:
-        _refuse(
-            log,
-            {"--reference": reference, "--operational": operational, "--channel": channel, "--resolution": resolution,
-             "--start": start, "--end": end, "--setup": setup, "--stamp": None if stamp == "auto" else stamp},
-        )  # fmt: skip
-        found = universal_file_study(log, method=method, wanted=wanted)
-    else:
-        with (
-            open_log(log, setup=setup, stamp=stamp, sample_rate_hz=rate) as opened,
-            out.progress(log.name) as progress,
-        ):
-            found = modal_study(
-                opened,
-                references=reference,
-                operational=operational,
-                channels=channel,
-                method=method,
-                wanted=wanted,
-                resolution_hz=resolution,
-                span=Span(start_s=start, end_s=end),
-                progress=progress,
-            )
-            damage = damage_sentences(opened.damage)
+    with opener(log) as opened, out.progress(log.name) as progress:
+        found = modal_study(
+            opened,
+            references=reference,
+            operational=operational,
+            channels=channel,
+            method=method,
+            wanted=wanted,
+            resolution_hz=resolution,
+            span=Span(start_s=start, end_s=end, join=join),
+            progress=progress,
+        )
     print_modes(out, found.modes, found.validation)
     print_relative_motion(out, found.modes, found.study.relative_motion)
-    out.lines(damage + found.study.findings)
+    out.lines(found.study.findings)
     _write(out, found, uff=uff, csv=csv, save=save)
     out.pictures(found.study, figures=figures, report=report)
     motions, passed_on = found.study.relative_motion, found.transmissibility
     out.json(modes_document(found.modes, found.validation, motions, passed_on))
-
-
-def _refuse(file: Path, given: Mapping[str, object]) -> None:
-    """Raise `SetupError` for options that mean nothing for a universal file."""
-    from chladni.signals.errors import SetupError
-
-    for name, value in given.items():
-        # A zero was given, too.
-        if value is not None and value is not False:
-            raise SetupError(f"{file}: {name} is for logs; a universal file holds averaged functions already")
 
 
 def _write(out: Output, found: "ModalStudy", *, uff: Path | None, csv: Path | None, save: Path | None) -> None:

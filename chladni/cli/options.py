@@ -5,14 +5,9 @@ from typing import Annotated, Literal
 
 import typer
 
-Log = Annotated[Path, typer.Argument(metavar="LOG", help="An MCAP log.", show_default=False)]
-Setup = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE", help="Setup file: points, directions, units, sensitivities.", show_default=False),
-]
-Stamp = Annotated[
-    Literal["auto", "header", "publish", "log"],
-    typer.Option(help="Which time of a message is its sample time: its own stamp, when published, when logged."),
+Log = Annotated[
+    Path,
+    typer.Argument(metavar="LOG", help="An MCAP log, or a data file of any kind that is read.", show_default=False),
 ]
 Rate = Annotated[
     float | None,
@@ -41,6 +36,12 @@ Overlap = Annotated[
 ]
 Start = Annotated[float | None, typer.Option(metavar="S", help="Seconds from the log's start.", show_default=False)]
 End = Annotated[float | None, typer.Option(metavar="S", help="Seconds from the log's start.", show_default=False)]
+Join = Annotated[
+    Literal["auto", "hold", "band-limited"],
+    typer.Option(
+        help="How channels of several sampling grids become one; auto holds commands and staircases between samples."
+    ),
+]
 Report = Annotated[
     Path | None,
     typer.Option(metavar="FILE.html", help="Write a self-contained HTML report.", show_default=False),

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from chladni.cli import options
+from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.words import number, unit, with_error
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from chladni.signals.power_spectral_density import PowerSpectralDensity
 
 
+@opens_files
 def psd(
     log: options.Log,
     *,
@@ -22,25 +24,24 @@ def psd(
     overlap: options.Overlap = None,
     start: options.Start = None,
     end: options.End = None,
-    setup: options.Setup = None,
-    stamp: options.Stamp = "auto",
-    rate: options.Rate = None,
+    opener: Opener,
     json: options.Json = None,
     figures: options.Figures = None,
     report: options.Report = None,
 ) -> None:
     """Averaged power spectral densities with named peaks."""
     from chladni.apps.documents import psd_document
-    from chladni.apps.findings import damage_sentences
+    from chladni.apps.findings import reading_sentences
     from chladni.apps.sources import Span
     from chladni.apps.spectra import Averaging, densities
     from chladni.apps.unit_peaks import unit_peaks
-    from chladni.io.log import open_log
     from chladni.signals.study import Study
 
-    require_places(reads=[log, setup], writes={"--json": json, "--report": report}, folders={"--figures": figures})
+    require_places(
+        reads=[log, opener.setup], writes={"--json": json, "--report": report}, folders={"--figures": figures}
+    )
     out = Output(json)
-    with open_log(log, setup=setup, stamp=stamp, sample_rate_hz=rate) as opened, out.progress(log.name) as progress:
+    with opener(log) as opened, out.progress(log.name) as progress:
         found = densities(
             opened,
             channels=channel,
@@ -48,18 +49,18 @@ def psd(
             span=Span(start_s=start, end_s=end),
             progress=progress,
         )
-        damage = damage_sentences(opened.damage)
+        told = reading_sentences(opened, everything=channel is None)
         geometry = opened.geometry
     document = psd_document(found)
-    named = [group for density in found for group in unit_peaks(density)]
+    named = [(density, group) for density in found for group in unit_peaks(density)]
     for density in found:
         _print_levels(out, density, document)
-    for group in named:
-        _print_peaks(out, group)
+    for density, group in named:
+        _print_peaks(out, density, group)
     notes = tuple(note for density in found for note in density.provenance.notes)
-    out.lines((*damage, *notes))
-    peaks = tuple(peak for group in named for peak in group.peaks)
-    study = Study(title=log.name, densities=found, peaks=peaks, geometry=geometry, findings=damage + notes)
+    out.lines((*told, *notes))
+    peaks = tuple(peak for _, group in named for peak in group.peaks)
+    study = Study(title=log.name, densities=found, peaks=peaks, geometry=geometry, findings=told + notes)
     out.pictures(study, figures=figures, report=report)
     out.json(document)
 
@@ -87,16 +88,18 @@ def _highest(channel: "Document") -> list[str]:
     return [number(peak["frequency_hz"], digits=6), number(peak["psd"]), unit(channel["psd_unit"])]
 
 
-def _print_peaks(out: Output, found: "UnitPeaks") -> None:
-    from chladni.spectral.peaks import MOST_PEAKS
+def _print_peaks(out: Output, density: "PowerSpectralDensity", found: "UnitPeaks") -> None:
+    from chladni.spectral.peaks import MOST_PEAKS, judged_above_hz
 
     where = "" if found.unit == "1" else f" in {found.unit}"
+    low_hz = judged_above_hz(density)
+    judged = f", above {number(low_hz)} Hz" if low_hz else ""
     if not found.peaks:
-        out.line(f"No peak stands out of the scatter{where}.")
+        out.line(f"No peak stands out of the scatter{where}{judged}.")
         return
     at_most = f", {MOST_PEAKS} at most" if len(found.peaks) == MOST_PEAKS else ""
     out.table(
-        f"Peaks{where}, the highest first{at_most}",
+        f"Peaks{where}, the highest first{at_most}{judged}",
         ["strongest in", "frequency [Hz]", "density", "unit"],
         [
             [

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from chladni.cli import options
+from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.settings import effect_of, with_settings
@@ -30,7 +31,10 @@ Seconds = Annotated[
 ]
 Rate = Annotated[
     float | None,
-    typer.Option(metavar="HZ", help="Sample rate; twenty times the highest natural frequency if not given."),
+    typer.Option(
+        metavar="HZ",
+        help="Sample rate; twenty times the highest natural frequency if not given. With --log: the log's true one.",
+    ),
 ]
 Kind = Annotated[
     Literal["random", "sweep", "multisine", "step", "impact"],
@@ -47,7 +51,9 @@ Band = Annotated[
 ]
 Driving = Annotated[
     Path | None,
-    typer.Option(metavar="LOG", help="Drive the model with this log's channels instead.", show_default=False),
+    typer.Option(
+        metavar="LOG", help="Drive the model with the channels of this log or data file instead.", show_default=False
+    ),
 ]
 Noise = Annotated[float, typer.Option(metavar="SHARE", help="Noise of each sensor, as a share of its signal's RMS.")]
 Seed = Annotated[int, typer.Option(metavar="N", help="Of everything random.")]
@@ -65,6 +71,7 @@ Effects = Annotated[
 ]
 
 
+@opens_files
 def simulate(
     model: ModelOrInstrument,
     *,
@@ -76,6 +83,7 @@ def simulate(
     level: Level = None,
     band: Band = None,
     log: Driving = None,
+    opener: Opener,
     noise: Noise = 0.0,
     seed: Seed = 0,
     settings: Settings = None,
@@ -90,7 +98,7 @@ def simulate(
     # A simulation may take minutes: it shouldn't be lost to a misspelt folder.
     require_place(out)
     require_places(
-        reads=[Path(model), log],
+        reads=[Path(model), log, opener.setup],
         writes={"--out": out, "the truth of --out": out.with_suffix(".truth.json"), "--json": json},
     )
     instrument = named_instrument(model)
@@ -99,8 +107,9 @@ def simulate(
     damage: tuple[str, ...] = ()
     if log is not None:
         _refuse({"--input": None if kind == "random" else kind, "--at": at, "--level": level, "--band": band,
-                 "--seconds": seconds, "--rate": rate})  # fmt: skip
-        recording, damage = recording_for(chosen, log)
+                 "--seconds": seconds})  # fmt: skip
+        with opener(log) as opened:
+            recording, damage = recording_for(chosen, opened)
     drive = Drive(
         word=kind,
         level=_usual_level(instrument, at) if level is None else level,

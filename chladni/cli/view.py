@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chladni.cli import options
+from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 
@@ -13,8 +14,11 @@ if TYPE_CHECKING:
     from chladni.signals.study import Study
 
 
+@opens_files
 def view(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="One MCAP log or more.", show_default=False)],
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="MCAP logs or data files, one or more.", show_default=False)
+    ],
     *,
     channel: options.Channels = None,
     reference: Annotated[
@@ -26,9 +30,7 @@ def view(
     resolution: options.Resolution = None,
     start: options.Start = None,
     end: options.End = None,
-    setup: options.Setup = None,
-    stamp: options.Stamp = "auto",
-    rate: options.Rate = None,
+    opener: Opener,
     save: Annotated[
         Path | None,
         typer.Option(metavar="OUT.rrd", help="Write a recording instead of opening a viewer.", show_default=False),
@@ -41,23 +43,19 @@ def view(
     """Waveforms, spectra, waterfalls and transfer functions in rerun."""
     from chladni.apps.analyse import analyse
     from chladni.apps.show import gather
-    from chladni.io.log import open_log
     from chladni.signals.errors import SetupError
 
     if save is not None and web:
         raise SetupError("--save writes a file and --web serves a page; give one of them")
     require_places(
-        reads=[*logs, setup],
+        reads=[*logs, opener.setup],
         writes={"--json": json, "--save": save, "--report": report},
         folders={"--figures": figures},
     )
     out = Output(json)
-    studies = []
+    opening, studies = opener.among(logs), []
     for log in logs:
-        with (
-            open_log(log, setup=setup, stamp=stamp, sample_rate_hz=rate) as opened,
-            out.progress(log.name) as progress,
-        ):
+        with opening(log) as opened, out.progress(log.name) as progress:
             studies.append(
                 analyse(
                     opened,

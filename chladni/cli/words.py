@@ -18,6 +18,17 @@ def number(value: float | None, *, digits: int = 4) -> str:
     return f"{value:.{digits}g}"
 
 
+def fixed(value: float, *, places: int) -> str:
+    """Give a number to so many places, a dash when there is none.
+
+    Examples
+    --------
+    >>> fixed(0.99949, places=3), fixed(float("nan"), places=3)
+    ('0.999', '-')
+    """
+    return f"{value:.{places}f}" if isfinite(value) else NOTHING
+
+
 def count(value: int | None) -> str:
     """Give a count, with a space between thousands, a dash when there is none.
 

@@ -1,12 +1,18 @@
 """What a log holds: topics, which time each is stamped with, and the channels, as the setup file refines them."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from chladni.io.arrival import arrival_order
+from chladni.io.batch_messages import BatchLayout
 from chladni.io.channel_source import ChannelSource
+from chladni.io.loss import Unread
 from chladni.io.mcap.container import McapContainer
-from chladni.io.message_path import near_matches, parse_message_path
-from chladni.io.setup import ChannelSetup, Setup
+from chladni.io.message_path import MessagePath, near_matches, parse_message_path
+from chladni.io.publishers import at_once, evenly_in_turn
+from chladni.io.setup import ChannelSetup, Setup, refined
 from chladni.io.stamps import (
     StampChoice,
     StampRequest,
@@ -17,10 +23,9 @@ from chladni.io.stamps import (
     head_of,
 )
 from chladni.io.stream import Stream
-from chladni.io.topic import Topic, read_heads, topics_of
+from chladni.io.topic import Topic, apart, read_arrivals, read_earlier_heads, read_heads, topics_of
 from chladni.io.topic_channels import TopicChannels, topic_channels
 from chladni.signals.errors import LogError, SetupError
-from chladni.signals.unit_text import in_unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,7 +41,9 @@ class Catalog:
     choices
         Which time of a topic's messages is their samples'.
     refused
-        Why the other topics can't be read.
+        Why the other topics, or some channels of these, can't be read.
+    unread
+        The same and all else that no channel was made of, in the order of the file.
     channels
         Every channel that is listed, in the order of the file.
     setups
@@ -45,17 +52,26 @@ class Catalog:
         Least and most time between a topic's samples and their log time in its first messages; None where the two
         don't run together, so that a time window can't be found by log time.
     start_ns
-        Earliest sample of the topics with channels: zero of all times in seconds. 0 for an empty log.
+        Earliest sample of the topics with channels, else the first message: zero of all times in seconds. 0 for an
+        empty log.
+    publishers
+        Names of the publishers of topics that several publish on at once, by topic. Each is listed as a topic of its
+        own.
+    in_turn
+        Names of the MCAP channels of topics where they send evenly in turn, by topic, and are read as one source.
     """
 
     file: str
     topics: Mapping[str, TopicChannels]
     choices: Mapping[str, StampChoice]
     refused: Mapping[str, str]
+    unread: tuple[Unread, ...]
     channels: tuple[ChannelSource, ...]
     setups: Mapping[tuple[str, str], ChannelSetup]
     lags_ns: Mapping[str, tuple[int, int] | None]
     start_ns: int
+    publishers: Mapping[str, tuple[str, ...]]
+    in_turn: Mapping[str, tuple[str, ...]]
 
     def resolve(self, path: str) -> ChannelSource:
         """Find the channel that a path names.
@@ -73,12 +89,38 @@ class Catalog:
 
     def _resolved(self, path: str) -> ChannelSource:
         parsed = parse_message_path(path, [*self.topics, *self.refused])
-        if parsed.topic in self.refused:
+        if parsed.topic not in self.topics:
             raise LogError(f"{path!r}: messages of {parsed.topic} can't be decoded: {self.refused[parsed.topic]}")
         if not parsed.steps:
             names = [one.channel.name for one in self.channels if one.topic == parsed.topic]
             raise LogError(f"{path!r} is a topic; name a channel of it; {near_matches(path, names)}")
-        return self.topics[parsed.topic].resolve(parsed)
+        source = self.topics[parsed.topic].resolve(parsed)
+        self._require_one_publisher(parsed, source)
+        return source
+
+    def _require_one_publisher(self, path: MessagePath, source: ChannelSource) -> None:
+        """Refuse a channel that several publish at once; one that only one of them knows is read."""
+        if source.selector is not None and source.selector.message_filters:
+            # A filter may tell the publishers apart; where it doesn't, their samples show it.
+            return
+        names = [f"{publisher}.{path.rest}" for publisher in self.publishers.get(path.topic, ())]
+        known = [name for name in names if self._is_known(name)]
+        if len(known) > 1:
+            raise LogError(
+                f"{path.text!r}: {len(known)} publish on {path.topic} at once; their samples are no single signal; "
+                f"name one of them: {' or '.join(known)}"
+            )
+
+    def _is_known(self, path: str) -> bool:
+        try:
+            source = self._resolved(path)
+        except LogError:
+            return False
+        return self.topics[source.topic].may_hold(source)
+
+    def publishing_with(self, topic: str) -> int:
+        """How many publish at once on a listed topic, or with it where it is one of several publishers itself."""
+        return next((len(names) for whole, names in self.publishers.items() if topic in (whole, *names)), 1)
 
     def streams(self, sources: Sequence[ChannelSource]) -> list[Stream]:
         """Group channels whose samples come in the same messages.
@@ -88,7 +130,9 @@ class Catalog:
         groups: dict[object, list[ChannelSource]] = {}
         for source in sources:
             selector = source.selector
-            key = (source.topic, *((selector.message_filters, selector.element_filters) if selector else ()))
+            key: tuple[object, ...] = (source.topic,)
+            if selector is not None:
+                key += (selector.publisher, selector.message_filters, selector.element_filters)
             groups.setdefault(key, []).append(source)
         return [self._stream(tuple(group)) for group in groups.values()]
 
@@ -116,11 +160,18 @@ def read_catalog(container: McapContainer, *, setup: Setup, request: StampReques
         When the messages' own stamp is asked for and a topic with channels has none.
     """
     topics, refused = topics_of(container.channels)
-    topics = read_heads(container, topics)
+    topics, undecodable = read_heads(container, topics)
+    topics, changed = read_earlier_heads(container, topics)
     _require_known_batches(setup, topics)
-    readable, unreadable = _channels_of(topics, setup)
+    readable, unreadable = _channels_of(topics, setup.batches, setup)
+    refused |= undecodable | changed | unreadable
+    parts, unreadable = _parts(container, readable, setup)
     refused |= unreadable
-    listed = [source for channels in readable.values() for source in channels.listed()]
+    publishers, in_turn = _publishers(container, readable, parts)
+    listed_topics = [name for topic in readable for name in publishers.get(topic, (topic,))]
+    readable |= {name: part for found in parts.values() for name, part in found.items()}
+    publishers |= {name: one.publishers for name, one in readable.items() if one.publishers}
+    listed = [source for name in listed_topics for source in readable[name].listed()]
     heads = {name: _head(channels.topic) for name, channels in readable.items()}
     choices = _choices(heads, {source.topic for source in listed}, request)
     catalog = Catalog(
@@ -128,24 +179,69 @@ def read_catalog(container: McapContainer, *, setup: Setup, request: StampReques
         topics=readable,
         choices=choices,
         refused=refused,
+        unread=tuple(_unread(container, readable, refused)),
         channels=(),
         setups={},
         lags_ns={topic: None if head is None else head.lag_range_ns(choices[topic]) for topic, head in heads.items()},
-        start_ns=_start_ns(heads, choices, {source.topic for source in listed}),
+        start_ns=_start_ns(heads, choices, {source.topic for source in listed}, container.time_range_ns),
+        publishers=publishers,
+        in_turn=in_turn,
     )
     setups = _setups(catalog, setup, listed)
     channels = tuple(with_setup(source, setups.get((source.topic, source.field))) for source in listed)
     return replace(catalog, channels=channels, setups=setups)
 
 
-def _channels_of(topics: Mapping[str, Topic], setup: Setup) -> tuple[dict[str, TopicChannels], dict[str, str]]:
+def _parts(
+    container: McapContainer, readable: Mapping[str, TopicChannels], setup: Setup
+) -> tuple[dict[str, dict[str, TopicChannels]], dict[str, str]]:
+    """Look at each MCAP channel of topics that have several by itself; what can't be read is told as a topic is."""
+    parts: dict[str, dict[str, TopicChannels]] = {}
+    refused: dict[str, str] = {}
+    for name, whole in readable.items():
+        if len(whole.topic.decoders) > 1:
+            topics = apart(whole.topic, container.channels)
+            parts[name], unreadable = _channels_of(topics, dict.fromkeys(topics, setup.batches.get(name)), setup)
+            refused |= unreadable
+    return parts, refused
+
+
+def _publishers(
+    container: McapContainer, readable: Mapping[str, TopicChannels], parts: Mapping[str, Mapping[str, TopicChannels]]
+) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
+    """Find the topics whose MCAP channels send the same at once, and those where they do so evenly in turn."""
+    several = {name: readable[name].topic for name in parts if any(True for _ in readable[name].listed())}
+    at_a_time: dict[str, tuple[str, ...]] = {}
+    in_turn: dict[str, tuple[str, ...]] = {}
+    for name, one in (read_arrivals(container, several) if several else {}).items():
+        order = arrival_order(one.log_ns, one)
+        came = one if order is None else one.kept(order)
+        if came.channel is None or not at_once(came.log_ns, came.channel):
+            continue
+        sending = set(np.unique(came.channel).tolist())
+        own = {part: channels for part, channels in parts[name].items() if sending & set(channels.topic.decoders)}
+        if not _share_joints(own):
+            found = in_turn if evenly_in_turn(came.log_ns, came.channel) else at_a_time
+            found[name] = tuple(own)
+    return at_a_time, in_turn
+
+
+def _share_joints(parts: Mapping[str, TopicChannels]) -> bool:
+    """Whether publishers name the elements of their arrays, and each has its own: then the names tell them apart."""
+    names = [part.element_names for part in parts.values()]
+    return all(names) and sum(map(len, names)) == len(frozenset().union(*names))
+
+
+def _channels_of(
+    topics: Mapping[str, Topic], layouts: Mapping[str, BatchLayout | None], setup: Setup
+) -> tuple[dict[str, TopicChannels], dict[str, str]]:
     readable: dict[str, TopicChannels] = {}
     refused: dict[str, str] = {}
     for name, topic in topics.items():
         try:
-            readable[name] = topic_channels(topic, setup.batches.get(name))
+            readable[name] = topic_channels(topic, layouts.get(name))
         except LogError as error:
-            if name in setup.batches:
+            if layouts.get(name) is not None:
                 raise SetupError(f"{setup.path}: [[batch]] {name}: {error}") from None
             refused[name] = str(error)
     return readable, refused
@@ -155,8 +251,8 @@ def _head(topic: Topic) -> TopicHead | None:
     if not topic.head:
         return None
     own = find_own_stamp(topic.fields, topic.schema_name)
-    decoded = topic.decode_head(own.leaves) if own is not None else []
-    return head_of(topic.head, own, decoded)
+    leaves = () if own is None else own.leaves
+    return head_of(topic.head_with(leaves), own, topic.decode_head(leaves) if leaves else [])
 
 
 def _choices(
@@ -172,17 +268,36 @@ def _choices(
             # Nobody asked for this topic's time; a text topic without stamps must not stop the log from being read.
             choices[topic] = choose_stamp(head, "auto", topic=topic)
     signals = {topic: head for topic, head in heads.items() if head is not None and topic in with_channels}
-    shifts = clock_shifts_ns({topic: head for topic, head in signals.items() if len(head.log_ns) > 1}, choices)
+    shifts = clock_shifts_ns({topic: head for topic, head in signals.items() if head.messages > 1}, choices)
     return choices | {topic: choices[topic].shifted(shift_ns) for topic, shift_ns in shifts.items()}
 
 
 def _start_ns(
-    heads: Mapping[str, TopicHead | None], choices: Mapping[str, StampChoice], with_channels: Collection[str]
+    heads: Mapping[str, TopicHead | None],
+    choices: Mapping[str, StampChoice],
+    with_channels: Collection[str],
+    logged_ns: tuple[int, int] | None,
 ) -> int:
     signals = {topic: head for topic, head in heads.items() if head is not None and topic in with_channels}
     # One message samples nothing, and latched ones carry the time of long ago.
-    starts = [head.start_ns(choices[topic]) for topic, head in signals.items() if len(head.log_ns) > 1]
-    return min(starts or [head.start_ns(choices[topic]) for topic, head in signals.items()], default=0)
+    starts = [head.start_ns(choices[topic]) for topic, head in signals.items() if head.messages > 1]
+    starts = starts or [head.start_ns(choices[topic]) for topic, head in signals.items()]
+    return min(starts, default=0 if logged_ns is None else logged_ns[0])
+
+
+def _unread(
+    container: McapContainer, readable: Mapping[str, TopicChannels], refused: Mapping[str, str]
+) -> Iterator[Unread]:
+    known = container.message_counts()
+    messages: dict[str, int] = {}
+    for channel in container.channels.values():
+        messages[channel.topic] = messages.get(channel.topic, 0) + (known or {}).get(channel.id, 0)
+    for topic in dict.fromkeys((*messages, *refused)):
+        counted = None if known is None else messages.get(topic)
+        if topic in refused:
+            yield Unread(topic=topic, reason=f"can't be decoded: {refused[topic]}", messages=counted)
+        if topic in messages and topic in readable:
+            yield from readable[topic].unread(counted)
 
 
 # --- setup -------------------------------------------------------------------------------------------------------
@@ -233,24 +348,5 @@ def with_setup(source: ChannelSource, setup: ChannelSetup | None) -> ChannelSour
     """
     if setup is None:
         return source
-    factor, unit = setup.si_unit(source.factor, source.channel.unit)
-    channel = source.channel
-    overload = channel.overload
-    if setup.overload is not None:
-        overload, overload_unit = setup.overload
-        if overload_unit != unit:
-            raise SetupError(
-                f"{setup.place}: {setup.path} range: it is {in_unit(overload_unit)}, the channel {in_unit(unit)}; "
-                "give the range in the channel's unit, or the channel's unit"
-            )
-    refined = replace(
-        channel,
-        unit=unit,
-        point=setup.point or channel.point,
-        direction=setup.direction or channel.direction,
-        role=setup.role or channel.role,
-        overload=overload,
-        # What is stated for this very channel goes before what its type is documented to hold.
-        units_possible=() if setup.unit or setup.sensitivity else channel.units_possible,
-    )
-    return replace(source, channel=refined, factor=factor)
+    channel, factor = refined(source.channel, source.factor, setup)
+    return replace(source, channel=channel, factor=factor)

@@ -3,16 +3,18 @@
 import json
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from json import JSONDecodeError
 from math import isfinite
 from typing import Final
 
 from chladni.io.field_selector import FieldSelector
-from chladni.io.known_schemas import known_unit, likely_role, possible_units
+from chladni.io.known_schemas import is_command, known_unit, likely_role, possible_units
 from chladni.io.topic import Topic
 from chladni.signals.channel import Channel, Vector, unit_direction
 from chladni.signals.errors import SetupError
+from chladni.signals.unit_labels import quantity_of_name, read_label
 from chladni.signals.units import si_factor
 
 UNKNOWN_UNIT: Final = "1"
@@ -91,6 +93,7 @@ def channel_of(topic: Topic, *, name: str, field: str, leaf: str, unit: str | No
         role="reference" if role == "reference" else "response" if role == "response" else likely_role(name, si_unit),
         overload=None if overload is None else overload * factor,
         units_possible=possible_units(topic.schema_name, leaf) if si_unit == UNKNOWN_UNIT else (),
+        held=is_command(topic.schema_name),
     )
     return channel, factor
 
@@ -105,21 +108,17 @@ def measured_fields(metadata: Mapping[str, str]) -> frozenset[str] | None:
 
 def _si_unit(topic: Topic, *, field: str, leaf: str, unit: str | None) -> tuple[float, str]:
     """First unit that is one: of the metadata, the message, the schema's comment, the type's documentation."""
-    said = (
-        topic.metadata.get(f"chladni.unit.{field}"),
-        topic.metadata.get("unit"),
-        unit,
-        comment_units(topic.schema_text).get(leaf),
-        known_unit(topic.schema_name, leaf),
-    )
-    for text in said:
-        if text:
-            try:
-                return si_factor(text)
-            except SetupError:
-                # A log may call its unit what it likes; what isn't understood counts as unknown, never as an error.
-                continue
-    return 1.0, UNKNOWN_UNIT
+    ours, documented = topic.metadata.get(f"chladni.unit.{field}"), known_unit(topic.schema_name, leaf)
+    labels = (topic.metadata.get("unit"), unit, comment_units(topic.schema_text).get(leaf))
+    # A log may call its unit what it likes; what isn't understood counts as unknown, never as an error.
+    if ours:
+        with suppress(SetupError):
+            return si_factor(ours)
+    for label in labels:
+        if label:
+            with suppress(SetupError):
+                return read_label(label, quantity=documented or quantity_of_name(field))
+    return (1.0, UNKNOWN_UNIT) if documented is None else si_factor(documented)
 
 
 def comment_units(schema_text: str) -> dict[str, str]:

@@ -30,11 +30,22 @@ class StreamClock:
         With shifts that are the same for all streams of the clock.
     messages
         Of the stream, in all of the log.
+    chosen
+        Their numbers in the file in the order of arrival, those without a time left out; None for all as stored.
     """
 
     number: int
     steps: ClockSteps
     messages: int
+    chosen: NDArray[np.int64] | None = None
+
+    def eras(self) -> NDArray[np.int32]:
+        """``[message]`` in the order of the file, how often the clock had been set before."""
+        if self.chosen is None:
+            return self.steps.eras(self.messages)
+        eras = np.zeros(self.messages, np.int32)
+        eras[self.chosen] = self.steps.eras(self.chosen.size)
+        return eras
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,19 +57,27 @@ class Stamped:
     key
         Of the stream.
     stamps_ns
-        ``[message]`` in the order of arrival.
+        ``[message]`` in the order of the file.
     base
-        Fitted to them.
+        Fitted to those chosen.
+    chosen
+        Messages that have a time, in the order of arrival; None for all as stored.
     """
 
     key: Key
     stamps_ns: NDArray[np.int64]
     base: TimeBase
+    chosen: NDArray[np.int64] | None = None
+
+    @property
+    def arrived_ns(self) -> NDArray[np.int64]:
+        """Stamps in the order of arrival."""
+        return self.stamps_ns if self.chosen is None else self.stamps_ns[self.chosen]
 
     def extents(self) -> NDArray[np.int64]:
         """``[2, stretch]`` earliest and latest stamp between two steps of the clock."""
         starts = np.append(0, self.base.clock.message)
-        return np.stack((np.minimum.reduceat(self.stamps_ns, starts), np.maximum.reduceat(self.stamps_ns, starts)))
+        return np.stack((np.minimum.reduceat(self.arrived_ns, starts), np.maximum.reduceat(self.arrived_ns, starts)))
 
 
 def clocks_of(streams: Sequence[Stamped]) -> dict[Key, StreamClock]:
@@ -92,7 +111,7 @@ def clocks_of(streams: Sequence[Stamped]) -> dict[Key, StreamClock]:
         shift_ns = _common_shift(members) if len(members) > 1 else members[0].base.clock.shift_ns
         for one in members:
             steps = replace(one.base.clock, shift_ns=shift_ns)
-            found[one.key] = StreamClock(number=number, steps=steps, messages=one.stamps_ns.size)
+            found[one.key] = StreamClock(number=number, steps=steps, messages=one.stamps_ns.size, chosen=one.chosen)
     return found
 
 
@@ -136,7 +155,7 @@ def _common_shift(members: Sequence[Stamped]) -> NDArray[np.int64]:
 def _phases(stamped: Stamped, origin_ns: int) -> NDArray[np.float64]:
     """``[stretch]`` phase of a stream's stamps, in periods, against that of the first stretch."""
     period_ns = _period_ns(stamped.base)
-    turns = (stamped.stamps_ns - origin_ns) / period_ns
+    turns = (stamped.arrived_ns - origin_ns) / period_ns
     starts = np.append(0, stamped.base.clock.message)
     phases = np.angle(np.add.reduceat(np.exp(2j * np.pi * turns), starts)) / (2 * np.pi)
     relative: NDArray[np.float64] = phases - phases[0]

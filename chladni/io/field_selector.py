@@ -61,6 +61,8 @@ class FieldSelector:
         Messages that fail one of them don't belong to the channel.
     element_filters
         Which element of the array is meant, when it isn't said by index.
+    publisher
+        Which of several publishers, told apart by their stamps, from 1; None for all messages.
     """
 
     leaf: FieldInfo
@@ -68,6 +70,7 @@ class FieldSelector:
     names_leaf: str | None = None
     message_filters: tuple[FieldFilter, ...] = ()
     element_filters: tuple[FieldFilter, ...] = ()
+    publisher: int | None = None
 
     @property
     def leaves(self) -> tuple[str, ...]:
@@ -115,6 +118,7 @@ class _Walk:
         self._names: str | None = None
         self._message_filters: list[FieldFilter] = []
         self._element_filters: list[FieldFilter] = []
+        self._publisher: int | None = None
 
     def take(self, step: FieldStep | IndexStep | KeyStep | FilterStep) -> None:
         match step:
@@ -148,6 +152,7 @@ class _Walk:
             names_leaf=self._names if self._index is not None else None,
             message_filters=tuple(self._message_filters),
             element_filters=tuple(self._element_filters),
+            publisher=self._publisher,
         )
 
     def _enter_array(self) -> None:
@@ -176,6 +181,9 @@ class _Walk:
         return names
 
     def _filter(self, step: FilterStep) -> None:
+        if step.field.startswith("@"):
+            self._publisher = self._number_of_publisher(step)
+            return
         leaf = _joined(self._prefix, step.field)
         if leaf not in self._known:
             raise self._unknown(leaf)
@@ -195,6 +203,19 @@ class _Walk:
             )
         else:
             self._message_filters.append(comparison)
+
+    def _number_of_publisher(self, step: FilterStep) -> int:
+        """What isn't in the message: who sent it."""
+        number = step.value if isinstance(step.value, float) else 0.0
+        known = step.field == "@publisher" and step.operator == "==" and not self._prefix
+        if known and number >= 1 and number.is_integer():
+            return int(number)
+        topic = self._path.topic
+        raise LogError(
+            f"{self._path.text!r}: {step.field} is no field of a message; right behind the topic, "
+            f"{topic}{{@channel==1}} is one MCAP channel, by its number in the log, of a topic that has several, and "
+            f"{topic}{{@publisher==1}} the first publisher of those that their stamps tell apart"
+        )
 
     def _unknown(self, leaf: str) -> LogError:
         near = near_matches(leaf, self._known)

@@ -1,9 +1,9 @@
 """A log's samples on their grid, block by block, in memory that doesn't grow with the log."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,10 @@ from chladni.io.grid_buffer import GridBuffer
 from chladni.io.placement import Group
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
+
+#: Blocks that are filled at a time, at most: so many, or as many as this memory holds.
+MOST_BLOCKS: Final = 8
+MOST_BYTES: Final = 1 << 29
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,6 +69,32 @@ class BlockGrid:
         """Grid index behind the last sample of a block."""
         return min(self.last, self.first + (number + 1) * self.block_samples)
 
+    @property
+    def block_bytes(self) -> int:
+        """Size of a block in memory."""
+        return max(1, self.block_samples * len(self.channels) * self.dtype.itemsize)
+
+    def parts(self, lowest: NDArray[np.int64], highest: NDArray[np.int64]) -> Iterator["BlockGrid"]:
+        """Cut the stretch so that the blocks being filled at a time fit into memory, though pieces come in any order.
+
+        A log that is stored in the order of time is one part. One that isn't is read once for each part.
+
+        Parameters
+        ----------
+        lowest, highest
+            ``[piece]``, grid indices of each piece, in the order of the file.
+        """
+        most = max(MOST_BLOCKS, MOST_BYTES // self.block_bytes)
+        reached = np.maximum.accumulate((np.minimum(highest, self.last) - self.first) // self.block_samples)
+        given = (np.minimum(complete(lowest, self.last), self.last) - self.first) // self.block_samples
+        # A piece is laid down before the blocks that are complete with it are given.
+        filling = reached + 1 - np.append(0, given[:-1])
+        if int(filling.max(initial=0)) <= most:
+            yield self
+            return
+        for first in range(self.first, self.last, most * self.block_samples):
+            yield replace(self, first=first, last=min(self.last, first + most * self.block_samples))
+
     def buffer(self, number: int) -> GridBuffer:
         """An empty block."""
         start = self.first + number * self.block_samples
@@ -90,7 +120,13 @@ class BlockGrid:
             yield from ((int(number), numbers == number) for number in np.unique(numbers))
 
 
-def blocks_of(grid: BlockGrid, pieces: Iterable[PlacedPiece], complete: Sequence[int]) -> Iterator[TimeSeries]:
+def complete(lowest: NDArray[np.int64], last: int) -> NDArray[np.int64]:
+    """For each piece the grid index below which no later piece has a sample, from the lowest index of each."""
+    following = np.append(lowest[1:], last)
+    return np.minimum.accumulate(following[::-1])[::-1]
+
+
+def blocks_of(grid: BlockGrid, pieces: Iterable[PlacedPiece], below: NDArray[np.int64]) -> Iterator[TimeSeries]:
     """Lay pieces onto the grid and give each block as soon as nothing more can fall into it.
 
     Parameters
@@ -99,17 +135,17 @@ def blocks_of(grid: BlockGrid, pieces: Iterable[PlacedPiece], complete: Sequence
         Where the samples lie.
     pieces
         In the order of the file.
-    complete
-        For each piece the grid index below which no later piece has a sample.
+    below
+        As `complete` gives it.
     """
     filling: dict[int, GridBuffer] = {}
     done = 0
-    for whole, below in zip(pieces, complete, strict=True):
+    for whole, complete_to in zip(pieces, below.tolist(), strict=True):
         piece = grid.inside(whole)
         for number, part in grid.cut(piece.index):
             if number not in filling:
                 filling[number] = grid.buffer(number)
             filling[number].put(piece.rows, piece.index[part], piece.values[:, part])
-        while done < grid.count and grid.end(done) <= below:
+        while done < grid.count and grid.end(done) <= complete_to:
             yield (filling.pop(done, None) or grid.buffer(done)).series()
             done += 1

@@ -70,6 +70,18 @@ _NO_SIGNALS = (
     "rosbag2_interfaces",
 )
 
+# Commands by their documentation, whose names don't say so.
+_COMMANDS = (
+    "ackermann_msgs/AckermannDrive",
+    "px4_msgs/ActuatorMotors",
+    "px4_msgs/ActuatorServos",
+    "mavros_msgs/ActuatorControl",
+    "mavros_msgs/AttitudeTarget",
+    "mavros_msgs/PositionTarget",
+    "mavros_msgs/OverrideRCIn",
+)
+_COMMAND_WORDS = frozenset(["command", "commands", "cmd", "cmds", "setpoint", "setpoints", "jog"])
+
 _BOOKKEEPING = re.compile(
     r"(^|\.)(header|stamp|timestamp\w*|time|seq|sequence\w*|device_id|\w*_?id|frame|\w*covariance\w*|variance"
     r"|error_count|clip_counter|calibration_count|samples|status|\w*flags?|ORB_QUEUE_LENGTH)(\[\])?(\.|$)"
@@ -123,6 +135,25 @@ def possible_units(schema_name: str, leaf: str) -> tuple[str, ...]:
     ('m/s', 'rad/s')
     """
     return _OPEN_UNITS.get((message_type(schema_name), leaf), ())
+
+
+def is_command(schema_name: str) -> bool:
+    """Whether a message type is a command: set by a controller, and kept until the next.
+
+    By the type's own documentation, or by a last word of its name that says so. A type that also carries measurements
+    (geometry_msgs/Twist, sensor_msgs/JointState) is none, whatever its topic is called.
+
+    Examples
+    --------
+    >>> is_command("px4_msgs/msg/VehicleRatesSetpoint"), is_command("unitree_go/msg/LowCmd")
+    (True, True)
+    >>> is_command("geometry_msgs/msg/Twist")
+    False
+    """
+    kind = message_type(schema_name)
+    name = re.split(r"[/.]", kind)[-1].removesuffix("Stamped")
+    last = re.findall(r"[A-Z]+[a-z0-9]*|[a-z0-9]+", name)[-1:]
+    return kind.removesuffix("Stamped") in _COMMANDS or any(word.lower() in _COMMAND_WORDS for word in last)
 
 
 def has_signals(schema_name: str) -> bool:

@@ -1,34 +1,89 @@
-"""A log: its channels, and their samples on a uniform grid."""
+"""A log: its channels, and their samples on a uniform grid; and the one door through which every kind is opened."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from math import isfinite
 from pathlib import Path
 from types import TracebackType
-from typing import Self
-from weakref import finalize
+from typing import TYPE_CHECKING, Any, Self
 
-from chladni.io.catalog import Catalog, read_catalog
-from chladni.io.channel_source import ChannelSource
-from chladni.io.gathering import LostMessages
-from chladni.io.log_clocks import LogClocks
+from chladni.io.files.formats import MCAP, file_kind
 from chladni.io.log_info import LogInfo
-from chladni.io.log_reader import FirstPass, LogReader, SampleGrid, Window, several_grids
-from chladni.io.log_survey import survey
-from chladni.io.loss import Loss, losses
-from chladni.io.mcap.container import McapContainer
+from chladni.io.log_reader import SampleGrid, several_grids
+from chladni.io.loss import Loss, Unread
 from chladni.io.mcap.limits import Limits
 from chladni.io.setup import Setup, load_setup
 from chladni.io.stamps import StampRequest
-from chladni.io.stream import Stream
 from chladni.signals.channel import Channel
-from chladni.signals.errors import LogError, SetupError
+from chladni.signals.errors import LogError
 from chladni.signals.geometry import Geometry
-from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.time_series import TimeSeries
 
-#: How much later (or earlier) than its sample a message may be logged, beyond what the first messages show, and still
-#: be found when a window of time is read: the log is indexed by log time.
-LATENESS_NS = 30 * NS_PER_S
+if TYPE_CHECKING:
+    from chladni.signals.frequency_response import FrequencyResponse
+    from chladni.signals.mode_set import ModeSet
+    from chladni.signals.resampling import JoinMethod
+
+
+def open(  # noqa: A001  # as in gzip and tarfile: users write chladni.open
+    path: Path | str,
+    *,
+    setup: Setup | Path | str | None = None,
+    stamp: StampRequest = "auto",
+    limits: Limits | None = None,
+    sample_rate_hz: float | None = None,
+    **reading: Any,
+) -> "Log":
+    """Open an MCAP log or a data file of any kind that is read; its first bytes tell the kind, else its suffix.
+
+    Parameters
+    ----------
+    path
+        The file.
+    setup
+        Setup file, or what `load_setup` made of one; channels of a data file are named by their names.
+    stamp
+        Of an MCAP log: which time a sample has: ``header`` (the message's own stamp), ``publish``, ``log``, or
+        ``auto``: the own stamp where messages have one that moves, else the publish time, else the log time.
+    limits
+        Of an MCAP log: how much memory it may ask for.
+    sample_rate_hz
+        True rate of the samples, where the file doesn't say it; nothing is resampled.
+    reading
+        Of a data file: options of its reader, see `chladni.io.files.formats.READ_OPTIONS`.
+
+    Returns
+    -------
+    Log
+        Samples of an MCAP log aren't read yet, those of a data file are in memory.
+
+    Raises
+    ------
+    LogError
+        When the file can't be read, or is of no kind that is read.
+    SetupError
+        When the setup file has mistakes, or names a channel that the log doesn't hold; when an option isn't one of
+        this kind of file, or is missing.
+
+    Examples
+    --------
+    >>> with open("arm.mcap") as log:  # doctest: +SKIP
+    ...     series = log.read(["/imu.linear_acceleration.x"], start_s=10, end_s=20)
+    >>> open("test.csv", time_unit="ms", units={"force": "N"}).read()  # doctest: +SKIP
+    """
+    path = Path(path)
+    known = load_setup(setup) if isinstance(setup, Path | str) else setup or Setup()
+    kind = file_kind(path)
+    if kind == MCAP:
+        from chladni.io.mcap_log import open_mcap
+
+        return open_mcap(
+            path, setup=known, stamp=stamp, limits=limits, sample_rate_hz=sample_rate_hz, options=reading
+        )
+    # Readers bring in numpy's and scipy's own, which a log of messages does without.
+    from chladni.io.file_log import open_file
+
+    rate = {} if sample_rate_hz is None else {"sample_rate_hz": sample_rate_hz}
+    return open_file(path, kind, setup=known, stamp=stamp, options=rate | reading)
 
 
 def open_log(
@@ -38,107 +93,67 @@ def open_log(
     stamp: StampRequest = "auto",
     limits: Limits | None = None,
     sample_rate_hz: float | None = None,
+    **reading: Any,
 ) -> "Log":
-    """Open an MCAP log; no sample is read yet.
-
-    Parameters
-    ----------
-    path
-        The file.
-    setup
-        Setup file, or what `load_setup` made of one.
-    stamp
-        Which time a sample has: ``header`` (the message's own stamp), ``publish``, ``log``, or ``auto``: the own
-        stamp where messages have one that moves, else the publish time, else the log time.
-    limits
-        How much memory the log may ask for.
-    sample_rate_hz
-        True rate of the samples, for what the stamps leave open. It changes no rate that they tell; to bring channels
-        to another rate, give one to `Log.read`.
-
-    Raises
-    ------
-    LogError
-        When the file can't be read, or is no MCAP log.
-    SetupError
-        When the setup file has mistakes, or names a channel that the log doesn't hold.
-
-    Examples
-    --------
-    >>> with open_log("arm.mcap") as log:  # doctest: +SKIP
-    ...     series = log.read(["/imu.linear_acceleration.x"], start_s=10, end_s=20)
-    """
-    if isinstance(setup, Path | str):
-        setup = load_setup(setup)
-    if sample_rate_hz is not None and not (isfinite(sample_rate_hz) and sample_rate_hz > 0):
-        raise SetupError(f"sample rate {sample_rate_hz} Hz must be finite and positive")
-    container = McapContainer.open(path, limits=limits)
-    log = Log(container, setup=setup or Setup(), stamp=stamp, sample_rate_hz=sample_rate_hz)
-    if setup is not None:
-        # A setup file that doesn't fit the log is better told now than after an hour of averaging.
-        try:
-            _ = log.channels
-        except BaseException:
-            container.close()
-            raise
-    return log
+    """Open a log; the same as `open`, under a name that hides no builtin."""
+    return open(path, setup=setup, stamp=stamp, limits=limits, sample_rate_hz=sample_rate_hz, **reading)
 
 
-class Log:
-    """Channels of one log file; made by `open_log`.
+class Log(ABC):
+    """Channels of one file, of whatever kind; made by `open`.
 
     Times in seconds count from `start_time_ns`, the earliest sample of all channels.
     """
 
-    def __init__(
-        self,
-        container: McapContainer,
-        *,
-        setup: Setup,
-        stamp: StampRequest,
-        sample_rate_hz: float | None = None,
-    ) -> None:
-        self._container = container
-        self._setup = setup
-        self._stamp = stamp
-        self._rate_hz = sample_rate_hz
-        self._clocks: LogClocks | None = None
-        self._catalog: Catalog | None = None
-        self._lost = LostMessages()
-        self._close = finalize(self, container.close)
-        self._known: tuple[object, FirstPass] | None = None
-        self._info: LogInfo | None = None
-
     @property
+    @abstractmethod
     def path(self) -> Path:
         """The file."""
-        return self._container.path
 
     @property
+    @abstractmethod
     def channels(self) -> tuple[Channel, ...]:
         """Every channel that is a signal: numbers, but no stamps, covariances, counters or identities."""
-        return tuple(source.channel for source in self._content.channels)
 
     @property
+    @abstractmethod
     def start_time_ns(self) -> int:
         """Time of the earliest sample, nanoseconds since the Unix epoch: zero of all times in seconds."""
-        return self._content.start_ns
 
     @property
+    @abstractmethod
+    def size_bytes(self) -> int:
+        """What reading all of it may take: the size of the file, or of its samples where they are in memory."""
+
+    @property
+    @abstractmethod
     def geometry(self) -> Geometry:
-        """Points and lines of the setup file; empty without one."""
-        return self._setup.geometry
+        """Points and lines of the file itself and of the setup file; empty without."""
 
     @property
+    @abstractmethod
     def damage(self) -> tuple[Loss, ...]:
         """What was lost of what has been read so far; complete after `info`, or after all of it has been read."""
-        return losses(self._container.damage, self._lost)
 
     @property
-    def _content(self) -> Catalog:
-        if self._catalog is None:
-            self._catalog = read_catalog(self._container, setup=self._setup, request=self._stamp)
-        return self._catalog
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on what was inferred from the file, or is odd about what has been read so far."""
+        return ()
+
+    @property
+    def unread(self) -> tuple[Unread, ...]:
+        """Topics, fields of topics, and parts of a data file that no channel is made of."""
+        return ()
+
+    @property
+    def functions(self) -> "FrequencyResponse | None":
+        """Frequency responses that the file holds ready-made, as universal files do."""
+        return None
+
+    @property
+    def modes(self) -> "ModeSet | None":
+        """Modes that the file holds ready-made, as universal files do."""
+        return None
 
     def read(
         self,
@@ -147,17 +162,23 @@ class Log:
         start_s: float | None = None,
         end_s: float | None = None,
         sample_rate_hz: float | None = None,
+        join: "JoinMethod | None" = None,
     ) -> TimeSeries:
         """Read channels onto one uniform grid.
 
         Parameters
         ----------
         paths
-            Message paths; None for every channel listed whose samples are uniform.
+            Message paths, or names of the channels of a data file; None for every channel listed whose samples are
+            uniform.
         start_s, end_s
             Only samples with ``start_s <= t < end_s``, seconds from the log's start.
         sample_rate_hz
-            Resample to this rate, band-limited; needed when channels have different rates or grids.
+            Rate of the grid; by default that of the channels, or as `join` chooses it.
+        join
+            How channels of different grids become one, see `chladni.signals.resampling.join_resampled`:
+            ``band-limited``, ``hold``, or ``auto``, as each channel tells. By default ``band-limited`` at
+            `sample_rate_hz`; without either such channels are refused.
 
         Returns
         -------
@@ -171,13 +192,18 @@ class Log:
             a grid and no rate is given, their clocks were set at different times, or the window holds no sample.
         """
         groups = self.read_groups(paths, start_s=start_s, end_s=end_s, one_clock=True)
-        if sample_rate_hz is not None:
-            return _on_one_grid(groups, sample_rate_hz, list(dict.fromkeys(paths)) if paths is not None else None)
+        if sample_rate_hz is not None or (join is not None and len(groups) > 1):
+            # Resampling brings in scipy's filters, which a plain read does without.
+            from chladni.signals.resampling import join as on_one_grid
+
+            joined = on_one_grid(groups, sample_rate_hz=sample_rate_hz, method=join or "band-limited")
+            return joined if paths is None else joined.select(list(self.names(paths)))
         if len(groups) > 1:
             told = [(one.channels, one.sample_rate_hz, one.start_time_ns) for one in groups]
             raise LogError(several_grids(self.path.name, told))
         return groups[0]
 
+    @abstractmethod
     def read_groups(
         self,
         paths: Sequence[str] | None = None,
@@ -201,8 +227,8 @@ class Log:
         LogError
             As `read` does, but not when channels have different grids.
         """
-        return self._reader(paths, start_s, end_s).series(one_clock=one_clock)
 
+    @abstractmethod
     def blocks(
         self,
         paths: Sequence[str] | None = None,
@@ -211,10 +237,7 @@ class Log:
         start_s: float | None = None,
         end_s: float | None = None,
     ) -> Iterator[TimeSeries]:
-        """Read channels block by block, in memory that doesn't grow with the samples of the log.
-
-        One pass over the log fits the time base to all stamps (16 bytes of memory a message), a second one places
-        the samples; the blocks one after another are what `read` gives.
+        """Read channels block by block; the blocks one after another are what `read` gives.
 
         Parameters
         ----------
@@ -230,22 +253,18 @@ class Log:
         LogError
             As `read` does.
         """
-        if not (isfinite(seconds) and seconds > 0):
-            raise LogError(f"blocks of {seconds} s: seconds must be finite and positive")
-        reader = self._reader(paths, start_s, end_s)
-        return self._held_open(reader.blocks(self._first_pass(reader), seconds))
 
+    @abstractmethod
     def grids(
         self, paths: Sequence[str] | None = None, *, start_s: float | None = None, end_s: float | None = None
     ) -> tuple[SampleGrid, ...]:
         """Tell which channels share a sampling grid, without keeping samples; arguments and errors as for `read`."""
-        reader = self._reader(paths, start_s, end_s)
-        return reader.grids(self._first_pass(reader))
 
+    @abstractmethod
     def names(self, paths: Sequence[str]) -> tuple[str, ...]:
         """Names that channels have in what is read; `LogError` when the log doesn't hold one."""
-        return tuple(source.channel.name for source in self._sources(paths))
 
+    @abstractmethod
     def info(self) -> LogInfo:
         """Read all of the log once and tell whether it's sound.
 
@@ -254,13 +273,10 @@ class Log:
         LogInfo
             Rates, jitter, gaps, clipped samples of every channel, events included; damage; findings as sentences.
         """
-        if self._info is None:
-            self._info = survey(self._container, self._content, self._lost, rate_hz=self._rate_hz)
-        return self._info
 
+    @abstractmethod
     def close(self) -> None:
         """Close the file; a log that is dropped closes it too."""
-        self._close()
 
     def __enter__(self) -> Self:
         return self
@@ -272,84 +288,3 @@ class Log:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
-
-    def _held_open(self, blocks: Iterator[TimeSeries]) -> Iterator[TimeSeries]:
-        # Whoever iterates over open_log(path).blocks() has no other hold on the log, and a dropped log is closed.
-        yield from blocks
-
-    def _first_pass(self, reader: LogReader) -> FirstPass:
-        # Whoever asks for the grids reads blocks next, of the same channels.
-        key = (reader.window, tuple(stream.key for stream in reader.streams))
-        if self._known is None or self._known[0] != key:
-            self._known = (key, reader.first_pass())
-        return self._known[1]
-
-    # --- selection ---
-
-    def _sources(self, paths: Sequence[str] | None) -> tuple[ChannelSource, ...]:
-        content = self._content
-        if paths is not None and not paths:
-            raise LogError(f"{self.path.name}: no channel is asked for; name one, or None for all")
-        sources = content.channels if paths is None else tuple(content.resolve(path) for path in dict.fromkeys(paths))
-        if not sources:
-            reasons = "; ".join(f"{topic}: {why}" for topic, why in list(content.refused.items())[:3])
-            raise LogError(
-                f"{self.path.name}: the log has no channel that could be read{reasons and f' ({reasons})'}"
-            )
-        return sources
-
-    def _reader(self, paths: Sequence[str] | None, start_s: float | None, end_s: float | None) -> LogReader:
-        sources = self._sources(paths)
-        streams = self._content.streams(sources)
-        if self._clocks is None:
-            listed = self._content.streams(self._content.channels)
-            self._clocks = LogClocks(self._container, listed, self._content.lags_ns)
-        window = self._window(streams, start_s, end_s)
-        known = self._clocks.before(streams, window)
-        return LogReader(
-            container=self._container,
-            streams=streams,
-            order=tuple(source.channel for source in sources),
-            # Log times may have been set back as well.
-            window=replace(window, log_start_ns=None, log_end_ns=None) if known else window,
-            lost=self._lost,
-            required=paths is not None,
-            clocks=self._clocks.of,
-            known_clocks=known,
-            rate_hz=self._rate_hz,
-        )
-
-    def _window(self, streams: Sequence[Stream], start_s: float | None, end_s: float | None) -> Window:
-        if start_s is None and end_s is None:
-            return Window()
-        start_ns, end_ns = self._time_ns(start_s), self._time_ns(end_s)
-        if start_ns is not None and end_ns is not None and start_ns >= end_ns:
-            raise LogError(
-                f"{self.path.name}: the window from {start_s} s to {end_s} s is empty; let it end after its start"
-            )
-        lags = [self._content.lags_ns[stream.topic.name] for stream in streams]
-        known = [lag for lag in lags if lag is not None]
-        bounded = len(known) == len(lags)
-        earliest, latest = min((low for low, _ in known), default=0), max((high for _, high in known), default=0)
-        return Window(
-            start_ns=start_ns,
-            end_ns=end_ns,
-            log_start_ns=None if start_ns is None or not bounded else max(0, start_ns + earliest - LATENESS_NS),
-            log_end_ns=None if end_ns is None or not bounded else max(0, end_ns + latest + LATENESS_NS),
-            told=f"between {start_s or 0.0} s and {'its end' if end_s is None else f'{end_s} s'}",
-        )
-
-    def _time_ns(self, time_s: float | None) -> int | None:
-        if time_s is None:
-            return None
-        if not isfinite(time_s):
-            raise LogError(f"{self.path.name}: time {time_s} s must be finite")
-        return self.start_time_ns + round(time_s * NS_PER_S)
-
-
-def _on_one_grid(groups: Sequence[TimeSeries], sample_rate_hz: float, order: Sequence[str] | None) -> TimeSeries:
-    # Resampling brings in scipy's filters, which a plain read does without.
-    from chladni.signals.resampling import join
-
-    joined = join(groups, sample_rate_hz=sample_rate_hz)
-    return joined if order is None else joined.select(order)

@@ -4,11 +4,12 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from chladni.io.catalog import Catalog
 from chladni.io.channel_source import UNKNOWN_UNIT
-from chladni.io.log_info import some_of
+from chladni.io.log_info import some_of, unread_sentences
 from chladni.io.loss import Loss
 from chladni.io.placement import Placement
 from chladni.io.sample_monitor import SampleMonitor
-from chladni.signals.sensor_quality import SensorFault
+from chladni.signals.channel import Channel
+from chladni.signals.sensor_quality import SensorFault, moments
 from chladni.signals.time_base import TimeBase
 from chladni.signals.wording import counted
 
@@ -16,7 +17,11 @@ MOST_LOSSES_TOLD = 3
 
 
 def log_findings(
-    content: Catalog, monitors: Sequence[SampleMonitor], placements: Sequence[Placement], damage: Sequence[Loss]
+    content: Catalog,
+    monitors: Sequence[SampleMonitor],
+    placements: Sequence[Placement],
+    damage: Sequence[Loss],
+    odd: Sequence[str],
 ) -> Iterator[str]:
     """Say what is wrong with a log, the worst first.
 
@@ -28,19 +33,27 @@ def log_findings(
         Of each stream: what its samples and its stamps showed.
     damage
         What was lost.
+    odd
+        What is odd about messages that were read.
     """
     if damage:
         yield damage_finding(damage)
-    yield from _together(_stamp_findings(placements))
-    yield from _together(finding for placement in placements for finding in _clock_findings(placement))
-    yield from _together(finding for monitor in monitors for finding in _missing_samples(monitor))
-    faults = [fault for monitor in monitors for fault in monitor.faults.values()]
-    yield from _faults_together([fault for fault in faults if fault.kind != "dead"])
-    yield from _together(_constant([fault for fault in faults if fault.kind == "dead"]))
+    yield from odd
+    yield from _publisher_findings(content)
+    yield from together(_stamp_findings(placements))
+    yield from together(finding for placement in placements for finding in _clock_findings(placement))
+    yield from together(finding for monitor in monitors for finding in _missing_samples(monitor))
+    yield from fault_findings([fault for monitor in monitors for fault in monitor.faults.values()])
     yield from _content_findings(content)
 
 
-def _together(findings: Iterable[tuple[str, str]]) -> Iterator[str]:
+def fault_findings(faults: Sequence[SensorFault]) -> Iterator[str]:
+    """Say what is wrong with sensors, by what their samples show."""
+    yield from _faults_together([fault for fault in faults if fault.kind != "dead"])
+    yield from together(_constant([fault for fault in faults if fault.kind == "dead"]))
+
+
+def together(findings: Iterable[tuple[str, str]]) -> Iterator[str]:
     """Join subjects that share a sentence; sentences in the order they first come."""
     subjects: dict[str, list[str]] = {}
     for subject, sentence in findings:
@@ -62,6 +75,13 @@ def damage_finding(damage: Sequence[Loss]) -> str:
 # --- of topics ---------------------------------------------------------------------------------------------------
 
 
+def _publisher_findings(content: Catalog) -> Iterator[str]:
+    for topic, names in content.publishers.items():
+        yield f"{topic}: {len(names)} publish here at once; each has channels of its own: {some_of(names)}"
+    for topic, names in content.in_turn.items():
+        yield f"{topic}: {len(names)} MCAP channels send in turn and are read as one; each alone: {some_of(names)}"
+
+
 def _stamp_findings(placements: Sequence[Placement]) -> Iterator[tuple[str, str]]:
     """Which topics don't simply go by their own stamps, and why."""
     for placement in placements:
@@ -76,6 +96,11 @@ def _clock_findings(placement: Placement) -> Iterator[tuple[str, str]]:
     if not base.samples:
         yield label, "no usable messages"
         return
+    if placement.stored_late:
+        yield (
+            label,
+            f"{counted(placement.stored_late, 'message')} stored behind later ones, read in the order of time",
+        )
     if base.verdict != "regular" or base.gap_count or base.wander_s * base.rate_hz > 1:
         yield label, base.advice
     if len(base.breaks_s):
@@ -108,10 +133,15 @@ def _breaks(base: TimeBase) -> str:
 
 def _missing_samples(monitor: SampleMonitor) -> Iterator[tuple[str, str]]:
     for channel, count in zip(monitor.gathering.stream.channels, monitor.missing.tolist(), strict=False):
-        if count and count == monitor.samples:
-            yield channel.name, "not one sample is a number (all are NaN); nobody fills this field"
-        elif count:
-            yield channel.name, f"{count} of {counted(monitor.samples, 'sample')} not a number; they count as missing"
+        if count:
+            yield channel.name, missing_sentence(count, monitor.samples)
+
+
+def missing_sentence(count: int, samples: int) -> str:
+    """Say how many samples of a channel are no numbers."""
+    if count == samples:
+        return "not one sample is a number (all are NaN); nobody fills this field"
+    return f"{count} of {counted(samples, 'sample')} not a number; they count as missing"
 
 
 def _faults_together(faults: Sequence[SensorFault]) -> Iterator[str]:
@@ -125,7 +155,8 @@ def _faults_together(faults: Sequence[SensorFault]) -> Iterator[str]:
             continue
         low, high = min(fault.count for fault in group), max(fault.count for fault in group)
         often = counted(low, "sample") if low == high else f"{low} to {counted(high, 'sample')}"
-        told = what if kind == "coarse" else f"{what} in {often} each"
+        when = moments(min(fault.first_s for fault in group), max(fault.last_s for fault in group))
+        told = what if kind == "coarse" else f"{what} in {often} each {when}"
         yield f"{some_of([fault.channel for fault in group])}: {told}; {remedy}"
 
 
@@ -145,12 +176,13 @@ def _constant(dead: Sequence[SensorFault]) -> Iterator[tuple[str, str]]:
 
 
 def _content_findings(content: Catalog) -> Iterator[str]:
-    yield from _together((topic, f"can't be decoded: {reason}") for topic, reason in content.refused.items())
-    yield from _together(
-        (f"{name}.{leaf}", "an array this long isn't listed; single elements can be read by path")
-        for name, channels in content.topics.items()
-        for leaf in channels.skipped_arrays()
-    )
-    unknown = [source.channel.name for source in content.channels if source.channel.unit == UNKNOWN_UNIT]
+    # Text beside signals is no trouble; where there is nothing else it is what the log holds.
+    yield from unread_sentences(one for one in content.unread if not (one.complete and content.channels))
+    yield from unit_findings([source.channel for source in content.channels])
+
+
+def unit_findings(channels: Sequence[Channel]) -> Iterator[str]:
+    """Say which channels have no unit."""
+    unknown = [channel.name for channel in channels if channel.unit == UNKNOWN_UNIT]
     if unknown:
         yield f"the log gives no unit for {some_of(unknown)}; a setup file can"

@@ -1,16 +1,21 @@
 """What `chladni info` tells of a log."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any, Final
+from typing import Any, Final, Literal
 
-from chladni.io.loss import Loss
+from chladni.io.gathering import LostMessages
+from chladni.io.loss import Loss, Unread
 from chladni.io.stamps import StampKind
 from chladni.signals.channel import Channel
+from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.time_base import TimeBase
+from chladni.signals.wording import counted
 
 INFO_FORMAT: Final = "chladni.info/1"
+SampleTime = StampKind | Literal["column", "rate"]
+"""Time of a message; or, in a data file, a column of times, or a rate and nothing else."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -22,7 +27,7 @@ class ChannelInfo:
     channel
         The channel.
     encoding
-        How its messages are encoded.
+        How its messages are encoded; of a data file its kind, such as ``csv``.
     samples
         Samples in the log.
     stamp, stamp_reason
@@ -36,17 +41,23 @@ class ChannelInfo:
         set, or leapt ahead.
     clipped
         Samples at the sensor's limit.
+    untimed
+        Messages left out because their stamp is no time.
+    publishers
+        How many publish the channel's topic at once.
     """
 
     channel: Channel
     encoding: str
     samples: int
-    stamp: StampKind
+    stamp: SampleTime
     stamp_reason: str
     time_base: TimeBase
     gaps: tuple[tuple[float, float], ...]
     breaks_s: tuple[float, ...]
     clipped: int
+    untimed: int = 0
+    publishers: int = 1
 
     def to_json(self) -> dict[str, Any]:
         """Give plain lists, numbers and texts; null where nothing is known."""
@@ -65,6 +76,8 @@ class ChannelInfo:
             "longest_stretch_s": _positive(self.time_base.longest_stretch_s),
             "duplicates": self.time_base.duplicates,
             "clipped": self.clipped,
+            "untimed": self.untimed,
+            "publishers": self.publishers,
         }
 
 
@@ -79,13 +92,17 @@ class LogInfo:
     start_time_ns
         Time of the earliest sample, nanoseconds since the Unix epoch.
     duration_s
-        From there to the end of the last sample, without breaks.
+        From there to the end of the last sample, without breaks; of a log without samples that of its messages.
     channels
         In the order of the file.
     damage
         What was lost.
     findings
         Sentences about the log's soundness, the worst first.
+    unread
+        Topics, and fields of topics, or parts of a data file, that no channel was made of.
+    functions
+        Frequency responses that the file holds ready-made, or None.
     """
 
     file: str
@@ -94,6 +111,8 @@ class LogInfo:
     channels: tuple[ChannelInfo, ...]
     damage: tuple[Loss, ...]
     findings: tuple[str, ...]
+    unread: tuple[Unread, ...] = ()
+    functions: FrequencyResponse | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Give the content of ``chladni info --json``."""
@@ -104,6 +123,8 @@ class LogInfo:
             "channels": [one.to_json() for one in self.channels],
             "damage": [_loss_json(one) for one in self.damage],
             "findings": list(self.findings),
+            "unread": [one.to_json() for one in self.unread],
+            **({} if self.functions is None else {"functions": _functions_json(self.functions)}),
         }
 
 
@@ -113,6 +134,21 @@ def _loss_json(loss: Loss) -> dict[str, Any]:
         "where": {"offset": loss.offset, "record": loss.record},
         "lost_messages": loss.lost_messages,
     }
+
+
+def _functions_json(functions: FrequencyResponse) -> list[dict[str, Any]]:
+    return [
+        {
+            "response": response.name,
+            "reference": reference.name,
+            "unit": functions.unit(row, column),
+            "lines": functions.frequency_hz.size,
+            "low_hz": float(functions.frequency_hz[0]),
+            "high_hz": float(functions.frequency_hz[-1]),
+        }
+        for row, response in enumerate(functions.responses)
+        for column, reference in enumerate(functions.references)
+    ]
 
 
 def _positive(number: float) -> float | None:
@@ -129,3 +165,31 @@ def some_of(names: Sequence[str], *, count: int = 3) -> str:
     """
     more = f" and {len(names) - count} more" if len(names) > count else ""
     return ", ".join(names[:count]) + more
+
+
+def unread_sentences(unread: Iterable[Unread]) -> tuple[str, ...]:
+    """Say what was left out and why, all that share a reason together.
+
+    Examples
+    --------
+    >>> unread_sentences([Unread(topic="/a", reason="holds no number", messages=9)])
+    ('/a (9 messages): holds no number',)
+    """
+    groups: dict[str, list[Unread]] = {}
+    for one in unread:
+        groups.setdefault(one.reason, []).append(one)
+    return tuple(f"{_counted_names(group)}: {reason}" for reason, group in groups.items())
+
+
+def _counted_names(group: Sequence[Unread]) -> str:
+    known = [one.messages for one in group if one.messages is not None]
+    messages = f" ({counted(sum(known), 'message')})" if len(known) == len(group) else ""
+    return f"{some_of([one.name for one in group])}{messages}"
+
+
+def oddities(lost: LostMessages) -> tuple[str, ...]:
+    """Say what is odd about messages that were read all the same."""
+    groups: dict[tuple[str, int], list[str]] = {}
+    for (topic, what), messages in lost.told.items():
+        groups.setdefault((what, messages), []).append(topic)
+    return tuple(f"{some_of(topics)}: {what} ({counted(n, 'message')})" for (what, n), topics in groups.items())

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,19 @@ from numpy.typing import NDArray
 
 from chladni.io.clocks import Key, Stamped, StreamClock
 from chladni.io.gathering import Gathering, LostMessages, gather, place_all, running_on, windowed
-from chladni.io.grid_blocks import BlockGrid, PlacedPiece, blocks_of
+from chladni.io.grid_blocks import BlockGrid, PlacedPiece, blocks_of, complete
 from chladni.io.grid_buffer import GridBuffer, grid_rows
 from chladni.io.mcap.container import McapContainer
-from chladni.io.placement import ALIGNED, Group, Placement, StatedRate, digests_of, group_placements
+from chladni.io.placement import (
+    ALIGNED,
+    NOWHERE,
+    Group,
+    Placement,
+    StatedRate,
+    digests_of,
+    group_placements,
+    lowest_index,
+)
 from chladni.io.stream import Piece, Stream, read_pieces
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
@@ -171,7 +181,11 @@ class LogReader:
             return self.known_clocks or self.clocks(self.streams)
 
         stated = None if self.rate_hz is None else StatedRate(hz=self.rate_hz, named=self.required)
-        return place_all(gatherings, clocks, stated=stated)
+        placements = place_all(gatherings, clocks, stated=stated)
+        lost = LostMessages()
+        lost.add_untimed(placements)
+        self.lost.merge(lost)
+        return placements
 
     def blocks(self, known: "FirstPass", seconds: float) -> Iterator[TimeSeries]:
         """Everything, block by block, in a second pass.
@@ -194,8 +208,11 @@ class LogReader:
         )
         members = {id(one.stream): number for number, one in enumerate(group.placements)}
         member_of = [members.get(id(one.stream)) for one in known.placements]
-        lowest = _lowest(known.sizes, member_of, group.placements)
-        return blocks_of(grid, self._placed(member_of, group.placements, rows.rows), _complete(lowest, last))
+        lowest, highest = _extents(known.sizes, member_of, group.placements)
+        return chain.from_iterable(
+            blocks_of(part, self._placed(member_of, group.placements, rows.rows), complete(lowest, last))
+            for part in grid.parts(lowest, highest)
+        )
 
     def grids(self, known: "FirstPass") -> tuple[SampleGrid, ...]:
         """What grids the channels lie on; see `groups`."""
@@ -336,9 +353,9 @@ def several_grids(file: str, told: Sequence[tuple[Sequence[Channel], float, int]
     ]
     highest_hz = f"{max(rate_hz for _, rate_hz, _ in told):.6g}"
     return (
-        f"{file}: channels have {len(grids)} different sampling grids: {'; '.join(grids)}; bring them to one by "
-        f"band-limited resampling: chladni convert {file} OUT.mcap --rate {highest_hz}, in Python "
-        f"sample_rate_hz={highest_hz}"
+        f"{file}: channels have {len(grids)} different sampling grids: {'; '.join(grids)}; bring them to one: "
+        f"chladni convert {file} OUT.mcap --resample {highest_hz}, in Python sample_rate_hz={highest_hz} or "
+        'join="auto"'
     )
 
 
@@ -367,22 +384,21 @@ def _sized(pieces: Iterable[tuple[int, Piece]], sizes: list[tuple[int, int]]) ->
         yield stream, piece
 
 
-def _lowest(
+def _extents(
     sizes: Sequence[tuple[int, int]], member_of: Sequence[int | None], placements: Sequence[Placement]
-) -> NDArray[np.int64]:
-    """Lowest grid index of each piece, in the order of the file."""
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Lowest and highest grid index of each piece, in the order of the file."""
     starts = [0] * len(placements)
-    lowest = []
+    extents = []
     for stream, messages in sizes:
         member = member_of[stream]
         if member is not None:
-            part = placements[member].index[starts[member] : starts[member] + messages]
-            starts[member] += messages
-            lowest.append(int(part.min()))
-    return np.array(lowest, np.int64)
-
-
-def _complete(lowest: NDArray[np.int64], last: int) -> list[int]:
-    """For each piece the grid index below which no later piece has a sample."""
-    following = np.append(lowest[1:], last)
-    return [int(below) for below in np.minimum.accumulate(following[::-1])[::-1]]
+            placement, part = placements[member], slice(starts[member], starts[member] + messages)
+            starts[member] = part.stop
+            ends = (
+                placement.index[part] if placement.counts is None else placement.index[part] + placement.counts[part]
+            )
+            # A piece of which nothing has a place on the grid isn't waited for.
+            extents.append((lowest_index(placement.index[part], otherwise=-NOWHERE), int(ends.max())))
+    lowest, highest = np.array(extents, np.int64).reshape(-1, 2).T
+    return lowest, highest

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -40,14 +41,21 @@ class Placement:
         Fitted to its stamps.
     index
         ``[message]``, grid index of each message's (first) sample, in the order of the file, counted from the
-        origin of the group; empty when the stream has no uniform time base.
+        origin of the group, `NOWHERE` for messages without a time; empty when the stream has no uniform time base.
     counts
         ``[message]``, samples of each; None when each has one.
     taken
         ``[message]``, samples at its start that are left out because an earlier message has their place; None when
         there are none.
     first_ns, end_ns
-        First stamp, and the end of the last sample, where the clock was set on time that runs on; None without any.
+        First stamp in the order of arrival, and the end of the last sample, where the clock was set on time that runs
+        on; None when there is none.
+    untimed
+        Messages left out because their stamps are no times beside the others.
+    stored_late
+        Messages that the file holds behind later ones.
+    publishers
+        How many publish at once, by their stamps alone.
     clock
         Number of the clock, where clocks of the log were set at different times: streams of different numbers share
         no time. None for stamps of one stretch.
@@ -60,12 +68,15 @@ class Placement:
     taken: NDArray[np.int64] | None = None
     first_ns: int | None = None
     end_ns: int | None = None
+    untimed: int = 0
+    stored_late: int = 0
+    publishers: int = 1
     clock: int | None = None
 
     @property
     def first(self) -> int:
         """Grid index of the first sample."""
-        return int(self.index.min())
+        return lowest_index(self.index, 0)
 
     @property
     def last(self) -> int:
@@ -96,6 +107,14 @@ class Placement:
         return replace(self, index=self.index + samples) if samples else self
 
 
+def lowest_index(index: NDArray[np.int64], otherwise: int) -> int:
+    """Lowest grid index of messages that have a place on the grid."""
+    lowest = int(index.min(initial=-NOWHERE))
+    if lowest < NOWHERE // 2:
+        lowest = int(index[index > NOWHERE // 2].min(initial=-NOWHERE))
+    return lowest if lowest < -NOWHERE else otherwise
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatedRate:
     """A sampling rate that the user states, for what the stamps leave open.
@@ -123,6 +142,7 @@ def place_stream(
     counts: NDArray[np.int64] | None,
     period_s: float,
     *,
+    chosen: NDArray[np.int64] | None = None,
     digests: NDArray[np.uint64] | None = None,
     stated: StatedRate | None = None,
     clock: ClockSteps | None = None,
@@ -140,6 +160,8 @@ def place_stream(
         ``[message]``, samples of each; None when each has one.
     period_s
         Time between the samples of a batch message, as it says itself.
+    chosen
+        Indices of the messages that have a time, in the order in which they came; None for all in file order.
     digests
         ``[message]``, of its samples, equal where they are; None when no two messages have the same stamp.
     stated
@@ -149,7 +171,61 @@ def place_stream(
     logged_ns
         ``[message]``, log times beside stamps of another clock; None when these are the stamps.
     """
-    seen = _Seen(stated=stated, clock=clock, logged_ns=logged_ns)
+    if chosen is None:
+        return _placed(stream, stamps_ns, counts, period_s, digests, seen=_Seen(stated, clock, logged_ns))
+    placement = _placed(
+        stream,
+        stamps_ns[chosen],
+        None if counts is None else counts[chosen],
+        period_s,
+        None if digests is None else digests[chosen],
+        seen=_Seen(stated, clock, None if logged_ns is None else logged_ns[chosen]),
+    )
+    if not placement.index.size:
+        return replace(placement, counts=counts)
+    taken = placement.taken
+    return replace(
+        placement,
+        counts=counts,
+        index=_in_file(placement.index, chosen, stamps_ns.size, otherwise=NOWHERE),
+        taken=None if taken is None else _in_file(taken, chosen, stamps_ns.size, otherwise=0),
+    )
+
+
+def without_grid(base: TimeBase, stamps_ns: NDArray[np.int64], advice: str) -> TimeBase:
+    """Give the time base of messages that have no grid, and the reason in place of its advice."""
+    span_s = float(np.ptp(stamps_ns)) / NS_PER_S
+    return replace(
+        base,
+        verdict="irregular",
+        advice=advice,
+        rate_hz=(stamps_ns.size - 1) / span_s if span_s else 0.0,
+        rate_std_hz=inf,
+        gaps=(),
+        gap_count=0,
+        missing=0,
+    )
+
+
+def _in_file(
+    numbers: NDArray[np.int64], chosen: NDArray[np.int64], messages: int, *, otherwise: int
+) -> NDArray[np.int64]:
+    """Bring what belongs to the chosen messages into the order of the file."""
+    spread = np.full(messages, otherwise, np.int64)
+    spread[chosen] = numbers
+    return spread
+
+
+def _placed(
+    stream: Stream,
+    stamps_ns: NDArray[np.int64],
+    counts: NDArray[np.int64] | None,
+    period_s: float,
+    digests: NDArray[np.uint64] | None,
+    *,
+    seen: "_Seen",
+) -> Placement:
+    """Do the work of `place_stream` for messages in the order of their arrival."""
     twins = None
     if counts is not None:
         base = seen.fit_batches(stamps_ns, counts, period_s)
@@ -168,12 +244,12 @@ def place_stream(
     index = message_index(chosen_ns, base, counts=counts)
     if kept is not None and twins is not None:
         index = index[np.searchsorted(kept, twins)]
-        clock = replace(base.clock, message=kept[base.clock.message])
-        placement = replace(placement, time_base=replace(base, clock=clock))
+        steps = replace(base.clock, message=kept[base.clock.message])
+        placement = replace(placement, time_base=replace(base, clock=steps))
     return replace(placement, index=index, taken=_taken(stamps_ns, index, counts))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
     """What is known of a stream beside its stamps, as for `place_stream`."""
 

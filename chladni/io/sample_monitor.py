@@ -1,5 +1,6 @@
 """Watching the samples of a stream as they are read, in bounded memory."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -9,12 +10,16 @@ from numpy.typing import NDArray
 from chladni.io.gathering import Gathering
 from chladni.io.placement import digests_of
 from chladni.io.stream import Piece
+from chladni.signals.channel import Channel
 from chladni.signals.sensor_quality import SensorFault, sensor_quality
-from chladni.signals.stamp_order import arrival_order
-from chladni.signals.time_series import TimeSeries
+from chladni.signals.stamp_order import arrival_order, untangle
+from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 STRETCH_VALUES: Final = 1 << 24
 """Values of a stream that are judged together: 128 MiB in double precision. A longer log is judged in stretches."""
+
+Faults = dict[tuple[str, str], SensorFault]
+"""By channel and kind."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -25,6 +30,8 @@ class SampleMonitor:
     ----------
     gathering
         Stamps of its messages.
+    start_ns
+        Start of the log, from which seconds are counted.
     samples
         Samples seen.
     missing
@@ -34,9 +41,10 @@ class SampleMonitor:
     """
 
     gathering: Gathering
+    start_ns: int
     samples: int = 0
     missing: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
-    faults: dict[tuple[str, str], SensorFault] = field(default_factory=dict)
+    faults: Faults = field(default_factory=dict)
     _waiting: list[Piece] = field(default_factory=list)
     _waiting_values: int = 0
 
@@ -54,28 +62,71 @@ class SampleMonitor:
         """Judge what has been kept back, and let it go."""
         if not self._waiting:
             return
-        values = _in_order(self._waiting)
+        pieces, values = self._waiting, _in_order(self._waiting)
         self._waiting, self._waiting_values = [], 0
-        nan = np.isnan(values)
+
+        def seconds(places: NDArray[np.int64]) -> NDArray[np.float64]:
+            return np.asarray((_stamps_of(pieces, places) - self.start_ns) / NS_PER_S)
+
+        missing = judge_samples(self.gathering.stream.channels, values, self.faults, seconds)
         self.samples += values.shape[1]
-        missing = np.count_nonzero(nan, axis=1)
         self.missing = self.missing + missing if self.missing.size else missing
-        series = TimeSeries(
-            values=values,
-            # Rules look at neighbouring samples; where they lie in time doesn't matter.
-            sample_rate_hz=1.0,
-            channels=self.gathering.stream.channels,
-            valid=~nan if missing.any() else None,
-        )
-        for fault in sensor_quality(series):
-            key = (fault.channel, fault.kind)
-            known = self.faults.get(key)
-            self.faults[key] = fault if known is None else replace(known, count=known.count + fault.count)
 
     def clipped(self, channel: str) -> int:
         """Samples of a channel at the sensor's limit."""
-        fault = self.faults.get((channel, "clipped"))
-        return 0 if fault is None else fault.count
+        return clipped_samples(self.faults, channel)
+
+
+def judge_samples(
+    channels: Sequence[Channel],
+    values: NDArray[np.floating[Any]],
+    faults: Faults,
+    seconds: Callable[[NDArray[np.int64]], NDArray[np.float64]],
+) -> NDArray[np.int64]:
+    """Add what the samples ``[channel, sample]`` of one stretch show to `faults`; count those that are no numbers.
+
+    `seconds` gives the times, from the log's start, of samples that are counted from the stretch's first.
+    """
+    nan = np.isnan(values)
+    missing: NDArray[np.int64] = np.count_nonzero(nan, axis=1)
+    series = TimeSeries(
+        values=values,
+        # Rules look at neighbouring samples; where they lie in time is looked up for what is found.
+        sample_rate_hz=1.0,
+        channels=tuple(channels),
+        valid=~nan if missing.any() else None,
+    )
+    found = sensor_quality(series)
+    if not found:
+        return missing
+    ends_s = seconds(np.array([(fault.first_s, fault.last_s) for fault in found]).astype(np.int64))
+    for fault, (first_s, last_s) in zip(found, ends_s, strict=True):
+        key = (fault.channel, fault.kind)
+        known = faults.get(key)
+        faults[key] = (
+            replace(fault, first_s=float(first_s), last_s=float(last_s))
+            if known is None
+            else replace(known, count=known.count + fault.count, last_s=float(last_s))
+        )
+    return missing
+
+
+def clipped_samples(faults: Faults, channel: str) -> int:
+    """Samples of a channel at the sensor's limit."""
+    fault = faults.get((channel, "clipped"))
+    return 0 if fault is None else fault.count
+
+
+def _stamps_of(pieces: list[Piece], places: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Stamps of samples that are counted in the order of time, on a clock that runs on where it was set."""
+    tangled = untangle(np.concatenate([piece.stamps_ns for piece in pieces]))
+    if pieces[0].counts is None:
+        return np.asarray(tangled.time_ns[places])
+    counts = np.concatenate([piece.counts for piece in pieces if piece.counts is not None])
+    counts = counts if tangled.order is None else counts[tangled.order]
+    message = np.searchsorted(np.cumsum(counts), places, side="right")
+    later = places - (np.cumsum(counts) - counts)[message]
+    return np.asarray(tangled.time_ns[message] + np.rint(later * pieces[0].period_s * NS_PER_S).astype(np.int64))
 
 
 def _in_order(pieces: list[Piece]) -> NDArray[np.floating[Any]]:

@@ -1,17 +1,19 @@
 """Setup file: where the sensors sit, what they measure, and how unusual messages are to be read."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from chladni.io.batch_messages import BatchLayout
 from chladni.io.message_path import near_matches
 from chladni.io.toml_reader import read_toml, tables
-from chladni.signals.channel import Role, Vector, unit_direction
+from chladni.signals.channel import Channel, Role, Vector, unit_direction
 from chladni.signals.errors import SetupError
 from chladni.signals.geometry import Geometry, Point
-from chladni.signals.units import parse_quantity, quotient, si_factor
+from chladni.signals.unit_labels import quantity_of_name, read_label
+from chladni.signals.unit_text import in_unit
+from chladni.signals.units import parse_quantity, quantity_by, quotient, si_factor
 
 if TYPE_CHECKING:
     from chladni.io.setup_file import BatchTable, ChannelTable
@@ -58,10 +60,11 @@ class ChannelSetup:
         Raises
         ------
         SetupError
-            When a sensitivity is given for a log that isn't in volts, amperes or coulombs.
+            When a sensitivity is given for a log that isn't in volts, amperes or coulombs, or a unit has several
+            meanings and nothing tells which.
         """
         if self.unit is not None:
-            factor, unit = si_factor(self.unit)
+            factor, unit = self._stated(self.unit, unit)
         if self.sensitivity is None:
             return factor, unit
         if unit == "1":
@@ -74,6 +77,13 @@ class ChannelSetup:
             )
         per_unit, sensitivity_unit = self.sensitivity
         return factor / per_unit, quotient(unit, sensitivity_unit)
+
+    def _stated(self, label: str, unit: str) -> tuple[float, str]:
+        """Read a unit as a label: what lb means is settled by the unit of the log, else by the channel's name."""
+        try:
+            return read_label(label, quantity=quantity_of_name(self.path) if unit == "1" else unit)
+        except SetupError as error:
+            raise SetupError(f"{self.place}: {self.path} unit: {error}") from error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +106,36 @@ class Setup:
     geometry: Geometry = field(default_factory=Geometry)
     channels: tuple[ChannelSetup, ...] = ()
     batches: Mapping[str, BatchLayout] = field(default_factory=dict)
+
+
+def refined(channel: Channel, factor: float, setup: ChannelSetup) -> tuple[Channel, float]:
+    """Refine a channel, and the factor from its numbers to SI, by what the setup file says of it.
+
+    Raises
+    ------
+    SetupError
+        When sensitivity or range don't fit the channel's unit.
+    """
+    factor, unit = setup.si_unit(factor, channel.unit)
+    overload = channel.overload
+    if setup.overload is not None:
+        overload, overload_unit = setup.overload
+        if overload_unit != unit:
+            raise SetupError(
+                f"{setup.place}: {setup.path} range: it is {in_unit(overload_unit)}, the channel {in_unit(unit)}; "
+                "give the range in the channel's unit, or the channel's unit"
+            )
+    told = replace(
+        channel,
+        unit=unit,
+        point=setup.point or channel.point,
+        direction=setup.direction or channel.direction,
+        role=setup.role or channel.role,
+        overload=overload,
+        # What is stated for this very channel goes before what its type is documented to hold.
+        units_possible=() if setup.unit or setup.sensitivity else channel.units_possible,
+    )
+    return told, factor
 
 
 def load_setup(path: Path | str) -> Setup:
@@ -127,8 +167,8 @@ def _channel(table: "ChannelTable", place: str) -> ChannelSetup:
         path=table.path,
         place=place,
         unit=table.unit,
-        sensitivity=None if table.sensitivity is None else parse_quantity(table.sensitivity),
-        overload=None if table.range is None else parse_quantity(table.range),
+        sensitivity=None if table.sensitivity is None else quantity_by(table.sensitivity, read_label),
+        overload=None if table.range is None else quantity_by(table.range, read_label),
         point=table.point,
         direction=None if table.direction is None else unit_direction(table.direction),
         role=table.role,

@@ -7,7 +7,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from chladni.signals.channel import unit_direction
 from chladni.signals.errors import SetupError
-from chladni.signals.units import parse_quantity, si_factor
+from chladni.signals.unit_labels import read_label, require_label
+from chladni.signals.units import parse_quantity, quantity_by, si_factor
 
 T = TypeVar("T")
 
@@ -20,8 +21,13 @@ def _checked(value: T, check: Callable[[T], object]) -> T:
     return value
 
 
+def _label(text: str) -> str:
+    # What the log says of the channel may settle which of several meanings it has.
+    return _checked(text, require_label)
+
+
 def _unit(text: str) -> str:
-    return _checked(text, si_factor)
+    return _checked(text, read_label)
 
 
 def _positive(text: str) -> None:
@@ -30,7 +36,10 @@ def _positive(text: str) -> None:
 
 
 def _quantity(text: str) -> str:
-    return _checked(text, _positive)
+    _checked(text, _positive)
+    # As labels are read: mV/lb is that of a force or of a mass, and has to say which.
+    _checked(text, lambda quantity: quantity_by(quantity, read_label))
+    return text
 
 
 def _direction(value: "str | Vector3") -> "str | Vector3":
@@ -74,6 +83,7 @@ Number = Annotated[float, Field(strict=True)]
 Vector3 = tuple[Number, Number, Number]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Path = Annotated[str, Field(min_length=1, max_length=1000)]
+Label = Annotated[str, AfterValidator(_label)]
 Unit = Annotated[str, AfterValidator(_unit)]
 Quantity = Annotated[str, AfterValidator(_quantity)]
 
@@ -95,7 +105,7 @@ class ChannelTable(_Table):
     path: Path
     point: Name | None = None
     direction: Annotated[str | Vector3, AfterValidator(_direction)] | None = None
-    unit: Unit | None = None
+    unit: Label | None = None
     sensitivity: Quantity | None = None
     range: Quantity | None = None
     role: Literal["response", "reference"] | None = None

@@ -11,6 +11,7 @@ from chladni.io.decoding.columns import Decoded
 from chladni.io.decoding.schema import FieldInfo
 from chladni.io.known_schemas import message_type
 from chladni.io.mcap.message_batch import MessageBatch
+from chladni.io.untimed import untimed
 from chladni.signals.errors import LogError
 
 StampKind = Literal["header", "publish", "log"]
@@ -157,36 +158,36 @@ def _to_ns(raw: NDArray[np.generic], unit_ns: int) -> tuple[NDArray[np.int64], N
 # --- choosing ----------------------------------------------------------------------------------------------------
 
 
+Times = tuple[NDArray[np.int64], NDArray[np.int64]]
+"""``[message]`` stamps and log times of some messages."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TopicHead:
-    """Times of the first messages of a topic.
+    """Times of the first messages of a topic; stamps that are no times are left out.
 
     Attributes
     ----------
+    messages
+        How many there are.
     own
         Fields of the own stamp, or None.
-    own_ns
-        ``[message]``, own stamps in the unit of their field, or None.
-    publish_ns, log_ns
-        ``[message]``.
+    times
+        By the kind of stamp; without ``header`` where the messages have no stamp of their own.
     """
 
+    messages: int
     own: OwnStamp | None
-    own_ns: NDArray[np.int64] | None
-    publish_ns: NDArray[np.int64]
-    log_ns: NDArray[np.int64]
+    times: Mapping[StampKind, Times]
 
     def start_ns(self, choice: StampChoice) -> int:
         """Earliest time of a topic's first messages."""
-        stamps = self._chosen(choice)
-        return int(stamps[plausible(stamps)].min(initial=LATEST_NS)) + choice.shift_ns
+        stamps, _ = self._chosen(choice)
+        return int(stamps.min(initial=LATEST_NS)) + choice.shift_ns
 
     def lags_ns(self, choice: StampChoice) -> NDArray[np.int64]:
         """Time from each message's sample to its log time."""
-        stamps = self._chosen(choice)
-        # Without own stamp in some messages the others can't be paired; their ends can.
-        logged = self.log_ns if stamps.size == self.log_ns.size else self.log_ns[[0, -1]]
-        stamps = stamps if stamps.size == self.log_ns.size else stamps[[0, -1]]
+        stamps, logged = self._chosen(choice)
         return logged - stamps - choice.shift_ns
 
     def offset_ns(self, choice: StampChoice) -> int:
@@ -196,28 +197,37 @@ class TopicHead:
     def lag_range_ns(self, choice: StampChoice) -> tuple[int, int] | None:
         """Least and most lag; None where it changes too much for it to be a delay."""
         lags = self.lags_ns(choice)
+        if not lags.size:
+            return None
         low, high = int(lags.min()), int(lags.max())
         return (low, high) if high - low < _STEADY_LAG_NS else None
 
-    def _chosen(self, choice: StampChoice) -> NDArray[np.int64]:
-        stamps = {"header": self.own_ns, "publish": self.publish_ns, "log": self.log_ns}[choice.kind]
-        return np.zeros(0, np.int64) if stamps is None else stamps
+    def _chosen(self, choice: StampChoice) -> Times:
+        nothing = np.zeros(0, np.int64)
+        return self.times.get(choice.kind, (nothing, nothing))
 
 
 def head_of(batches: Sequence[MessageBatch], own: OwnStamp | None, decoded: Sequence[Decoded]) -> TopicHead:
     """Collect the times of the first batches of a topic, with the own stamps' unit found out."""
     publish = np.concatenate([batch.publish_time_ns for batch in batches])
     logged = np.concatenate([batch.log_time_ns for batch in batches])
-    if own is None:
-        return TopicHead(own=None, own_ns=None, publish_ns=publish, log_ns=logged)
-    if own.unit_ns is None:
+    times: dict[StampKind, Times] = {"log": _timed(logged, logged, None)}
+    times["publish"] = times["log"] if np.array_equal(publish, logged) else _timed(publish, logged, logged)
+    if own is not None and own.unit_ns is None:
         numbers = np.concatenate([part.columns[own.leaf].numbers for part in decoded]).astype(np.float64)
         own = replace(own, unit_ns=_unit_ns(numbers, logged))
-    if own.unit_ns is None:
-        return TopicHead(own=own, own_ns=None, publish_ns=publish, log_ns=logged)
-    read = [own_stamps_ns(own, part) for part in decoded]
-    stamps, usable = (np.concatenate([pair[part] for pair in read]) for part in (0, 1))
-    return TopicHead(own=own, own_ns=stamps[usable], publish_ns=publish, log_ns=logged)
+    if own is not None and own.unit_ns is not None:
+        read = [own_stamps_ns(own, part) for part in decoded]
+        stamps, usable = (np.concatenate([pair[part] for pair in read]) for part in (0, 1))
+        usable &= plausible(stamps)
+        times["header"] = _timed(stamps[usable], logged[usable], logged[usable])
+    return TopicHead(messages=len(logged), own=own, times=times)
+
+
+def _timed(stamps_ns: NDArray[np.int64], logged_ns: NDArray[np.int64], by_ns: NDArray[np.int64] | None) -> Times:
+    """Leave out the stamps that are no times."""
+    away = untimed(stamps_ns, by_ns)
+    return (stamps_ns, logged_ns) if away is None else (stamps_ns[~away], logged_ns[~away])
 
 
 def _unit_ns(numbers: NDArray[np.float64], log_ns: NDArray[np.int64]) -> int | None:
@@ -228,7 +238,8 @@ def _unit_ns(numbers: NDArray[np.float64], log_ns: NDArray[np.int64]) -> int | N
     for unit_ns in (1_000_000_000, 1_000_000, 1000, 1):
         if EPOCH_FROM_NS <= float(np.median(finite)) * unit_ns <= 5e18:
             return unit_ns
-    own_span, log_span = float(np.ptp(finite)), float(np.ptp(log_ns))
+    # Without the outermost twentieths, where a stamp that is no time would be.
+    own_span, log_span = (float(np.ptp(np.percentile(one, [5, 95]))) for one in (finite, log_ns))
     if own_span <= 0 or log_span <= 0:
         return None
     for unit_ns in (1_000_000_000, 1_000_000, 1000, 1):
@@ -261,7 +272,7 @@ def choose_stamp(head: TopicHead, request: StampRequest, *, topic: str) -> Stamp
         return StampChoice(kind="log", reason="log time, as asked for")
     trouble = _own_trouble(head)
     if request == "header":
-        if head.own is None or head.own_ns is None:
+        if head.own is None or "header" not in head.times:
             raise LogError(f"{topic}: stamp 'header' is asked for, but {trouble}; use 'publish' or 'log'")
         return StampChoice(kind="header", reason=f"{head.own.name}, as asked for", own=head.own)
     if trouble is None and head.own is not None:
@@ -275,15 +286,18 @@ def choose_stamp(head: TopicHead, request: StampRequest, *, topic: str) -> Stamp
 def _own_trouble(head: TopicHead) -> str | None:
     if head.own is None:
         return "messages have no stamp of their own"
-    if head.own_ns is None:
+    if "header" not in head.times:
         return f"{head.own.name} is no clock: its numbers don't run with the log's time in s, ms, us or ns"
-    return _standstill(head.own_ns, head.own.name)
+    stamps_ns, _ = head.times["header"]
+    if 2 * stamps_ns.size < head.messages:
+        return f"{head.own.name} is no time in {head.messages - stamps_ns.size} of the first {head.messages} messages"
+    return _standstill(stamps_ns, head.own.name)
 
 
 def _publish_trouble(head: TopicHead) -> str | None:
-    if np.array_equal(head.publish_ns, head.log_ns):
+    if head.times["publish"] is head.times["log"]:
         return "publish time is the same as log time"
-    return _standstill(head.publish_ns, "publish time")
+    return _standstill(head.times["publish"][0], "publish time")
 
 
 def _standstill(stamps_ns: NDArray[np.int64], name: str) -> str | None:
@@ -318,6 +332,7 @@ def clock_shifts_ns(heads: Mapping[str, TopicHead], choices: Mapping[str, StampC
     dict
         Nanoseconds to add, by topic; topics that need none are left out.
     """
+    heads = {topic: head for topic, head in heads.items() if head.lags_ns(choices[topic]).size}
     clocks = _clocks({topic: head.offset_ns(choices[topic]) for topic, head in heads.items()})
     mixed = len(clocks) > 1
     shifts: dict[str, int] = {}

@@ -1,12 +1,13 @@
 """A stream: channels of one topic whose samples come in the same messages, and so at the same times."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.arrival import Arrivals, numbered
 from chladni.io.batch_messages import BatchLayout, expand
 from chladni.io.channel_source import ChannelSource
 from chladni.io.decoding import Decoded
@@ -35,8 +36,12 @@ class Piece:
         ``[channel, sample]``, SI, messages one after another; NaN where a message doesn't hold the channel.
     lost
         Messages that are not in it, by the reason why.
-    logged_ns
-        ``[message]``, log times beside stamps of another clock; None when these are the stamps.
+    told
+        What is odd about messages that are in it, and about how many.
+    arrivals
+        ``[message]``, when they were logged, and more that the log says of each.
+    untimed
+        Messages that are not in it because their stamp is no time; counted in `lost`, too.
     eras
         ``[message]``, how often the clock had been set before, where that is known and `stamps_ns` run on; else None.
     """
@@ -46,7 +51,9 @@ class Piece:
     period_s: float
     values: NDArray[np.floating[Any]]
     lost: Mapping[str, int]
-    logged_ns: NDArray[np.int64] | None = None
+    arrivals: Arrivals
+    untimed: int = 0
+    told: Mapping[str, int] = field(default_factory=dict)
     eras: NDArray[np.int32] | None = None
 
     def within(self, start_ns: int | None, end_ns: int | None) -> "Piece":
@@ -74,7 +81,7 @@ class Piece:
             stamps_ns=self.stamps_ns[keep],
             counts=counts,
             values=self.values[:, samples],
-            logged_ns=None if self.logged_ns is None else self.logged_ns[keep],
+            arrivals=self.arrivals.kept(keep),
             eras=None if self.eras is None else self.eras[keep],
         )
 
@@ -110,9 +117,16 @@ class Stream:
         return tuple(source.channel for source in self.sources)
 
     @property
+    def publisher(self) -> int | None:
+        """Whose messages these are, of several publishers that their stamps tell apart; None for all."""
+        selector = self.sources[0].selector
+        return None if selector is None else selector.publisher
+
+    @property
     def label(self) -> str:
         """What people know the stream by."""
-        return self.topic.name if not self.filters else self.sources[0].channel.name
+        whole = not self.filters and self.publisher is None
+        return self.topic.name if whole else self.sources[0].channel.name
 
     @property
     def key(self) -> tuple[str, ...]:
@@ -129,22 +143,25 @@ class Stream:
         """Leaves that the stamps and the filters need."""
         return tuple(dict.fromkeys((*self.choice.leaves, *(one.leaf for one in self.filters))))
 
-    def piece(self, batch: MessageBatch, decoded: Decoded, *, with_values: bool = True) -> Piece:
+    def piece(self, batch: MessageBatch, decoded: Decoded, *, stretch: int = 0, with_values: bool = True) -> Piece:
         """Take the stream's samples out of a batch of its topic.
 
-        Without values the piece has the same messages, counts and type of samples, but no rows.
+        Without values the piece has the same messages, counts and type of samples, but no rows. The number of the
+        stretch of the log orders messages of several MCAP channels.
         """
         stamps_ns, usable = self._stamps_ns(batch, decoded)
+        arrivals = Arrivals.of(batch, stretch if len(self.topic.decoders) > 1 else None)
+        wanted = kept_messages(decoded, self.filters)
         lost = dict(decoded.reasons)
-        unstamped = int(np.count_nonzero(~usable & ~decoded.bad))
+        unstamped = int(np.count_nonzero(wanted & ~usable))
         if unstamped:
             lost[f"{self.choice.label} is no time between 1970 and 2116"] = unstamped
-        logged_ns = None if self.choice.kind == "log" else batch.log_time_ns
         if self.layout is not None:
-            return self._blocks(decoded, stamps_ns, logged_ns, usable, lost, with_values=with_values)
-        wanted = kept_messages(decoded, self.filters) & usable
-        piece = self._single_samples(decoded, stamps_ns, logged_ns, wanted, lost)
-        return piece if with_values else replace(piece, values=piece.values[:0])
+            piece = self._blocks(decoded, stamps_ns, usable, lost, arrivals, with_values=with_values)
+        else:
+            piece = self._single_samples(decoded, stamps_ns, wanted & usable, lost, arrivals)
+            piece = piece if with_values else replace(piece, values=piece.values[:0])
+        return replace(piece, untimed=unstamped, told=decoded.told)
 
     def without(self, messages: int, reason: str) -> Piece:
         """Give an empty piece that says why `messages` of them are not in it."""
@@ -154,6 +171,7 @@ class Stream:
             period_s=0.0,
             values=np.zeros((len(self.sources), 0), np.float32),
             lost={reason: messages},
+            arrivals=Arrivals.joined([]),
         )
 
     def _stamps_ns(self, batch: MessageBatch, decoded: Decoded) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -169,9 +187,9 @@ class Stream:
         self,
         decoded: Decoded,
         stamps_ns: NDArray[np.int64],
-        logged_ns: NDArray[np.int64] | None,
         keep: NDArray[np.bool_],
         lost: dict[str, int],
+        arrivals: Arrivals,
     ) -> Piece:
         columns = [_column(decoded, source) for source in self.sources]
         somewhere = [present for _, present in columns if present is not None]
@@ -188,16 +206,16 @@ class Stream:
             period_s=0.0,
             values=values,
             lost=lost,
-            logged_ns=logged_ns if whole or logged_ns is None else logged_ns[keep],
+            arrivals=arrivals if whole else arrivals.kept(keep),
         )
 
     def _blocks(
         self,
         decoded: Decoded,
         stamps_ns: NDArray[np.int64],
-        logged_ns: NDArray[np.int64] | None,
         usable: NDArray[np.bool_],
         lost: dict[str, int],
+        arrivals: Arrivals,
         *,
         with_values: bool,
     ) -> Piece:
@@ -223,7 +241,7 @@ class Stream:
             period_s=float(np.median(periods_s)) if periods_s.size else 0.0,
             values=values,
             lost=lost,
-            logged_ns=None if logged_ns is None else logged_ns[keep],
+            arrivals=arrivals if keep.all() else arrivals.kept(keep),
         )
         return piece.kept(plausible(piece.stamps_ns))
 
@@ -281,27 +299,39 @@ def read_pieces(
         Of the stream.
     piece : Piece
     """
-    users: dict[int, list[int]] = {}
-    for index, stream in enumerate(streams):
-        for channel_id in stream.topic.decoders:
-            users.setdefault(channel_id, []).append(index)
-    leaves = {
-        channel_id: _leaves(channel_id, [streams[index] for index in indices])
-        for channel_id, indices in users.items()
+    readers = {
+        channel_id: _Readers.of(channel_id, streams)
+        for channel_id in dict.fromkeys(one for stream in streams for one in stream.topic.decoders)
     }
-    for batch in container.batches(users, start_time_ns=start_ns, end_time_ns=end_ns):
-        indices = users[batch.channel_id]
-        wanted = leaves[batch.channel_id]
-        if isinstance(wanted, str):
-            yield from ((index, streams[index].without(len(batch), wanted)) for index in indices)
-            continue
-        decoded = streams[indices[0]].topic.decode(batch, wanted)
-        yield from ((index, streams[index].piece(batch, decoded, with_values=with_values)) for index in indices)
+    for stretch, batch in numbered(container.batches(readers, start_time_ns=start_ns, end_time_ns=end_ns)):
+        reader = readers[batch.channel_id]
+        yield from ((index, streams[index].without(len(batch), why)) for index, why in reader.refused.items())
+        if reader.streams:
+            decoded = streams[reader.streams[0]].topic.decode(batch, reader.leaves)
+            for index in reader.streams:
+                yield index, streams[index].piece(batch, decoded, stretch=stretch, with_values=with_values)
 
 
-def _leaves(channel_id: int, streams: Sequence[Stream]) -> tuple[str, ...] | str:
-    """Leaves to decode in the messages of one MCAP channel, or why it can't be read with the others of its topic."""
-    wanted = tuple(dict.fromkeys(leaf for stream in streams for leaf in stream.leaves()))
-    known = {info.path for info in streams[0].topic.decoders[channel_id].fields}
-    absent = [leaf for leaf in wanted if leaf not in known]
-    return f"a second schema on the topic has no field {absent[0]}" if absent else wanted
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Readers:
+    """Which streams read the messages of one MCAP channel, and why others of its topic can't."""
+
+    streams: tuple[int, ...]
+    leaves: tuple[str, ...]
+    refused: Mapping[int, str]
+
+    @classmethod
+    def of(cls, channel_id: int, streams: Sequence[Stream]) -> "_Readers":
+        of_topic = {index: one for index, one in enumerate(streams) if channel_id in one.topic.decoders}
+        known = {info.path for one in of_topic.values() for info in one.topic.decoders[channel_id].fields}
+        absent = {index: [leaf for leaf in one.leaves() if leaf not in known] for index, one in of_topic.items()}
+        able = tuple(index for index, lacks in absent.items() if not lacks)
+        return cls(
+            streams=able,
+            leaves=tuple(dict.fromkeys(leaf for index in able for leaf in streams[index].leaves())),
+            refused={
+                index: f"a second schema on the topic has no field {lacks[0]}"
+                for index, lacks in absent.items()
+                if lacks
+            },
+        )

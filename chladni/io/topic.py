@@ -7,10 +7,12 @@ from typing import Final
 
 import numpy as np
 
-from chladni.io.decoding import Decoded, Decoder, FieldInfo, make_decoder
+from chladni.io.arrival import Arrivals, arrival_order, numbered
+from chladni.io.decoding import Decoded, Decoder, FieldInfo, definition_text, make_decoder
 from chladni.io.mcap.channel_registry import McapChannel
 from chladni.io.mcap.container import McapContainer
 from chladni.io.mcap.message_batch import MessageBatch
+from chladni.io.untimed import untimed
 from chladni.signals.errors import LogError
 
 HEAD_MESSAGES: Final = 64
@@ -57,16 +59,39 @@ class Topic:
         """Decode some leaves of one batch."""
         return self.decoders[batch.channel_id].columns(batch, leaves)
 
-    def decode_head(self, leaves: Sequence[str]) -> list[Decoded]:
-        """Decode some leaves of the first messages."""
-        return [self.decode(batch, leaves) for batch in self.head]
+    def head_with(self, leaves: Sequence[str]) -> list[MessageBatch]:
+        """Give the first messages whose schema has these leaves: MCAP channels of a topic may differ in it."""
+        known = {channel: {info.path for info in decoder.fields} for channel, decoder in self.decoders.items()}
+        return [batch for batch in self.head if known[batch.channel_id].issuperset(leaves)]
 
-    def with_head(self, head: Sequence[MessageBatch]) -> "Topic":
-        """Give the topic with its first messages, from which decoders without a schema learn their fields."""
-        decoders = dict(self.decoders)
-        for batch in head:
-            decoders[batch.channel_id] = decoders[batch.channel_id].informed_by(batch)
-        return replace(self, head=tuple(head), decoders=decoders)
+    def decode_head(self, leaves: Sequence[str]) -> list[Decoded]:
+        """Decode some leaves of the first messages that have them."""
+        return [self.decode(batch, leaves) for batch in self.head_with(leaves)]
+
+    @property
+    def unread(self) -> Mapping[str, str]:
+        """Numeric leaves that can't be read, and why."""
+        return next(iter(self.decoders.values())).unread
+
+    def with_head(self, head: Sequence[MessageBatch]) -> "tuple[Topic, str | None]":
+        """Give the topic with the first messages of its channels, from which decoders learn what no schema tells.
+
+        Returns
+        -------
+        topic : Topic
+            Without the channels whose messages can't be decoded.
+        reason : str or None
+            Why one of them can't.
+        """
+        decoders: dict[int, Decoder] = {}
+        reason = None
+        for channel, decoder in self.decoders.items():
+            try:
+                decoders[channel] = decoder.informed_by([batch for batch in head if batch.channel_id == channel])
+            except LogError as error:
+                reason = str(error)
+        readable = tuple(batch for batch in head if batch.channel_id in decoders)
+        return replace(self, head=readable, decoders=decoders), reason
 
 
 def topics_of(channels: Mapping[int, McapChannel]) -> tuple[dict[str, Topic], dict[str, str]]:
@@ -111,7 +136,7 @@ def _new_topic(channel: McapChannel, decoder: Decoder) -> Topic:
         encoding=channel.message_encoding,
         metadata=dict(channel.metadata),
         decoders={channel.id: decoder},
-        schema_text=schema.data.decode("utf-8", "replace") if schema is not None and is_text else "",
+        schema_text=definition_text(schema.data) if schema is not None and is_text else "",
     )
 
 
@@ -123,14 +148,41 @@ def _joined(topic: Topic, channel: McapChannel, decoder: Decoder) -> Topic:
     )
 
 
+def apart(topic: Topic, channels: Mapping[int, McapChannel]) -> dict[str, Topic]:
+    """Give each MCAP channel of a topic as a topic of its own, whose name says which channel it is.
+
+    Parameters
+    ----------
+    topic
+        With its head.
+    channels
+        Of the log, by id.
+    """
+    return {
+        f"{topic.name}{{@channel=={channel}}}": replace(
+            _new_topic(channels[channel], decoder),
+            name=f"{topic.name}{{@channel=={channel}}}",
+            head=tuple(batch for batch in topic.head if batch.channel_id == channel),
+        )
+        for channel, decoder in topic.decoders.items()
+    }
+
+
 # --- first messages ----------------------------------------------------------------------------------------------
 
 
-def read_heads(container: McapContainer, topics: Mapping[str, Topic]) -> dict[str, Topic]:
+def read_heads(container: McapContainer, topics: Mapping[str, Topic]) -> tuple[dict[str, Topic], dict[str, str]]:
     """Give the topics with their first messages.
 
     All topics are looked for together, since most begin in the same few chunks; those that don't are then looked
     for alone, where an index leads straight to them.
+
+    Returns
+    -------
+    topics : dict
+        Topics whose messages can be decoded.
+    refused : dict
+        Why messages of the others can't.
     """
     counts = container.message_counts()
     heads: dict[int, list[MessageBatch]] = {channel: [] for topic in topics.values() for channel in topic.decoders}
@@ -139,10 +191,15 @@ def read_heads(container: McapContainer, topics: Mapping[str, Topic]) -> dict[st
     for channel in sorted(missing):
         if not heads[channel]:
             _fill(heads, {channel}, container.batches({channel}), budget=_JOINT_BATCHES, counts=counts)
-    return {
-        name: topic.with_head([batch for channel in topic.decoders for batch in heads[channel]])
-        for name, topic in topics.items()
-    }
+    found: dict[str, Topic] = {}
+    refused: dict[str, str] = {}
+    for name, topic in topics.items():
+        informed, reason = topic.with_head([batch for channel in topic.decoders for batch in heads[channel]])
+        if informed.decoders:
+            found[name] = informed
+        if reason is not None:
+            refused[name] = reason
+    return found, refused
 
 
 def _fill(
@@ -166,6 +223,48 @@ def _fill(
             missing.discard(batch.channel_id)
         if not missing:
             return
+
+
+def read_earlier_heads(
+    container: McapContainer, topics: Mapping[str, Topic]
+) -> tuple[dict[str, Topic], dict[str, str]]:
+    """Give the topics with the messages that are first by time as their heads, where a log stores others before them.
+
+    Nothing is read where the log holds no message that was logged before all the heads. Those that can't be decoded
+    by these are told with the reason, as `read_heads` does.
+    """
+    known = [int(batch.log_time_ns.min()) for topic in topics.values() for batch in topic.head]
+    span_ns = container.time_range_ns
+    if span_ns is None or not known or span_ns[0] >= min(known):
+        return dict(topics), {}
+    found, refused = dict(topics), dict[str, str]()
+    for name, arrivals in read_arrivals(container, topics).items():
+        order = arrival_order(arrivals.log_ns, arrivals)
+        first_ns = arrivals.log_ns[:HEAD_MESSAGES] if order is None else arrivals.log_ns[order[:HEAD_MESSAGES]]
+        if first_ns.size and first_ns[0] < min(int(batch.log_time_ns.min()) for batch in topics[name].head):
+            window = container.batches(
+                topics[name].decoders, start_time_ns=int(first_ns[0]), end_time_ns=int(first_ns[-1]) + 1
+            )
+            found[name], reason = topics[name].with_head([_first(batch, HEAD_MESSAGES) for batch in window])
+            if reason is not None:
+                refused[name] = reason
+    return {name: topic for name, topic in found.items() if topic.decoders}, refused
+
+
+def read_arrivals(container: McapContainer, topics: Mapping[str, Topic]) -> dict[str, Arrivals]:
+    """Give the arrivals of all messages of some topics, those left out whose log time is no time."""
+    owner = {channel: topic for topic in topics.values() for channel in topic.decoders}
+    parts: dict[str, list[Arrivals]] = {name: [] for name in topics}
+    for stretch, batch in numbered(container.batches(owner)):
+        topic = owner[batch.channel_id]
+        parts[topic.name].append(Arrivals.of(batch, stretch if len(topic.decoders) > 1 else None))
+    found = {name: Arrivals.joined(some) for name, some in parts.items()}
+    return {name: _with_log_time(one) for name, one in found.items()}
+
+
+def _with_log_time(arrivals: Arrivals) -> Arrivals:
+    away = untimed(arrivals.log_ns, None)
+    return arrivals if away is None else arrivals.kept(~away)
 
 
 def _first(batch: MessageBatch, count: int) -> MessageBatch:

@@ -1,7 +1,8 @@
 """The channels of one topic: all that are listed, and any that a path names."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +13,14 @@ from chladni.io.decoding import FieldInfo
 from chladni.io.decoding.columns import Strings
 from chladni.io.field_selector import FieldFilter, FieldSelector, names_beside, resolve_fields
 from chladni.io.known_schemas import MAX_LISTED_ELEMENTS, has_signals, is_signal
+from chladni.io.loss import Unread
 from chladni.io.message_path import FieldStep, IndexStep, MessagePath, near_matches, quoted
+from chladni.io.publishers import at_once
 from chladni.io.topic import Topic
 from chladni.signals.errors import LogError
+
+FRAME_FIELDS: Final = ("header.frame_id", "frame_id")
+"""Where messages say which of several sensors of one kind they come from."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -33,6 +39,8 @@ class TopicChannels:
         Longest length seen of each array that is counted in the message.
     joints
         Names of array elements, by the leaf that holds them: every distinct list of names that the head holds.
+    frames
+        Filters on the frame's name, one for each of several publishers that send at once; else empty.
     """
 
     topic: Topic
@@ -41,12 +49,21 @@ class TopicChannels:
     units: tuple[str, ...]
     lengths: dict[str, int]
     joints: dict[str, tuple[tuple[str, ...], ...]]
+    frames: tuple[FieldFilter, ...] = ()
+
+    @property
+    def publishers(self) -> tuple[str, ...]:
+        """Beginnings of the paths of each of several publishers that send at once; empty where there's one."""
+        return tuple(f"{self.topic.name}{_written(frame)}" for frame in self.frames)
 
     def listed(self) -> Iterator[ChannelSource]:
         """Give every channel that is a signal, in the order of the schema."""
         measured = measured_fields(self.topic.metadata)
         sources = self._columns() if self.layout is not None else self._leaves()
-        return (source for source in sources if measured is None or source.field in measured)
+        wanted = [source for source in sources if measured is None or source.field in measured]
+        if not self.frames:
+            return iter(wanted)
+        return (self._of_frame(source, frame) for frame in self.frames for source in wanted)
 
     def resolve(self, path: MessagePath) -> ChannelSource:
         """Find the channel that a path names; its name is the path as it was written.
@@ -58,19 +75,49 @@ class TopicChannels:
         """
         if self.layout is not None:
             return self._column_source(path)
+        if path.rest in self.topic.unread:
+            raise LogError(f"{path.text!r} {self.topic.unread[path.rest]}")
         selector = resolve_fields(path, self.topic.fields)
         return self._leaf_source(selector, field=self._spelling(path, selector), name=path.text)
 
-    def skipped_arrays(self) -> tuple[str, ...]:
+    @property
+    def element_names(self) -> frozenset[str]:
+        """All names that the first messages give to elements of their arrays."""
+        return frozenset(name for lists in self.joints.values() for names in lists for name in names)
+
+    def may_hold(self, source: ChannelSource) -> bool:
+        """Whether the first messages have the elements that a channel names."""
+        filters = () if source.selector is None else source.selector.element_filters
+        named = [one.value for one in filters if one.leaf in self.joints and one.operator == "=="]
+        return self.element_names.issuperset(map(str, named))
+
+    def unread(self, messages: int | None) -> Iterator[Unread]:
+        """Say what no channel is made of: fields that can't be read, or all of a topic of `messages` messages."""
+        if not any(self.listed()):
+            yield self._nothing_listed(messages)
+            return
+        for path, reason in self.topic.unread.items():
+            yield Unread(topic=self.topic.name, field=path, reason=reason)
+        for path in self._long_arrays():
+            reason = "an array this long isn't listed; single elements can be read by path"
+            yield Unread(topic=self.topic.name, field=path, reason=reason)
+
+    def _nothing_listed(self, messages: int | None) -> Unread:
+        hidden = next(iter(self.topic.unread.values()), None)
+        numbers = any(info.kind == "number" for info in self.topic.fields)
+        if hidden is not None:
+            reason = hidden
+        elif numbers:
+            reason = "none of its numbers is listed as a signal; single ones can be read by path"
+        else:
+            reason = "holds no number"
+        return Unread(topic=self.topic.name, reason=reason, messages=messages, complete=hidden is None)
+
+    def _long_arrays(self) -> Iterator[str]:
         """Numeric arrays that are too long to be listed element by element."""
-        return tuple(
-            info.path
-            for info in self.topic.fields
-            if self.layout is None
-            and info.kind == "number"
-            and info.array is not None
-            and self._length(info) > MAX_LISTED_ELEMENTS
-        )
+        for info in self.topic.fields if self.layout is None else ():
+            if info.kind == "number" and info.array is not None and self._length(info) > MAX_LISTED_ELEMENTS:
+                yield info.path
 
     # --- batch messages ---
 
@@ -128,6 +175,16 @@ class TopicChannels:
     def _listed(self, field: str, selector: FieldSelector) -> ChannelSource:
         return self._leaf_source(selector, field=field, name=f"{self.topic.name}.{field}")
 
+    def _of_frame(self, source: ChannelSource, frame: FieldFilter) -> ChannelSource:
+        if source.selector is None:
+            raise AssertionError("columns of batch messages aren't told apart by frames")
+        return replace(
+            source,
+            field=f"{_written(frame)}.{source.field}",
+            channel=replace(source.channel, name=f"{self.topic.name}{_written(frame)}.{source.field}"),
+            selector=replace(source.selector, message_filters=(frame,)),
+        )
+
     def _identified_by_text(self, info: FieldInfo) -> bool:
         """Whether elements are messages with text inside (a frame's name, say) and no fixed number."""
         prefix, mark, _ = info.path.partition("[]")
@@ -140,14 +197,16 @@ class TopicChannels:
 
     def _leaf_source(self, selector: FieldSelector, *, field: str, name: str) -> ChannelSource:
         leaf = selector.leaf
-        channel, factor = channel_of(self.topic, name=name, field=field, leaf=leaf.path, unit=None)
+        # A log's writer knows fields, and no filter on whose they are.
+        known_as = field.partition("}.")[2] if field.startswith("{") else field
+        channel, factor = channel_of(self.topic, name=name, field=known_as, leaf=leaf.path, unit=None)
         if leaf.kind in ("time", "duration"):
             factor = 1e-9
         return ChannelSource(topic=self.topic.name, field=field, channel=channel, factor=factor, selector=selector)
 
     def _spelling(self, path: MessagePath, selector: FieldSelector) -> str:
         """Field in the spelling of the list: by index where a name always stands in the same place."""
-        if selector.message_filters:
+        if selector.message_filters or selector.publisher is not None:
             return path.rest
         if selector.index is not None:
             return _with_index(selector.leaf.path, selector.index)
@@ -157,6 +216,11 @@ class TopicChannels:
             if only.operator == "==" and len(lists) == 1 and lists[0].count(str(only.value)) == 1:
                 return _with_index(selector.leaf.path, lists[0].index(str(only.value)))
         return path.rest
+
+
+def _written(frame: FieldFilter) -> str:
+    escaped = str(frame.value).replace("\\", "\\\\").replace('"', '\\"')
+    return f'{{{frame.leaf}=="{escaped}"}}'
 
 
 def _with_index(leaf: str, index: int) -> str:
@@ -194,6 +258,7 @@ def topic_channels(topic: Topic, layout: BatchLayout | None = None) -> TopicChan
         units=units,
         lengths={} if layout is not None else _lengths(topic),
         joints={} if layout is not None else _joints(topic),
+        frames=() if layout is not None else _frames(topic),
     )
 
 
@@ -208,6 +273,25 @@ def _lengths(topic: Topic) -> dict[str, int]:
             good = counts[~decoded.bad]
             lengths[path] = max(lengths[path], int(good.max(initial=0)))
     return lengths
+
+
+def _frames(topic: Topic) -> tuple[FieldFilter, ...]:
+    """Filters on the frame's name where the first messages are of several publishers at once with different ones."""
+    leaf = next((info.path for info in topic.fields if info.path in FRAME_FIELDS and info.kind == "string"), None)
+    head = [] if leaf is None else topic.head_with([leaf])
+    if leaf is None or not head:
+        return ()
+    names = np.array([name for part in topic.decode_head([leaf]) for name in _texts(part.columns[leaf].strings)])
+    logged = np.concatenate([batch.log_time_ns for batch in head])
+    order = np.argsort(logged, kind="stable")
+    known, label = np.unique(names[order], return_inverse=True)
+    if len(known) < 2 or not at_once(logged[order], label):
+        return ()
+    return tuple(FieldFilter(leaf=leaf, operator="==", value=str(name)) for name in dict.fromkeys(names.tolist()))
+
+
+def _texts(strings: Strings) -> list[str]:
+    return [str(strings[place]) for place in range(len(strings))]
 
 
 def _joints(topic: Topic) -> dict[str, tuple[tuple[str, ...], ...]]:

@@ -41,6 +41,8 @@ class Channel:
     units_possible
         SI units that the message's type leaves open while `unit` is ``1``, such as ``m`` and ``rad`` of a joint's
         position; empty when anything is possible.
+    held
+        Whether the quantity is known to keep its value between samples, as a command does.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Channel:
     role: Role = "response"
     overload: float | None = None
     units_possible: tuple[str, ...] = ()
+    held: bool = False
 
     def with_name(self, name: str) -> Self:
         """Give the same channel under another name."""

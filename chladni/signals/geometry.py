@@ -1,5 +1,6 @@
 """Where the measurement points sit and which of them are joined by lines."""
 
+from collections import Counter
 from dataclasses import dataclass
 
 from chladni.signals.channel import Vector
@@ -30,10 +31,10 @@ class Geometry:
     lines: tuple[tuple[str, ...], ...] = ()
 
     def __post_init__(self) -> None:
-        names = [point.name for point in self.points]
-        for name in names:
-            if names.count(name) > 1:
-                raise SetupError(f"point {name!r} is defined {names.count(name)} times; point names are unique")
+        names = Counter(point.name for point in self.points)
+        for name, count in names.items():
+            if count > 1:
+                raise SetupError(f"point {name!r} is defined {count} times; point names are unique")
         for line in self.lines:
             for name in line:
                 if name not in names:

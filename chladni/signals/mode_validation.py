@@ -17,7 +17,8 @@ class ModeValidation(Value):
     auto_mac
         ``[mode, mode]`` modal assurance criterion between the modes themselves, 0 to 1.
     mpc
-        ``[mode]`` modal phase collinearity, 1 for a shape that moves in one phase.
+        ``[mode]`` modal phase collinearity, 1 for a shape that moves in one phase; NaN for shapes of one component,
+        as the two that follow.
     mpd_deg
         ``[mode]`` mean phase deviation, 0 for such a shape.
     mean_phase_deg

@@ -33,6 +33,8 @@ class Provenance:
         the estimate is too high by sigma/omega_r until it's subtracted.
     skipped
         Segments left out because samples in them were missing or rejected.
+    longest_s
+        Longest stretch of the record without a gap, in seconds: no segment can be longer. 0 where that isn't known.
     notes
         Sentences of advice: what was masked, what to distrust, what to do about it.
     """
@@ -47,6 +49,7 @@ class Provenance:
     detrend: str = "constant"
     window_decay_per_s: float = 0.0
     skipped: int = 0
+    longest_s: float = 0.0
     notes: tuple[str, ...] = ()
 
     def with_estimator(self, estimator: str) -> Self:

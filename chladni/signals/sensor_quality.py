@@ -48,8 +48,8 @@ class SensorFault:
         ``clipped``, ``dead``, ``dropouts``, ``spikes``, ``not-a-number`` or ``coarse``.
     count
         Samples concerned.
-    first_s
-        Time of the first one, seconds from the start of the series.
+    first_s, last_s
+        Time of the first and of the last one, seconds from the start of the series.
     what, remedy
         What was found, and what to do.
     """
@@ -58,14 +58,27 @@ class SensorFault:
     kind: FaultKind
     count: int
     first_s: float
+    last_s: float
     what: str
     remedy: str
 
     @property
     def sentence(self) -> str:
-        """What was found in which channel and how often, and what to do."""
-        often = "" if self.kind in _THROUGHOUT else f" in {counted(self.count, 'sample')}"
+        """What was found in which channel, how often and when, and what to do."""
+        often = f" in {counted(self.count, 'sample')} {moments(self.first_s, self.last_s)}"
+        often = "" if self.kind in _THROUGHOUT else often
         return f"{self.channel}: {self.what}{often}; {self.remedy}"
+
+
+def moments(first_s: float, last_s: float) -> str:
+    """Say when samples lie that are counted.
+
+    Examples
+    --------
+    >>> moments(0.0, 0.8125), moments(3.2, 3.2)
+    ('between 0 and 0.8125 s', 'at 3.2 s')
+    """
+    return f"at {first_s:.4g} s" if first_s == last_s else f"between {first_s:.4g} and {last_s:.4g} s"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -107,10 +120,11 @@ def sensor_quality(series: TimeSeries) -> tuple[SensorFault, ...]:
     Rules, with q the smallest step seen and m the median step between neighbours:
 
     - clipped: at or above 99.9 % of the channel's overload; or at least three samples in a row at the very top (or
-      bottom), three times as many there as on the value next to it, reached with a step above 0.1 m and 4 q, and
-      no more by chance than once in 1000 where values repeat elsewhere (or reached with a step above 6 m). A top
-      reached smoothly is where a motion turns or rests, and an end at exactly 0 is that of a quantity of one sign
-      (a speed, a level), which no larger range would move.
+      bottom), three times as many there as on the value next to it, reached with a step above 0.1 m and 4 q (at the
+      start of the record: left so), and no more by chance than once in 1000 where values repeat elsewhere (or reached
+      with a step above 6 m). A top reached smoothly is where a motion turns or rests, what else goes one way only is
+      no vibration, and an end at exactly 0 is that of a quantity of one sign (a speed, a level), which no larger
+      range would move.
     - dead: constant, or two or three values within 0.1 % of the mean or 0.01 % of the overload.
     - dropouts: the same value for at least eight samples, or for four to seven where by the share of values that
       repeat no more than 1e-5 such runs are due to chance, not at an end of the range, between steps above 0.1 m
@@ -144,13 +158,13 @@ def _channel_faults(
         values = values[place]
     if values.size >= _FEWEST:
         faults += _faults_of(_record(channel, values), place)
-    return [replace(fault, first_s=fault.first_s / rate_hz) for fault in faults]
+    return [replace(one, first_s=one.first_s / rate_hz, last_s=one.last_s / rate_hz) for one in faults]
 
 
 def _faults_of(record: _Record, place: Ints | None) -> list[SensorFault]:
-    """Apply the rules; `first_s` is an index until the caller knows better."""
+    """Apply the rules; `first_s` and `last_s` are indices until the caller knows better."""
     channel = record.channel
-    if _is_dead(record):
+    if _is_dead(record) and not _beyond_range(record).size:
         everything = np.arange(record.samples.size)
         return _fault(channel, "dead", everything, _dead_told(record), place)
     clipped, told = _clipped(record)
@@ -180,9 +194,19 @@ def _fault(
 ) -> list[SensorFault]:
     if not samples.size:
         return []
-    first = float(samples[0] if place is None else place[samples[0]])
+    first, last = (samples if place is None else place[samples])[[0, -1]].astype(float)
     what, remedy = told
-    return [SensorFault(channel=channel.name, kind=kind, count=samples.size, first_s=first, what=what, remedy=remedy)]
+    return [
+        SensorFault(
+            channel=channel.name,
+            kind=kind,
+            count=samples.size,
+            first_s=float(first),
+            last_s=float(last),
+            what=what,
+            remedy=remedy,
+        )
+    ]
 
 
 def _record(channel: Channel, samples: Samples) -> _Record:
@@ -238,17 +262,23 @@ def _is_coarse(record: _Record) -> bool:
 def _clipped(record: _Record) -> tuple[Ints, tuple[str, str]]:
     """Give the samples beyond the range, and what to say of them."""
     unit = record.channel.unit
-    if record.channel.overload is not None:
-        limit = _NEAR_OVERLOAD * record.channel.overload
-        if max(record.high, -record.low) >= limit:
-            reached = with_unit(f"{record.channel.overload:.6g}", unit)
-            there = np.flatnonzero(np.abs(record.samples) >= limit)
-            return there, (f"reaches its range of {reached}", "use a larger range")
+    there = _beyond_range(record)
+    if there.size:
+        reached = with_unit(f"{record.channel.overload:.6g}", unit)
+        return there, (f"reaches its range of {reached}", "use a larger range")
     ends = {level: _plateaus(record, level) for level in (record.low, record.high) if level != 0}
     levels = " and ".join(f"{level:.6g}" for level, there in ends.items() if there.size)
     # A tank that is full stays at 100 %; samples alone can't tell that from a sensor at its limit.
     told = (f"is cut off at {with_unit(levels, unit)}", "use a larger range, unless the quantity itself ends there")
     return np.sort(np.concatenate([*ends.values()])), told
+
+
+def _beyond_range(record: _Record) -> Ints:
+    """Samples at the end of the range that is named, if one is."""
+    limit = _NEAR_OVERLOAD * (record.channel.overload or np.inf)
+    if max(record.high, -record.low) < limit:
+        return np.empty(0, dtype=np.int64)
+    return np.flatnonzero(np.abs(record.samples) >= limit)
 
 
 def _plateaus(record: _Record, level: float) -> Ints:
@@ -257,10 +287,16 @@ def _plateaus(record: _Record, level: float) -> Ints:
     starts, lengths = _runs(there)
     if lengths.size == 0 or lengths.max() < _SHORTEST_PLATEAU or _rests(record, there):
         return there[:0]
+    others = record.samples[record.samples != level]
+    if _one_way(others):
+        return there[:0]
     # A sine piles up at its ends as well, but no more than 2.4 times as on the next value.
-    beside = _count_beside(record, level)
-    entered = starts[(lengths >= _SHORTEST_PLATEAU) & (starts > 1)]
-    entry = np.maximum(record.step(entered - 1), record.step(entered - 2))
+    beside = int(np.count_nonzero(others == (others.max() if level == record.high else others.min())))
+    long = lengths >= _SHORTEST_PLATEAU
+    first, last = starts[long], (starts + lengths - 1)[long]
+    entry = np.maximum(record.step(first - 1), record.step(first - 2))
+    # A record that begins at its end of the range is judged by how it leaves.
+    entry = np.where(first > 1, entry, np.maximum(record.step(last), record.step(last + 1)))
     kinked = entry > max(0.1 * record.typical_step, 4 * record.smallest_step)
     if _by_chance(record, there, lengths) and not np.any(entry > 6 * record.typical_step):
         return there[:0]
@@ -275,10 +311,10 @@ def _by_chance(record: _Record, ends: Ints, lengths: Ints) -> bool:
     return bool(lengths.size * repeating ** (int(lengths.max()) - 1) > _CHANCE)
 
 
-def _count_beside(record: _Record, level: float) -> int:
-    """How many samples have the value next to an end of the range."""
-    others = record.samples[record.samples != level]
-    return int(np.count_nonzero(others == (others.max() if level == record.high else others.min())))
+def _one_way(samples: Samples) -> bool:
+    """Whether samples never rise or never fall, as after a step that something follows slowly."""
+    steps = np.diff(samples)
+    return bool(not np.any(steps > 0) or not np.any(steps < 0))
 
 
 def _rests(record: _Record, ends: Ints) -> bool:

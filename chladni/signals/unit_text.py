@@ -30,15 +30,39 @@ _SPELLINGS = str.maketrans(
         "\N{GREEK CAPITAL LETTER OMEGA}": "ohm",
         "·": "*",
         "⋅": "*",
+        "∙": "*",
+        "•": "*",
         "×": "*",
         "%": "percent",
         "‰": "permille",
+        # What editors make of a minus, and what looks like the degree sign.
+        "\N{MINUS SIGN}": "-",
+        "\N{EN DASH}": "-",
+        "\N{HYPHEN}": "-",
+        "\N{NON-BREAKING HYPHEN}": "-",
+        "\N{MASCULINE ORDINAL INDICATOR}": "°",
+        "\N{RING ABOVE}": "°",
     }
 )
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _RAISED_RUN = re.compile(r"⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]+")
+_WORDS = (
+    # Degrees of temperature are one symbol; deg C would be a product.
+    (re.compile(r"(?:°|\b[Dd]eg(?:rees?)?\.?)\s*(?:([CFK])\b|([Cc])elsius\b|([Ff])ahrenheit\b)"), r" deg\1\2\3 "),
+    (re.compile(r"°"), "deg"),
+    (re.compile(r"\s+per\s+"), "/"),
+    (re.compile(r"\bsquare\s+([A-Za-z]+)"), r"\1^2"),
+    (re.compile(r"\bcubic\s+([A-Za-z]+)"), r"\1^3"),
+    (re.compile(r"\s+squared\b"), "^2"),
+    (re.compile(r"\s+cubed\b"), "^3"),
+    # Powers in braces or parentheses, as TeX and some exporters have them.
+    (re.compile(r"\^\s*[{(]\s*([+-]?[0-9]+)\s*[})]"), r"^\1"),
+    # A dot closes an abbreviation (in./s); between symbols it multiplies, as a hyphen does: N.m, ft-lbf, m.s-2.
+    (re.compile(r"(?<=[A-Za-z])\.(?![A-Za-z0-9(])"), ""),
+    (re.compile(r"(?<=[A-Za-z0-9)])[.-](?=[A-Za-z(])"), "*"),
+)
 _TOKEN = re.compile(
-    r"\s*(?:(?P<symbol>[A-Za-z_]+)|(?P<number>[0-9]+)|(?P<operator>[*/()])|\^\s*(?P<exponent>[+-]?[0-9]+))"
+    r"\s*(?:(?P<symbol>[A-Za-z_]+)|(?P<number>-?[0-9]+)|(?P<operator>[*/()])|\^\s*(?P<exponent>[+-]?[0-9]+))"
 )
 
 
@@ -122,15 +146,22 @@ def combined(left: Scaled, right: Scaled, *, power: int = 1) -> Scaled:
     return scale, result
 
 
+def spelled(text: str) -> str:
+    """Give an expression in the one spelling that is read: ``m/s²``, ``m/s**2`` and ``m/s^{2}`` are ``m/s^2``."""
+    raised = _RAISED_RUN.sub(lambda run: "^" + run.group().translate(_RAISED), text)
+    plain = raised.translate(_SPELLINGS).replace("**", "^")
+    for pattern, replacement in _WORDS:
+        plain = pattern.sub(replacement, plain)
+    return plain.strip()
+
+
 class _Reader:
     """Recursive descent over one expression; depth and length are bounded by `MAX_LENGTH`."""
 
     def __init__(self, text: str, resolve: Callable[[str], Scaled]) -> None:
         self._text = text
         self._resolve = resolve
-        spelled = _RAISED_RUN.sub(lambda run: "^" + run.group().translate(_RAISED), text)
-        spelled = spelled.replace("°", "deg").translate(_SPELLINGS)
-        self._rest = self._tokens(spelled.replace("**", "^").strip())
+        self._rest = self._tokens(spelled(text))
 
     def whole(self) -> Scaled:
         if not self._rest:
@@ -148,8 +179,8 @@ class _Reader:
             if match is None:
                 raise self._mistake(f"{spelled[place:].strip()[:10]!r} can't be read")
             kind, content = str(match.lastgroup), match.group(str(match.lastgroup))
-            # Digits count as an exponent only right behind a symbol: m/s2, but not "m 2".
-            if kind == "number" and tokens and tokens[-1][0] == "symbol" and match.group() == content:
+            # Digits count as an exponent only right behind a symbol: m/s2, but not "m 2". None writes m0 for 1.
+            if kind == "number" and tokens and tokens[-1][0] == "symbol" and match.group() == content != "0":
                 kind = "exponent"
             tokens.append((kind, content))
             place = match.end()
@@ -163,13 +194,16 @@ class _Reader:
             if operator == " " and divided:
                 raise self._mistake("a blank after '/' is ambiguous; write N/(m s) or N/m*s")
             divided = divided or operator == "/"
-            result = combined(result, self._factor(), power=-1 if operator == "/" else 1)
+            result = combined(result, self._factor(below=operator == "/"), power=-1 if operator == "/" else 1)
         return result
 
-    def _factor(self) -> Scaled:
+    def _factor(self, *, below: bool = False) -> Scaled:
         # Only the bare 1 is a number that units have; anything else is a quantity, or a slip.
         kind, text = self._rest.pop(0) if self._rest else ("", "its end")
         if kind == "symbol":
+            glued = self._glued(text)
+            if glued is not None:
+                return glued
             result = self._resolve(text)
         elif (kind, text) == ("number", "1"):
             result = (1.0, {})
@@ -178,11 +212,33 @@ class _Reader:
         else:
             raise self._mistake(f"found {text!r} where a symbol is due")
         if self._rest and self._rest[0][0] == "exponent":
-            exponent = int(self._rest.pop(0)[1])
-            if abs(exponent) > MAX_EXPONENT:
-                raise self._mistake(f"exponents go to {MAX_EXPONENT}, found {exponent}")
+            exponent = self._exponent()
+            if below and exponent < 0:
+                raise self._mistake("a negative power behind '/' divides twice; write m/s^2 or m s^-2")
             result = combined((1.0, {}), result, power=exponent)
         return result
+
+    def _exponent(self) -> int:
+        exponent = int(self._rest.pop(0)[1])
+        if abs(exponent) > MAX_EXPONENT:
+            raise self._mistake(f"exponents go to {MAX_EXPONENT}, found {exponent}")
+        return exponent
+
+    def _glued(self, symbol: str) -> Scaled | None:
+        """A motion and its seconds written as one: ms^-2 is m s^-2 to whoever measures vibration, never 1/(ms)^2."""
+        if len(symbol) < 2 or symbol[-1] != "s" or not self._rest or self._rest[0][0] != "exponent":
+            return None
+        try:
+            scale, factors = self._resolve(symbol[:-1])
+        except SetupError:
+            return None
+        if list(factors.values()) != [1] or next(iter(factors)) not in {(motion, 0) for motion in MOTION}:
+            return None
+        exponent = self._exponent()
+        if exponent > 0:
+            meanings = f"{symbol[:-1]}/s^{exponent} or ({symbol})^{exponent}"
+            raise self._mistake(f"{symbol}^{exponent} may be meant as {meanings}; write which")
+        return combined((scale, factors), self._resolve("s"), power=exponent)
 
     def _group(self) -> Scaled:
         result = self._expression()

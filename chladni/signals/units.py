@@ -4,6 +4,7 @@ The symbols and their scales are in ``units.txt``, read by pint on first need; S
 """
 
 import re
+from collections.abc import Callable
 from difflib import get_close_matches
 from functools import lru_cache
 from math import isfinite
@@ -34,6 +35,20 @@ _REFUSED = {
     "dB": "decibels are logarithmic; give the linear value",
     "gram": "chladni reads g as gravity and has no gram; give masses in kg",
 }
+# Symbols; what is longer is a word, which may have a plural.
+_SHORT = 4
+# Those that capitals may hide: nobody means picojoules by PJ.
+_PREFIXES = ("", *"numckM", "nano", "micro", "milli", "centi", "kilo", "mega")
+# Prefixes in use where not all are. No sensor counts in gigaseconds, hectogravities or centivolts, and nobody divides
+# days: such a reading is one by the letter.
+_PREFIXES_OF = {
+    "meter": ("nano", "micro", "milli", "centi", "deci", "kilo", "pico"),
+    "second": ("pico", "nano", "micro", "milli"),
+    "standard_gravity": ("nano", "micro", "milli"),
+    "litre": ("micro", "milli", "centi", "deci", "hecto"),
+    "tonne": ("kilo",),
+} | dict.fromkeys(["minute", "hour", "day", "foot", "mil", "mile", "count", "order", "percent"], ())
+_RARE_PREFIXES = {"centi": ("newton",), "deci": ("bar",), "hecto": ("pascal",)}
 # Farther than any derivative in use: snap is m/s^4.
 _HIGHEST_DERIVATIVE = 6
 
@@ -66,7 +81,7 @@ def si_factor(unit: str) -> tuple[float, str]:
     >>> si_factor("kN/mm")
     (1000000.0, 'N/m')
     """
-    factor, exponents = read(unit, _si_symbol)
+    factor, exponents = read(unit, symbol_in_si)
     return factor, write(exponents)
 
 
@@ -85,11 +100,16 @@ def parse_quantity(text: str) -> tuple[float, str]:
     >>> parse_quantity("100 mV/m")
     (0.1, 'V/m')
     """
+    return quantity_by(text, si_factor)
+
+
+def quantity_by(text: str, unit_in_si: Callable[[str], tuple[float, str]]) -> tuple[float, str]:
+    """Read a number with its unit, the unit by `unit_in_si`, as `parse_quantity` does."""
     # Cut, because text from a file may be of any length and the message below repeats it.
     match = _QUANTITY.fullmatch(text[:200])
     if match is None or not isfinite(float(match["number"])):
         raise SetupError(f"quantity {text[:60]!r}: begins with no finite number; quantities look like '1.2 kN/mm'")
-    factor, unit = si_factor(match["unit"].strip())
+    factor, unit = unit_in_si(match["unit"].strip())
     value = float(match["number"]) * factor
     if not isfinite(value):
         raise SetupError(f"quantity {text[:60]!r}: too large for a floating point number in {unit}")
@@ -185,7 +205,8 @@ def _text(unit: str) -> Scaled:
     return read(unit, symbol_as_written)
 
 
-def _si_symbol(symbol: str) -> Scaled:
+def symbol_in_si(symbol: str) -> Scaled:
+    """Give the scale and the SI factors of one symbol, the `resolve` of what people write; `SetupError` else."""
     if symbol in SI_SYMBOLS:
         return symbol_as_written(symbol)
     return _known_symbol(symbol)
@@ -194,15 +215,64 @@ def _si_symbol(symbol: str) -> Scaled:
 @lru_cache(maxsize=256)
 def _known_symbol(symbol: str) -> Scaled:
     registry = _registry()
-    # pint would take the s of "Ns" for a plural; only whole words may have one.
-    readings: list[tuple[str, str]] = [
-        (prefix, name) for prefix, name, plural in registry.parse_unit_name(symbol) if not plural or len(symbol) > 4
-    ]
+    readings = _readings(symbol)
     if symbol in _REFUSED or not readings:
         raise SetupError(f"unit {symbol!r}: {_REFUSED.get(symbol) or _advice(symbol, registry)}")
     # A name without prefix comes first: "min" is a minute before it's a thousandth of an inch.
-    prefix, name = min(readings, key=lambda reading: len(reading[0]))
-    root = registry.Quantity(1.0, prefix + name).to_root_units()
+    return _scaled(*min(readings, key=lambda reading: len(reading[0])))
+
+
+def _readings(symbol: str, *, case_sensitive: bool = True) -> list[tuple[str, str]]:
+    """Prefix and name of each unit that a symbol may stand for."""
+    found = _registry().parse_unit_name(symbol, case_sensitive=case_sensitive)
+    # pint would take the s of "Ns" for a plural; only whole words may have one.
+    return [
+        (prefix, name)
+        for prefix, name, plural in found
+        if (not plural or len(symbol) > _SHORT) and (not prefix or _has_prefix(name, prefix))
+    ]
+
+
+def _has_prefix(name: str, prefix: str) -> bool:
+    if name in _PREFIXES_OF:
+        return prefix in _PREFIXES_OF[name]
+    return prefix not in _RARE_PREFIXES or name in _RARE_PREFIXES[prefix]
+
+
+@lru_cache(maxsize=256)
+def in_other_case(symbol: str) -> tuple[str, ...]:
+    """Give the symbols of different units that `symbol` is in capitals, or without: ``kHz`` for ``KHZ``."""
+    folded, names = symbol.casefold(), _names_by_folded()
+    # Where capitals and small letters stand side by side, a prefix is meant as it stands: mBar is no megabar.
+    mixed = not (symbol.islower() or symbol.isupper() or symbol.istitle())
+    singular = folded[:-1] if len(folded) > _SHORT and folded.endswith("s") else folded
+    words = [
+        prefix + name
+        for spelled in dict.fromkeys([folded, singular])
+        for prefix in _PREFIXES
+        if spelled.startswith(prefix.casefold()) and (not mixed or symbol.startswith((prefix, "K")))
+        for name in names.get(spelled[len(prefix) :], ())
+    ]
+    found: dict[tuple[float, str], str] = {}
+    for word in words:
+        try:
+            factor, exponents = symbol_in_si(word)
+        except SetupError:
+            continue
+        found.setdefault((factor, write(exponents)), word)
+    return tuple(found.values())
+
+
+@lru_cache(maxsize=1)
+def _names_by_folded() -> dict[str, list[str]]:
+    names: dict[str, list[str]] = {}
+    for name in map(str, _registry()):
+        names.setdefault(name.casefold(), []).append(name)
+    return names
+
+
+def _scaled(prefix: str, name: str) -> Scaled:
+    root = _registry().Quantity(1.0, prefix + name).to_root_units()
     result: Scaled = (float(root.magnitude), {})
     for dimension, exponent in root.dimensionality.items():
         result = combined(result, symbol_as_written(str(dimension).strip("[]")), power=round(float(exponent)))
@@ -211,10 +281,7 @@ def _known_symbol(symbol: str) -> Scaled:
 
 def _advice(symbol: str, registry: Any) -> str:
     known = sorted(name for name in map(str, registry) if len(name) <= len(symbol) + 2)
-    other_case = {
-        registry.get_symbol(prefix + name)
-        for prefix, name, _ in registry.parse_unit_name(symbol, case_sensitive=False)
-    }
+    other_case = {registry.get_symbol(prefix + name) for prefix, name in _readings(symbol, case_sensitive=False)}
     near = sorted(other_case) or get_close_matches(symbol, known, n=3, cutoff=0.5)
     joined = [f"{symbol[0]} {symbol[1:]}"] if len(symbol) == 2 and set(symbol) <= SI_SYMBOLS else []
     hint = f"; near: {', '.join(joined + near)}" if joined + near else ""

@@ -15,6 +15,7 @@ from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.wording import rounded_up
 from chladni.spectral.averaging import PeakHold, SegmentAverage, WeightedSum
 from chladni.spectral.held_samples import HeldSamples
 from chladni.spectral.segment_spectra import segment_spectra
@@ -249,6 +250,7 @@ class CrossSpectraAccumulator:
             averaging=self.averaging,
             detrend=self.segmentation.detrend,
             skipped=self.stretch.skipped,
+            longest_s=self.stretch.longest_run / self.sample_rate_hz,
             notes=self._notes(count.segments),
         )
 
@@ -265,7 +267,7 @@ class CrossSpectraAccumulator:
         if not longest and len(self.channels) == 1:
             return "no sample is a number (all are NaN); leave the channel out"
         if longest >= SHORTEST_SEGMENT:
-            remedy = f"ask for {self.sample_rate_hz / longest:.3g} Hz or coarser, or {remedy}"
+            remedy = f"ask for {rounded_up(self.sample_rate_hz / longest)} Hz or coarser, or {remedy}"
         return (
             f"no segment of {samples / self.sample_rate_hz:g} s ({samples} samples) fits between gaps: the longest "
             f"stretch {where} has {longest} samples; {remedy}"

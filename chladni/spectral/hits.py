@@ -55,6 +55,8 @@ class Impacts:
         Force at which a hit begins, in the channel's unit, with the sign of the pulses.
     pretrigger_s, record_s
         A record begins `pretrigger_s` before the trigger and lasts `record_s`.
+    longest_s
+        Longest record that fits between the hits as they usually follow each other.
     pulse_s
         Typical width of the force pulse at half its height.
     accepted, rejected
@@ -67,6 +69,7 @@ class Impacts:
     trigger_level: float
     pretrigger_s: float
     record_s: float
+    longest_s: float
     pulse_s: float
     accepted: tuple[Hit, ...]
     rejected: tuple[Rejection, ...]
@@ -106,7 +109,7 @@ class Judge:
             self._weak(at),
             self._ringing(at),
             self._missing(inside),
-            self._beyond(first),
+            self._beyond(at, first),
         ]
         return [reason for reason in found if reason]
 
@@ -155,7 +158,8 @@ class Judge:
         valid = self.series.valid
         return "samples are missing in it" if valid is not None and not valid[:, inside].all() else ""
 
-    def _beyond(self, first: int) -> str:
-        if first < 0:
-            return "its pretrigger begins before the log"
+    def _beyond(self, at: int, first: int) -> str:
+        # Of a hit that begins with the log only silence is missing; of one that is under way, the force.
+        if self.pulses.starts[at] == 0:
+            return "its pulse begins before the log"
         return "its record ends after the log" if first + self.length > self.pulses.force.size else ""

@@ -8,6 +8,7 @@ from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.wording import rounded_up
 from chladni.spectral.accumulator import line_frequencies_hz, one_sided_weights
 from chladni.spectral.force_pulses import (
     LONGEST_PULSE_S,
@@ -92,8 +93,8 @@ def find_impacts(
     -------
     Impacts
         With a `Rejection` for each hit left out: overload (a channel's limit reached, or a crest cut flat), a double
-        hit, a hit too weak, samples missing, a record that begins while the hit before still rings or that leaves
-        the log.
+        hit, a hit too weak, samples missing, a record that begins while the hit before still rings or that ends after
+        the log, a pulse that begins before it. What a record lacks before the log is taken for silence.
 
     Raises
     ------
@@ -111,9 +112,8 @@ def find_impacts(
     pulse = int(np.median(pulses.widths))
     # The pulse crosses the trigger at a tenth of its height, less than one width after it began.
     before = 2 * pulse if pretrigger_s is None else round(pretrigger_s * rate_hz)
-    length = (
-        _record_length(pulses.starts, before, pulses.force.size) if record_s is None else round(record_s * rate_hz)
-    )
+    longest = _record_length(pulses.starts, before, pulses.force.size)
+    length = longest if record_s is None else round(record_s * rate_hz)
     if not 0 <= before < length:
         raise EstimateError(
             f"a record of {length / rate_hz:g} s can't hold {before / rate_hz:g} s of pretrigger; make it longer"
@@ -125,6 +125,7 @@ def find_impacts(
         trigger_level=pulses.sign * pulses.level,
         pretrigger_s=before / rate_hz,
         record_s=length / rate_hz,
+        longest_s=longest / rate_hz,
         pulse_s=pulse / rate_hz,
         accepted=accepted,
         rejected=rejected,
@@ -168,8 +169,7 @@ def impact_cross_spectra(
     Brown (1977), the correction of damping after Fladung & Rost (1997).
     """
     if not impacts.accepted:
-        reasons = "; ".join(f"record {r.record}: {r.reason}" for r in impacts.rejected) or "no hit was found"
-        raise EstimateError(f"no hit of {impacts.force!r} was accepted ({reasons})")
+        raise EstimateError(f"no hit of {impacts.force!r} was accepted{_why_none(impacts)}")
     if not 0 <= decay_per_s < np.inf:
         raise EstimateError(f"decay_per_s is {decay_per_s}; it must be 0 or positive")
     rate_hz = series.sample_rate_hz
@@ -187,6 +187,16 @@ def impact_cross_spectra(
         bandwidth_hz=1 / impacts.record_s,
         provenance=_provenance(series, impacts, force_window=force_window, decay_per_s=decay_per_s),
     )
+
+
+def _why_none(impacts: Impacts) -> str:
+    if impacts.record_s > impacts.longest_s:
+        return (
+            f": records of {impacts.record_s:.3g} s are longer than the {impacts.longest_s:.3g} s between hits; ask "
+            f"for a resolution of {rounded_up(1 / impacts.longest_s)} Hz or coarser, or hit at longer intervals"
+        )
+    reasons = "; ".join(f"record {r.record}: {r.reason}" for r in impacts.rejected) or "no hit was found"
+    return f" ({reasons})"
 
 
 def _record_length(starts: NDArray[np.int64], before: int, samples: int) -> int:
@@ -213,15 +223,15 @@ def _advice(pulses: Pulses, double_hit_share: float, accepted: int) -> tuple[str
 def _record(series: TimeSeries, impacts: Impacts, hit: Hit, length: int) -> Samples:
     """Samples of one hit, each channel freed of its offset."""
     first = round(hit.time_s * series.sample_rate_hz) - round(impacts.pretrigger_s * series.sample_rate_hz)
-    record = series.values[:, first : first + length].astype(np.float64)
-    if first < 0 or record.shape[1] < length:
+    silent = max(-first, 0)
+    record = series.values[:, first + silent : first + length].astype(np.float64)
+    if silent + record.shape[1] < length:
         raise EstimateError(f"record {hit.record} leaves the series; give the one in which the impacts were found")
     offset = record.mean(axis=1)
     # The mean of a force holds its pulse; what it reads in silence is the median.
     force = series.index(impacts.force)
     offset[force] = np.median(record[force])
-    centred: Samples = record - offset[:, np.newaxis]
-    return centred
+    return np.pad(record - offset[:, np.newaxis], ((0, 0), (silent, 0)))
 
 
 def _windows(series: TimeSeries, impacts: Impacts, length: int, *, force_window: bool, decay_per_s: float) -> Samples:
@@ -247,6 +257,7 @@ def _provenance(series: TimeSeries, impacts: Impacts, *, force_window: bool, dec
         averaging="impact",
         window_decay_per_s=decay_per_s,
         skipped=len(impacts.rejected),
+        longest_s=impacts.longest_s,
         notes=(*impacts.notes, *notes, *_still_ringing(series, impacts, decay_per_s)),
     )
 

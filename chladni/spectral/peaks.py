@@ -14,11 +14,13 @@ from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
 from chladni.spectral.leakage import leakage, line_correlation, named_window
+from chladni.spectral.uncertainty import std_or_scatter
 from chladni.spectral.windows import noise_bandwidth_bins
 
 # The floor around a line is the median of a tenth of the spectrum, of this many lines at least.
 FLOOR_SHARE = 0.1
 FLOOR_LINES = 51
+FEWEST_LINES = 5
 # Interpolation between lines is never better than this share of a line: windows and resonances are not parabolas.
 INTERPOLATION_LINES = 0.02
 # Estimates said to be exact still scatter by rounding and by the slow change of any machine; one that is as uncertain
@@ -36,7 +38,11 @@ MOST_PEAKS = 10
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Curve:
-    """Power over frequency, of one function, with what is needed to judge a maximum of it."""
+    """Power over frequency, of one function, with what is needed to judge a maximum of it.
+
+    `sampled`: whether the lines are points of the function itself, as of those that a file holds ready-made; nothing
+    is known of a window that would have smeared them.
+    """
 
     frequency_hz: Floats
     power: Floats
@@ -47,6 +53,7 @@ class _Curve:
     line_sampled: bool
     window: Floats
     tonal: bool
+    sampled: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +107,7 @@ def find_peaks(
     2. its ratio to the deepest line on either side, up to a higher peak, exceeds F(nu, nu) at `false_alarm` over the
        number of pairs of lines that were compared to find it;
     3. that ratio is `min_prominence_db` or more;
-    4. it lies above two noise bandwidths, where an offset or a trend leaks.
+    4. it lies above `judged_above_hz`; the line at 0 Hz is nobody's valley, since the mean is taken off.
 
     The frequency comes from the three highest lines by the window's own main lobe, when the peak is as narrow as
     that; otherwise from a fit of 1/G = a + b f + c f^2 (a resonance near its top) to the lines above half the peak.
@@ -152,7 +159,8 @@ def find_response_peaks(
     -------
     tuple of Peak
         The highest first; ``channels`` are the response and its reference. Heights are magnitudes. Lines whose
-        coherence unrelated channels would show with a chance of 0.1 % or more hold no peak.
+        coherence unrelated channels would show with a chance of 0.1 % or more hold no peak. Of functions without
+        error bars, as files of other programs hold them, the scatter is what lines differ from their neighbours by.
 
     Raises
     ------
@@ -189,18 +197,22 @@ def _density_curve(density: PowerSpectralDensity, row: int) -> _Curve:
 
 
 def _response_curve(response: FrequencyResponse, row: int, column: int) -> _Curve:
-    magnitude, std = np.abs(response.values[row, column]), response.std[row, column]
-    usable = response.excited & np.isfinite(magnitude) & (magnitude > 0)
-    spacing_hz = _spacing(response.frequency_hz)
+    values = response.values[row, column]
+    usable = response.excited & np.isfinite(values) & (values != 0)
+    magnitude, std = np.abs(values[usable]), response.std[row, column, usable]
+    if _without_averages(response):
+        std = std_or_scatter(values[usable], std)
     # A magnitude wrong by 1 % is a power wrong by 2 %.
     return _curve(
         response.frequency_hz[usable],
-        magnitude[usable] ** 2,
-        2 * std[usable] / magnitude[usable],
+        magnitude**2,
+        2 * std / magnitude,
         trusted=_coherent(response, row)[usable],
         provenance=response.provenance,
-        bandwidth_hz=spacing_hz * noise_bandwidth_bins(named_window(response.provenance.window)),
+        bandwidth_hz=_bandwidth_hz(response),
         tonal=False,
+        # Whoever averaged elsewhere doesn't say how: the lines are points of the function itself.
+        sampled=not response.provenance.effective_averages,
     )
 
 
@@ -213,21 +225,49 @@ def _curve(
     provenance: Provenance,
     bandwidth_hz: float,
     tonal: bool,
+    sampled: bool = False,
 ) -> _Curve:
-    line_sampled = provenance.averaging == "periodic"
-    # Whole periods don't leak, and a transient that has died away has no trend: only the offset itself is excluded.
-    first_hz = 0.0 if line_sampled or provenance.averaging == "impact" else 2 * bandwidth_hz
     return _Curve(
         frequency_hz=frequency_hz,
         power=power,
         relative_std=np.clip(relative_std, SMALLEST_RELATIVE_STD, LARGEST_RELATIVE_STD),
         trusted=trusted,
         spacing_hz=_spacing(frequency_hz),
-        first_hz=first_hz,
-        line_sampled=line_sampled,
+        first_hz=0.0 if sampled else _leaks_below_hz(provenance, bandwidth_hz),
+        line_sampled=provenance.averaging == "periodic",
         window=named_window(provenance.window),
         tonal=tonal,
+        sampled=sampled,
     )
+
+
+def judged_above_hz(estimate: PowerSpectralDensity | FrequencyResponse) -> float:
+    """Frequency above which peaks are looked for: the noise bandwidth of the window, below which a trend leaks.
+
+    0 for whole periods, which don't leak, and for hits, whose transient has died away: only the offset is left out.
+
+    Examples
+    --------
+    >>> from chladni.signals.channel import Channel
+    >>> line_hz = np.arange(5.0)
+    >>> density = PowerSpectralDensity(
+    ...     frequency_hz=line_hz, values=line_hz[None], std=line_hz[None], channels=(Channel(name="a", unit="m"),),
+    ...     bandwidth_hz=1.5, provenance=Provenance(window="hann"),
+    ... )
+    >>> judged_above_hz(density)
+    1.5
+    """
+    return _leaks_below_hz(estimate.provenance, _bandwidth_hz(estimate))
+
+
+def _bandwidth_hz(estimate: PowerSpectralDensity | FrequencyResponse) -> float:
+    if isinstance(estimate, PowerSpectralDensity):
+        return estimate.bandwidth_hz
+    return _spacing(estimate.frequency_hz) * noise_bandwidth_bins(named_window(estimate.provenance.window))
+
+
+def _leaks_below_hz(provenance: Provenance, bandwidth_hz: float) -> float:
+    return 0.0 if provenance.averaging in ("periodic", "impact") else bandwidth_hz
 
 
 def _coherent(response: FrequencyResponse, row: int) -> NDArray[np.bool_]:
@@ -235,14 +275,26 @@ def _coherent(response: FrequencyResponse, row: int) -> NDArray[np.bool_]:
 
     With few averages the std is itself an accident, small on some of many lines; the coherence tells which.
     """
+    if _without_averages(response):
+        return np.ones(response.frequency_hz.shape, bool)
     freedom = max(response.provenance.effective_averages - len(response.references), 0.0)
     return np.asarray((1 - response.coherence[row]) ** freedom <= COHERENT_BY_CHANCE)
+
+
+def _without_averages(response: FrequencyResponse) -> bool:
+    """Whether nothing was averaged: a file that tells of no averages, or a hit a reference.
+
+    The force of a single hit has no line of chance, as a single segment of a random one has.
+    """
+    account = response.provenance
+    single = account.averaging == "impact" and account.effective_averages <= len(response.references)
+    return single or not account.effective_averages
 
 
 def _significant(curve: _Curve, min_prominence_db: float, false_alarm: float) -> list[_Found]:
     """Every maximum of a curve that the scatter of its lines doesn't explain."""
     power = curve.power
-    if power.size < 5:
+    if power.size < FEWEST_LINES:
         return []
     over_floor = power / _floor(curve)
     freedom = 2 / curve.relative_std**2
@@ -252,9 +304,11 @@ def _significant(curve: _Curve, min_prominence_db: float, false_alarm: float) ->
     loud = (scipy.special.chdtrc(freedom, freedom * over_floor) <= chance) & curve.trusted & (curve.relative_std <= 1)
     # Once for all peaks: inverting the chi-squared distribution is most of the work here.
     sure = power * freedom / scipy.special.chdtri(freedom, 1 - UPPER_BOUND_CHANCE)
+    # Of the line at 0 Hz, whose mean is taken off, any slow motion would stand out.
+    lowest = int(curve.first_hz > 0 and curve.frequency_hz[0] < 0.5 * curve.spacing_hz)
     found = []
     for line in np.flatnonzero(loud & _maxima(curve)):
-        valley = _valley(power, sure, int(line))
+        valley = _valley(power[lowest:], sure[lowest:], int(line) - lowest) + lowest
         ratio, pairs = power[line] / power[valley], abs(int(line) - valley)
         surprise = scipy.special.fdtrc(freedom[line], freedom[valley], ratio)
         if surprise * pairs <= chance and 10 * np.log10(ratio) >= min_prominence_db:
@@ -308,6 +362,9 @@ def _located(curve: _Curve, line: int, over_floor: float) -> _Found:
     else:
         run = _above_half(curve, line)
         narrow = run.size <= 2 * noise_bandwidth_bins(curve.window) + 1
+        if narrow and curve.sampled:
+            # Three points of a lone resonance tell all of it, however narrow it is.
+            run, narrow = np.arange(line - 1, line + 2), False
         frequency_hz, std_hz, power = _from_three(curve, line) if narrow else _from_resonance(curve, line, run)
     return _Found(
         frequency_hz=frequency_hz,

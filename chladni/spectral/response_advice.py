@@ -6,12 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.provenance import Provenance
+from chladni.signals.wording import counted, rounded_up
 
 # H2/H1 = 1/coherence: 5 % apart in the median is more than a calibration's uncertainty.
 SPREAD_WORTH_A_WORD = 0.05
 HARDLY_COHERENT = 0.3
 # Four lines in the half-power bandwidth keep the bias of a peak near 2 % (Bendat & Piersol 2010, section 8.5.1).
 LINES_PER_PEAK = 4.0
+# Segments end to end, below which averages tell little from chance.
+FEWEST_SEGMENTS = 4
+# A longer segment is worth asking for from here.
+MUCH_LONGER = 1.05
 # Peaks are judged where the estimate is sure enough for a width to mean something.
 TRUSTED_COHERENCE = 0.5
 PROMINENCE = 3.0
@@ -21,6 +27,52 @@ def response_notes(response: FrequencyResponse) -> FrequencyResponse:
     """Add the notes on H1/H2 spread, resolution and number of averages to a response."""
     notes = [*_spread_note(response), *_resolution_notes(response), *_averages_note(response)]
     return replace(response, provenance=response.provenance.with_notes(*notes))
+
+
+def longest_segment_s(account: Provenance, *, segments: float = FEWEST_SEGMENTS) -> float:
+    """Longest segment of which so many fit end to end into what was averaged, or the longest record between hits.
+
+    0 where that isn't known: functions of a file, whole periods.
+    """
+    if account.averaging == "impact":
+        return account.longest_s
+    if account.averaging == "periodic" or not account.averages:
+        return 0.0
+    whole_s = account.segment_s * (1 + (account.averages - 1) * (1 - account.overlap))
+    return min(whole_s / segments, account.longest_s or whole_s)
+
+
+def closer_lines(account: Provenance, *, step_hz: float, wanted_hz: float, longest_s: float | None = None) -> str:
+    """Say how to get lines so close: by an option as far as the record allows, beyond by what to measure.
+
+    Parameters
+    ----------
+    account
+        Of the estimate.
+    step_hz, wanted_hz
+        Distance of its lines, and the one that is wanted.
+    longest_s
+        Longest segment that may be asked for; None for `longest_segment_s`.
+    """
+    times = _times(step_hz / wanted_hz)
+    if account.averaging == "periodic":
+        return f"a period {times} as long helps"
+    longest_s = longest_segment_s(account) if longest_s is None else longest_s
+    if not longest_s:
+        return f"lines {rounded_up(wanted_hz, digits=2)} Hz apart help, from records {times} as long"
+    if longest_s * wanted_hz >= 1:
+        return f"ask for a resolution of {rounded_up(wanted_hz, digits=2)} Hz"
+    if account.averaging == "impact":
+        further = f"records of {1 / wanted_hz:.2g} s help: hit at longer intervals"
+    else:
+        further = f"a record {_times(1 / (longest_s * wanted_hz))} as long helps"
+    if longest_s < MUCH_LONGER * account.segment_s:
+        return further
+    return f"ask for a resolution of {rounded_up(1 / longest_s)} Hz; {further} further"
+
+
+def _times(factor: float) -> str:
+    return f"{factor:.0f} times" if factor >= 10 else f"{factor:.2g} times"
 
 
 def half_power_lines(magnitude: NDArray[np.float64], peak: int) -> float:
@@ -64,8 +116,9 @@ def _spread_note(response: FrequencyResponse) -> list[str]:
 
 
 def _resolution_notes(response: FrequencyResponse) -> list[str]:
+    account = response.provenance
     # Whole periods don't leak: their lines are exact, however few.
-    if response.provenance.averaging == "periodic":
+    if account.averaging == "periodic":
         return []
     spacing = float(response.frequency_hz[1] - response.frequency_hz[0])
     notes = []
@@ -74,12 +127,20 @@ def _resolution_notes(response: FrequencyResponse) -> list[str]:
         if narrowest is None:
             continue
         peak, width = narrowest
+        closer = closer_lines(account, step_hz=spacing, wanted_hz=width * spacing / LINES_PER_PEAK)
         notes.append(
             f"{channel.name}: the peak at {response.frequency_hz[peak]:.4g} Hz is {width:.1f} lines wide at half "
-            f"power and reads low by about {1 / (3 * width**2):.0%} or more; ask for "
-            f"{width * spacing / LINES_PER_PEAK:.2g} Hz or finer"
+            f"power and {_reads_low(account, width)}; {closer}"
         )
     return notes
+
+
+def _reads_low(account: Provenance, width: float) -> str:
+    """By how much: a window averages over the peak; of a transient that has died away the lines are exact."""
+    if account.averaging == "impact":
+        # |H| of a resonance half a line off its top.
+        return f"reads low by up to {1 - 1 / np.hypot(1, 1 / width):.0%} between the lines"
+    return f"reads low by about {1 / (3 * width**2):.0%} or more"
 
 
 def _narrowest_peak(response: FrequencyResponse, row: int) -> tuple[int, float] | None:
@@ -104,8 +165,10 @@ def _averages_note(response: FrequencyResponse) -> list[str]:
     averages = response.provenance.effective_averages
     if averages > len(response.references):
         return []
+    hits = response.provenance.averaging == "impact"
     note = (
-        f"{averages:.3g} effective averages can't part {len(response.references)} references from noise, and "
-        "coherence is 1 whatever the data; ask for a coarser resolution or a longer record"
+        f"{averages:.3g} effective averages can't part {counted(len(response.references), 'reference')} from noise, "
+        "and coherence is 1 whatever the data; "
+        f"{'take more hits' if hits else 'ask for a coarser resolution, or measure longer'}"
     )
     return [note]

@@ -6,6 +6,7 @@ from math import floor, isfinite, log2
 from typing import Literal
 
 from chladni.signals.errors import EstimateError, SetupError
+from chladni.signals.wording import rounded_up
 from chladni.spectral.windows import Window
 
 Detrend = Literal["none", "constant", "linear"]
@@ -161,9 +162,9 @@ def _samples_for(resolution_hz: float, sample_rate_hz: float, samples_available:
     # What was asked for comes before a length that transforms fast: the transform takes any length.
     samples = round(sample_rate_hz / resolution_hz)
     if samples_available is not None and samples_available < samples:
+        needed_s, there_s = samples / sample_rate_hz, samples_available / sample_rate_hz
         raise SetupError(
-            f"resolution {resolution_hz:g} Hz needs segments of {samples / sample_rate_hz:g} s, but the record is "
-            f"{samples_available / sample_rate_hz:g} s long; ask for {sample_rate_hz / samples_available:.3g} Hz or "
-            "coarser"
+            f"resolution {resolution_hz:g} Hz needs segments of {needed_s:g} s, but the record is {there_s:g} s "
+            f"long; ask for {rounded_up(1 / there_s)} Hz or coarser"
         )
     return samples

@@ -45,13 +45,16 @@ def mode_ticks(modes: ModeSet) -> tuple[str, ...]:
 
 
 def mode_table(modes: ModeSet, validation: ModeValidation | None) -> tuple[Row, list[Row]]:
-    """Give headings and rows: number, frequency and damping with one sigma, phase collinearity, modal mass."""
+    """Give headings and rows: number, frequency and damping with one sigma, phase collinearity, modal mass.
+
+    A single channel has one component in each shape, and no phase to compare.
+    """
     columns: list[tuple[str, list[str]]] = [
         ("Mode", [str(row + 1) for row in range(modes.frequency_hz.size)]),
         ("Frequency [Hz]", _estimates(modes.frequency_hz, modes.frequency_std_hz)),
         ("Damping [%]", _estimates(modes.damping_ratio * 100, modes.damping_std * 100)),
     ]
-    if validation is not None:
+    if validation is not None and len(modes.channels) > 1:
         columns += [
             ("MPC", [f"{value:.3f}" for value in validation.mpc]),
             ("MPD [deg]", [f"{value:.1f}" for value in validation.mpd_deg]),

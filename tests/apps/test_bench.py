@@ -119,6 +119,30 @@ def test_a_stretch_outside_the_log_is_told(log: Any) -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_a_data_file_is_held_beside_as_a_log_is(tmp_path: Path) -> None:
+    values = np.random.default_rng(1).standard_normal((2, 2000))
+    made = made_log(tmp_path, values)
+    np.savetxt(tmp_path / "made.csv", values.T, delimiter=",", header="flow,velocity", comments="", fmt="%.17g")
+    with pytest.raises(SetupError, match=r"dropped\.csv: .*--rate HZ"):
+        OpenedLog(tmp_path / "made.csv", "dropped.csv", private=False)
+    reading = {"sample_rate_hz": 1000.0, "units": {"flow": "m^3/s", "velocity": "m/s"}}
+    file = OpenedLog(tmp_path / "made.csv", "dropped.csv", private=False, reading=reading)
+    assert file.duration_s == pytest.approx(2.0)
+    assigned = assign(MOTOR.model(), file.channels)
+    assert {name: assigned[name] for name in BOTH} == {"flow": "flow", "velocity": "velocity"}
+    chosen = {"flow": "flow", "velocity": "velocity"}
+    ours, theirs = (compare(MOTOR.model(), one, names, 0.0, 1.0) for one, names in ((file, chosen), (made, BOTH)))
+    assert [one.value for one in ours.quantities] == pytest.approx([one.value for one in theirs.quantities], rel=1e-6)
+
+
+def test_a_file_without_samples_over_time_says_what_it_holds(tmp_path: Path) -> None:
+    from tests.io.files.test_uff_contents import write_functions
+
+    write_functions(tmp_path / "frf.uff")
+    with pytest.raises(LogError, match=r"holds 1 frequency response and \d modes, but no samples over time"):
+        OpenedLog(tmp_path / "frf.uff", "frf.uff", private=False)
+
+
 def made_log(
     tmp_path: Path, values: np.ndarray, *, valid: np.ndarray | None = None, rate_hz: float = 1000.0
 ) -> OpenedLog:

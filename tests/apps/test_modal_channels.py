@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from chladni.apps.modal_channels import excitation_names, motions_of_one_unit, responses_alone
+from chladni.apps.excitation import excitation_names
+from chladni.apps.modal_channels import motions_of_one_unit, responses_alone
+from chladni.apps.modes import identify_modes
 from chladni.apps.sources import Span, no_progress
+from chladni.apps.spectra import frf
 from chladni.io.log import open_log
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
@@ -44,8 +47,10 @@ def test_without_marks_the_first_force_that_changes_is_the_excitation():
 
 @pytest.mark.parametrize("series", [noise(ONE, TWO), noise(ONE, HAMMER, still=["hammer"])])
 def test_no_excitation_is_told_with_both_remedies(series):
-    with pytest.raises(EstimateError, match=r"name it as reference.*responses alone"):
-        excitation_names(series, Span())
+    with pytest.raises(EstimateError, match=r"name it as reference \(--reference\).*responses alone.*there are one"):
+        identify_modes(series)
+    with pytest.raises(EstimateError, match=r"name it as reference \(--reference\); there are one"):
+        frf(series)
 
 
 def test_motions_of_the_most_common_unit_are_chosen_and_the_others_named():
@@ -105,7 +110,10 @@ def test_named_channels_of_a_log_are_taken_as_they_are(log):
     assert notes == ()
 
 
-def test_named_channels_of_two_grids_are_refused_by_the_log(log):
+def test_named_channels_of_two_grids_are_joined_and_it_is_said(log):
     names = ["/slow/a.accel.linear.x", "/fast/a.accel.linear.x"]
-    with pytest.raises(Exception, match="/slow/a"):
-        responses_alone(log, names, Span(), progress=no_progress)
+    samples, notes = responses_alone(log, names, Span(), progress=no_progress)
+    assert samples.names == tuple(names)
+    (note,) = notes
+    assert note.startswith("2 sampling grids joined: brought to ")
+    assert "band-limited" in note

@@ -10,6 +10,7 @@ from chladni.signals.errors import EstimateError, LogError
 from chladni.signals.testing import assert_close
 from chladni.signals.time_series import TimeSeries
 from tests.arm import FORCE, TOOL, WRIST, write_arm
+from tests.make_logs import FLOAT64, LogMaker
 
 
 @pytest.fixture(scope="module")
@@ -99,8 +100,54 @@ def test_responses_default_to_what_moves_on_the_references_clock(tmp_path):
     with chladni.open_log(two_rates(tmp_path)) as log:
         with pytest.raises(EstimateError, match="response"):
             chladni.frf(log, reference="/slow.accel.linear.x")
+        named = chladni.frf(log, reference="/slow.accel.linear.x", response="/fast.accel.linear.x")
+    assert named.frequency_hz[-1] == 50.0
+    assert any("2 sampling grids joined: brought to 100 Hz by band-limited" in one for one in named.provenance.notes)
+
+
+LATE_S, GAIN = 0.012, 0.5
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory):
+    """Commands at 50 Hz, and a state at 250 Hz that is half of what was commanded three samples before."""
+    path = tmp_path_factory.mktemp("driven") / "drive.mcap"
+    commands = np.random.default_rng(4).standard_normal(6000)
+    state = GAIN * np.repeat(commands, 5)
+    start_ns = 1_700_000_000_000_000_000
+    with LogMaker(path) as maker:
+        command = maker.ros2("/drive", "my_msgs/msg/MotorCommand", FLOAT64)
+        encoder = maker.ros2("/encoder", "std_msgs/msg/Float64", FLOAT64)
+        for number, value in enumerate(commands):
+            maker.write(command, {"data": value}, start_ns + number * 20_000_000)
+        for number, value in enumerate(state):
+            maker.write(encoder, {"data": value}, start_ns + number * 4_000_000 + round(LATE_S * 1e9))
+    return path
+
+
+def test_commands_are_held_between_their_messages(driven):
+    with chladni.open_log(driven) as log:
+        found = chladni.frf(log, reference="/drive.data", response="/encoder.data", resolution_hz=0.5)
+    assert found.frequency_hz[-1] == 125.0
+    low = (found.frequency_hz > 0.5) & (found.frequency_hz < 24.0)
+    expected = GAIN * np.exp(-2j * np.pi * LATE_S * found.frequency_hz)
+    # The state is exact; what is left of windows of 2 s of a delay of 12 ms.
+    np.testing.assert_allclose(found.values[0, 0, low], expected[low], atol=0.02)
+    assert any("its message type is a command" in note for note in found.provenance.notes)
+
+
+def test_the_way_of_joining_can_be_named(driven):
+    with chladni.open_log(driven) as log:
+        smooth = chladni.frf(log, reference="/drive.data", response="/encoder.data", join="band-limited")
+        series = log.read(["/encoder.data", "/drive.data"], join="auto")
         with pytest.raises(LogError, match="different sampling grids"):
-            chladni.frf(log, reference="/slow.accel.linear.x", response="/fast.accel.linear.x")
+            log.read(["/encoder.data", "/drive.data"])
+    assert smooth.frequency_hz[-1] == 25.0
+    assert not any("held" in note for note in smooth.provenance.notes)
+    assert [channel.name for channel in series.channels] == ["/encoder.data", "/drive.data"]
+    assert series.sample_rate_hz == 250.0
+    # Both begin where the encoder does, three samples after the first command.
+    np.testing.assert_array_equal(series.values[0, 3:], GAIN * series.values[1, :-3])
 
 
 def test_a_response_of_a_series_and_of_its_log_agree(arm_log):
@@ -155,11 +202,36 @@ def test_variance_slower_than_the_segments_is_told(tmp_path):
     with log_of(tmp_path, rows) as log:
         (coarse,), (fine,) = densities(log), densities(log, averaging=Averaging(resolution_hz=0.1))
     (note,) = coarse.provenance.notes
-    within = coarse.values[0].sum() * coarse.frequency_hz[1]
+    # Lines 0.781 Hz apart, peaks from 1.17 Hz on: what lies above is leakage.
+    above = coarse.frequency_hz > 1.2
+    within = coarse.values[0, above].sum() * coarse.frequency_hz[1]
     assert note.startswith("/stroke.accel.linear.x: up to ")
-    assert f"{1 - within / rows['stroke'].var():.0%} of the variance" in note
-    assert "finer than 0.781 Hz" in note
+    share = float(note.split("up to ")[1].split("%")[0]) / 100
+    assert share == pytest.approx(1 - within / rows["stroke"].var(), abs=0.02)
+    assert "slower than 1.17 Hz" in note
+    assert "ask for a resolution of 0.18 Hz" in note
     assert not fine.provenance.notes
+
+
+def test_a_tone_in_lines_that_are_not_judged_is_told_with_what_shows_it():
+    # 5 s at 400 Hz have lines 6.25 Hz apart, of which those above 9.4 Hz are judged.
+    time_s = np.arange(2000) / 400
+
+    def tone(frequency_hz):
+        values = np.sin(2 * np.pi * frequency_hz * time_s)[np.newaxis]
+        return TimeSeries(values=values, sample_rate_hz=400.0, channels=(Channel(name="a", unit="m/s^2"),))
+
+    found = chladni.psd(tone(20.0))
+    assert found.provenance.notes == ()
+    (peak,) = chladni.find_peaks(found)
+    assert peak.frequency_hz == pytest.approx(20.0, abs=0.05)
+    below = chladni.psd(tone(6.0))
+    assert chladni.find_peaks(below) == ()
+    (note,) = below.provenance.notes
+    assert "slower than 9.38 Hz" in note
+    asked_hz = float(note.split("ask for a resolution of ")[1].split(" Hz")[0])
+    (followed,) = chladni.find_peaks(chladni.psd(tone(6.0), resolution_hz=asked_hz))
+    assert followed.frequency_hz == pytest.approx(6.0, abs=asked_hz / 2)
 
 
 def test_the_variance_of_a_large_log_is_watched_block_by_block(tmp_path, large):
@@ -185,13 +257,14 @@ def test_segments_that_a_gap_costs_are_told(tmp_path):
 
 def test_no_segment_between_gaps_says_which_resolution_would_do(tmp_path):
     valid = np.ones((1, 4000), dtype=bool)
-    # As even as every fiftieth would be the ticks of a clock that is coarser than the sampling.
-    valid[0, np.cumsum(np.append(50, np.random.default_rng(1).integers(20, 51, 100)))] = False
+    # At random, 49 samples apart at most: an even one in fifty is what a clock that ticks every 10 ms makes of 98 Hz.
+    lost = np.cumsum(np.append(49, np.random.default_rng(8).integers(3, 51, 300)))
+    valid[0, lost[lost < 4000]] = False
     rows = {"a": np.random.default_rng(3).standard_normal(4000)}
     with log_of(tmp_path, rows, rate_hz=100.0, valid=valid) as log:
-        with pytest.raises(EstimateError, match=r"/a\.accel.*ask for 2\.04 Hz or coarser"):
+        with pytest.raises(EstimateError, match=r"/a\.accel.*ask for 2\.05 Hz or coarser"):
             densities(log, averaging=Averaging(resolution_hz=1.0))
-        assert densities(log, averaging=Averaging(resolution_hz=2.04))
+        assert densities(log, averaging=Averaging(resolution_hz=2.05))
         # Without a wish the segments are as long as fit: 32 of the 49 samples between gaps.
         (density,) = densities(log)
         assert density.frequency_hz[1] == pytest.approx(100 / 32)

@@ -31,7 +31,7 @@ def test_an_existing_file_is_kept_unless_told(run, arm_log, tmp_path):
 def test_options_of_the_file_kinds(run, tmp_path):
     table = tmp_path / "a.csv"
     table.write_text("0,1.5\n1,2.5\n2,3.5\n3,2.5\n")
-    outcome = run("convert", table, tmp_path / "a.mcap", "--read", "time_unit=ms", "--json", "-")
+    outcome = run("convert", table, tmp_path / "a.mcap", "--time-unit", "ms", "--json", "-")
     assert outcome.code == 0, outcome.err
     assert outcome.document["duration_s"] == pytest.approx(0.004)
 
@@ -52,8 +52,8 @@ def test_columns_of_a_table_without_titles_get_names_and_units(run, tmp_path):
     table.write_text("0,1.5,7\n1,2.5,8\n2,3.5,9\n3,2.5,8\n")
     refused = run("convert", table, target)
     assert refused.code == 2
-    assert "--read time_unit=ms" in refused.err
-    options = ("--read", "time_unit=ms", "--read", "names=t,force, tip", "--read", "units=force:N,tip:g")
+    assert "--time NAME --time-unit s" in refused.err
+    options = ("--time-unit", "ms", "--read", "names=t,force, tip", "--read", "units=force:N,tip:g")
     assert run("convert", table, target, *options).code == 0
     with chladni.open_log(target) as log:
         assert [(channel.name, channel.unit) for channel in log.channels] == [
@@ -61,6 +61,19 @@ def test_columns_of_a_table_without_titles_get_names_and_units(run, tmp_path):
             ("/daq.tip", "m/s^2"),
         ]
         np.testing.assert_allclose(log.read().values[1], np.array([7, 8, 9, 8]) * 9.80665)
+
+
+def test_what_is_not_read_is_told(run, tmp_path):
+    table = tmp_path / "a.csv"
+    table.write_text("n,state,a\n" + "".join(f"{index * 5},on,{index % 7}\n" for index in range(60)))
+    outcome = run("convert", table, tmp_path / "a.npz", "--time", "n", "--time-unit", "ms")
+    assert outcome.code == 0, outcome.err
+    assert "state: not read: text, such as 'on'" in outcome.out
+    document = run("convert", table, tmp_path / "b.npz", "--time", "n", "--time-unit", "ms", "--json", "-").document
+    assert document["unread"] == [{"name": "state", "reason": "not read: text, such as 'on'", "messages": None}]
+    # The advice of a refusal, followed.
+    assert run("convert", table, tmp_path / "c.npz").code == 2
+    assert run("convert", table, tmp_path / "c.npz", "--time", "none", "--rate", 200).code == 0
 
 
 def test_units_that_are_no_pairs_are_told(run, tmp_path):

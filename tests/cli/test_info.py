@@ -3,17 +3,25 @@ import json
 import numpy as np
 import pytest
 
-from tests.make_logs import START_NS, write_stored
+from tests.make_logs import START_NS, with_strange_topics, write_stored
 
 CHANNEL_KEYS = {
     "name", "unit", "encoding", "rate_hz", "samples", "stamp", "stamp_reason", "jitter_s",
-    "gaps", "duplicates", "clipped", "rate_std_hz", "breaks", "longest_stretch_s",
+    "gaps", "duplicates", "clipped", "untimed", "publishers", "rate_std_hz", "breaks", "longest_stretch_s",
 }  # fmt: skip
 
 
 def test_the_document_holds_what_was_promised(run, arm_log):
     document = run("info", arm_log, "--json", "-").document
-    assert set(document) >= {"format", "start_time_ns", "duration_s", "channels", "damage"}
+    assert set(document) == {
+        "format",
+        "start_time_ns",
+        "duration_s",
+        "channels",
+        "damage",
+        "findings",
+        "unread",
+    }
     assert document["format"] == "chladni.info/1"
     assert document["duration_s"] == pytest.approx(25.0)
     assert [set(channel) for channel in document["channels"]] == [CHANNEL_KEYS] * 6
@@ -72,6 +80,19 @@ def test_many_channels_are_grouped_in_the_table_and_listed_in_the_document(run, 
     outcome = run("info", tmp_path / "wide.mcap", "--json", "-")
     assert [channel["name"] for channel in outcome.document["channels"]] == [f"/daq.a{n}" for n in range(20)]
     assert "/daq.{a0..19} " in outcome.err
+
+
+def test_topics_without_channels_are_in_the_table_and_in_the_document(run, tmp_path):
+    log = with_strange_topics(tmp_path / "a.mcap")
+    outcome = run("info", log, "--json", "-")
+    assert outcome.code == 0
+    assert [one["name"] for one in outcome.document["channels"]] == ["/good.x"]
+    assert [(one["name"], one["messages"]) for one in outcome.document["unread"]] == [("/bad", 100), ("/text", 100)]
+    assert all(set(one) == {"name", "reason", "messages"} for one in outcome.document["unread"])
+    table = outcome.err.splitlines()
+    assert any(line.startswith("/bad ") and line.endswith("100 messages, not read") for line in table)
+    assert any(line.startswith("/text ") and line.endswith("100 messages, no signal") for line in table)
+    assert any(line.startswith("- /bad (100 messages): can't be decoded: ") for line in table)
 
 
 def test_breaks_of_the_clock_are_counted_and_the_longest_stretch_is_told(run, tmp_path):

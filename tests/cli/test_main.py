@@ -4,9 +4,9 @@ import sys
 
 import pytest
 
-import chladni.io.log
 from chladni import __version__
 from chladni.cli.main import DEFECT, INTERRUPTED, SUCCESS, UNUSABLE
+from chladni.io.mcap_log import McapLog
 
 
 def test_help_names_every_command(run):
@@ -26,7 +26,6 @@ def test_version(run):
         (["nonsense"], "No such command 'nonsense'"),
         (["info"], "Missing argument 'LOG'"),
         (["info", "a.mcap", "--bogus"], "No such option: --bogus"),
-        (["frf", "a.mcap"], "Missing option '--reference'"),
         (["psd", "a.mcap", "--stamp", "foo"], "Invalid value for '--stamp': 'foo' is not one of"),
         (["psd", "a.mcap", "--resolution", "fine"], "Invalid value for '--resolution'"),
         (["info", "not-there.mcap"], "not-there.mcap: can't be opened: No such file or directory"),
@@ -58,7 +57,7 @@ def test_a_defect_is_one_line_and_code_1(run, arm_log, monkeypatch):
     def broken(self):
         raise ZeroDivisionError("two\nlines")
 
-    monkeypatch.setattr(chladni.io.log.Log, "info", broken)
+    monkeypatch.setattr(McapLog, "info", broken)
     outcome = run("info", arm_log)
     assert outcome.code == DEFECT
     assert outcome.err == (

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from tests.arm import FORCE, TOOL, short_arm
+from tests.impact_file import write_functions
+from tests.io.files.uff_makers import response_set
+from tests.modal.truth import chain, mac
 
 KEYS = {"frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std", "mpc", "shape", "relative_motion"}
 
@@ -133,15 +136,100 @@ def test_a_universal_file_without_functions_shows_the_modes_that_it_holds(run, a
     assert "5 modes" in outcome.out
 
 
-@pytest.mark.parametrize("option", [["--operational"], ["--start", 0], ["--resolution", 0], ["--stamp", "log"]])
-def test_options_of_logs_are_refused_for_a_universal_file(run, tmp_path, option):
+def accelerance(frequency_hz):
+    """One degree of freedom of 3 kg, 12 Hz and 1 %: -r^2 over m (1 - r^2 + 2 j zeta r)."""
+    ratio = frequency_hz / 12.0
+    return -(ratio**2) / (3.0 * (1 - ratio**2 + 0.02j * ratio))
+
+
+def test_functions_of_a_universal_file_without_unit_give_frequencies_and_take_a_setup_file(run, tmp_path):
+    values = accelerance(0.25 * np.arange(200))
+    path = tmp_path / "function.uff"
+    path.write_bytes(response_set(values, step=0.25, type=0, below_type=0, label="NONE"))
+    bare = run("modes", path, "--json", "-")
+    assert bare.code == 0, bare.err
+    (mode,) = bare.document["modes"]
+    assert mode["frequency_hz"] == pytest.approx(12.0, rel=1e-9)
+    assert mode["damping_ratio"] == pytest.approx(0.01, rel=1e-6)
+    setup = tmp_path / "setup.toml"
+    tables = [("1:+3", "m/s^2"), ("1:+3 (reference)", "N")]
+    setup.write_text(
+        'format = "chladni.setup/1"\n'
+        + "".join(f'[[channel]]\npath = "{name}"\nunit = "{unit}"\n' for name, unit in tables)
+    )
+    told = run("modes", path, "--setup", setup)
+    assert told.code == 0, told.err
+    assert "modal mass [kg]" in told.out
+    row = next(line for line in told.out.splitlines() if line.startswith("1 ") and "±" in line)
+    # The last column is the modal mass with its error.
+    assert float(row.split()[-3]) == pytest.approx(3.0, rel=1e-3)
+
+
+def test_one_function_without_unit_costs_no_other(run, tmp_path):
+    values = accelerance(0.25 * np.arange(200))
+    path = tmp_path / "functions.uff"
+    path.write_bytes(response_set(values, step=0.25) + response_set(values, step=0.25, node=2, label="EU"))
+    outcome = run("modes", path)
+    assert outcome.code == 0, outcome.err
+    told = " ".join(outcome.out.split())
+    assert "left out: 2:+3 without unit" in told
+    assert "whatever unit the sensor was set up in" in told
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (["--operational"], "responses and 5 modes, but no samples over time; chladni frf arm.uff shows them"),
+        (["--start", 0], "arm.uff: holds averaged functions already; leave out resolution"),
+        (["--resolution", 0], "arm.uff: holds averaged functions already; leave out resolution"),
+        (["--stamp", "log"], "stamp 'log' (--stamp) chooses among the times of messages"),
+        (["--reference", "/x.y"], "no reference '/x.y'; references: /shaker"),
+    ],
+)
+def test_options_of_samples_are_refused_for_functions(run, arm_log, tmp_path, option, words):
+    made = run("modes", arm_log, "--setup", arm_log.with_name("setup.toml"), "--uff", tmp_path / "arm.uff")
+    assert made.code == 0, made.err
     outcome = run("modes", tmp_path / "arm.uff", *option)
     assert outcome.code == 2
-    assert f"{option[0]} is for logs" in outcome.err
+    assert words in outcome.err
 
 
-def test_a_universal_file_with_neither_is_refused(run, shared_data):
-    outcome = run("modes", next(iter(sorted(shared_data.glob("*.uff")))))
-    assert outcome.code == 2
-    assert "chladni convert" in outcome.err
-    assert outcome.err.count("\n") == 1
+@pytest.mark.parametrize("damping", [1e-3, 2e-4])
+def test_a_file_of_resonances_narrower_than_its_lines_has_them_all(run, tmp_path, damping):
+    lines_hz, structure = np.arange(0.0, 400.0), chain(first_hz=51.3, damping=damping)
+    functions = structure.accelerance(lines_hz, (0,))
+    path = write_functions(tmp_path / "narrow.uff", functions, lines_hz, responses=range(1, 6), references=[1])
+    document = run("modes", path, "--json", "-").document
+    assert [mode["frequency_hz"] for mode in document["modes"]] == pytest.approx(structure.frequency_hz, rel=1e-6)
+    assert [mode["damping_ratio"] for mode in document["modes"]] == pytest.approx([damping] * 5, rel=1e-3)
+    told = " ".join(run("modes", path).out.split())
+    assert "take power in" in told
+    assert "average longer" not in told
+
+
+@pytest.mark.parametrize("fixed", [0, 4])
+def test_a_roving_hammer_gives_shapes_over_the_points_it_hit(run, tmp_path, fixed):
+    lines_hz, structure = np.arange(0.0, 8.0, 0.02), chain()
+    functions = structure.accelerance(lines_hz, range(5))[fixed : fixed + 1]
+    path = write_functions(tmp_path / "rove.uff", functions, lines_hz, responses=[fixed + 1], references=range(1, 6))
+    document = run("modes", path, "--json", "-").document
+    for mode, shape in zip(document["modes"], structure.shapes, strict=True):
+        assert [entry["point"] for entry in mode["shape"]] == ["1", "2", "3", "4", "5"]
+        found = np.array([entry["real"] + 1j * entry["imag"] for entry in mode["shape"]])
+        assert mac(found, shape) == pytest.approx(1, abs=1e-6)
+        assert mode["mpc"] == pytest.approx(1, abs=1e-6)
+        # Unit mass: 1/phi_max^2 kg.
+        assert mode["modal_mass"] == pytest.approx(1 / np.abs(shape).max() ** 2, rel=1e-3)
+    assert document["references"] == [f"{fixed + 1}:+3 (reference)"]
+    assert any("5 hit points taken as responses" in note for note in document["notes"])
+
+
+def test_modes_of_one_channel_have_no_phase_collinearity(run, tmp_path):
+    lines_hz = np.arange(0.0, 8.0, 0.02)
+    functions = chain().accelerance(lines_hz, (0,))[:1]
+    path = write_functions(tmp_path / "one.uff", functions, lines_hz, responses=[1], references=[1])
+    outcome = run("modes", path, "--json", "-")
+    modes = outcome.document["modes"]
+    assert len(modes) == 5
+    assert [(mode["mpc"], mode["mpd_deg"], mode["mean_phase_deg"]) for mode in modes] == [(None, None, None)] * 5
+    assert "1.000" not in run("modes", path).out

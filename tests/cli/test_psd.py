@@ -5,7 +5,7 @@ from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 from tests.arm import TOOL, WRIST, short_arm
-from tests.make_logs import START_NS, write_stored
+from tests.make_logs import START_NS, two_sensors, with_strange_topics, write_stored
 
 
 def tool_samples():
@@ -40,6 +40,20 @@ def test_a_part_of_the_log(run, arm_log):
     segments = tool_samples()[5000:15000].reshape(10, 1000)
     power = np.mean((segments - segments.mean(axis=1, keepdims=True)) ** 2)
     assert document["channels"][0]["rms"] == pytest.approx(np.sqrt(power), rel=1e-9)
+
+
+def test_of_two_publishers_on_a_topic_each_has_a_spectrum_and_one_can_be_named(run, tmp_path):
+    two_sensors(tmp_path / "two.mcap", offset_s=0.003, seconds=40)
+    names = ["/s{@channel==1}.data", "/s{@channel==2}.data"]
+    both = run("psd", tmp_path / "two.mcap", "--channel", names[0], "--resolution", 0.5, "--json", "-").document
+    assert [channel["name"] for channel in both["channels"]] == names[:1]
+    assert both["channels"][0]["peaks"][0]["frequency_hz"] == pytest.approx(5.0, abs=0.01)
+    second = run("psd", tmp_path / "two.mcap", "--channel", names[1], "--resolution", 0.5, "--json", "-").document
+    assert second["channels"][0]["peaks"][0]["frequency_hz"] == pytest.approx(7.0, abs=0.01)
+    assert second["channels"][0]["rms"] == pytest.approx(3 / np.sqrt(2), rel=0.01)
+    refused = run("psd", tmp_path / "two.mcap", "--channel", "/s.data")
+    assert refused.code == 2
+    assert f"name one of them: {' or '.join(names)}" in " ".join(refused.err.split())
 
 
 def test_people_get_levels_peaks_and_what_was_left_out(run, arm_log):
@@ -92,6 +106,17 @@ def test_a_table_that_is_cut_says_so_and_how_it_is_ordered(run, tmp_path):
     assert [f"Peaks in {unit}, the highest first, 10 at most" in mixed for unit in ("m/s^2", "N")] == [True, True]
     # The title is one line, however narrow the table is.
     assert any(line.startswith("Levels: ") and line.rstrip().endswith("Hz apart") for line in alike.splitlines())
+
+
+def test_a_topic_that_cannot_be_decoded_is_told_and_the_rest_is_averaged(run, tmp_path):
+    log = with_strange_topics(tmp_path / "a.mcap")
+    outcome = run("psd", log, "--json", "-")
+    assert outcome.code == 0
+    assert [channel["name"] for channel in outcome.document["channels"]] == ["/good.x"]
+    assert "- /bad (100 messages): can't be decoded: " in outcome.err
+    # Text holds nothing that could be averaged, and who names a channel knows what is left out.
+    assert "/text" not in outcome.err
+    assert "/bad" not in run("psd", log, "--channel", "/good.x", "--json", "-").err
 
 
 @pytest.mark.parametrize(

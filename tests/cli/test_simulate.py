@@ -111,7 +111,6 @@ def test_the_same_seed_gives_the_same_bytes(run: Run, model: Path, tmp_path: Pat
         (["--effect", "coulomb_friction@sprng:force=1"], "sprng"),
         (["--effect", "coulomb_friction@spring:force"], "not of the form NAME=VALUE"),
         (["--input", "step", "--band", "1", "2"], "no meaning for step"),
-        (["--log", "x.mcap", "--rate", "100"], "--rate has no meaning with --log"),
         (["--noise", "-1"], "must not be negative"),
         (["--rate", "-1"], "rate -1.0 must be finite and positive"),
         (["--rate", "inf"], "rate inf must be finite and positive"),

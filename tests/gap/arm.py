@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 import chladni
 from chladni.gap.records.measurement import Measurement
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.structures.structure import Body, Joint, Structure
 from chladni.models.structures.structure_input import StructureInput
 from chladni.models.structures.structure_model import StructureModel
@@ -17,6 +18,13 @@ from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 
 RATE_HZ = 1000.0
+#: A word for each kind of site. The whole catalogue beside a cause is weighed where that is the claim.
+ONE_OF_EACH_KIND = frozenset({"coulomb_friction", "hardening_stiffness", "saturation", "gain_error", "time_offset"})
+
+
+def all_but(*words: str) -> frozenset[str]:
+    """Words of the catalogue to leave out, so that these and one of each kind take part."""
+    return frozenset(CATALOGUE) - ONE_OF_EACH_KIND - set(words)
 
 
 def arm() -> StructureModel:

@@ -262,7 +262,7 @@ def test_not_a_number_counts_as_missing(tmp_path: Path) -> None:
         assert np.isnan(series.values[2, 9])
         told = log.info().findings
         assert f"{AXES[1]}: 1 of 300 samples not a number; they count as missing" in told
-        assert any(finding.startswith(f"{AXES[2]}: is no number in 1 sample; ") for finding in told)
+        assert any(finding.startswith(f"{AXES[2]}: is no number in 1 sample at ") for finding in told)
 
 
 def test_stamps_that_leap_for_days_take_no_memory(tmp_path: Path) -> None:
@@ -554,7 +554,7 @@ def test_channels_on_several_grids_are_refused_with_the_remedy_of_either_surface
     write_scalars(tmp_path / "a.mcap", {"/a": (fast, range(1000)), "/b": (slow, range(300))})
     with open_log(tmp_path / "a.mcap") as log, pytest.raises(LogError, match="different sampling grids") as caught:
         log.read()
-    for remedy in ("in Python sample_rate_hz=100", "chladni convert a.mcap OUT.mcap --rate 100,"):
+    for remedy in ("in Python sample_rate_hz=100", "chladni convert a.mcap OUT.mcap --resample 100,"):
         assert remedy in str(caught.value)
 
 
@@ -907,6 +907,11 @@ def test_units_in_comments_and_metadata(tmp_path: Path) -> None:
         ("chladni.overload.z", "inf", "overload", None),
         ("chladni.point.z", "tip", "point", "tip"),
         ("unit", "g", "unit", "m/s^2"),
+        ("unit", "Gs", "unit", "m/s^2"),
+        ("unit", "RPM", "unit", "rad/s"),
+        ("unit", "EU", "unit", "1"),
+        ("unit", "C", "unit", "1"),
+        ("chladni.unit.z", "C", "unit", "C"),
         ("chladni.unit.z", "bananas", "unit", "1"),
     ],
 )

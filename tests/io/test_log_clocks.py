@@ -196,7 +196,7 @@ def test_topics_of_different_rates_keep_their_phases(tmp_path: Path, rate_hz: fl
         both = np.isfinite(series.values).all(axis=0)
         assert np.count_nonzero(both) > 0.5 * 18.1 * 200
         np.testing.assert_allclose(series.values[0, both], series.values[1, both], atol=2e-3)
-    written = convert(tmp_path / "a.mcap", tmp_path / "b.csv", sample_rate_hz=200.0)
+    written = convert(tmp_path / "a.mcap", tmp_path / "b.csv", resample_hz=200.0)
     assert written.channels == tuple(names("/fast", "/slow"))
 
 
@@ -217,7 +217,7 @@ def test_topics_whose_clocks_were_set_at_different_times_are_not_brought_togethe
         assert log.read(names("/a", "/b"), end_s=0.39).samples == 39
         assert log.read(names("/a")).channels[0].name == "/a.x"
     with pytest.raises(LogError, match=told):
-        convert(tmp_path / "a.mcap", tmp_path / "b.csv", sample_rate_hz=100.0)
+        convert(tmp_path / "a.mcap", tmp_path / "b.csv", resample_hz=100.0)
     with open_log(tmp_path / "a.mcap", stamp="log") as log:
         series = log.read(names("/a", "/b"))
         there = np.isfinite(series.values[0])

@@ -9,6 +9,9 @@ import pytest
 from chladni.io.log import open_log
 from chladni.io.log_findings import damage_finding
 from chladni.io.loss import Loss
+from chladni.io.mcap.writer import write_mcap
+from chladni.signals.channel import Channel
+from chladni.signals.time_series import TimeSeries
 from tests.make_logs import START_NS, LogMaker
 
 NOBODY_FILLS = "0 throughout; sensors that aren't connected, or fields that nobody fills"
@@ -51,8 +54,9 @@ def test_topics_and_channels_that_share_a_sentence_share_a_finding(tmp_path: Pat
     noise[3:, 300] -= 90.0
     rows = {f"/{name}": [{"x": x, "zero": 0.0, "set": 7.0} for x in noise[row]] for row, name in enumerate("abcde")}
     found = findings_of(tmp_path / "a.mcap", rows)
+    leaps = "leaps away and back in 1 to 2 samples each between 2 and 3 s; check connectors and grounding"
     assert found == (
-        "/a.x, /b.x, /c.x and 2 more: leaps away and back in 1 to 2 samples each; check connectors and grounding",
+        f"/a.x, /b.x, /c.x and 2 more: {leaps}",
         f"/a.zero, /b.zero, /c.zero and 2 more: {NOBODY_FILLS}",
         "/a.set, /b.set, /c.set and 2 more: constant; settings, fields that aren't measured, or dead sensors",
         "the log gives no unit for /a.x, /a.zero, /a.set and 12 more; a setup file can",
@@ -82,3 +86,22 @@ def test_true_and_false_under_a_schema_of_numbers_are_no_damage(shared_data: Pat
     assert {channel.samples for channel in info.channels} == {3143}
     # 35 topics that share one clock, one state of it, and a handful of sensors' troubles.
     assert len(info.findings) < 12
+
+
+def test_a_sensor_at_its_rail_is_told_with_its_span_in_seconds_of_the_log(tmp_path: Path) -> None:
+    noise = np.random.default_rng(1).standard_normal(400)
+    noise[:150] = 16.0
+    rows = {"/a": [{"x": x} for x in np.random.default_rng(2).standard_normal(400)], "/b": [{"x": x} for x in noise]}
+    (told,) = [found for found in findings_of(tmp_path / "a.mcap", rows) if "cut off" in found]
+    assert told.startswith("/b.x: is cut off at 16 in 150 samples between 0 and 1.49 s;")
+
+
+def test_samples_of_batch_messages_have_times_of_their_own(tmp_path: Path) -> None:
+    # Messages of many samples: the rail ends within one.
+    values = np.random.default_rng(1).standard_normal((2, 10_000))
+    values[1, 2_000:3_333] = 16.0
+    channels = (Channel(name="/daq.a", unit="m/s^2"), Channel(name="/daq.b", unit="m/s^2"))
+    write_mcap([TimeSeries(values=values, sample_rate_hz=5000.0, channels=channels)], tmp_path / "a.mcap")
+    with open_log(tmp_path / "a.mcap") as log:
+        (told,) = [found for found in log.info().findings if "cut off" in found]
+    assert told.startswith("/daq.b: is cut off at 16 m/s^2 in 1333 samples between 0.4 and 0.6664 s;")

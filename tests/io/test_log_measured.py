@@ -157,6 +157,6 @@ def test_every_measured_log_has_an_info_without_nan(shared_data: Path) -> None:
         assert json.loads(text)["format"] == "chladni.info/1"
         keys = (
             "name,unit,encoding,rate_hz,rate_std_hz,samples,stamp,stamp_reason,jitter_s,gaps,breaks,longest_stretch_s,"
-            "duplicates,clipped"
+            "duplicates,clipped,untimed,publishers"
         )
         assert all(",".join(channel) == keys for channel in content["channels"])

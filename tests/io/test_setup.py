@@ -105,6 +105,39 @@ def test_sensitivity_turns_volts_to_acceleration(tmp_path: Path) -> None:
         channel.si_unit(1.0, "m/s^2")
 
 
+@pytest.mark.parametrize(
+    ("path", "unit", "log_unit", "factor", "si_unit"),
+    [
+        ("/load.wrench.force.z", "lb", "N", 4.4482216152605, "N"),
+        ("/scale.data", "lb", "kg", 0.45359237, "kg"),
+        ("/hammer", "lb", "1", 4.4482216152605, "N"),
+        ("/imu.x", "G", "m/s^2", 9.80665, "m/s^2"),
+        ("/mag.x", "G", "1", 1e-4, "T"),
+        ("/a.x", "ms^-2", "1", 1.0, "m/s^2"),
+    ],
+)
+def test_a_unit_is_a_label_that_the_log_or_the_name_settles(
+    tmp_path: Path, path: str, unit: str, log_unit: str, factor: float, si_unit: str
+) -> None:
+    (tmp_path / "setup.toml").write_text(
+        f'format = "chladni.setup/1"\n[[channel]]\npath = "{path}"\nunit = "{unit}"\n'
+    )
+    (channel,) = load_setup(tmp_path / "setup.toml").channels
+    assert channel.si_unit(1.0, log_unit) == (pytest.approx(factor, rel=1e-15), si_unit)
+
+
+def test_a_unit_of_several_meanings_that_nothing_settles_is_told_with_its_line(tmp_path: Path) -> None:
+    (tmp_path / "setup.toml").write_text('format = "chladni.setup/1"\n[[channel]]\npath = "/daq.c1"\nunit = "lb"\n')
+    (channel,) = load_setup(tmp_path / "setup.toml").channels
+    with pytest.raises(SetupError, match=r"setup.toml:2: /daq.c1 unit: unit 'lb': it may be lbf or lbm; write which"):
+        channel.si_unit(1.0, "1")
+    (tmp_path / "setup.toml").write_text(
+        'format = "chladni.setup/1"\n[[channel]]\npath = "/daq.c1"\nsensitivity = "50 mV/lb"\n'
+    )
+    with pytest.raises(SetupError, match=r"setup.toml:4: .* it may be mV/lbf or mV/lbm; write which"):
+        load_setup(tmp_path / "setup.toml")
+
+
 def test_millivolts_with_a_charge_free_sensitivity(tmp_path: Path) -> None:
     text = 'format = "chladni.setup/1"\n[[channel]]\npath = "/a.x"\nunit = "mV"\nsensitivity = "2 mV/N"\n'
     (channel,) = load_setup(setup_of(tmp_path, text)).channels

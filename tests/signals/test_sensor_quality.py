@@ -155,16 +155,64 @@ def test_clipping_on_one_side() -> None:
 def test_only_the_end_that_is_cut_off_is_named() -> None:
     fault = only(faults_of(np.minimum(SOUND["sine"], 0.8)))
     assert fault.sentence.startswith(
-        f"/imu.x: is cut off at 0.8 m/s^2 in {fault.count} samples; use a larger range, "
+        f"/imu.x: is cut off at 0.8 m/s^2 in {fault.count} samples between {fault.first_s:.4g} and "
+        f"{fault.last_s:.4g} s; use a larger range, "
     )
     ranged = only(faults_of(np.minimum(SOUND["sine"], 0.8), overload=0.8))
     assert ranged.what == "reaches its range of 0.8 m/s^2"
 
 
+@pytest.mark.parametrize("samples", [3, 100, 50_000, 99_900])
+@pytest.mark.parametrize("step", [0.0, 1 / 128])
+@pytest.mark.parametrize("level", [-16.0, 16.0])
+def test_a_sensor_at_its_rail_from_the_first_sample_on(samples: int, step: float, level: float) -> None:
+    values = noise() if step == 0 else np.round(noise() / step) * step
+    values[:samples] = level
+    fault = only(faults_of(values))
+    assert (fault.kind, fault.count) == ("clipped", samples)
+    assert (fault.first_s, fault.last_s) == (0.0, (samples - 1) / RATE_HZ)
+    assert f"in {samples} samples between 0 and {(samples - 1) / RATE_HZ:.4g} s" in fault.sentence
+    # The same at the end of the record.
+    ended = only(faults_of(values[::-1]))
+    assert (ended.kind, ended.count) == ("clipped", samples)
+    assert ended.first_s == (SAMPLES - samples) / RATE_HZ
+    assert ended.last_s == (SAMPLES - 1) / RATE_HZ
+
+
+def test_a_sensor_that_comes_back_from_its_rail() -> None:
+    # An amplifier recovers from an overload in half a second, with the vibration on top.
+    recovering = np.minimum(16.0, 40 * np.exp(-2 * seconds()) + noise())
+    fault = only(faults_of(recovering))
+    there = np.flatnonzero(recovering == 16.0)
+    assert (fault.count, fault.first_s, fault.last_s) == (there.size, 0.0, there[-1] / RATE_HZ)
+
+
+def test_what_begins_at_rest_is_not_at_its_rail() -> None:
+    time_s, rest_s = seconds(), 20.0
+    after = np.clip(time_s - rest_s, 0, None)
+    share = np.clip(after / 60, 0, 1)
+    made = {
+        "a swing let go": np.cos(2 * np.pi * 0.5 * after),
+        "a point to point motion": 10 * share**3 - 15 * share**4 + 6 * share**5 - 1,
+        "a ramp from rest": after - 1.0,
+        "a speed that runs out": np.exp(-0.1 * after),
+        "a step of a command": np.where(after > 0, -1.0, 1.0),
+        "a fall": 3000 - 9.81 * np.minimum(after, 20) ** 2 / 2,
+    }
+    for name, values in made.items():
+        assert faults_of(values) == (), name
+
+
+def test_a_record_at_its_named_range_throughout_is_clipped_not_dead() -> None:
+    fault = only(faults_of(np.full(1000, 5.0), unit="V", overload=5.0))
+    assert (fault.kind, fault.count) == ("clipped", 1000)
+    assert only(faults_of(np.full(1000, 5.0), unit="V")).kind == "dead"
+
+
 def test_one_sample_is_told_in_the_singular() -> None:
     values = noise()
     values[5000] += 80.0
-    assert "leaps away and back in 1 sample;" in only(faults_of(values)).sentence
+    assert "leaps away and back in 1 sample at 5 s;" in only(faults_of(values)).sentence
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -505,3 +505,11 @@ def test_advice_names_everything_that_was_put_right() -> None:
         "the clock was set (1 step); 2 samples missing in 1 gap, averages leave out what touches them; "
         "1 repeated stamp, the first message of each is kept; 1 message late, put in order"
     )
+
+
+@pytest.mark.parametrize("into_the_second", [0, 13, 49])
+@pytest.mark.parametrize("seconds", [20, 120, 700])
+def test_stamps_of_whole_seconds_are_bursts_of_all_samples_in_them(into_the_second: int, seconds: int) -> None:
+    number = np.arange(50 * seconds)
+    base = fit_time_base((number + into_the_second) // 50 * 10**9 + 1_700_000_000 * 10**9)
+    assert (base.verdict, base.rate_hz, base.duplicates) == ("bursts", 50.0, 0)

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
+from chladni.spectral.frequency_response import frequency_response
 from chladni.spectral.impact import find_impacts, impact_cross_spectra, is_impact_test
+from chladni.spectral.peaks import find_response_peaks
 from tests.spectral.measured_logs import hammer
 
 RATE_HZ = 10_000.0
@@ -158,10 +160,48 @@ def test_weak_hits_are_rejected_and_bumps_below_the_trigger_are_counted():
 
 
 def test_a_record_must_fit_into_the_log():
-    force = pulses(10, [(0.0005, 100.0), (2.0, 100.0), (4.0, 100.0), (9.5, 100.0)])
+    force = pulses(10, [(-0.0005, 100.0), (2.0, 100.0), (4.0, 100.0), (9.5, 100.0)])
     impacts = find_impacts(hammer_log(force), force="/hammer", record_s=1.0, pretrigger_s=0.01)
     reasons = {rejection.record: rejection.reason for rejection in impacts.rejected}
-    assert reasons == {1: "its pretrigger begins before the log", 4: "its record ends after the log"}
+    assert reasons == {1: "its pulse begins before the log", 4: "its record ends after the log"}
+
+
+@pytest.mark.parametrize("start_s", [0.0, 0.0002, 0.001])
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+def test_a_hit_at_the_start_of_the_record_is_a_hit(start_s, noise):
+    """A single hit, fewer samples after the start than a record has before its trigger; 1 s decays by e^-11."""
+    log = hammer_log(pulses(1.0, [(start_s, 100.0)]), noise=noise)
+    assert is_impact_test(log, "/hammer")
+    impacts = find_impacts(log, force="/hammer")
+    assert impacts.rejected == ()
+    assert impacts.accepted[0].time_s < start_s + 0.0005
+    spectra = impact_cross_spectra(log, impacts)
+    response = frequency_response(spectra, references="/hammer")
+    inside = (response.frequency_hz > 50) & (response.frequency_hz < 500)
+    s = 2j * np.pi * response.frequency_hz[inside]
+    exact = s**2 * receptance(s)
+    # Half a record or more of noise of 1e-4 of the greatest sample against the spectrum of the pulse.
+    tolerance = 1e-4 if noise == 0 else 0.03
+    np.testing.assert_allclose(response.values[0, 0, inside], exact, atol=tolerance * np.abs(exact).max())
+    (peak,) = find_response_peaks(response, count=1)
+    assert peak.frequency_hz == pytest.approx(FREQUENCY_HZ, abs=0.1)
+
+
+def test_several_hits_of_which_the_first_is_at_the_start():
+    impacts = find_impacts(hammer_log(pulses(10, [(0.0, 150.0), *FIVE[1:]])), force="/hammer")
+    assert impacts.rejected == ()
+    assert len(impacts.accepted) == 5
+
+
+def test_records_longer_than_the_time_between_hits_are_told_with_the_longest():
+    log = hammer_log(pulses(10, FIVE))
+    impacts = find_impacts(log, force="/hammer", record_s=2.5)
+    assert impacts.longest_s == pytest.approx(1.9, abs=0.1)
+    with pytest.raises(EstimateError, match=r"records of 2.5 s are longer .* ask for a resolution of") as told:
+        impact_cross_spectra(log, impacts)
+    asked_hz = float(str(told.value).split("a resolution of ")[1].split(" Hz")[0])
+    followed = impact_cross_spectra(log, find_impacts(log, force="/hammer", record_s=1 / asked_hz))
+    assert followed.provenance.averages == 5
 
 
 def test_a_hit_while_the_one_before_still_rings():

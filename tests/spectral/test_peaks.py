@@ -319,3 +319,82 @@ def test_few_averages_do_not_lend_a_weak_peak_the_height_of_its_neighbour():
         assert height <= peak.height * (1 + 1e-9) <= 1.4 * height
         # It lies within the lines that are its own, not those up to the neighbour a hertz away.
         assert peak.frequency_std_hz < 0.5
+
+
+# --- functions that a file holds ready-made, without error bars --------------------------------------------------
+
+
+def held(values, spacing_hz=0.5):
+    rows = np.atleast_2d(values)[:, np.newaxis]
+    lines = rows.shape[-1]
+    return FrequencyResponse(
+        frequency_hz=spacing_hz * np.arange(1, lines + 1),
+        values=rows,
+        std=np.full(rows.shape, np.inf),
+        coherence=np.full((len(rows), lines), np.nan),
+        excited=np.ones(lines, dtype=bool),
+        responses=tuple(Channel(name=f"c{row}", unit="m/s^2") for row in range(len(rows))),
+        references=(Channel(name="f", unit="N"),),
+        provenance=Provenance(estimator="as in the file"),
+    )
+
+
+def as_in_a_file(response):
+    return replace(
+        response,
+        std=np.full(response.std.shape, np.inf),
+        coherence=np.full(response.coherence.shape, np.nan),
+        provenance=Provenance(estimator="as in the file"),
+    )
+
+
+def accelerance(frequency_hz, natural_hz, damping_ratio):
+    ratio = frequency_hz / natural_hz
+    return -(ratio**2) / (1 - ratio**2 + 2j * damping_ratio * ratio)
+
+
+@pytest.mark.parametrize("damping_ratio", [0.02, 2e-3, 2e-4])
+@pytest.mark.parametrize("natural_hz", [40.0, 40.1, 40.2])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_functions_without_error_bars_show_their_resonances(damping_ratio, natural_hz, noise):
+    frequency_hz = 0.5 * np.arange(1, 401)
+    random = np.random.default_rng(7)
+    scatter = noise * (random.standard_normal(400) + 1j * random.standard_normal(400))
+    (peak,) = find_response_peaks(held(accelerance(frequency_hz, natural_hz, damping_ratio) + scatter))
+    # Three points tell a lone resonance; the mass line beside it shifts the top by some hundredths of a line.
+    assert peak.frequency_hz == pytest.approx(natural_hz, abs=max(0.05, 4 * peak.frequency_std_hz))
+
+
+def test_noise_without_error_bars_gives_no_peak():
+    random = np.random.default_rng(11)
+    rows = random.standard_normal((60, 400)) + 1j * random.standard_normal((60, 400))
+    alarms = sum(bool(find_response_peaks(held(row), false_alarm=0.05)) for row in rows)
+    # 3 are allowed in the mean; a binomial count exceeds 9 with a chance of 0.1 %.
+    assert alarms <= 9
+
+
+def test_functions_of_a_file_have_their_peaks_without_std_coherence_and_averages():
+    response = oscillators(lambda f: np.ones(f.size, dtype=bool))
+    peaks, known = find_response_peaks(as_in_a_file(response)), find_response_peaks(response)
+    assert [peak.channels for peak in peaks] == [peak.channels for peak in known]
+    np.testing.assert_allclose([p.frequency_hz for p in peaks], [p.frequency_hz for p in known], atol=0.01)
+
+
+def test_noise_in_a_file_has_no_peaks():
+    response = as_in_a_file(oscillators(lambda f: np.ones(f.size, dtype=bool)))
+    # One in a hundred functions may have one by chance; so have 3 or more of 40 once in 100 times.
+    found = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        noise = rng.standard_normal(response.values.shape) + 1j * rng.standard_normal(response.values.shape)
+        found += len(find_response_peaks(replace(response, values=noise)))
+    assert found <= 2
+
+
+def test_a_single_hit_has_its_peaks_and_a_single_segment_none():
+    response = oscillators(lambda f: np.ones(f.size, dtype=bool))
+    one = replace(as_in_a_file(response), coherence=np.ones(response.coherence.shape))
+    hit = Provenance(averaging="impact", averages=1, effective_averages=1.0)
+    assert len(find_response_peaks(replace(one, provenance=hit))) == 4
+    segment = Provenance(averages=1, effective_averages=1.0)
+    assert find_response_peaks(replace(one, provenance=segment)) == ()

@@ -93,6 +93,21 @@ def test_a_band_that_is_left_out_is_not_bridged() -> None:
         assert ((x > 40) & (x < 50)).any()
 
 
+def test_a_coherence_that_a_file_does_not_hold_is_told() -> None:
+    response = synthetic.frequency_response()
+    study = synthetic.study()
+    unknown = replace(response, coherence=np.full_like(response.coherence, np.nan))
+    assert "not in the file" in texts(next(iter(response_figures(replace(study, response=unknown)).values())))
+    assert "not in the file" not in texts(next(iter(response_figures(study).values())))
+
+
+def test_a_peak_above_every_line_is_inside_the_frame() -> None:
+    (found,) = synthetic.response_peaks()
+    high = replace(found, height=100 * found.height)
+    (figure,) = response_figures(replace(synthetic.study(), response_peaks=(high,))).values()
+    assert figure.axes[0].get_ylim()[1] > high.height
+
+
 def test_bands_are_one_sigma(figures: dict[str, Figure]) -> None:
     density = synthetic.density()
     (axes,) = figures["psd 1 Force"].axes

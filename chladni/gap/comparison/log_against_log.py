@@ -166,7 +166,7 @@ def _require_same_rate(measured: Measurement, simulated: Measurement) -> None:
     if abs(ours_hz - theirs_hz) > SAME_RATE * ours_hz:
         raise LogError(
             f"{measured.log} has {ours_hz:g} Hz, {simulated.log} {theirs_hz:g} Hz; bring them to one rate, "
-            f"chladni convert {simulated.log} OUT.mcap --rate {ours_hz:g}"
+            f"chladni convert {simulated.log} OUT.mcap --resample {ours_hz:g}"
         )
 
 

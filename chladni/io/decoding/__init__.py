@@ -1,7 +1,7 @@
 """Encoded messages of a log to columns: CDR, ROS 1, protobuf and JSON."""
 
 from chladni.io.decoding.columns import Column, Decoded, Decoder, EncodedMessages, Strings
-from chladni.io.decoding.decoder import SUPPORTED, make_decoder
+from chladni.io.decoding.decoder import SUPPORTED, definition_text, make_decoder
 from chladni.io.decoding.schema import FieldInfo, FieldKind
 
 __all__ = [
@@ -13,5 +13,6 @@ __all__ = [
     "FieldInfo",
     "FieldKind",
     "Strings",
+    "definition_text",
     "make_decoder",
 ]

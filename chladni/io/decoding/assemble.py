@@ -25,7 +25,7 @@ def scattered(pieces: Sequence[Piece], messages: int) -> NDArray[np.generic]:
     if len(first.rows) == messages:
         return first.values
     # Only values of fixed width come here (a number or a string's place), so zeros for all are bounded.
-    out = np.zeros((messages, *first.values.shape[1:]), first.values.dtype)
+    out = np.zeros((messages, *first.values.shape[1:]), np.result_type(*(piece.values for piece in pieces)))
     for piece in pieces:
         out[piece.rows] = piece.values
     return out

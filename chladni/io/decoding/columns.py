@@ -164,11 +164,14 @@ class Decoded:
         Messages that are malformed as far as the fields asked for go.
     reasons : mapping of str to int
         What was wrong, and with how many messages.
+    told : mapping of str to int
+        What is odd about messages that are read all the same, and about how many.
     """
 
     columns: Mapping[str, Column]
     bad: NDArray[np.bool_]
     reasons: Mapping[str, int] = field(default_factory=dict)
+    told: Mapping[str, int] = field(default_factory=dict)
 
 
 class Decoder(Protocol):
@@ -178,13 +181,22 @@ class Decoder(Protocol):
     def fields(self) -> tuple[FieldInfo, ...]:
         """Leaves of the message in the order of the schema; empty while only messages could tell."""
 
-    def informed_by(self, messages: EncodedMessages) -> Decoder:
-        """Complete the fields from the first messages; a decoder whose schema tells everything is returned as is.
+    @property
+    def unread(self) -> Mapping[str, str]:
+        """Numeric leaves that can't be read, and why; they aren't among `fields`."""
+
+    def informed_by(self, heads: Sequence[EncodedMessages]) -> Decoder:
+        """Learn from the first messages what the schema doesn't tell.
 
         Parameters
         ----------
-        messages : EncodedMessages
-            The first messages of the channel.
+        heads : sequence of EncodedMessages
+            The first messages of the channel; none for a silent one.
+
+        Raises
+        ------
+        LogError
+            If they show that messages of this channel can't be decoded.
         """
 
     def columns(self, messages: EncodedMessages, paths: Sequence[str]) -> Decoded:
@@ -199,20 +211,24 @@ class Decoder(Protocol):
         Raises
         ------
         LogError
-            If a path isn't in the schema, or the messages as a whole are in a form that isn't supported.
+            If a path isn't in the schema.
         """
 
 
-def require_known(paths: Sequence[str], fields: Sequence[FieldInfo], *, schema_name: str) -> None:
-    """Refuse a path that is not a leaf of the schema.
+def require_known(
+    paths: Sequence[str], fields: Sequence[FieldInfo], *, schema_name: str, unread: Mapping[str, str] | None = None
+) -> None:
+    """Refuse a path that is not a leaf of the schema, or one that can't be read.
 
     Raises
     ------
     LogError
-        Names the path and fields that come near it.
+        Names the path, and fields that come near it or why it can't be read.
     """
     known = {info.path for info in fields}
     for path in paths:
+        if unread and path in unread:
+            raise LogError(f"{schema_name}: {path} {unread[path]}")
         if path not in known:
             from difflib import get_close_matches
 

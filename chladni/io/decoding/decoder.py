@@ -52,25 +52,26 @@ def make_decoder(*, message_encoding: str, schema_name: str, schema_encoding: st
             from chladni.io.decoding.binary import BinaryDecoder
             from chladni.io.decoding.message_text import parse_ros2_text
 
-            return BinaryDecoder(parse_ros2_text(schema_name, _text(schema_data, schema_name)), encapsulated=True)
+            return BinaryDecoder(parse_ros2_text(schema_name, definition_text(schema_data)), encapsulated=True)
         case "cdr", "ros2idl" | "omgidl":
             from chladni.io.decoding.binary import BinaryDecoder
             from chladni.io.decoding.idl import parse_idl
 
-            return BinaryDecoder(parse_idl(schema_name, _text(schema_data, schema_name)), encapsulated=True)
+            return BinaryDecoder(parse_idl(schema_name, definition_text(schema_data)), encapsulated=True)
         case "ros1", "ros1msg":
             from chladni.io.decoding.binary import BinaryDecoder
             from chladni.io.decoding.message_text import parse_ros1_text
 
-            return BinaryDecoder(parse_ros1_text(schema_name, _text(schema_data, schema_name)), encapsulated=False)
+            return BinaryDecoder(parse_ros1_text(schema_name, definition_text(schema_data)), encapsulated=False)
         case "protobuf", "protobuf":
             from chladni.io.decoding.protobuf_messages import ProtobufDecoder
 
             return ProtobufDecoder.of_schema(schema_name, schema_data)
-        case "json", "jsonschema" | "":
+        case "json", _:
             from chladni.io.decoding.json_messages import JsonDecoder
 
-            return JsonDecoder.of_schema(schema_name, schema_data)
+            # Messages in JSON name their fields themselves, so a schema in another language isn't needed.
+            return JsonDecoder.of_schema(schema_name, schema_data if schema_encoding == "jsonschema" else b"")
     pairs = ", ".join(f"{message}/{schema or 'no schema'}" for message, schema in SUPPORTED)
     raise LogError(
         f"schema {schema_name!r}: message encoding {message_encoding!r} with schema encoding {schema_encoding!r} "
@@ -78,10 +79,12 @@ def make_decoder(*, message_encoding: str, schema_name: str, schema_encoding: st
     )
 
 
-def _text(data: bytes, name: str) -> str:
+def definition_text(data: bytes) -> str:
+    """Give a definition as text.
+
+    Its names are ASCII; what else it may hold stands in comments, which old editors write in Latin-1.
+    """
     try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise LogError(
-            f"schema {name!r}: the definition isn't UTF-8 text ({error.reason} at {error.start})"
-        ) from error
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")

@@ -64,14 +64,25 @@ def found_of(leaf: Leaf, rows: Sequence[Sequence[object]]) -> Found:
     if leaf.info.kind == "string":
         return Found(values=interned(cast("list[StringValue]", values)), counts=counts)
     if not isinstance(leaf.type, Array):
-        # A number that is missing is NaN, for which integers and truth values have no room.
-        incomplete = leaf.info.dtype != np.float32 and any(isinstance(value, float) for value in values)
-        return Found(values=np.array(values, np.float64 if incomplete else leaf.info.dtype), counts=counts)
+        return Found(values=np.array(values, _roomy(leaf, values)), counts=counts)
     # Elements of all arrays of a message belong to it.
     arrays = cast("Sequence[Sequence[Sequence[float]]]", rows)
     counts = np.array([sum(map(len, row)) for row in arrays], np.int64)
-    parts = [np.asarray(one, leaf.info.dtype) for row in arrays for one in row]
+    parts = [np.asarray(one, _roomy(leaf, one)) for row in arrays for one in row]
     return Found(values=np.concatenate([np.empty(0, leaf.info.dtype), *parts]), counts=counts)
+
+
+def _roomy(leaf: Leaf, values: Iterable[object]) -> np.dtype[np.generic] | None:
+    """Type for values of a leaf: one that is missing is NaN, for which integers and truth values have no room."""
+    dtype = leaf.info.dtype
+    if (
+        dtype is None
+        or dtype.kind == "f"
+        or isinstance(values, np.ndarray)
+        or not any(isinstance(value, float) for value in values)
+    ):
+        return dtype
+    return np.dtype(np.float64)
 
 
 def nothing(leaf: Leaf) -> NDArray[np.generic] | Strings:

@@ -1,12 +1,12 @@
 """Message definitions in OMG IDL: what ROS 2 emits (``ros2idl``) and plain IDL (``omgidl``).
 
 The part of IDL 4.2 that describes data: modules, structs (also derived ones), enums, typedefs, sequences, arrays,
-strings, constants. Annotations are read over, apart from ``@optional``, which changes the wire.
+strings, constants. Annotations are read over, apart from those that change the wire: ``@optional``, ``@bit_bound``
+of an enum, and the extensibility of a struct.
 """
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -14,11 +14,22 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from chladni.io.decoding.message_text import ROS_DURATION, ROS_TIME
-from chladni.io.decoding.schema import MAX_NESTING, Array, FieldType, Member, Primitive, Record, Text
+from chladni.io.decoding.schema import (
+    MAX_FIXED_BYTES,
+    MAX_NESTING,
+    Array,
+    FieldType,
+    Member,
+    Primitive,
+    Record,
+    Text,
+)
 from chladni.signals.errors import LogError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from chladni.io.decoding.schema import Extensibility
 
 # Comments end at the end of the text at the latest, so that a text made of openings can't take quadratic time.
 _TOKEN: Final = re.compile(
@@ -33,7 +44,11 @@ _NUMBERS: Final = {
     "uint32": np.uint32, "int64": np.int64, "uint64": np.uint64, "short": np.int16, "unsigned short": np.uint16,
     "long": np.int32, "unsigned long": np.uint32, "long long": np.int64, "unsigned long long": np.uint64,
 }  # fmt: skip
-_ENUM: Final = Primitive(dtype=np.dtype(np.uint32))
+# Bits that an enum may be bound to, and the bytes that hold them (DDS-XTypes 1.3, 7.3.1.2.1.6).
+_ENUM_TYPES: Final = ((8, np.uint8), (16, np.uint16), (32, np.uint32))
+_EXTENSIBILITY: Final[dict[str, Extensibility]] = {
+    "final": "final", "appendable": "appendable", "mutable": "mutable", "extensible": "appendable",
+}  # fmt: skip
 _ROS_STAMPS: Final[dict[str, FieldType]] = {
     f"builtin_interfaces::msg::{name}": kind for name, kind in (("Time", ROS_TIME), ("Duration", ROS_DURATION))
 }
@@ -90,11 +105,12 @@ class _Field:
 class _Struct:
     fields: tuple[_Field, ...]
     base: _Reference | None = None
+    extensibility: Extensibility | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Enum:
-    pass
+    type: Primitive
 
 
 _Declaration = _Struct | _Field | _Enum
@@ -110,7 +126,7 @@ class _Reader:
         self.scope: tuple[str, ...] = ()
         self.constants: dict[str, int] = {}
         self.declared: dict[str, _Declaration] = {}
-        self.optional = False
+        self.annotations: dict[str, str] = {}
 
     def read_all(self) -> dict[str, _Declaration]:
         while self.place < len(self.tokens):
@@ -164,17 +180,23 @@ class _Reader:
         readers[word]()
 
     def _annotations(self) -> None:
-        self.optional = False
+        """Take the annotations before a declaration: names, and what stands in their parentheses."""
+        self.annotations = {}
         while self._accept("@"):
-            self.optional |= self._name() == "optional"
-            if self._accept("("):
-                self._pass_parentheses()
+            name = self._name()
+            self.annotations[name.lower()] = self._parentheses() if self._accept("(") else ""
 
-    def _pass_parentheses(self) -> None:
-        depth = 1
+    def _parentheses(self) -> str:
+        depth, content = 1, ""
         while depth:
             sign = self._next("')'")
             depth += (sign == "(") - (sign == ")")
+            content = content or sign
+        return content.lower()
+
+    def _extensibility(self) -> Extensibility | None:
+        stated = [*self.annotations, self.annotations.get("extensibility", "").removesuffix("_extensibility")]
+        return next((_EXTENSIBILITY[word] for word in stated if word in _EXTENSIBILITY), None)
 
     def _module(self) -> None:
         if len(self.scope) >= MAX_NESTING:
@@ -188,20 +210,25 @@ class _Reader:
         self._accept(";")
 
     def _struct(self) -> None:
-        name = self._name()
+        name, extensibility = self._name(), self._extensibility()
         base = self._reference() if self._accept(":") else None
         fields: list[_Field] = []
         if self._accept("{"):
             while not self._accept("}"):
                 self._annotations()
-                if self.optional:
+                if self.annotations.get("optional", "false") != "false":
                     raise self._wrong("no @optional member, which plain CDR lays out differently")
                 fields += self._fields()
-            self.declared[self._full(name)] = _Struct(fields=tuple(fields), base=base)
+            self.declared[self._full(name)] = _Struct(fields=tuple(fields), base=base, extensibility=extensibility)
         self._accept(";")
 
     def _enum(self) -> None:
-        self.declared[self._full(self._name())] = _Enum()
+        bits = self.annotations.get("bit_bound", "32")
+        dtype = next((kind for most, kind in _ENUM_TYPES if _is_number(bits) and int(bits) <= most), None)
+        if dtype is None:
+            raise self._wrong("an enum bound to at most 32 bits")
+        kind = Primitive(dtype=np.dtype(dtype), enumerated=True)
+        self.declared[self._full(self._name())] = _Enum(type=kind)
         self._expect("{")
         while self._next("'}'") != "}":
             pass
@@ -219,7 +246,7 @@ class _Reader:
         while (token := self._next("';'")) != ";":
             value.append(token)
         # Only whole numbers can be sizes; other constants don't matter to the wire.
-        if len(value) == 1 and value[0].isdigit():
+        if len(value) == 1 and _is_number(value[0]):
             self.constants[self._full(name)] = int(value[0][:12])
 
     def _fields(self) -> list[_Field]:
@@ -239,7 +266,7 @@ class _Reader:
 
     def _size(self) -> int:
         token = self._next("a size")
-        size = int(token[:12]) if token.isdigit() else self._constant_size(token)
+        size = int(token[:12]) if _is_number(token) else self._constant_size(token)
         if size < 1:
             raise self._wrong("a size of at least 1")
         return size
@@ -275,6 +302,11 @@ class _Reader:
         return _Reference(name=name, scope=self.scope)
 
 
+def _is_number(token: str) -> bool:
+    # isdigit alone takes superscripts, too.
+    return token.isascii() and token.isdigit()
+
+
 class _Resolver:
     def __init__(self, schema: str, declared: dict[str, _Declaration]) -> None:
         self.schema = schema
@@ -303,18 +335,23 @@ class _Resolver:
                 inherited = self._type(base, above) if base is not None else None
                 first = inherited.members if isinstance(inherited, Record) else ()
                 own = tuple(Member(name=one.name, type=self._field(one, above)) for one in fields)
-                return Record(name=name, members=first + own)
+                return Record(name=name, members=first + own, extensibility=declared.extensibility)
             case _Field():
                 return self._field(declared, above)
-            case _Enum():
-                return _ENUM
+            case _Enum(type=kind):
+                return kind
 
     def _field(self, declared: _Field, above: tuple[str, ...]) -> FieldType:
         kind = self._type(declared.type, above)
         if not declared.sizes:
             return kind
         # Several dimensions lie on the wire as one, the last index running fastest.
-        length = math.prod(declared.sizes)
+        length = 1
+        for size in declared.sizes:
+            length *= size
+            # Checked on the way: a product of many sizes would take hours.
+            if length > MAX_FIXED_BYTES:
+                raise LogError(f"schema {self.schema}: {declared.name} has {length} elements or more; it is refused")
         if isinstance(kind, Array) and kind.length is not None:
             return Array(element=kind.element, length=length * kind.length)
         return Array(element=kind, length=length)

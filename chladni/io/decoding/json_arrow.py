@@ -15,7 +15,7 @@ import numpy as np
 
 from chladni.io.decoding.columns import Strings
 from chladni.io.decoding.found import Found
-from chladni.io.decoding.json_schema import FLOAT, NANOSECONDS, SECONDS
+from chladni.io.decoding.json_schema import FLOAT, INTEGER, NANOSECONDS, SECONDS
 from chladni.io.decoding.schema import Array, FieldType, Leaf, Primitive, Stamp, Text, tree_of
 
 if TYPE_CHECKING:
@@ -51,25 +51,29 @@ def read_by_arrow(span: Span, leaves: Sequence[Leaf]) -> list[Found] | None:
     stream = span.lines() if all(_is_plain(leaf) for leaf in leaves) else None
     if stream is None:
         return None
+    block_bytes = max(BLOCK_BYTES, 2 * int((span.ends - span.starts).max()))
+    table = _parsed(stream, leaves, block_bytes)
+    if table is None or table.num_rows != len(span):
+        return None
+    found = [_found(table, leaf) for leaf in leaves]
+    complete = [one for one in found if one is not None]
+    return complete if len(complete) == len(found) else None
+
+
+def _parsed(stream: bytes, leaves: Sequence[Leaf], block_bytes: int) -> pa.Table | None:
     import pyarrow as pa
     from pyarrow import json as arrow_json
 
-    longest = int((span.ends - span.starts).max())
     try:
-        table = arrow_json.read_json(
+        return arrow_json.read_json(
             pa.BufferReader(stream),
-            read_options=arrow_json.ReadOptions(use_threads=True, block_size=max(BLOCK_BYTES, 2 * longest)),
+            read_options=arrow_json.ReadOptions(use_threads=True, block_size=block_bytes),
             parse_options=arrow_json.ParseOptions(
                 explicit_schema=pa.schema(_arrow_fields(tree_of(leaves), pa)), unexpected_field_behavior="ignore"
             ),
         )
     except pa.ArrowInvalid:
         return None
-    if table.num_rows != len(span):
-        return None
-    found = [_found(table, leaf) for leaf in leaves]
-    complete = [one for one in found if one is not None]
-    return complete if len(complete) == len(found) else None
 
 
 def _is_plain(leaf: Leaf) -> bool:
@@ -105,7 +109,7 @@ def _found(table: pa.Table, leaf: Leaf) -> Found | None:
         if array.null_count:
             return None
         array = array.field(name)
-    if array.null_count and leaf.type != FLOAT:
+    if array.null_count and leaf.type not in (FLOAT, INTEGER):
         # A key that is missing, or null itself: the rules say what becomes of the message.
         return None
     match leaf.type:
@@ -125,19 +129,17 @@ def _complete(array: pa.Array) -> pa.Array | None:
     return None if array.null_count else array
 
 
-def _of_numbers(array: pa.Array) -> Found | None:
-    values = array.to_numpy(zero_copy_only=False)
-    # Nulls of a double become NaN, which is what the rules make of them.
-    return None if values.dtype.kind == "f" and np.isinf(values).any() else Found(values=values)
+def _of_numbers(array: pa.Array) -> Found:
+    # Nulls become NaN, and integers beside them doubles, which is what the rules make of them.
+    return Found(values=array.to_numpy(zero_copy_only=False))
 
 
 def _of_lists(array: pa.Array) -> Found | None:
     elements = _complete(array.flatten())
-    numbers = None if elements is None else _of_numbers(elements)
-    if numbers is None:
+    if elements is None:
         return None
     counts = np.diff(array.offsets.to_numpy()).astype(np.int64)
-    return Found(values=numbers.values, counts=counts)
+    return Found(values=_of_numbers(elements).values, counts=counts)
 
 
 def _of_times(array: pa.Array) -> Found | None:

@@ -9,20 +9,21 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from chladni.io.decoding.columns import Decoded, outside_buffer, require_known
+from chladni.io.decoding.columns import Decoded, Strings, outside_buffer, require_known
 from chladni.io.decoding.found import Found, found_of, joined_column, nothing
 from chladni.io.decoding.json_arrow import read_by_arrow
-from chladni.io.decoding.json_schema import discovered_record, parse_json_schema
+from chladni.io.decoding.json_schema import Settled, parse_json_schema
 from chladni.io.decoding.json_stream import Span
-from chladni.io.decoding.json_values import extract, load_message
+from chladni.io.decoding.json_values import Extractor, load_message
 from chladni.io.decoding.schema import leaves
+from chladni.signals.errors import LogError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from chladni.io.decoding.columns import EncodedMessages
+    from chladni.io.decoding.columns import Column, EncodedMessages
     from chladni.io.decoding.json_values import Value
     from chladni.io.decoding.schema import FieldInfo, Leaf, Record
 
@@ -38,6 +39,7 @@ SMALLEST_SPLIT: Final = 256
 LARGEST_STREAM: Final = 1 << 28
 """Most bytes that are parsed at once: Arrow's blocks have 31-bit sizes, and its arrays come on top."""
 
+_CONTRADICTED: Final = "the schema calls {} {}, which its values aren't; they are read as they are"
 _SYNTAX: Final = (json.JSONDecodeError, UnicodeDecodeError)
 
 
@@ -48,33 +50,58 @@ class JsonDecoder:
     ----------
     name : str
         Name of the schema, for messages.
-    record : Record or None
-        The fields; None where only messages can tell them (see `informed_by`).
+    stated : Record or None
+        The fields as the schema states them.
+    note : str
+        What is wrong with the schema; empty for a sound one, or none.
+    heads : sequence of EncodedMessages
+        First messages, for what the schema doesn't tell.
+
+    Raises
+    ------
+    LogError
+        If there are too many fields, or first messages of which none is a JSON object.
     """
 
-    def __init__(self, name: str, record: Record | None) -> None:
+    def __init__(
+        self, name: str, stated: Record | None, *, note: str = "", heads: Sequence[EncodedMessages] = ()
+    ) -> None:
         self.name = name
-        self._leaves = {leaf.info.path: leaf for leaf in leaves(record)} if record is not None else {}
-        self._known = record is not None
+        self.unread: Mapping[str, str] = {}
+        self._stated, self._note = stated, note
+        settled = Settled(name, stated, self._first(heads))
+        self._contradicted = settled.contradicted
+        self._leaves = {leaf.info.path: leaf for leaf in leaves(settled.record)}
         self.fields: tuple[FieldInfo, ...] = tuple(leaf.info for leaf in self._leaves.values())
 
     @classmethod
     def of_schema(cls, name: str, data: bytes) -> JsonDecoder:
-        """Make a decoder from a JSON Schema, or from none (empty data)."""
-        return cls(name, parse_json_schema(name, data))
+        """Make a decoder from a JSON Schema, or from none (empty data).
 
-    def informed_by(self, messages: EncodedMessages) -> JsonDecoder:
-        """Give a decoder that knows the fields: from the schema, else from the first messages."""
-        if self._known:
-            return self
-        outside = outside_buffer(messages)
-        first = []
-        for content in _span(messages, np.flatnonzero(~outside)[:FIRST_MESSAGES]).contents():
+        Messages tell their own fields, so one whose schema can't be used is read without it, with a word.
+        """
+        try:
+            return cls(name, parse_json_schema(name, data))
+        except LogError as error:
+            return cls(name, None, note=f"{error}; the fields are those of the first messages")
+
+    def informed_by(self, heads: Sequence[EncodedMessages]) -> JsonDecoder:
+        """Give a decoder that knows the fields: from the schema and from the first messages."""
+        return JsonDecoder(self.name, self._stated, note=self._note, heads=heads)
+
+    def _first(self, heads: Sequence[EncodedMessages]) -> list[object]:
+        spans = [_span(head, np.flatnonzero(~outside_buffer(head))) for head in heads]
+        contents = [content for span in spans for content in span.part(0, FIRST_MESSAGES).contents()][:FIRST_MESSAGES]
+        found = []
+        for content in contents:
             try:
-                first.append(load_message(content))
+                found.append(load_message(content))
             except ValueError:
                 continue  # `columns` reports it; a damaged first message must not hide the fields of the others
-        return JsonDecoder(self.name, discovered_record(self.name, first))
+        if contents and not any(isinstance(value, dict) for value in found):
+            what = "JSON that names its values, as in an object" if found else "JSON"
+            raise LogError(f"none of the first {len(contents)} messages is {what}, so there is no field to read")
+        return found
 
     def columns(self, messages: EncodedMessages, paths: Sequence[str]) -> Decoded:
         """Decode the fields named; see `chladni.io.decoding.columns.Decoder`."""
@@ -91,7 +118,22 @@ class JsonDecoder:
             leaf.info.path: joined_column(found, bad, empty=nothing(leaf))
             for leaf, found in zip(block.leaves, block.found, strict=True)
         }
-        return Decoded(columns=columns, bad=bad, reasons=dict(block.reasons))
+        told = block.told + self._contradictions(columns, int(np.count_nonzero(~bad)))
+        return Decoded(columns=columns, bad=bad, reasons=dict(block.reasons), told=dict(told))
+
+    def _contradictions(self, columns: Mapping[str, Column], sound: int) -> Counter[str]:
+        """Say where the schema calls a field what its values aren't."""
+        told = Counter({self._note: sound} if self._note else {})
+        for path, column in columns.items():
+            for stated, word in self._contradicted.items():
+                if path == stated or path.startswith((f"{stated}.", f"{stated}[]")):
+                    told[_CONTRADICTED.format(stated, word)] = sound
+            if self._leaves[path].info.dtype == np.int64 and not isinstance(column.values, Strings):
+                numbers = column.values
+                whole = numbers.dtype.kind != "f" or bool((np.isnan(numbers) | (numbers == np.floor(numbers))).all())
+                if not whole and self._stated is not None:
+                    told[_CONTRADICTED.format(path, "an integer")] = sound
+        return told
 
 
 class _Block:
@@ -102,6 +144,7 @@ class _Block:
         self.found: list[list[Found]] = [[] for _ in chosen]
         self.bad: list[NDArray[np.bool_]] = []
         self.reasons: Counter[str] = Counter()
+        self.told: Counter[str] = Counter()
 
     def read(self, span: Span) -> None:
         """Read messages: all at once where they are sound, the fewer at once the nearer an unsound one."""
@@ -121,9 +164,10 @@ class _Block:
     def _one_by_one(self, contents: Sequence[bytes]) -> None:
         bad = np.zeros(len(contents), np.bool_)
         rows: list[list[list[Value]]] = []
+        extract = Extractor(self.leaves, self.told)
         for index, content in enumerate(contents):
             try:
-                rows.append(extract(load_message(content), self.leaves))
+                rows.append(extract(load_message(content)))
             except ValueError as error:
                 bad[index] = True
                 self.reasons["not JSON" if isinstance(error, _SYNTAX) else str(error)] += 1

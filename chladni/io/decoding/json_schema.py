@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from chladni.io.decoding.schema import MAX_NESTING, Array, FieldType, Member, Primitive, Record, Stamp, Text
+from chladni.io.message_path import quoted
 from chladni.signals.errors import LogError
 
 if TYPE_CHECKING:
@@ -23,6 +25,12 @@ BOOLEAN: Final = Primitive(dtype=np.dtype(np.bool_))
 TIME: Final = Stamp(kind="time", seconds=np.dtype(np.int64), nanoseconds=np.dtype(np.int64))
 DURATION: Final = Stamp(kind="duration", seconds=np.dtype(np.int64), nanoseconds=np.dtype(np.int64))
 
+LARGEST_EXACT: Final = 2**53
+"""Largest number up to which a double holds every integer."""
+
+_NUMBER: Final = re.compile(
+    r"\s*[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|inf(?:inity)?)\s*", re.ASCII | re.IGNORECASE
+)
 _SCALARS: Final[dict[str, FieldType]] = {"number": FLOAT, "integer": INTEGER, "boolean": BOOLEAN, "string": Text()}
 
 
@@ -122,54 +130,114 @@ def _record(name: str, members: Mapping[str, FieldType | None]) -> Record:
     return Record(name=name, members=tuple(known))
 
 
-def discovered_record(name: str, values: Iterable[object]) -> Record:
-    """Derive the fields from decoded messages.
+class Settled:
+    """Fields of JSON messages: those that the schema states, and what messages show beyond it or against it.
 
-    Every number counts as a float, since a later message may hold a fraction where the first held 0.
+    A schema may have been derived from one message: where its values are of another kind, they are what counts, and
+    what it doesn't mention is read as well. Every number without stated type counts as a float, since a later message
+    may hold a fraction where the first held 0; only what a double can't hold stays whole.
 
     Parameters
     ----------
     name : str
+        Of the schema.
+    stated : Record or None
+        What it says.
     values : iterable
         Decoded messages; those that aren't objects are passed over.
 
-    Returns
-    -------
-    Record
-        All keys found, in the order they first appear; a key whose type differs keeps the first.
+    Attributes
+    ----------
+    record : Record
+        All fields. Of a key whose values differ in kind, numbers count before others, and else the first.
+    contradicted : dict
+        What the schema calls a field, by its path, where messages show otherwise.
 
     Examples
     --------
-    >>> record = discovered_record("demo", [{"value": 1, "note": None}, {"value": 0.5, "note": "b"}])
-    >>> [member.name for member in record.members]
+    >>> settled = Settled("demo", None, [{"value": 1, "note": None}, {"value": 0.5, "note": "b"}])
+    >>> [member.name for member in settled.record.members]
     ['value', 'note']
     """
-    messages = [value for value in values if isinstance(value, dict)]
-    return _merged(name, messages, 0)
+
+    def __init__(self, name: str, stated: Record | None, values: Iterable[object]) -> None:
+        self._name = name
+        self.contradicted: dict[str, str] = {}
+        self.record = self._merged(stated, [value for value in values if isinstance(value, dict)], "", 0)
+
+    def _merged(self, stated: Record | None, objects: list[dict[str, object]], path: str, depth: int) -> Record:
+        known = {member.name: member.type for member in stated.members} if stated is not None else {}
+        members: dict[str, FieldType | None] = {}
+        for key in dict.fromkeys([*known, *(key for value in objects for key in value)]):
+            below = f"{path}.{quoted(key)}" if path else quoted(key)
+            values = [value[key] for value in objects if key in value]
+            members[key] = self._type_of(known.get(key), values, below, depth)
+        return _record(self._name, members)
+
+    def _type_of(self, stated: FieldType | None, values: list[object], path: str, depth: int) -> FieldType | None:
+        given = [value for value in values if value is not None]
+        if depth > MAX_NESTING or not given:
+            return stated
+        shown = self._shown(stated, given, path, depth)
+        if stated is not None and shown is not None and _word(shown) != _word(stated):
+            self.contradicted[path] = _word(stated)
+        return shown or stated
+
+    def _shown(self, stated: FieldType | None, given: list[object], path: str, depth: int) -> FieldType | None:
+        if isinstance(given[0], list):
+            elements = [element for value in given if isinstance(value, list) for element in value]
+            inner = stated.element if isinstance(stated, Array) else None
+            element = self._type_of(inner, elements, path, depth + 1)
+            return None if element is None else Array(element=element)
+        if isinstance(given[0], dict):
+            if isinstance(stated, Stamp) or (stated is None and is_stamp(given[0])):
+                return stated or TIME
+            inner_record = stated if isinstance(stated, Record) else None
+            objects = [value for value in given if isinstance(value, dict)]
+            return self._merged(inner_record, objects, path, depth + 1)
+        return _scalar_of(stated, given)
 
 
-def _merged(name: str, objects: list[dict[str, object]], depth: int) -> Record:
-    keys = dict.fromkeys(key for value in objects for key in value)
-    members = {key: _type_of_all(name, [value[key] for value in objects if key in value], depth) for key in keys}
-    return _record(name, members)
-
-
-def _type_of_all(name: str, values: list[object], depth: int) -> FieldType | None:
-    if depth > MAX_NESTING:
-        return None
-    first = next((value for value in values if value is not None), None)
-    if isinstance(first, bool):
+def _scalar_of(stated: FieldType | None, given: list[object]) -> FieldType:
+    """Type of values of which the first is no list and no object."""
+    numbers = [value for value in given if isinstance(value, int | float) and not isinstance(value, bool)]
+    if numbers and stated == INTEGER:
+        return INTEGER if all(isinstance(value, int) or value.is_integer() for value in numbers) else FLOAT
+    if numbers:
+        exact = stated is None and all(isinstance(value, int) for value in numbers)
+        return INTEGER if exact and max(map(abs, numbers)) > LARGEST_EXACT else FLOAT
+    if stated in (FLOAT, INTEGER) and stated is not None:
+        return stated  # switches are written as true and false, and numbers in quotes
+    if isinstance(given[0], bool):
         return BOOLEAN
-    if isinstance(first, int | float):
-        return FLOAT
-    if isinstance(first, str):
-        return Text()
-    if isinstance(first, list):
-        elements = [element for value in values if isinstance(value, list) for element in value]
-        element = _type_of_all(name, elements, depth + 1)
-        return None if element is None else Array(element=element)
-    if isinstance(first, dict):
-        if is_stamp(first):
-            return TIME
-        return _merged(name, [value for value in values if isinstance(value, dict)], depth + 1)
-    return None
+    texts = [value for value in given if isinstance(value, str)]
+    # Whole numbers in quotes are as often names: only a point or an exponent shows a measured value.
+    numeric = stated is None and all(number_in(text) is not None for text in texts)
+    return FLOAT if numeric and any(sign in text for text in texts for sign in ".eE") else Text()
+
+
+def number_in(text: str) -> float | None:
+    """Number that a text is, as JSON or C write it; None where it is anything else.
+
+    Examples
+    --------
+    >>> number_in("-0.5e3"), number_in("nan"), number_in("1_000"), number_in("0x1F"), number_in("n/a")
+    (-500.0, nan, None, None, None)
+    """
+    return float(text) if _NUMBER.fullmatch(text) else None
+
+
+def _word(kind: FieldType) -> str:
+    match kind:
+        case Array():
+            return "a list"
+        case Record():
+            return "an object"
+        case Stamp():
+            return "a time"
+        case Text():
+            return "text"
+        case _ if kind == BOOLEAN:
+            return "a truth value"
+        case _:
+            return "an integer" if kind == INTEGER else "a number"

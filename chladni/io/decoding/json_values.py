@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from chladni.io.decoding.json_schema import NANOSECONDS, SECONDS
+from chladni.io.decoding.json_schema import NANOSECONDS, SECONDS, number_in
 from chladni.io.decoding.schema import Array, FieldType, Primitive, Stamp, Text
 
 if TYPE_CHECKING:
+    from collections import Counter
     from collections.abc import Sequence
 
     from chladni.io.decoding.schema import Leaf
@@ -25,8 +26,8 @@ _INT64: Final = range(-(2**63), 2**63)
 def load_message(content: bytes) -> object:
     """Parse one message.
 
-    ``NaN`` and ``Infinity``, which JSON doesn't know but many writers write, are let through here: only where an
-    infinite value is asked for is the message bad. Of a key that is given twice the last counts.
+    ``NaN`` and ``Infinity``, which JSON doesn't know but many writers write, are let through. Of a key that is given
+    twice the last counts.
 
     Raises
     ------
@@ -40,99 +41,115 @@ def load_message(content: bytes) -> object:
     return parsed
 
 
-def extract(message: object, leaves: Sequence[Leaf]) -> list[list[Value]]:
-    """Values of each leaf in one message: one, or, below a list of objects, any number.
+class Extractor:
+    """Takes the values of leaves out of one message after another.
 
     A number that is absent or null is NaN, whatever its type: fields of JSON objects are optional, and one that a
-    message lacks says nothing against those beside it. True and false are 1 and 0 where a number belongs.
+    message lacks says nothing against those beside it. So is what isn't a number, with a word. True and false are 1
+    and 0 where a number belongs, and numbers in quotes are numbers, with a word. What is called an integer and isn't
+    one is a float.
 
     Parameters
     ----------
-    message : object
-        As `load_message` gives it.
     leaves : sequence of Leaf
-
-    Raises
-    ------
-    ValueError
-        Says which field is of another type or infinite, or which time, text or list is missing.
+    told : collections.Counter
+        What was odd, and in how many values; written to.
     """
-    return [[_value(found, leaf.type, leaf) for found in _reached(message, leaf)] for leaf in leaves]
 
+    def __init__(self, leaves: Sequence[Leaf], told: Counter[str]) -> None:
+        self._leaves = leaves
+        self._told = told
 
-def _reached(message: object, leaf: Leaf) -> list[object]:
-    places: list[object] = [_object(message, leaf)]
-    for name, lists in zip(leaf.names, leaf.lists, strict=True):
-        places = [_member(place, name, leaf) for place in places]
-        for _ in range(lists):
-            places = [element for place in places for element in _list(place, leaf)]
-    return places
+    def __call__(self, message: object) -> list[list[Value]]:
+        """Give the values of each leaf: one, or, below a list of objects, any number.
 
+        Parameters
+        ----------
+        message : object
+            As `load_message` gives it.
 
-def _member(place: object, name: str, leaf: Leaf) -> object:
-    return None if place is None else _object(place, leaf).get(name)
+        Raises
+        ------
+        ValueError
+            Says that the message is no object, or which time or text is missing.
+        """
+        if isinstance(message, dict):
+            return [
+                [self._value(one, leaf.type, leaf) for one in self._reached(message, leaf)] for leaf in self._leaves
+            ]
+        raise ValueError("the message is no object")
 
+    def _odd(self, leaf: Leaf, what: str) -> None:
+        self._told[f"{leaf.info.path}: {what}"] += 1
 
-def _object(found: object, leaf: Leaf) -> dict[str, object]:
-    if isinstance(found, dict):
-        return found
-    raise ValueError(f"{leaf.info.path}: no object where one belongs")
+    def _reached(self, message: object, leaf: Leaf) -> list[object]:
+        places = [message]
+        for name, lists in zip(leaf.names, leaf.lists, strict=True):
+            places = [self._member(place, name, leaf) for place in places]
+            for _ in range(lists):
+                places = [element for place in places for element in self._list(place, leaf)]
+        return places
 
+    def _member(self, place: object, name: str, leaf: Leaf) -> object:
+        if isinstance(place, dict):
+            return place.get(name)
+        if place is not None:
+            self._odd(leaf, "no object where one belongs; what is in it counts as missing")
+        return None
 
-def _list(found: object, leaf: Leaf) -> list[object]:
-    if isinstance(found, list):
-        return found
-    raise ValueError(f"{leaf.info.path}: no list where one belongs")
-
-
-def _value(found: object, kind: FieldType, leaf: Leaf) -> Value:
-    if isinstance(kind, Array):
-        return tuple(_scalar(element, kind.element, leaf) for element in _list(found, leaf))
-    if isinstance(kind, Primitive) and (found is None or (isinstance(found, float) and math.isnan(found))):
-        return math.nan
-    return _scalar(found, kind, leaf)
-
-
-def _scalar(found: object, kind: FieldType, leaf: Leaf) -> Scalar:
-    if isinstance(kind, Text) and isinstance(found, str):
-        found.encode("utf-8")  # a lone surrogate parses, but is no text: nothing could write it
-        return found
-    if isinstance(kind, Stamp) and isinstance(found, dict):
-        return _nanoseconds(found, leaf)
-    if isinstance(kind, Primitive) and isinstance(found, int | float):
-        return _number(found, kind, leaf)
-    if found is None:
-        raise ValueError(f"no value for {leaf.info.path}")
-    raise ValueError(f"{leaf.info.path} is no {leaf.info.kind}")
-
-
-def _number(found: float, kind: Primitive, leaf: Leaf) -> Scalar:
-    if kind.dtype == np.bool_:
-        if isinstance(found, bool):
+    def _list(self, found: object, leaf: Leaf) -> list[object]:
+        if isinstance(found, list):
             return found
-        raise ValueError(f"{leaf.info.path} is no bool")
-    # Controllers write switches as true and false under schemas that know numbers only.
-    return _double(found, leaf) if kind.dtype == np.float64 else _whole(found, leaf)
+        if found is not None:
+            self._odd(leaf, "no list where one belongs; it counts as empty")
+        return []
+
+    def _value(self, found: object, kind: FieldType, leaf: Leaf) -> Value:
+        match kind:
+            case Array(element=element):
+                return tuple(self._scalar(one, element, leaf) for one in self._list(found, leaf))
+            case _:
+                return self._scalar(found, kind, leaf)
+
+    def _scalar(self, found: object, kind: FieldType, leaf: Leaf) -> Scalar:
+        if isinstance(kind, Primitive):
+            return self._number(found, kind, leaf)
+        if isinstance(kind, Text) and isinstance(found, str):
+            found.encode("utf-8")  # a lone surrogate parses, but is no text: nothing could write it
+            return found
+        if isinstance(kind, Stamp) and isinstance(found, dict):
+            return _nanoseconds(found, leaf)
+        raise ValueError(
+            f"no value for {leaf.info.path}" if found is None else f"{leaf.info.path} is no {leaf.info.kind}"
+        )
+
+    def _number(self, found: object, kind: Primitive, leaf: Leaf) -> Scalar:
+        if isinstance(found, str) and (quoted := number_in(found)) is not None:
+            self._odd(leaf, "numbers in quotes, read as numbers")
+            found = quoted
+        if kind.dtype == np.bool_ and isinstance(found, bool):
+            return found
+        # Controllers write switches as true and false under schemas that know numbers only.
+        if kind.dtype != np.bool_ and isinstance(found, int | float):
+            return _double(found) if kind.dtype == np.float64 else _whole(found)
+        if found is not None and not (isinstance(found, float) and math.isnan(found)):
+            self._odd(leaf, f"no {leaf.info.kind} where one belongs; it counts as missing")
+        return math.nan
 
 
-def _double(found: float, leaf: Leaf) -> float:
+def _double(found: float) -> float:
     try:
-        value = float(found)
-    except OverflowError as error:
-        raise ValueError(f"{leaf.info.path} exceeds the range of a double") from error
-    if math.isinf(value):
-        raise ValueError(f"{leaf.info.path} isn't finite")
-    return value
+        return float(found)
+    except OverflowError:
+        # As a parser makes infinity of 1e999.
+        return math.inf if found > 0 else -math.inf
 
 
-def _whole(found: float, leaf: Leaf) -> int:
+def _whole(found: float) -> float:
     # JSON Schema counts 5.0 as an integer.
-    if found % 1 != 0:
-        raise ValueError(f"{leaf.info.path} isn't whole")
-    whole = int(found)
-    if whole not in _INT64:
-        raise ValueError(f"{leaf.info.path} exceeds 64 bits")
-    return whole
+    if isinstance(found, int) or found.is_integer():
+        return int(found) if int(found) in _INT64 else _double(found)
+    return found
 
 
 def _nanoseconds(found: dict[str, object], leaf: Leaf) -> int:
@@ -140,4 +157,7 @@ def _nanoseconds(found: dict[str, object], leaf: Leaf) -> int:
     seconds = found.get(SECONDS)
     if len(parts) != 1 or type(parts[0]) is not int or type(seconds) is not int:
         raise ValueError(f"{leaf.info.path} is no time of sec and nsec")
-    return _whole(seconds * 1_000_000_000 + parts[0], leaf)
+    whole = seconds * 1_000_000_000 + parts[0]
+    if whole not in _INT64:
+        raise ValueError(f"{leaf.info.path} exceeds 64 bits")
+    return whole

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chladni.io.decoding.schema import Array, FieldType, Primitive, Record, Stamp, Text
+from chladni.io.decoding.schema import Array, Delimited, FieldType, Primitive, Record, Stamp, Text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -73,6 +73,9 @@ class Layouts:
             case Array(element=element, length=int() as length):
                 layout = self.of(element)
                 return None if layout is None else _repeated(layout, length)
+            case Delimited(content=content):
+                layout = self.of(content)
+                return None if layout is None else _sequence([self._padded(4, self.alignment(4)), layout])
             case Record(members=members):
                 parts = [self.of(member.type) for member in members]
                 whole = [part for part in parts if part is not None]
@@ -111,6 +114,7 @@ def element_offset(layouts: Layouts, kind: FieldType, names: tuple[str, ...]) ->
 
 def _offset_from(layouts: Layouts, kind: FieldType, names: tuple[str, ...], start: int) -> int | None:
     position = start
+    kind, position = _past_delimiters(layouts, kind, position)
     for name in names:
         if not isinstance(kind, Record):
             return None
@@ -120,10 +124,17 @@ def _offset_from(layouts: Layouts, kind: FieldType, names: tuple[str, ...], star
                 break
             part = layouts.of(member.type)
             position += part.sizes[position % part.alignment] if part is not None else 0
+        kind, position = _past_delimiters(layouts, kind, position)
     if not isinstance(kind, Primitive | Stamp):
         return None
     width = 4 if isinstance(kind, Stamp) else kind.dtype.itemsize
     return position + -position % layouts.alignment(width) - start
+
+
+def _past_delimiters(layouts: Layouts, kind: FieldType, position: int) -> tuple[FieldType, int]:
+    while isinstance(kind, Delimited):
+        kind, position = kind.content, position + -position % layouts.alignment(4) + 4
+    return kind, position
 
 
 def _fixed(sizes: list[int]) -> FixedLayout:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from functools import partial
@@ -14,7 +15,7 @@ from chladni.io.decoding.assemble import joined, scattered
 from chladni.io.decoding.columns import Column, Decoded, outside_buffer, require_known
 from chladni.io.decoding.found import Found, found_of, joined_column, nothing
 from chladni.io.decoding.piece import Piece
-from chladni.io.decoding.protobuf_schema import load_descriptor, record_of, zero_is_default
+from chladni.io.decoding.protobuf_schema import fields_of, has_no_defaults, load_descriptor, record_of
 from chladni.io.decoding.protobuf_template import (
     Template,
     UnfitError,
@@ -28,11 +29,12 @@ from chladni.io.decoding.schema import Array, FieldType, Primitive, Stamp, Text,
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from google.protobuf.descriptor import Descriptor
+    from google.protobuf.descriptor import Descriptor, FieldDescriptor
     from google.protobuf.message import Message
     from numpy.typing import NDArray
 
     from chladni.io.decoding.columns import EncodedMessages
+    from chladni.io.decoding.protobuf_template import Slot
     from chladni.io.decoding.schema import FieldInfo, Leaf
 
 MAX_TEMPLATES: Final = 16
@@ -61,7 +63,8 @@ class ProtobufDecoder:
         self._leaves = {leaf.info.path: leaf for leaf in leaves(record_of(descriptor))}
         self._descriptor = descriptor
         self._message_class: type[Message] = message_factory.GetMessageClass(descriptor)
-        self._without_defaults = zero_is_default(descriptor)
+        self._without_defaults = has_no_defaults(descriptor)
+        self.unread: Mapping[str, str] = {}
         self.fields: tuple[FieldInfo, ...] = tuple(leaf.info for leaf in self._leaves.values())
 
     @classmethod
@@ -69,16 +72,22 @@ class ProtobufDecoder:
         """Make a decoder from a serialised FileDescriptorSet."""
         return cls(load_descriptor(name, data))
 
-    def informed_by(self, messages: EncodedMessages) -> ProtobufDecoder:
+    def informed_by(self, heads: Sequence[EncodedMessages]) -> ProtobufDecoder:
         """Give this decoder: the descriptors tell all fields."""
-        del messages
+        del heads
         return self
 
     def columns(self, messages: EncodedMessages, paths: Sequence[str]) -> Decoded:
-        """Decode the fields named; see `chladni.io.decoding.columns.Decoder`. What a message leaves out is 0."""
+        """Decode the fields named; see `chladni.io.decoding.columns.Decoder`.
+
+        Of what a message leaves out, a field with presence (`optional`, in a oneof, of proto2, or inside a message
+        that isn't there) is missing, NaN, unless the descriptor gives it a default. One without presence is 0: that
+        is how proto3 writes zero.
+        """
         require_known(paths, self.fields, schema_name=self.name)
-        batch = _Batch(messages, [self._leaves[path] for path in paths], self._message_class)
-        if self._templates_serve(batch.chosen):
+        chosen = [_Chosen(self._leaves[path], fields_of(self._leaves[path], self._descriptor)) for path in paths]
+        batch = _Batch(messages, chosen, self._message_class)
+        if self._templates_serve([one.leaf for one in chosen]):
             return batch.by_templates(self._descriptor)
         return batch.by_library()
 
@@ -87,10 +96,17 @@ class ProtobufDecoder:
         return plain and packed_in_fixed_width(chosen, self._descriptor)
 
 
+class _Chosen(NamedTuple):
+    """A leaf that is asked for, and the fields that lead to it."""
+
+    leaf: Leaf
+    fields: tuple[FieldDescriptor, ...]
+
+
 class _Batch:
     """Messages of one call and what was found wrong with them."""
 
-    def __init__(self, messages: EncodedMessages, chosen: Sequence[Leaf], message_class: type[Message]) -> None:
+    def __init__(self, messages: EncodedMessages, chosen: Sequence[_Chosen], message_class: type[Message]) -> None:
         self.messages = messages
         self.chosen = chosen
         self.message_class = message_class
@@ -104,7 +120,7 @@ class _Batch:
         found = self._read(np.flatnonzero(~self.bad))
         columns = {
             leaf.info.path: joined_column([one], self.bad, empty=nothing(leaf))
-            for leaf, one in zip(self.chosen, found, strict=True)
+            for (leaf, _), one in zip(self.chosen, found, strict=True)
         }
         return Decoded(columns=columns, bad=self.bad, reasons=dict(self.reasons))
 
@@ -124,7 +140,7 @@ class _Batch:
         alone = self._read(rows)
         rows = rows[~self.bad[rows]]
         columns = {}
-        for leaf, some, one in zip(self.chosen, pieces, alone, strict=True):
+        for (leaf, _), some, one in zip(self.chosen, pieces, alone, strict=True):
             some.append(Piece(rows=rows, values=np.asarray(one.values), counts=one.counts))
             columns[leaf.info.path] = self._column(leaf, some)
         return Decoded(columns=columns, bad=self.bad, reasons=dict(self.reasons))
@@ -141,7 +157,7 @@ class _Batch:
         """Read all messages that have the layout of the first one; tells which those are."""
         done = np.zeros(len(rows), np.bool_)
         content = self._content(int(rows[0]))
-        wanted = {names: isinstance(leaf.type, Array) for leaf in self.chosen for names in _slots_of(leaf)}
+        wanted = {names: isinstance(leaf.type, Array) for leaf, _ in self.chosen for names in _slots_of(leaf)}
         try:
             self.message_class.FromString(content)
             template = Template(content, descriptor, wanted)
@@ -150,17 +166,16 @@ class _Batch:
         alike = np.flatnonzero(self.messages.lengths[rows] == len(content))
         table = self._table(self.messages.offsets[rows[alike]], len(content))
         fits = template.fitting(table)
-        for leaf in self.chosen:
-            if isinstance(leaf.type, Stamp):
+        for leaf, _ in self.chosen:
+            slot = template.slots.get((*leaf.names, "seconds"))
+            if isinstance(leaf.type, Stamp) and slot is not None:
                 # Exact arithmetic, which finds an overflow, is the library's way.
-                seconds = read_slot(table, template.slots.get((*leaf.names, "seconds")), leaf.type.seconds).astype(
-                    np.int64
-                )
+                seconds = read_slot(table, slot, leaf.type.seconds).astype(np.int64)
                 fits &= (seconds > -LARGEST_TIME_S) & (seconds < LARGEST_TIME_S)
         done[alike[fits]] = True
         table, taken = table[fits], rows[done]
-        for leaf, some in zip(self.chosen, pieces, strict=True):
-            some.append(Piece(rows=taken, values=_from_template(table, template, leaf)))
+        for one, some in zip(self.chosen, pieces, strict=True):
+            some.append(Piece(rows=taken, values=_from_template(table, template, one)))
         return done
 
     def _table(self, offsets: NDArray[np.int64], length: int) -> NDArray[np.uint8]:
@@ -184,7 +199,7 @@ class _Batch:
     def _read(self, rows: NDArray[np.intp]) -> list[Found]:
         """Read messages one by one; bad ones are marked and give nothing."""
         decode_error = self._decode_error()
-        readers = [_reader(leaf) for leaf in self.chosen]
+        readers = [_reader(one) for one in self.chosen]
         values = []
         for index in rows.tolist():
             try:
@@ -194,7 +209,7 @@ class _Batch:
                 self._mark(index, "not a protobuf message of this type")
             except OverflowError:
                 self._mark(index, _TIME_OVERFLOW)
-        return [found_of(leaf, [one[i] for one in values]) for i, leaf in enumerate(self.chosen)]
+        return [found_of(leaf, [one[i] for one in values]) for i, (leaf, _) in enumerate(self.chosen)]
 
     def _mark(self, index: int, reason: str) -> None:
         self.bad[index] = True
@@ -207,32 +222,77 @@ def _slots_of(leaf: Leaf) -> list[tuple[str, ...]]:
     return [leaf.names]
 
 
-def _from_template(table: NDArray[np.uint8], template: Template, leaf: Leaf) -> NDArray[np.generic]:
+def _from_template(table: NDArray[np.uint8], template: Template, chosen: _Chosen) -> NDArray[np.generic]:
+    leaf, fields = chosen
+    above = leaf.names if isinstance(leaf.type, Stamp) else leaf.names[:-1]
+    inside = all(above[:depth] in template.entered for depth in range(1, len(above) + 1))
     slots = [template.slots.get(names) for names in _slots_of(leaf)]
-    if isinstance(leaf.type, Stamp):
-        seconds = read_slot(table, slots[0], leaf.type.seconds)
-        nanoseconds = read_slot(table, slots[1], leaf.type.nanoseconds)
-        total: NDArray[np.int64] = seconds.astype(np.int64) * 1_000_000_000 + nanoseconds.astype(np.int64)
-        return total
     dtype = leaf.info.dtype or np.dtype(np.uint8)
-    return (read_block if isinstance(leaf.type, Array) else read_slot)(table, slots[0], dtype)
+    if isinstance(leaf.type, Array):
+        return np.zeros((len(table), 0), dtype) if slots[0] is None else read_block(table, slots[0], dtype)
+    if slots[0] is None and _is_missing(leaf, fields[-1], inside=inside):
+        return np.full(len(table), np.nan, np.promote_types(dtype, np.float32))
+    if isinstance(leaf.type, Stamp):
+        types = leaf.type.seconds, leaf.type.nanoseconds
+        seconds, rest = (_read(table, slot, one).astype(np.int64) for slot, one in zip(slots, types, strict=True))
+        total: NDArray[np.int64] = seconds * 1_000_000_000 + rest
+        return total
+    return _read(table, slots[0], dtype)
 
 
-def _reader(leaf: Leaf) -> Callable[[Message], Sequence[object]]:
+def _is_missing(leaf: Leaf, field: FieldDescriptor, *, inside: bool) -> bool:
+    """Whether a leaf that a message leaves out, or not `inside` of one that is there, isn't zero but missing."""
+    if isinstance(leaf.type, Stamp):
+        return leaf.type.kind == "duration" and not inside
+    return field.has_presence or not inside
+
+
+def _read(table: NDArray[np.uint8], slot: Slot | None, dtype: np.dtype[np.generic]) -> NDArray[np.generic]:
+    return np.zeros(len(table), dtype) if slot is None else read_slot(table, slot, dtype)
+
+
+def _reader(chosen: _Chosen) -> Callable[[Message], Sequence[object]]:
     """Function that gives the values of a leaf in one message: one, or, below a list of messages, any number."""
+    leaf, fields = chosen
     if any(leaf.lists) or not isinstance(leaf.type, Primitive | Text):
-        return partial(_values, leaf=leaf)
+        return partial(_values, chosen=chosen)
     # The common case: plain numbers, reached by attributes alone.
-    reach = attrgetter(".".join(leaf.names))
-    return lambda message: (reach(message),)
+    if not any(map(_is_optional, fields)):
+        reach = attrgetter(".".join(leaf.names))
+        return lambda message: (reach(message),)
+    way = [(field.name, _is_optional(field)) for field in fields]
+    missing = (_value(None, leaf.type),)
+
+    def read(message: Any) -> Sequence[object]:
+        for name, optional in way:
+            if optional and not message.HasField(name):
+                return missing
+            message = getattr(message, name)
+        return (message,)
+
+    return read
 
 
-def _values(message: Message, leaf: Leaf) -> Sequence[object]:
+def _is_optional(field: FieldDescriptor) -> bool:
+    """Whether a field that a message leaves out has no value at all."""
+    return field.has_presence and not field.has_default_value
+
+
+def _values(message: Message, chosen: _Chosen) -> Sequence[object]:
     places: list[object] = [message]
-    for name, lists in zip(leaf.names, leaf.lists, strict=True):
-        below = [getattr(place, name) for place in places]
+    for field, lists in zip(chosen.fields, chosen.leaf.lists, strict=True):
+        below = [_member(place, field) for place in places]
         places = [element for one in below for element in _elements(one)] if lists else below
-    return [_value(place, leaf.type) for place in places]
+    return [_value(place, chosen.leaf.type) for place in places]
+
+
+def _member(place: Any, field: FieldDescriptor) -> object:
+    """Value of a field; None where it's missing."""
+    if place is None:
+        return None
+    # Entries of a map have a key and a value, always.
+    absent = _is_optional(field) and not isinstance(place, _Entry) and not place.HasField(field.name)
+    return None if absent else getattr(place, field.name)
 
 
 class _Entry(NamedTuple):
@@ -242,10 +302,10 @@ class _Entry(NamedTuple):
     value: object
 
 
-def _elements(field: Iterable[object]) -> Iterable[object]:
+def _elements(field: object) -> Iterable[object]:
     if isinstance(field, Mapping):
         return [_Entry(key, value) for key, value in field.items()]
-    return field
+    return () if field is None else cast("Iterable[object]", field)
 
 
 def _value(found: object, kind: FieldType) -> object:
@@ -253,7 +313,13 @@ def _value(found: object, kind: FieldType) -> object:
         case Array() if isinstance(found, bytes):
             return np.frombuffer(found, np.uint8)
         case Array(element=element):
-            return tuple(_value(one, element) for one in cast("Iterable[object]", found))
+            return tuple(_value(one, element) for one in _elements(found))
+        case Stamp(kind="time") if found is None:
+            return 0  # no time at all, as one that nobody set
+        case Text() if found is None:
+            return ""
+        case _ if found is None:
+            return math.nan
         case Stamp():
             return _nanoseconds(found)
         case _:

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from google.protobuf.descriptor_pb2 import FileDescriptorProto
     from google.protobuf.descriptor_pool import DescriptorPool
 
+    from chladni.io.decoding.schema import Leaf
+
 _INT64: Final = np.dtype(np.int64)
 _INT32: Final = np.dtype(np.int32)
 STAMPS: Final = {
@@ -105,8 +107,17 @@ def _repeated(descriptor: Descriptor) -> set[str]:
     return {field.name for field in proto.field if field.label == _REPEATED}
 
 
-def zero_is_default(descriptor: Descriptor) -> bool:
-    """Whether a field left out of this message, or of a message in it, is always zero, and none is required.
+def fields_of(leaf: Leaf, descriptor: Descriptor) -> tuple[FieldDescriptor, ...]:
+    """Fields that lead from a message to a leaf, that of the leaf included."""
+    found: list[FieldDescriptor] = []
+    for name in leaf.names:
+        found.append(descriptor.fields_by_name[name])
+        descriptor = found[-1].message_type
+    return tuple(found)
+
+
+def has_no_defaults(descriptor: Descriptor) -> bool:
+    """Whether no field of this message, or of a message in it, has a default other than zero, and none is required.
 
     That is so in proto3; elsewhere only the library knows what an absent field means.
     """

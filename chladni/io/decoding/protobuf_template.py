@@ -63,6 +63,13 @@ class Template:
     wanted : dict of tuple of str to bool
         Names that lead to the fields asked for, and whether each is an array.
 
+    Attributes
+    ----------
+    slots : dict
+        Where each field asked for stands, by its names; those that the message leaves out have none.
+    entered : set of tuple of str
+        Names that lead to the messages inside this one, of those that may hold a field asked for.
+
     Raises
     ------
     UnfitError
@@ -73,6 +80,7 @@ class Template:
         self.content = np.frombuffer(content, np.uint8)
         self.mask = np.zeros(len(content), np.uint8)
         self.slots: dict[tuple[str, ...], Slot] = {}
+        self.entered: set[tuple[str, ...]] = set()
         self._bytes = content
         self._wanted = wanted
         self._above = {names[:depth] for names in wanted for depth in range(1, len(names))}
@@ -152,24 +160,23 @@ class Template:
         if names in self._wanted:
             self.slots[names] = slot
         else:
+            self.entered.add(names)
             self._scan(slot.at, slot.at + slot.width, slot.field.message_type, names)
 
 
-def read_slot(rows: NDArray[np.uint8], slot: Slot | None, dtype: np.dtype[np.generic]) -> NDArray[np.generic]:
-    """Read a number a message; zeros where the messages leave it out.
+def read_slot(rows: NDArray[np.uint8], slot: Slot, dtype: np.dtype[np.generic]) -> NDArray[np.generic]:
+    """Read a number a message.
 
     Parameters
     ----------
     rows : uint8 array [message, byte]
-    slot : Slot or None
+    slot : Slot
     dtype : numpy.dtype
 
     Returns
     -------
     ndarray [message]
     """
-    if slot is None:
-        return np.zeros(len(rows), dtype)
     if _WIRE_OF[slot.field.type] in _FIXED:
         return read_block(rows, slot, dtype)[:, 0]
     value = np.zeros(len(rows), np.uint64)
@@ -182,15 +189,13 @@ def read_slot(rows: NDArray[np.uint8], slot: Slot | None, dtype: np.dtype[np.gen
     return value.astype(np.bool_) if dtype == np.bool_ else value.view(np.int64).astype(dtype)
 
 
-def read_block(rows: NDArray[np.uint8], slot: Slot | None, dtype: np.dtype[np.generic]) -> NDArray[np.generic]:
+def read_block(rows: NDArray[np.uint8], slot: Slot, dtype: np.dtype[np.generic]) -> NDArray[np.generic]:
     """Read an array of numbers of fixed width from each message.
 
     Returns
     -------
     ndarray [message, element]
     """
-    if slot is None:
-        return np.zeros((len(rows), 0), dtype)
     content = np.ascontiguousarray(rows[:, slot.at : slot.at + slot.width])
     return content.view(dtype.newbyteorder("<")).astype(dtype, copy=False)
 

@@ -31,13 +31,18 @@ PADDING_MEMBER: Final = "structure_needs_at_least_one_member"
 """Name of the byte that ROS 2 puts into a message without fields."""
 
 FieldKind = Literal["number", "bool", "string", "time", "duration"]
+Extensibility = Literal["final", "appendable", "mutable"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Primitive:
-    """A number or a truth value of fixed width; ``dtype`` is native, the wire's byte order is the decoder's."""
+    """A number or a truth value of fixed width; ``dtype`` is native, the wire's byte order is the decoder's.
+
+    ``enumerated`` ones are names for numbers, which some writers of arrays don't count as primitive.
+    """
 
     dtype: np.dtype[np.generic]
+    enumerated: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,14 +71,22 @@ class Array:
     bound: int | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Delimited:
+    """A value behind a 32-bit number that counts its bytes: what XCDR2 makes of types that may grow."""
+
+    content: FieldType
+
+
 # Compared by identity: a definition may use one type many times, and comparing or hashing by content would
 # take time exponential in its depth.
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Record:
-    """A message type: named members in the order of the wire."""
+    """A message type: named members in the order of the wire; its extensibility where the definition states it."""
 
     name: str
     members: tuple[Member, ...]
+    extensibility: Extensibility | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +97,7 @@ class Member:
     type: FieldType
 
 
-FieldType = Primitive | Text | Stamp | Array | Record
+FieldType = Primitive | Text | Stamp | Array | Record | Delimited
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,6 +216,8 @@ def _leaves_of(kind: FieldType, way: _Way) -> Iterator[Leaf]:
             yield Leaf(info=info, names=way.names, lists=way.lists, type=kind)
         case Array(element=element, length=length):
             yield from _leaves_of(element, way.opened(length, marked=True))
+        case Delimited(content=content):
+            yield from _leaves_of(content, way)
         case Record(members=members):
             for member in members:
                 if member.name != PADDING_MEMBER:
@@ -248,6 +263,8 @@ def smallest_size(kind: FieldType, known: dict[FieldType, int]) -> int:
         case Array(element=element, length=length):
             smallest = smallest_size(element, known)
             size = 4 if length is None else length * smallest
+        case Delimited(content=content):
+            size = 4 + smallest_size(content, known)
         case Record(members=members):
             size = sum(smallest_size(member.type, known) for member in members)
     if size > MAX_FIXED_BYTES:

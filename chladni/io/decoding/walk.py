@@ -16,8 +16,18 @@ from chladni.io.decoding.cursor import Cursor, uniform
 from chladni.io.decoding.element_span import ElementPlaces, ElementSpan
 from chladni.io.decoding.layout import Layouts, element_offset
 from chladni.io.decoding.piece import Piece
-from chladni.io.decoding.schema import Array, FieldType, Leaf, Primitive, Record, Stamp, Text, Tree, smallest_size
-from chladni.signals.errors import LogError
+from chladni.io.decoding.schema import (
+    Array,
+    Delimited,
+    FieldType,
+    Leaf,
+    Primitive,
+    Record,
+    Stamp,
+    Text,
+    Tree,
+    smallest_size,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -31,6 +41,9 @@ Each step costs some hundred microseconds whatever the number of messages; a fil
 message would otherwise stop the reader for hours.
 """
 
+MAX_MEASURED_STEPS: Final = 1000
+"""The same where first messages are only measured, a tenth of a second for one topic."""
+
 UINT32: Final = np.dtype(np.uint32)
 UINT8: Final = np.dtype(np.uint8)
 
@@ -42,13 +55,19 @@ class WireRules:
     Parameters
     ----------
     max_alignment : int
-        8 in CDR, 1 (no padding) in ROS 1.
+        8 in CDR, 4 in XCDR2, 1 (no padding) in ROS 1.
     terminated : bool
         Strings end with a zero byte, counted in their length (CDR).
+    spare : int
+        Most bytes that a message may have behind its last field.
+    origin : int
+        Bytes in front of the first field that alignment counts, too.
     """
 
     max_alignment: int
     terminated: bool
+    spare: int
+    origin: int = 0
 
 
 class Walk:
@@ -70,13 +89,33 @@ class Walk:
         self.pieces: dict[str, list[Piece]] = {}
         self.smallest: dict[FieldType, int] = {}
         self.steps_left = MAX_ELEMENT_STEPS
+        self.strict = False
+        # Whether everything was passed over, so that the cursor stands at the end of the messages.
+        self.complete = True
+
+    def drop_other_lengths(self) -> None:
+        """Drop messages that are longer or shorter than their fields: their definition isn't the one that is read."""
+        cursor = self.cursor
+        if self.complete:
+            # As an unsigned number one that is too short by a byte is longer than any.
+            left = (cursor.size - cursor.position).view(np.uint64)
+            cursor.drop(left > self.rules.spare, "its length isn't that of its definition")
+
+    def measure(self, kind: FieldType, *, delimited: bool) -> None:
+        """Pass over everything, and look at each delimiter on the way where there are such."""
+        self.strict = delimited
+        self.steps_left = MAX_MEASURED_STEPS
+        self.skip(kind)
+        self.drop_other_lengths()
 
     def record(self, record: Record, wanted: Tree, *, last: bool) -> None:
-        """Read the wanted members of a message; with `last`, don't measure what follows them."""
+        """Read the wanted members of a message; with `last`, measure what follows them only where that is cheap."""
         missing = len(wanted)
         for member in record.members:
             if last and not missing:
-                return
+                if not self._passed(member.type):
+                    return
+                continue
             below = wanted.get(member.name)
             if below is None:
                 self.skip(member.type)
@@ -84,9 +123,20 @@ class Walk:
                 missing -= 1
                 self.read(member.type, below, last=last and not missing)
 
+    def _passed(self, kind: FieldType) -> bool:
+        """Pass over a value of fixed size; False where this isn't one, or one before it wasn't."""
+        layout = self.layouts.of(kind) if self.complete else None
+        self.complete = layout is not None
+        if layout is not None:
+            self.cursor.pass_over(layout)
+        return self.complete
+
     def read(self, kind: FieldType, wanted: Tree | Leaf, *, last: bool = False) -> None:
         """Read one value, or the wanted leaves in it, from each message."""
         match kind:
+            case Delimited():
+                self._delimiter()
+                self.read(kind.content, wanted, last=last)
             case Record():
                 self.record(kind, _below(wanted), last=last)
             case Primitive(dtype=dtype):
@@ -106,11 +156,13 @@ class Walk:
 
     def skip(self, kind: FieldType) -> None:
         """Move over one value in each message."""
-        layout = self.layouts.of(kind)
+        layout = None if self.strict and not isinstance(kind, Primitive | Stamp) else self.layouts.of(kind)
         if layout is not None:
             self.cursor.pass_over(layout)
             return
         match kind:
+            case Delimited():
+                self._measured_content(kind)
             case Text():
                 self._text(kind)
             case Record(members=members):
@@ -135,13 +187,22 @@ class Walk:
         self.cursor.advance(4)
         return length
 
+    def _delimiter(self) -> int | NDArray[np.int64]:
+        length = self._length()
+        return _kept(length, self.cursor.claim(length, "a delimited value"))
+
+    def _measured_content(self, kind: Delimited) -> None:
+        """Pass over a delimited value, of the messages whose delimiter counts its bytes."""
+        length = self._delimiter()
+        before, end = self.cursor.rows, np.broadcast_to(self.cursor.position + length, len(self.cursor))
+        self.skip(kind.content)
+        end = end[np.searchsorted(before, self.cursor.rows)]
+        self.cursor.drop(end != self.cursor.position, "a delimiter contradicts the definition")
+
     def _text(self, text: Text) -> tuple[int | NDArray[np.int64], int | NDArray[np.int64]]:
         """Move over a string; gives the place and the number of bytes of its characters."""
         if text.wide:
-            raise LogError(
-                "wstring: writers disagree on its width (2 or 4 bytes a character), so fields after it can't be "
-                "located; choose fields that come before it"
-            )
+            raise AssertionError("fields behind a wstring can't be located, and aren't offered")
         cursor = self.cursor
         length = self._length()
         length = _kept(length, cursor.claim(length, "a string"))
@@ -164,7 +225,7 @@ class Walk:
                 self._numbers(dtype, counts, wanted)
             case Text() if wanted is not None:
                 self._texts(array.element, counts, wanted)
-            case _ if self._fixed_elements(array.element, counts, wanted):
+            case _ if not self.strict and self._fixed_elements(array.element, counts, wanted):
                 return
             case _:
                 self._each_element(array.element, counts, wanted)

@@ -1,23 +1,32 @@
 """What a data file holds, and the way of its columns to SI."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, LogError, SetupError
+from chladni.signals.geometry import Geometry
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+
+if TYPE_CHECKING:
+    from chladni.signals.frequency_response import FrequencyResponse
+    from chladni.signals.mode_set import ModeSet
+    from chladni.signals.time_base import TimeBase
 
 MAX_BYTES = 8 * 2**30
 """Most memory that the arrays of one file may take unless the caller allows more."""
+# As for the topics of a log, see `chladni.io.placement`: points of one grid are never farther apart than this share
+# of a period, and a grid isn't this many times as long as the samples on it.
+_ALIGNED, _SPARSE = 0.01, 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FileContents:
-    """The time series of a data file.
+    """The time series of a data file, and what else it holds.
 
     Attributes
     ----------
@@ -25,23 +34,63 @@ class FileContents:
         One for each sample rate, start and length.
     notes
         Sentences on what was inferred or left out.
+    unread
+        (name, reason) of each part that was left out: a column of text, an object of MATLAB.
+    time_bases
+        What the file's own times say about the clock of each series, None where it states a rate instead; one for
+        each series, or empty when the file has no times at all.
+    functions, modes
+        Frequency responses and modes that the file holds ready-made; None when there are none.
+    geometry
+        Measurement points and lines, where the file has them.
     """
 
     series: tuple[TimeSeries, ...]
     notes: tuple[str, ...] = ()
+    unread: tuple[tuple[str, str], ...] = ()
+    time_bases: tuple["TimeBase | None", ...] = ()
+    functions: "FrequencyResponse | None" = None
+    modes: "ModeSet | None" = None
+    geometry: Geometry = field(default_factory=Geometry)
 
 
-def in_si(values: NDArray[np.floating[Any]], unit: str) -> tuple[NDArray[np.floating[Any]], str]:
-    """Give the values in SI and their unit; values already in SI are given back untouched, to the bit."""
-    from chladni.signals.units import si_factor
+def with_notes(contents: FileContents, notes: Iterable[str]) -> FileContents:
+    """Put notes before those that there are."""
+    return replace(contents, notes=(*notes, *contents.notes))
 
-    factor, si_unit = si_factor(unit)
-    return (values if factor == 1.0 else values * factor), si_unit
+
+NOTHING: Final = FileContents(series=())
+"""What a part of a file holds of which nothing is told."""
+
+
+def joined(parts: Sequence[FileContents]) -> FileContents:
+    """Put what several parts of a file hold into one."""
+    return FileContents(
+        series=tuple(series for part in parts for series in part.series),
+        notes=tuple(note for part in parts for note in part.notes),
+        unread=tuple(left_out for part in parts for left_out in part.unread),
+        time_bases=tuple(base for part in parts for base in part.time_bases or (None,) * len(part.series)),
+    )
+
+
+def unit_in_si(name: str, label: str) -> tuple[float, str]:
+    """Give the factor to SI and the SI unit of a column by its label; its name settles what a label may mean.
+
+    Raises
+    ------
+    SetupError
+        When the label is no unit, or leaves the unit open.
+    """
+    from chladni.signals.unit_labels import quantity_of_name, read_label
+
+    return read_label(label, quantity=quantity_of_name(name))
 
 
 def _channel_in_si(values: NDArray[np.floating[Any]], channel: Channel) -> tuple[NDArray[np.floating[Any]], str]:
     try:
-        return in_si(values, channel.unit)
+        factor, unit = unit_in_si(channel.name, channel.unit)
+        # Values already in SI are given back untouched, to the bit.
+        return (values if factor == 1.0 else values * factor), unit
     except SetupError as error:
         raise SetupError(f"channel {channel.name!r}: {error}; or state its unit yourself") from error
 
@@ -112,7 +161,69 @@ def placed_rows(
     lost = int(np.isfinite(rows).any(axis=0).sum() - np.isfinite(grid.values).any(axis=0).sum())
     if lost:
         notes.append(f"{where}: {lost} samples came at the same time as another one and are left out.")
-    return FileContents(series=(series,), notes=tuple(notes))
+    return FileContents(series=(series,), notes=tuple(notes), time_bases=(base,))
+
+
+def on_common_grids(series: Sequence[TimeSeries]) -> tuple[TimeSeries, ...]:
+    """Bring series whose samples fall on the points of one grid together; what one doesn't cover is missing there."""
+    groups: list[list[TimeSeries]] = []
+    for part in series:
+        home = next((group for group in groups if _share_a_grid([*group, part])), None)
+        if home is None:
+            groups.append([part])
+        else:
+            home.append(part)
+    return tuple(group[0] if len(group) == 1 else _laid_together(group) for group in groups)
+
+
+def _share_a_grid(parts: Sequence[TimeSeries]) -> bool:
+    """Whether the grids run together all along, and their span isn't mostly empty."""
+    first, last = parts[0], parts[-1]
+    offset = _offset(first, last)
+    drift = abs(first.sample_rate_hz / last.sample_rate_hz - 1) * max(first.samples, last.samples)
+    if abs(offset - round(offset)) + drift > _ALIGNED:
+        return False
+    places = [(round(_offset(first, part)), part.samples) for part in parts]
+    length = max(place + samples for place, samples in places) - min(place for place, _ in places)
+    # Two recordings that lie hours apart aren't one measurement.
+    return length <= _SPARSE * sum(samples for _, samples in places)
+
+
+def _offset(first: TimeSeries, other: TimeSeries) -> float:
+    """Samples from the first one's start to the other's."""
+    return (other.start_time_ns - first.start_time_ns) / NS_PER_S * first.sample_rate_hz
+
+
+def _laid_together(parts: Sequence[TimeSeries]) -> TimeSeries:
+    offsets = [round(_offset(parts[0], part)) for part in parts]
+    begin = min(offsets)
+    length = max(offset + part.samples for offset, part in zip(offsets, parts, strict=True)) - begin
+    rows = sum(len(part.channels) for part in parts)
+    values = np.full((rows, length), np.nan, np.result_type(*(part.values.dtype for part in parts)))
+    row = 0
+    for offset, part in zip(offsets, parts, strict=True):
+        known = part.values if part.valid is None else np.where(part.valid, part.values, np.nan)
+        values[row : row + len(part.channels), offset - begin : offset - begin + part.samples] = known
+        row += len(part.channels)
+    return TimeSeries(
+        values=values,
+        sample_rate_hz=parts[0].sample_rate_hz,
+        start_time_ns=parts[offsets.index(begin)].start_time_ns,
+        channels=tuple(channel for part in parts for channel in part.channels),
+        valid=finite_mask(values),
+    )
+
+
+def one_line(said: object) -> str:
+    r"""Give the start of what a library says of a file as one line: it may hold the file's own bytes.
+
+    Examples
+    --------
+    >>> one_line(ValueError("bad name 'a\x00b'\nand more"))
+    "bad name 'a.b'"
+    """
+    line = str(said).partition("\n")[0][:120]
+    return "".join(letter if letter.isprintable() else "." for letter in line)
 
 
 def one_series(series: Iterable[TimeSeries], kind: str) -> TimeSeries:
@@ -122,7 +233,7 @@ def one_series(series: Iterable[TimeSeries], kind: str) -> TimeSeries:
         rates = ", ".join(f"{part.sample_rate_hz:g} Hz from {part.start_time_ns} ns" for part in parts) or "none"
         raise LogError(
             f"{kind} holds channels of one rate and start, here are {len(parts)} groups ({rates}); choose channels "
-            "of one group, or have them brought to one sample rate"
+            "of one group (--channel NAME), or have them brought to one sample rate (--resample HZ)"
         )
     return parts[0]
 

@@ -1,4 +1,4 @@
-"""MATLAB ``.mat`` files of versions 5 to 7.2."""
+"""MATLAB ``.mat`` files: versions 5 to 7.2 by our own reader, 7.3 by HDF5."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,9 +8,11 @@ import numpy as np
 
 from chladni.io.atomic import atomic_path
 from chladni.io.files.contents import MAX_BYTES, FileContents
-from chladni.io.files.mat_elements import HEADER_BYTES, read_mat_elements
+from chladni.io.files.mat_elements import HEADER_BYTES, Unreadable, read_mat_elements
+from chladni.io.files.mat_hdf5 import read_mat_hdf5
 from chladni.io.files.named_arrays import series_of_arrays
-from chladni.io.files.series_fields import SERIES_FORMAT, series_fields, series_of_fields
+from chladni.io.files.series_fields import SERIES_FORMAT, restated, series_fields, series_of_fields
+from chladni.io.files.time_reading import TimeOptions
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
 
@@ -21,44 +23,58 @@ def read_mat(
     path: Path | str,
     *,
     sample_rate_hz: float | None = None,
+    time: str | None = None,
+    time_unit: str | None = None,
     units: Mapping[str, str] | None = None,
     max_bytes: int = MAX_BYTES,
 ) -> FileContents:
     """Read our own layout (`chladni.io.files.series_fields`), or any variables with a rate or a time vector.
 
-    Fields of structs are named with dots: ``data.accel``.
+    Fields of structs are named with dots: ``data.accel``, those of arrays of structs and cells with a number from 0:
+    ``data.signals[0].values``. Objects of MATLAB's own classes are left out and told.
 
     Parameters
     ----------
     sample_rate_hz
         Rate of foreign variables when nothing in the file says it.
+    time
+        Name of the vector of times, ``none`` when there's none whatever it's called.
+    time_unit
+        What its numbers count, see `chladni.io.files.time_reading.TIME_UNITS`.
     units
-        Unit by variable name, for foreign variables.
+        Unit by channel name, instead of that in the file.
     max_bytes
         Most memory that the variables may take, unpacked.
 
     Raises
     ------
     LogError
-        When the file is of version 7.3, damaged, too large, or holds no signal.
+        When the file is damaged, too large, or holds no signal, or it is of version 7.3 and h5py isn't installed.
     SetupError
         When nothing says the sample rate, or a unit is unknown.
     """
     path = Path(path)
-    raw = _raw(path, max_bytes)
+    with path.open("rb") as file:
+        header = file.read(HEADER_BYTES)
     try:
-        variables = read_mat_elements(raw, max_bytes=max_bytes)
+        if header.startswith((b"MATLAB 7.3", b"\x89HDF")):
+            variables = read_mat_hdf5(path, max_bytes=max_bytes)
+        else:
+            variables = read_mat_elements(_raw(path, header, max_bytes), max_bytes=max_bytes)
     except LogError as error:
         raise LogError(f"{path}: this mat file can't be read: {error}") from error
+    flat, unread = _flat(variables)
     if variables.get("format") == SERIES_FORMAT:
-        return FileContents(
-            series=tuple(
-                series_of_fields(fields, where=f"{path}, {name}")
-                for name, fields in variables.items()
-                if isinstance(fields, Mapping)
-            )
+        series = tuple(
+            series_of_fields(fields, where=f"{path}, {name}")
+            for name, fields in variables.items()
+            if isinstance(fields, Mapping)
         )
-    return series_of_arrays(_flat(variables), where=str(path), sample_rate_hz=sample_rate_hz, units=units)
+        if not series and unread:
+            raise LogError(f"{path}: {unread[0][0]}: {unread[0][1]}")
+        return FileContents(series=restated(series, units, where=str(path)), unread=unread)
+    options = TimeOptions(column=time, unit=time_unit, rate_hz=sample_rate_hz)
+    return series_of_arrays(flat, options, where=str(path), units=units, unread=unread)
 
 
 def write_mat(
@@ -96,29 +112,35 @@ def _as_matlab(array: np.ndarray[Any, Any]) -> Any:
     return array.astype(object) if array.dtype.kind == "U" else array
 
 
-def _flat(content: Mapping[str, Any], prefix: str = "", depth: int = 0) -> dict[str, Any]:
+def _flat(content: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[tuple[str, str], ...]]:
+    """Name what lies in structs and cells with dots and numbers, and give (name, reason) of what isn't read."""
     flat: dict[str, Any] = {}
-    for name, value in content.items():
-        if isinstance(value, Mapping) and depth < _MAX_DEPTH:
-            flat |= _flat(value, f"{prefix}{name}.", depth + 1)
-        elif not isinstance(value, Mapping):
-            flat[prefix + name] = value
-    return flat
+    unread: list[tuple[str, str]] = []
+    waiting = [(name, value, 0) for name, value in reversed(list(content.items()))]
+    while waiting:
+        name, value, depth = waiting.pop()
+        if isinstance(value, Unreadable):
+            unread.append((name, value.reason))
+        elif isinstance(value, Mapping) and depth < _MAX_DEPTH:
+            waiting.extend((f"{name}.{field}", part, depth + 1) for field, part in reversed(list(value.items())))
+        elif isinstance(value, list) and depth < _MAX_DEPTH:
+            # Cells of text are names and remarks.
+            parts = [(place, part) for place, part in enumerate(value) if not isinstance(part, str)]
+            waiting.extend((f"{name}[{place}]", part, depth + 1) for place, part in reversed(parts))
+        elif isinstance(value, np.ndarray) and value.dtype.kind == "c":
+            unread.append((name, "complex numbers, which are no samples"))
+        elif isinstance(value, np.ndarray) and value.ndim > 2:
+            unread.append((name, f"an array of {value.ndim} axes"))
+        else:
+            flat[name] = value
+    return flat, tuple(unread)
 
 
-def _raw(path: Path, max_bytes: int) -> bytes:
-    with path.open("rb") as file:
-        header = file.read(HEADER_BYTES)
-    if header.startswith((b"MATLAB 7.3", b"\x89HDF")):
-        raise LogError(
-            f"{path}: is a version 7.3 file (HDF5), which isn't read; save it in MATLAB with "
-            f"save('{path.name}', '-v7')"
-        )
+def _raw(path: Path, header: bytes, max_bytes: int) -> bytes:
     if len(header) < HEADER_BYTES or header[126:128] not in (b"IM", b"MI"):
-        raise LogError(f"{path}: is no mat file of versions 5 to 7.2")
+        raise LogError("it is no mat file of versions 5 to 7.3")
     # The file itself is held in memory beside its arrays.
-    if path.stat().st_size > max_bytes:
-        raise LogError(
-            f"{path}: has {path.stat().st_size} bytes, {max_bytes} are allowed; raise max_bytes to read it"
-        )
+    size = path.stat().st_size
+    if size > max_bytes:
+        raise LogError(f"it has {size} bytes, {max_bytes} are allowed; raise max_bytes to read it")
     return path.read_bytes()

@@ -23,10 +23,22 @@ _INT32, _UINT32, _MATRIX, _COMPRESSED = 5, 6, 14, 15
 _STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _TEXT = {1: "latin-1", 2: "latin-1", 16: "utf-8", 17: "utf-16", 18: "utf-32", 4: "utf-16"}
 _NUMERIC = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
-_CELL, _STRUCT, _CHAR = 1, 2, 4
+_CELL, _STRUCT, _CHAR, _OPAQUE = 1, 2, 4, 17
+_OTHERS = {3: "an object of MATLAB", 5: "a sparse matrix", 16: "a function"}
 _COMPLEX = 0x0800
 # Deep enough for any struct a person made; Python's own stack ends at a thousand.
 _MAX_DEPTH = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unreadable:
+    """In place of a content that isn't read."""
+
+    reason: str
+
+
+class _TooLargeError(LogError):
+    """The variables unpack to more than is allowed."""
 
 
 def read_mat_elements(raw: bytes, *, max_bytes: int) -> dict[str, Any]:
@@ -43,36 +55,44 @@ def read_mat_elements(raw: bytes, *, max_bytes: int) -> dict[str, Any]:
     -------
     variables
         Arrays without axes of length one, text as `str`, cells as lists, structs as dictionaries (lists of them,
-        when they are arrays), None for what is none of these (objects, functions, sparse matrices).
+        when they are arrays), `Unreadable` for what is none of these, and for what is damaged.
 
     Raises
     ------
     LogError
-        When a length or type doesn't fit, or the variables unpack to more than `max_bytes`.
+        When nothing can be read, or the variables unpack to more than `max_bytes`.
     """
     order = "<" if raw[126:128] == b"IM" else ">"
     variables: dict[str, Any] = {}
-    for body in _matrices(memoryview(raw), order, max_bytes):
-        name, content = _Matrix(body=body, order=order).read()
-        variables[name] = content
-    return variables
-
-
-def _matrices(raw: memoryview, order: str, max_bytes: int) -> Iterator[memoryview]:
     place, left = HEADER_BYTES, max_bytes
     while place + 8 <= len(raw):
         kind, length = struct.unpack_from(f"{order}II", raw, place)
-        if place + 8 + length > len(raw):
-            raise LogError(f"a variable claims {length} bytes, {len(raw) - place - 8} are there; it's cut short")
-        body = raw[place + 8 : place + 8 + length]
+        body = memoryview(raw)[place + 8 : place + 8 + length]
         place += 8 + length
         # Compressed variables follow one another without padding, unlike everything else.
-        if kind == _COMPRESSED:
-            unpacked = _unpacked(body, left)
-            left -= len(unpacked)
-            kind, body, _ = _element(memoryview(unpacked), 0, order)
-        if kind == _MATRIX and len(body):
-            yield body
+        try:
+            _require_whole(body, length)
+            if kind == _COMPRESSED:
+                unpacked = _unpacked(body, left)
+                left -= len(unpacked)
+                kind, body, _ = _element(memoryview(unpacked), 0, order)
+            if kind == _MATRIX and len(body):
+                name, content = _Matrix(body=body, order=order).read()
+                variables[name] = content
+        except _TooLargeError:
+            raise
+        except LogError as error:
+            variables[f"variable {len(variables) + 1}"] = Unreadable(reason=str(error))
+    read = [content for content in variables.values() if not isinstance(content, Unreadable)]
+    damaged = [content.reason for content in variables.values() if isinstance(content, Unreadable)]
+    if damaged and not read:
+        raise LogError(damaged[0])
+    return variables
+
+
+def _require_whole(body: memoryview, length: int) -> None:
+    if len(body) < length:
+        raise LogError(f"a variable claims {length} bytes, {len(body)} are there; it's cut short")
 
 
 def _unpacked(packed: memoryview, allowed: int) -> bytes:
@@ -83,7 +103,7 @@ def _unpacked(packed: memoryview, allowed: int) -> bytes:
     except zlib.error as error:
         raise LogError(f"a compressed variable is damaged ({error})") from error
     if len(content) > allowed:
-        raise LogError("the variables unpack to more bytes than allowed; raise max_bytes to read them")
+        raise _TooLargeError("the variables unpack to more bytes than allowed; raise max_bytes to read them")
     if not unpacker.eof:
         raise LogError("a compressed variable is damaged (it ends too early)")
     return content
@@ -116,6 +136,8 @@ class _Matrix:
 
     def read(self) -> tuple[str, Any]:
         flags = self._numbers(_UINT32)
+        if len(flags) and flags[0] & 0xFF == _OPAQUE:
+            return self._opaque()
         shape = tuple(int(length) for length in self._numbers(_INT32))
         if len(flags) != 2 or len(shape) < 2 or min(shape) < 0:
             raise LogError(f"an array has {len(flags)} flags and the shape {shape}")
@@ -134,7 +156,16 @@ class _Matrix:
             return [content for _, content in self._members(prod(shape))]
         if kind == _STRUCT:
             return self._struct(prod(shape))
-        return None
+        return Unreadable(reason=_OTHERS.get(kind, f"of the class {kind}, which isn't known"))
+
+    def _opaque(self) -> tuple[str, Any]:
+        """Name an object of a class of MATLAB's own, whose content only MATLAB knows: strings, tables, dates."""
+        texts = []
+        for _ in range(3):
+            kind, content, self.place = _element(self.body, self.place, self.order)
+            texts.append(bytes(content).decode("latin-1") if kind in _TEXT else "")
+        name, _, kind_name = texts
+        return name, Unreadable(reason=f"a {kind_name or 'class'} of MATLAB, which only MATLAB reads")
 
     def _numbers(self, expected: int | None = None) -> NDArray[Any]:
         kind, content, self.place = _element(self.body, self.place, self.order)

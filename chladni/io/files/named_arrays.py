@@ -1,37 +1,55 @@
-"""Time series from a set of named arrays, as ``.mat`` and ``.npz`` files hold them."""
+"""Time series from a set of named arrays, as ``.mat``, ``.npz`` and ``.npy`` files hold them."""
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.files.contents import FileContents, placed_rows, series_of_rows, times_to_ns, unit_of
-from chladni.signals.channel import Channel
+from chladni.io.files.columns import Column
+from chladni.io.files.contents import FileContents
+from chladni.io.files.table import Part, series_of_parts
+from chladni.io.files.time_column import is_time_name
+from chladni.io.files.time_reading import NO_TIMES, NS_OF, UNIT_OF, TimeOptions, words_of
 from chladni.signals.errors import LogError, SetupError
+from chladni.signals.time_series import NS_PER_S
 
-RATE_NAMES = ("fs", "sample_rate", "sample_rate_hz", "sampling_rate", "samplerate", "rate_hz")
-INTERVAL_NAMES = ("dt", "ts", "delta_t", "sample_time")
-TIME_NAMES = ("t", "time", "time_s", "timestamps_s")
+_RATE_NAMES: Final = frozenset(
+    {"fs", "sr", "fsamp", "fsample", "sfreq", "framerate"}
+    | {f"{how}{what}" for how in ("sample", "sampling") for what in ("rate", "freq", "frequency")}
+)
+_INTERVAL_NAMES: Final = frozenset(
+    {"dt", "ts", "deltat", "tsample"}
+    | {f"{how}{what}" for how in ("sample", "sampling") for what in ("time", "interval", "period")}
+)
+# The longer ones first: each ends in hz.
+_HZ: Final = {"khz": 1e3, "mhz": 1e6, "hz": 1.0}
+# Two scalars say the same rate when they're this near: an interval is often rounded.
+_SAME_RATE: Final = 0.01
 
 
 def series_of_arrays(
     arrays: Mapping[str, Any],
+    options: TimeOptions,
     *,
     where: str,
-    sample_rate_hz: float | None = None,
     units: Mapping[str, str] | None = None,
+    unread: tuple[tuple[str, str], ...] = (),
 ) -> FileContents:
     """Find the signals among named arrays, and their rate or times.
 
-    The rate is a scalar called ``fs``, ``sample_rate`` or alike (Hz), or an interval called ``dt`` or alike (s);
-    times are a vector called ``t`` or ``time`` (s). Vectors as long as the time vector, or else as the longest one,
-    are channels; of a matrix each row or column of that length is one, ``name[0]``, ``name[1]``, ...
+    The rate is a scalar called ``fs``, ``sample_rate`` or alike (Hz), or an interval called ``dt`` or alike (s).
+    Times are a vector called ``t``, ``time`` or alike. Vectors as long as it, or else as the longest one, are
+    channels; of a matrix each column or row of that length is one, ``name[0]``, ``name[1]``, ... Arrays of one struct
+    (``run.time``, ``run.x``) belong together: each struct with times or a rate of its own is a series of its own.
 
     Parameters
     ----------
     where
-        File and structure, for messages.
+        File, for messages.
+    unread
+        (name, reason) of what is left out already.
 
     Raises
     ------
@@ -40,93 +58,131 @@ def series_of_arrays(
     SetupError
         When nothing says the sample rate, or two things do.
     """
-    # Scalars and texts are what describes the signals; they are looked up by name below.
     signals = {name: np.asarray(array) for name, array in arrays.items() if _is_signal(array)}
-    times = _times(signals)
-    rate_hz = _rate(arrays, where=where, given=sample_rate_hz, has_times=times is not None)
-    length = len(times) if times is not None else max((max(array.shape) for array in signals.values()), default=0)
-    columns, left_out = _columns(signals, length)
-    if not columns or length < 2:
+    if not signals:
         raise LogError(f"{where}: holds no vector of numbers to be a signal; it has {_listed(arrays)}")
-    _require_known(where, columns, units)
-    channels = [Channel(name=name, unit=unit_of(name, None, units)) for name in columns]
-    rows = list(columns.values())
-    notes = _notes(where, left_out, length)
-    if times is None:
-        return FileContents(series=(series_of_rows(rows, channels, sample_rate_hz=rate_hz),), notes=notes)
-    placed = placed_rows(times_to_ns(times, where=where), rows, channels, where=where)
-    return FileContents(series=placed.series, notes=notes + placed.notes)
+    parts, left_out = _parts(signals, arrays, options, where)
+    return series_of_parts(parts, options, where=where, units=units, unread=(*unread, *left_out))
 
 
-def _is_signal(array: Any) -> bool:
-    return isinstance(array, np.ndarray) and array.ndim in (1, 2) and array.size > 1 and array.dtype.kind in "fiub"
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Rate:
+    """What a scalar says of the rate."""
+
+    name: str
+    hz: float
 
 
-def _times(signals: dict[str, NDArray[Any]]) -> NDArray[np.float64] | None:
-    named = [name for name in signals if name.rpartition(".")[2].lower() in TIME_NAMES]
-    if not named:
-        return None
-    return signals.pop(named[0]).astype(np.float64).ravel()
+def _parts(
+    signals: Mapping[str, NDArray[Any]], arrays: Mapping[str, Any], options: TimeOptions, where: str
+) -> tuple[list[Part], list[tuple[str, str]]]:
+    """Part the signals by the struct that holds their times or rate, and by length."""
+    times = {name: array.size for name, array in signals.items() if _is_time_vector(name, array, options)}
+    rates = _rates(arrays)
+    keys = {name: _key(name, array, times, rates) for name, array in signals.items()}
+    groups: dict[tuple[str, int], list[Column]] = {}
+    left_out: list[tuple[str, str]] = []
+    for name, array in signals.items():
+        struct, length = keys[name]
+        beside = [signals[other] for other, key in keys.items() if key == (struct, 0)]
+        longest = length or max(max(one.shape) for one in beside)
+        if longest in array.shape:
+            groups.setdefault((struct, longest), []).extend(_columns(name, array, longest))
+        else:
+            left_out.append((name, f"of {array.size} numbers beside {longest} samples"))
+    parts = []
+    for (struct, _), columns in groups.items():
+        rate = _stated(_nearest(rates, struct), options, where)
+        stated_hz, stated_by = (None, "") if rate is None else (rate.hz, repr(rate.name))
+        parts.append(Part(columns=columns, stated_rate_hz=stated_hz, stated_by=stated_by))
+    return parts, left_out
 
 
-def _rate(arrays: Mapping[str, Any], *, where: str, given: float | None, has_times: bool) -> float:
-    found = _scalar(arrays, RATE_NAMES)
-    interval = _scalar(arrays, INTERVAL_NAMES)
-    if has_times:
-        if given is not None:
-            raise SetupError(f"{where}: has a time vector; leave the sample rate out")
-        return 1.0  # not used: the times say it
-    # A rate in Hz beats an interval: 1/dt of a rounded dt is a rounded rate.
-    if found is None and interval is not None and interval > 0:
-        found = 1.0 / interval
-    if found is not None and given is not None and not np.isclose(found, given, rtol=1e-9):
-        raise SetupError(f"{where}: says {found:g} Hz, {given:g} Hz was given; leave the sample rate out")
-    rate_hz = found if found is not None else given
-    if rate_hz is None or not (np.isfinite(rate_hz) and rate_hz > 0):
-        raise SetupError(
-            f"{where}: nothing says the sample rate; give it, or store a scalar fs [Hz] or a vector time [s]; "
-            f"it has {_listed(arrays)}"
-        )
-    return float(rate_hz)
-
-
-def _scalar(arrays: Mapping[str, Any], names: tuple[str, ...]) -> float | None:
-    for name, content in arrays.items():
-        if name.rpartition(".")[2].lower() in names and np.size(content) == 1:
-            number = np.asarray(content)
-            if number.dtype.kind in "fiu":
-                return float(number.reshape(()))
+def _stated(rates: list[_Rate], options: TimeOptions, where: str) -> _Rate | None:
+    """Give the rate that scalars agree on; they may differ where the caller gives the right one."""
+    if all(abs(rate.hz / rates[0].hz - 1) < _SAME_RATE for rate in rates):
+        return rates[0] if rates else None
+    if options.rate_hz is None:
+        told = ", ".join(f"{rate.name} {rate.hz:g} Hz" for rate in rates)
+        raise SetupError(f"{where}: states several sample rates, {told}; give the right one (--rate HZ)")
     return None
 
 
-def _columns(
-    signals: Mapping[str, NDArray[Any]], length: int
-) -> tuple[dict[str, NDArray[np.floating[Any]]], list[str]]:
-    columns: dict[str, NDArray[np.floating[Any]]] = {}
-    left_out = []
-    for name, array in signals.items():
-        if length not in array.shape:
-            left_out.append(name)
-            continue
-        # Whichever axis has the length of the signals is time; a square matrix is read in columns of time.
-        rows = array.reshape(1, -1) if array.size == length else array if array.shape[1] == length else array.T
-        # Integers become double, which holds 53 bits of them.
-        rows = rows if rows.dtype in (np.float32, np.float64) else rows.astype(np.float64)
-        labels = [name] if len(rows) == 1 else [f"{name}[{index}]" for index in range(len(rows))]
-        columns |= dict(zip(labels, rows, strict=True))
-    return columns, left_out
+def _key(
+    name: str, array: NDArray[Any], times: Mapping[str, int], rates: Mapping[str, list[_Rate]]
+) -> tuple[str, int]:
+    """Give the struct whose times or rate an array has, the nearest around it, and the times' length; 0 of a rate."""
+    struct = name
+    while struct:
+        struct = struct.rpartition(".")[0]
+        around = [length for other, length in times.items() if other.rpartition(".")[0] == struct]
+        fitting = [length for length in around if length in array.shape]
+        if fitting:
+            return struct, fitting[0]
+        if struct in rates and not around:
+            return struct, 0
+    anywhere = [(other.rpartition(".")[0], length) for other, length in times.items()]
+    return next((place for place in anywhere if place[1] in array.shape), anywhere[0] if anywhere else ("", 0))
 
 
-def _require_known(where: str, columns: Mapping[str, object], units: Mapping[str, str] | None) -> None:
-    for name in units or {}:
-        if name not in columns:
-            raise SetupError(f"{where}: has no channel {name!r} to give a unit; channels: {', '.join(columns)}")
+def _is_time_vector(name: str, array: NDArray[Any], options: TimeOptions) -> bool:
+    if max(array.shape) != array.size or options.column == NO_TIMES:
+        return False
+    return name == options.column if options.column else array.dtype.kind in "mM" or is_time_name(name)
 
 
-def _notes(where: str, left_out: list[str], length: int) -> tuple[str, ...]:
-    if not left_out:
-        return ()
-    return (f"{where}: {', '.join(left_out)} left out, being of other length than {length} samples.",)
+def _rates(arrays: Mapping[str, Any]) -> dict[str, list[_Rate]]:
+    """Give the rates that scalars state, by the struct that they stand in."""
+    rates: dict[str, list[_Rate]] = {}
+    for name, content in arrays.items():
+        struct, _, last = name.rpartition(".")
+        number = np.asarray(content) if np.size(content) == 1 else None
+        if number is not None and number.dtype.kind in "fiu":
+            hz = rate_of_scalar(last, float(number.reshape(())))
+            if hz is not None:
+                rates.setdefault(struct, []).append(_Rate(name=name, hz=hz))
+    return rates
+
+
+def rate_of_scalar(name: str, number: float) -> float | None:
+    """Give the rate in Hz that a number of this name states, None when it states none.
+
+    Examples
+    --------
+    >>> [rate_of_scalar(name, 0.5) for name in ("fs", "sample_rate_kHz", "dt", "dt_ms", "mass")]
+    [0.5, 500.0, 2.0, 2000.0, None]
+    """
+    if not (np.isfinite(number) and number > 0):
+        return None
+    words = words_of(name)
+    joined = "".join(words)
+    if joined in _RATE_NAMES:
+        return number
+    for unit, factor in _HZ.items():
+        if joined.endswith(unit) and joined.removesuffix(unit) in (*_RATE_NAMES, "rate"):
+            return number * factor
+    if words and words[-1] in UNIT_OF and "".join(words[:-1]) in _INTERVAL_NAMES:
+        return NS_PER_S / (number * NS_OF[UNIT_OF[words[-1]]])
+    # Seconds by custom; whole numbers of them may be milliseconds as well.
+    return 1 / number if joined in _INTERVAL_NAMES and number < 1 else None
+
+
+def _nearest(rates: Mapping[str, list[_Rate]], struct: str) -> list[_Rate]:
+    """Give the rates in a struct, else in the nearest around it, else all."""
+    while struct not in rates and struct:
+        struct = struct.rpartition(".")[0]
+    return rates[struct] if struct in rates else [rate for found in rates.values() for rate in found]
+
+
+def _is_signal(array: Any) -> bool:
+    return isinstance(array, np.ndarray) and array.ndim in (1, 2) and array.size > 1 and array.dtype.kind in "fiubmM"
+
+
+def _columns(name: str, array: NDArray[Any], length: int) -> list[Column]:
+    """Give a column for each vector of the length; of a square matrix its columns, as MATLAB likes them."""
+    rows = array.reshape(1, -1) if array.size == length else array.T if array.shape[0] == length else array
+    labels = [name] if len(rows) == 1 else [f"{name}[{index}]" for index in range(len(rows))]
+    return [Column(name=label, numbers=row) for label, row in zip(labels, rows, strict=True)]
 
 
 def _listed(arrays: Mapping[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""NumPy ``.npz`` files, never unpickled."""
+"""NumPy ``.npz`` and ``.npy`` files, never unpickled."""
 
 import struct
 import tokenize
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from chladni.io.atomic import atomic_write
 from chladni.io.files.contents import MAX_BYTES, FileContents
 from chladni.io.files.named_arrays import series_of_arrays
-from chladni.io.files.series_fields import SERIES_FORMAT, series_fields, series_of_fields
+from chladni.io.files.series_fields import SERIES_FORMAT, restated, series_fields, series_of_fields
+from chladni.io.files.time_reading import TimeOptions
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
 
@@ -40,6 +41,8 @@ def read_npz(
     path: Path | str,
     *,
     sample_rate_hz: float | None = None,
+    time: str | None = None,
+    time_unit: str | None = None,
     units: Mapping[str, str] | None = None,
     max_bytes: int = MAX_BYTES,
 ) -> FileContents:
@@ -49,8 +52,12 @@ def read_npz(
     ----------
     sample_rate_hz
         Rate of foreign arrays when nothing in the file says it.
+    time
+        Name of the vector of times, ``none`` when there's none whatever it's called.
+    time_unit
+        What its numbers count, see `chladni.io.files.time_reading.TIME_UNITS`.
     units
-        Unit by array name, for foreign arrays.
+        Unit by channel name, instead of that in the file.
     max_bytes
         Most memory that the arrays may take together; their headers are checked before anything is unpacked.
 
@@ -70,11 +77,53 @@ def read_npz(
     except _DAMAGED as error:
         raise LogError(f"{path}: this npz file can't be read: {error}") from error
     if str(content.get("format", "")) != SERIES_FORMAT:
-        return series_of_arrays(content, where=str(path), sample_rate_hz=sample_rate_hz, units=units)
+        options = TimeOptions(column=time, unit=time_unit, rate_hz=sample_rate_hz)
+        return series_of_arrays(content, options, where=str(path), units=units)
     groups = _groups(content)
-    return FileContents(
-        series=tuple(series_of_fields(fields, where=f"{path}, {name}") for name, fields in groups.items())
-    )
+    series = [series_of_fields(fields, where=f"{path}, {name}") for name, fields in groups.items()]
+    return FileContents(series=restated(series, units, where=str(path)))
+
+
+def read_npy(
+    path: Path | str,
+    *,
+    sample_rate_hz: float | None = None,
+    time: str | None = None,
+    time_unit: str | None = None,
+    units: Mapping[str, str] | None = None,
+    max_bytes: int = MAX_BYTES,
+) -> FileContents:
+    """Read one array: a vector, a matrix with a column or row for each channel, or a structured array.
+
+    The channels are called as the file is, with a number; those of a structured array as its fields are.
+
+    Parameters
+    ----------
+    sample_rate_hz
+        Samples a second, which such a file says nowhere.
+    time
+        Name of the column that holds times, such as ``acc[0]`` of ``acc.npy``.
+    time_unit, units, max_bytes
+        As in `read_npz`.
+
+    Raises
+    ------
+    LogError
+        When the file is damaged, too large, holds Python objects, or no signal.
+    SetupError
+        When nothing says the sample rate, or a unit is unknown.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            shape, dtype = _header(file)
+            _require_held(str(path), shape, dtype, path.stat().st_size - file.tell(), max_bytes)
+        array = np.load(path, allow_pickle=False)
+    except _DAMAGED as error:
+        raise LogError(f"{path}: this npy file can't be read: {error}") from error
+    fields = {name: array[name] for name in dtype.names} if dtype.names else {path.stem: array}
+    options = TimeOptions(column=time, unit=time_unit, rate_hz=sample_rate_hz)
+    return series_of_arrays(fields, options, where=str(path), units=units)
 
 
 def write_npz(
@@ -121,18 +170,24 @@ def _require_bounded(path: Path, archive: zipfile.ZipFile, max_bytes: int) -> No
     for entry in archive.infolist():
         with archive.open(entry) as file:
             shape, dtype = _header(file)
-        if dtype.hasobject:
-            raise LogError(f"{path}: {entry.filename} holds Python objects, which are never loaded; store numbers")
-        # Python integers: a product of lengths from a file may well overflow 64 bits.
-        size = dtype.itemsize * int(np.prod([int(length) for length in shape], dtype=object))
-        # The header is as untrusted as the rest: NumPy would allocate what it announces.
-        if size > entry.file_size:
-            raise LogError(f"{path}: {entry.filename} announces {size} bytes and holds {entry.file_size}")
+        _require_held(f"{path}: {entry.filename}", shape, dtype, entry.file_size, max_bytes)
         total += entry.file_size
     if total > max_bytes:
         raise LogError(
             f"{path}: its arrays take {total} bytes, {max_bytes} are allowed; raise max_bytes to read them"
         )
+
+
+def _require_held(where: str, shape: tuple[int, ...], dtype: np.dtype[Any], held: int, max_bytes: int) -> None:
+    """Check an array's header against the bytes that are there: NumPy would allocate what it announces."""
+    if dtype.hasobject:
+        raise LogError(f"{where} holds Python objects, which are never loaded; store numbers")
+    # Python integers: a product of lengths from a file may well overflow 64 bits.
+    size = dtype.itemsize * int(np.prod([int(length) for length in shape], dtype=object))
+    if size > held:
+        raise LogError(f"{where} announces {size} bytes and holds {held}")
+    if size > max_bytes:
+        raise LogError(f"{where} takes {size} bytes, {max_bytes} are allowed; raise max_bytes to read it")
 
 
 def _header(file: Any) -> tuple[tuple[int, ...], np.dtype[Any]]:

@@ -15,15 +15,17 @@
 ===================  ==================================================================
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.channel import Channel, Role, Vector
-from chladni.signals.errors import ChladniError, LogError
+from chladni.signals.errors import ChladniError, LogError, SetupError
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.unit_labels import read_label
 
 SERIES_FORMAT = "chladni.series/1"
 
@@ -46,6 +48,37 @@ def series_fields(series: TimeSeries) -> dict[str, NDArray[Any]]:
     if series.valid is not None:
         fields["valid"] = series.valid.T
     return fields
+
+
+def restated(series: Sequence[TimeSeries], units: Mapping[str, str] | None, *, where: str) -> tuple[TimeSeries, ...]:
+    """Take the numbers of series for those of other units.
+
+    Parameters
+    ----------
+    units
+        Unit by channel name of the numbers as they stand.
+
+    Raises
+    ------
+    SetupError
+        When a unit is unknown, or stated for a channel that isn't there.
+    """
+    known = [channel.name for part in series for channel in part.channels]
+    for name in units or {}:
+        if name not in known:
+            raise SetupError(f"{where}: has no channel {name!r} to give a unit; channels: {', '.join(known)}")
+    return tuple(_restated(part, units) for part in series) if units else tuple(series)
+
+
+def _restated(series: TimeSeries, units: Mapping[str, str]) -> TimeSeries:
+    factors, channels = np.ones(len(series.channels)), list(series.channels)
+    for row, channel in enumerate(series.channels):
+        if channel.name in units:
+            factors[row], unit = read_label(
+                units[channel.name], quantity=None if channel.unit == "1" else channel.unit
+            )
+            channels[row] = replace(channel, unit=unit)
+    return replace(series, values=series.values * factors[:, np.newaxis], channels=tuple(channels))
 
 
 def series_of_fields(fields: Mapping[str, Any], *, where: str) -> TimeSeries:

@@ -1,7 +1,9 @@
 """Universal files: time records of dataset 58, text and binary, with the units of dataset 164."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isclose
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,6 @@ from chladni.io.files.contents import (
     require_no_gaps,
     series_of_rows,
     times_to_ns,
-    unit_of,
 )
 from chladni.io.files.uff_header import (
     FUNCTION_TYPES,
@@ -24,27 +25,35 @@ from chladni.io.files.uff_header import (
     rate_of_header,
     says_rate,
     start_of_header,
-    unit_of_header,
 )
+from chladni.io.files.uff_records import UniversalFile, open_uff
 from chladni.io.files.uff_sets import (
     FUNCTION_AT_NODE,
+    HEADER,
+    LEFT_OUT,
     UNITS,
     Dataset,
     cut_off_note,
-    open_uff,
+    listed_kinds,
     read_dataset,
     read_headers,
     si_units,
     write_datasets,
 )
+from chladni.io.files.uff_units import FoundUnit, abscissa_unit, ordinate_unit, unit_sentences
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.unit_labels import read_label
 
 _SINGLE = 2
+# Of a product and a quotient in double precision.
+_ROUNDING = 1e-15
 
 
-def read_uff(path: Path | str, *, units: Mapping[str, str] | None = None) -> FileContents:
+def read_uff(
+    path: Path | str, *, units: Mapping[str, str] | None = None, time_unit: str | None = None
+) -> FileContents:
     """Read the time records (function type 1) of a universal file.
 
     A channel is named by the first line of its record, with its node added where that isn't unique; its point and
@@ -55,43 +64,61 @@ def read_uff(path: Path | str, *, units: Mapping[str, str] | None = None) -> Fil
     ----------
     units
         Unit by channel name, instead of that in the file.
+    time_unit
+        Unit of the abscissa of all records, such as ``ms``, instead of that in the file.
 
     Returns
     -------
     FileContents
-        One series for each rate, start and length. The notes name functions that were left out, and say where the
-        rate was restored from an increment that the file rounds to six digits.
+        One series for each rate, start and length. The notes name what was left out and why, channels whose unit the
+        file leaves open or contradicts itself in, and rates restored from an increment of six digits.
 
     Raises
     ------
     LogError
-        When the file is damaged, or holds no time record (what it holds is named).
+        When the file is no universal file, or no time record in it can be read.
     SetupError
-        When a unit is unknown.
+        When a unit that is stated here is unknown.
     """
-    path = Path(path)
-    file = open_uff(path)
-    headers = read_headers(path, file)
-    functions = [number for number, header in enumerate(headers) if header.get("type") == FUNCTION_AT_NODE]
-    records = [number for number in functions if headers[number].get("func_type") == TIME_RESPONSE]
+    file = open_uff(Path(path))
+    headers = read_headers(file)
+    found = time_records(file, headers, units=units, time_unit=time_unit)
+    return replace(found, notes=found.notes + _left_out(file.path, headers))
+
+
+def time_records(
+    file: UniversalFile, headers: Sequence[Dataset], *, units: Mapping[str, str] | None, time_unit: str | None
+) -> FileContents:
+    """Read what `read_uff` reads, without a word on all else."""
+    path = file.path
+    numbers = [number for number, header in enumerate(headers) if header.get("func_type") == TIME_RESPONSE]
+    names = dict(zip(numbers, _names([headers[number] for number in numbers]), strict=True))
+    _require_known(path, names.values(), units)
+    records, mistakes = [], [header["mistake"] for header in headers if "mistake" in header]
+    for number, name in names.items():
+        try:
+            records.append(_time_record(file, headers, number, name, units, time_unit))
+        except LogError as error:
+            mistakes.append(str(error))
     if not records:
-        raise LogError(f"{path}: holds no time record (function type 1), but {_listed(headers, functions)}")
-    names = _names([headers[number] for number in records])
-    _require_known(path, names, units)
-    system = next((header for header in headers if header.get("type") == UNITS), None)
-    notes = cut_off_note(path) + _left_out(path, headers, [number for number in functions if number not in records])
+        raise LogError(
+            mistakes[0]
+            if mistakes
+            else f"{path}: holds no time record (function type 1), but {_listed(headers, range(len(headers)))}"
+        )
+    notes = cut_off_note(file) + tuple(f"{one}{LEFT_OUT}" for one in mistakes)
+    notes += tuple(note for record in records for note in record.notes)
+    unit_notes: dict[str, list[str]] = {}
+    for record in records:
+        for note in record.unit_notes:
+            unit_notes.setdefault(note, []).append(record.channel.name)
+    notes += tuple(unit_sentences(path, unit_notes, "--read units=NAME:UNIT states another"))
     # Records of one measurement share their time axis; others in the same file may not.
-    groups: dict[tuple[Any, ...], list[tuple[Dataset, Channel]]] = {}
-    for number, name in zip(records, names, strict=True):
-        dataset = _time_record(path, file, number)
-        unit, factor = unit_of_header(dataset, system)
-        if name in (units or {}):
-            unit, factor = unit_of(name, unit, units), 1.0
-        channel = channel_of_header(dataset, name, unit)
-        dataset["data"] = _values(dataset, factor)
-        groups.setdefault(_time_axis(dataset), []).append((dataset, channel))
+    groups: dict[tuple[Any, ...], list[_Record]] = {}
+    for record in records:
+        groups.setdefault(record.axis, []).append(record)
     parts = [_series(path, group) for group in groups.values()]
-    notes += tuple(note for part in parts for note in part.notes) + _rate_notes(path, headers, records)
+    notes += tuple(note for part in parts for note in part.notes) + _rate_notes(path, records)
     return FileContents(series=tuple(series for part in parts for series in part.series), notes=notes)
 
 
@@ -134,40 +161,98 @@ def write_uff(
     return tuple(losses)
 
 
-def _time_record(path: Path, file: Any, number: int) -> Dataset:
-    dataset = read_dataset(path, file, number)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Record:
+    """A time record in SI; the second of its abscissa in seconds, and what was taken how."""
+
+    dataset: Dataset
+    channel: Channel
+    values: NDArray[np.floating[Any]]
+    second: float
+    start_ns: int
+    notes: tuple[str, ...]
+    unit_notes: tuple[str, ...]
+
+    @property
+    def rate_hz(self) -> float | None:
+        return rate_of_header(self.dataset, self.second)
+
+    @property
+    def uneven(self) -> bool:
+        return bool(self.dataset["abscissa_spacing"] == 0)
+
+    @property
+    def axis(self) -> tuple[Any, ...]:
+        """What records of one measurement share."""
+        if self.uneven:
+            return ("uneven", self.second, self.dataset["x"].tobytes())
+        return (self.rate_hz, self.start_ns, len(self.values))
+
+
+def _time_record(
+    file: UniversalFile,
+    headers: Sequence[Dataset],
+    number: int,
+    name: str,
+    units: Mapping[str, str] | None,
+    time_unit: str | None,
+) -> _Record:
+    where = f"{file.path}: dataset {number + 1} ({name})"
+    dataset, notes = read_dataset(file, headers, number)
     if np.iscomplexobj(dataset["data"]):
-        raise LogError(f"{path}: dataset {number + 1} is a time record of complex values, which isn't a measurement")
-    return dataset
+        raise LogError(f"{where} is a time record of complex values, which isn't a measurement")
+    if time_unit is not None:
+        dataset |= {"abscissa_axis_units_lab": time_unit, "abscissa_spec_data_type": 0}
+    try:
+        time = abscissa_unit(dataset, "s")
+        start_ns = start_of_header(dataset, time.factor)
+    except LogError as error:
+        raise LogError(f"{where} {error}; say what it is over with --read time_unit=ms or the like") from error
+    if dataset["abscissa_spacing"] != 0 and rate_of_header(dataset, time.factor) is None:
+        raise LogError(f"{where}: the increment {dataset['abscissa_inc']} s is no sample interval")
+    found = ordinate_unit(dataset) if name not in (units or {}) else _stated_unit(where, dataset, (units or {})[name])
+    return _Record(
+        dataset=dataset,
+        channel=channel_of_header(dataset, name, found.unit),
+        values=_values(dataset, found.factor),
+        second=time.factor,
+        start_ns=start_ns,
+        notes=notes + tuple(f"{where}: {note}." for note in time.notes),
+        unit_notes=found.notes,
+    )
 
 
-def _time_axis(dataset: Dataset) -> tuple[Any, ...]:
-    if dataset["abscissa_spacing"] == 0:
-        return ("uneven", dataset["x"].tobytes())
-    return (rate_of_header(dataset), start_of_header(dataset), len(dataset["data"]))
+def _stated_unit(where: str, dataset: Dataset, label: str) -> FoundUnit:
+    quantity = ordinate_unit({**dataset, "ordinate_axis_units_lab": ""}).unit
+    try:
+        factor, unit = read_label(label, quantity=None if quantity == "1" else quantity)
+    except SetupError as error:
+        raise SetupError(f"{where}: {error}") from error
+    return FoundUnit(factor=factor, unit=unit)
 
 
-def _series(path: Path, group: list[tuple[Dataset, Channel]]) -> FileContents:
-    first = group[0][0]
-    rows = [dataset["data"] for dataset, _ in group]
-    channels = [channel for _, channel in group]
-    start_ns = start_of_header(first)
-    if first["abscissa_spacing"] == 0:
+def _series(path: Path, group: list[_Record]) -> FileContents:
+    first = group[0]
+    rows = [record.values for record in group]
+    channels = [record.channel for record in group]
+    if first.uneven:
+        times_s = first.dataset["x"] * first.second
         return placed_rows(
-            times_to_ns(first["x"], start_ns=start_ns, where=str(path)), rows, channels, where=str(path)
+            times_to_ns(times_s, start_ns=first.start_ns, where=str(path)), rows, channels, where=str(path)
         )
-    rate_hz = rate_of_header(first)
-    if rate_hz is None:
-        raise LogError(f"{path}: {channels[0].name}: the increment {first['abscissa_inc']} s is no sample interval")
-    series = series_of_rows(rows, channels, sample_rate_hz=rate_hz, start_time_ns=start_ns)
+    if first.rate_hz is None:
+        raise AssertionError("a record without a rate isn't read")
+    series = series_of_rows(rows, channels, sample_rate_hz=first.rate_hz, start_time_ns=first.start_ns)
     return FileContents(series=(series,))
 
 
 def _values(dataset: Dataset, factor: float) -> NDArray[np.floating[Any]]:
     # Text holds decimals, which double precision keeps better; binary single precision is exact in single.
     single = dataset["ord_data_type"] == _SINGLE and dataset["binary"]
-    values: NDArray[np.floating[Any]] = dataset["data"].astype(np.float32 if single else np.float64)
-    return values if factor == 1.0 else values * factor
+    # Damaged binary values may be anything; what isn't finite counts as missing.
+    with np.errstate(over="ignore", invalid="ignore"):
+        values: NDArray[np.floating[Any]] = dataset["data"].astype(np.float32 if single else np.float64)
+        return values if factor == 1.0 else values * factor
 
 
 def _names(headers: list[Dataset]) -> list[str]:
@@ -183,36 +268,44 @@ def _names(headers: list[Dataset]) -> list[str]:
     return names
 
 
-def _require_known(path: Path, names: list[str], units: Mapping[str, str] | None) -> None:
+def _require_known(path: Path, names: Iterable[str], units: Mapping[str, str] | None) -> None:
+    known = list(names)
     for name in units or {}:
-        if name not in names:
-            raise SetupError(f"{path}: has no channel {name!r} to give a unit; channels: {', '.join(names)}")
+        if name not in known:
+            raise SetupError(f"{path}: has no channel {name!r} to give a unit; channels: {', '.join(known)}")
 
 
-def _listed(headers: list[Dataset], functions: list[int]) -> str:
-    if not functions:
-        kinds = Counter(header["type"] for header in headers)
-        return "datasets " + ", ".join(f"{kind} ({count})" for kind, count in kinds.items())
-    kinds = Counter(int(headers[number]["func_type"]) for number in functions)
-    return ", ".join(
-        f"{FUNCTION_TYPES.get(kind, f'function type {kind}')} ({count})" for kind, count in kinds.items()
-    )
+def _listed(headers: Sequence[Dataset], numbers: Iterable[int]) -> str:
+    """Functions by their type, then other datasets, but those of units and of the file itself."""
+    chosen = [headers[number] for number in numbers]
+    kinds = Counter(header["func_type"] for header in chosen if "func_type" in header)
+    listed = [f"{FUNCTION_TYPES.get(kind, f'function type {kind}')} ({count})" for kind, count in kinds.items()]
+    others = [header for header in chosen if header["type"] not in (FUNCTION_AT_NODE, UNITS, HEADER)]
+    if others or not listed:
+        listed.append(f"datasets {listed_kinds(others or chosen)}")
+    return ", ".join(listed)
 
 
-def _left_out(path: Path, headers: list[Dataset], others: list[int]) -> tuple[str, ...]:
+def _left_out(path: Path, headers: Sequence[Dataset]) -> tuple[str, ...]:
+    others = [
+        number
+        for number, header in enumerate(headers)
+        if header.get("func_type", TIME_RESPONSE) != TIME_RESPONSE
+        or header["type"] not in (FUNCTION_AT_NODE, UNITS, HEADER)
+    ]
     return (f"{path}: left out, being no time records: {_listed(headers, others)}.",) if others else ()
 
 
-def _rate_notes(path: Path, headers: list[Dataset], records: list[int]) -> tuple[str, ...]:
+def _rate_notes(path: Path, records: Sequence[_Record]) -> tuple[str, ...]:
     increments = {
-        headers[number]["abscissa_inc"]: rate_of_header(headers[number])
-        for number in records
-        if headers[number]["abscissa_spacing"] != 0 and not says_rate(headers[number])
+        record.dataset["abscissa_inc"] * record.second: record.rate_hz
+        for record in records
+        if not record.uneven and not says_rate(record.dataset)
     }
     return tuple(
         f"{path}: the sample rate {rate_hz:.12g} Hz was taken for the rounded increment {increment:g} s."
         for increment, rate_hz in increments.items()
-        if rate_hz is not None and rate_hz != 1.0 / increment
+        if rate_hz is not None and not isclose(rate_hz * increment, 1.0, rel_tol=_ROUNDING)
     )
 
 

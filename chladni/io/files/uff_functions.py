@@ -2,20 +2,20 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.files.uff_header import DIRECTIONS, quantity_code, unit_of_header
-from chladni.io.files.uff_sets import FUNCTION_AT_NODE, Dataset, read_dataset
+from chladni.io.files.uff_header import DIRECTIONS, quantity_code
+from chladni.io.files.uff_records import UniversalFile
+from chladni.io.files.uff_sets import FUNCTION_AT_NODE, LEFT_OUT, Dataset, read_dataset
+from chladni.io.files.uff_units import FoundUnit, abscissa_unit, function_units, unit_sentences
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.provenance import Provenance
-from chladni.signals.units import si_factor
+from chladni.signals.unit_labels import read_label
 from chladni.signals.wording import counted
 
 GENERAL, RESPONSE_FUNCTION, COHERENCE = 0, 4, 6
@@ -85,7 +85,7 @@ def function_datasets(
 
 
 def read_functions(
-    path: Path, file: Any, headers: Sequence[Dataset], names: Mapping[int, str], system: Dataset | None
+    file: UniversalFile, headers: Sequence[Dataset], names: Mapping[int, str], *, units: Mapping[str, str]
 ) -> tuple[FrequencyResponse | None, tuple[str, ...]]:
     """Read the frequency responses of a file, those of one frequency axis and a full grid of channels.
 
@@ -95,56 +95,90 @@ def read_functions(
         Of all datasets, as `chladni.io.files.uff_sets.read_headers` gives them.
     names
         Name of a point by node.
-    system
-        Dataset 164, or None.
+    units
+        Unit by channel name, instead of that in the file.
 
     Returns
     -------
-    FrequencyResponse or None when there is none, and sentences on what was left out.
+    FrequencyResponse or None when there is none, and sentences on what was left out, or taken how.
 
     Raises
     ------
-    LogError
-        When a function is damaged, or in a unit that isn't known.
+    SetupError
+        When a unit that is stated is unknown, or stands for a ratio.
     """
-    by_axis: dict[bytes, Functions] = {}
-    beside: dict[int, Functions] = {GENERAL: {}, COHERENCE: {}}
+    read = _Read()
     for number, header in enumerate(headers):
-        if not _is_read(header):
-            continue
-        dataset = read_dataset(path, file, number)
-        try:
-            pair, factor = _channels(dataset, names, system)
-        except SetupError as error:
-            raise LogError(f"{path}: dataset {number + 1}: {error}") from error
-        if header["func_type"] != COHERENCE:
-            # Damaged binary values may be anything; what isn't finite is masked by `excited`.
-            with np.errstate(over="ignore", invalid="ignore"):
-                dataset["data"] = dataset["data"] * factor
-        if header["func_type"] == RESPONSE_FUNCTION:
-            dataset["x"] = _frequency_axis(dataset)
-            _require_rising(path, number, dataset["x"])
-            by_axis.setdefault(dataset["x"].tobytes(), {}).setdefault(pair, dataset)
-        else:
-            beside[header["func_type"]][pair] = dataset
-    if not by_axis:
-        return None, ()
+        if "mistake" in header:
+            read.notes.append(f"{header['mistake']}{LEFT_OUT}")
+        elif is_read(header):
+            try:
+                _read_function(file, headers, number, names, units, read)
+            except LogError as error:
+                read.notes.append(f"{error}{LEFT_OUT}")
+    notes = [*read.notes, *unit_sentences(file.path, read.unit_notes, "--read units=NAME:UNIT states another")]
+    if not read.by_axis:
+        return None, tuple(notes)
     # One response has one axis: the one that most functions share.
-    found = max(by_axis.values(), key=len)
-    notes = _left_out_notes(path, headers, len(found))
+    found = max(read.by_axis.values(), key=len)
+    if read.responses > len(found):
+        what = counted(read.responses - len(found), "function")
+        notes.append(f"{file.path}: {what} left out: repeated, or of another frequency axis than most.")
     references = tuple(dict.fromkeys(pair[1] for pair in found))
     named = dict.fromkeys(pair[0] for pair in found)
     responses = tuple(one for one in named if all((one, source) in found for source in references))
     missing = len(found) - len(responses) * len(references)
     if missing:
-        notes += (f"{path}: {counted(missing, 'function')} left out: not every response has every reference.",)
-    return (_assembled(found, responses, references, beside) if responses else None), notes
+        what = counted(missing, "function")
+        notes.append(f"{file.path}: {what} left out: not every response has every reference.")
+    return (_assembled(found, responses, references, read.beside) if responses else None), tuple(notes)
 
 
-def _is_read(header: Dataset) -> bool:
-    if header["type"] != FUNCTION_AT_NODE:
-        return False
-    kind = header["func_type"]
+@dataclass(slots=True, kw_only=True)
+class _Read:
+    """What was read so far: functions by their axis, what belongs to them by name, and what is told of it."""
+
+    by_axis: dict[bytes, Functions] = field(default_factory=dict)
+    beside: dict[int, dict[tuple[str, str], Dataset]] = field(default_factory=lambda: {GENERAL: {}, COHERENCE: {}})
+    responses: int = 0
+    names: dict[str, None] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    unit_notes: dict[str, list[str]] = field(default_factory=dict)
+
+
+def _read_function(
+    file: UniversalFile,
+    headers: Sequence[Dataset],
+    number: int,
+    names: Mapping[int, str],
+    units: Mapping[str, str],
+    read: _Read,
+) -> None:
+    dataset, notes = read_dataset(file, headers, number)
+    where = f"{file.path}: dataset {number + 1}"
+    kind = dataset["func_type"]
+    if kind == RESPONSE_FUNCTION:
+        notes += _brought_to_hertz(dataset, where)
+    pair, factor, unit_notes = _channels(dataset, names, units)
+    if kind != COHERENCE:
+        # Damaged binary values may be anything; what isn't finite is masked by `excited`.
+        with np.errstate(over="ignore", invalid="ignore"):
+            dataset["data"] = dataset["data"] * factor
+    read.notes += notes
+    read.names |= dict.fromkeys(channel.name for channel in pair)
+    if kind != RESPONSE_FUNCTION:
+        read.beside[kind][pair[0].name, pair[1].name] = dataset
+        return
+    read.responses += 1
+    read.by_axis.setdefault(dataset["x"].tobytes(), {}).setdefault(pair, dataset)
+    for channel, told in zip(pair, unit_notes, strict=True):
+        for note in told:
+            read.unit_notes.setdefault(note, []).append(channel.name)
+
+
+def is_read(header: Dataset) -> bool:
+    """Whether a dataset is a frequency response, or belongs to one."""
+    kind = header.get("func_type")
     return kind in (RESPONSE_FUNCTION, COHERENCE) or (kind == GENERAL and str(header["id3"]).strip() == _STD)
 
 
@@ -152,7 +186,7 @@ def _assembled(
     found: Functions,
     responses: tuple[Channel, ...],
     references: tuple[Channel, ...],
-    beside: Mapping[int, Functions],
+    beside: Mapping[int, Mapping[tuple[str, str], Dataset]],
 ) -> FrequencyResponse:
     axis: NDArray[np.float64] = found[responses[0], references[0]]["x"]
     shape = (len(responses), len(references), axis.size)
@@ -163,10 +197,10 @@ def _assembled(
     for row, measured in enumerate(responses):
         for column, source in enumerate(references):
             values[row, column] = found[measured, source]["data"]
-            sigma = beside[GENERAL].get((measured, source))
+            sigma = beside[GENERAL].get((measured.name, source.name))
             if sigma is not None and len(sigma["data"]) == axis.size:
                 std[row, column] = sigma["data"]
-            share = beside[COHERENCE].get((measured, source))
+            share = beside[COHERENCE].get((measured.name, source.name))
             if share is not None and len(share["data"]) == axis.size and len(references) == 1:
                 coherence[row] = share["data"]
     return FrequencyResponse(
@@ -215,9 +249,17 @@ def _axis_fields(frequency_hz: NDArray[np.float64], *, binary: bool) -> tuple[Da
     return {"abscissa_spacing": 0, "x": frequency_hz}, losses
 
 
-def _require_rising(path: Path, number: int, axis: NDArray[np.float64]) -> None:
-    if not (np.all(np.isfinite(axis)) and np.all(axis[1:] > axis[:-1])):
-        raise LogError(f"{path}: dataset {number + 1}: its frequencies don't rise; the file is damaged")
+def _brought_to_hertz(dataset: Dataset, where: str) -> tuple[str, ...]:
+    """Bring the abscissae of a function to hertz, and say how they were taken."""
+    try:
+        found = abscissa_unit(dataset, "Hz")
+    except LogError as error:
+        raise LogError(f"{where} {error}") from error
+    axis = _frequency_axis(dataset)
+    dataset["x"] = axis if found.factor == 1.0 else axis * found.factor
+    if not (np.all(np.isfinite(dataset["x"])) and np.all(dataset["x"][1:] > dataset["x"][:-1])):
+        raise LogError(f"{where}: its frequencies don't rise; the file is damaged")
+    return tuple(f"{where}: {note}." for note in found.notes)
 
 
 def _frequency_axis(dataset: Dataset) -> NDArray[np.float64]:
@@ -234,22 +276,30 @@ def _frequency_axis(dataset: Dataset) -> NDArray[np.float64]:
 
 
 def _channels(
-    dataset: Dataset, names: Mapping[int, str], system: Dataset | None
-) -> tuple[tuple[Channel, Channel], float]:
-    """Response and reference of a function, and the factor that turns its values into SI."""
-    unit, factor = unit_of_header(dataset, system)
-    below = {
-        "ordinate_axis_units_lab": dataset["orddenom_axis_units_lab"],
-        "ordinate_spec_data_type": dataset["orddenom_spec_data_type"],
-    }
-    source_unit, source_factor = unit_of_header(below, system)
-    to_si, unit = si_factor(unit)
-    source_to_si, source_unit = si_factor(source_unit)
+    dataset: Dataset, names: Mapping[int, str], units: Mapping[str, str]
+) -> tuple[tuple[Channel, Channel], float, tuple[tuple[str, ...], tuple[str, ...]]]:
+    """Response and reference of a function, the factor that turns its values into SI, and notes on both units."""
+    response, reference = function_units(dataset)
     # Names in full are told by our own fifth line; elsewhere the first two lines hold anything.
     ours = _AXIS.match(str(dataset["id5"]).strip()) is not None
-    measured = _channel(dataset, "rsp", names, dataset["id1"] if ours else "", unit)
-    source = _channel(dataset, "ref", names, dataset["id2"] if ours else "", source_unit)
-    return (measured, source), factor * to_si / (source_factor * source_to_si)
+    measured = _channel(dataset, "rsp", names, dataset["id1"] if ours else "", response.unit)
+    source = _channel(dataset, "ref", names, dataset["id2"] if ours else "", reference.unit)
+    measured, response = _as_stated(measured, response, units)
+    source, reference = _as_stated(source, reference, units)
+    return (measured, source), response.factor / reference.factor, (response.notes, reference.notes)
+
+
+def _as_stated(channel: Channel, found: FoundUnit, units: Mapping[str, str]) -> tuple[Channel, FoundUnit]:
+    """Give a channel and its numbers the unit that is stated for it."""
+    if channel.name not in units:
+        return channel, found
+    if found.of_ratio:
+        raise SetupError(
+            f"{channel.name}: the unit {units[channel.name]!r} is stated, but the file labels the ratio of response "
+            "and reference; leave it out"
+        )
+    factor, unit = read_label(units[channel.name], quantity=None if found.unit == "1" else found.unit)
+    return replace(channel, unit=unit), FoundUnit(factor=factor, unit=unit)
 
 
 def _channel(dataset: Dataset, side: str, names: Mapping[int, str], title: str, unit: str) -> Channel:
@@ -262,14 +312,6 @@ def _channel(dataset: Dataset, side: str, names: Mapping[int, str], title: str, 
         direction=DIRECTIONS.get(axis),
         role="reference" if side == "ref" else "response",
     )
-
-
-def _left_out_notes(path: Path, headers: Sequence[Dataset], used: int) -> tuple[str, ...]:
-    functions = sum(header.get("func_type") == RESPONSE_FUNCTION for header in headers)
-    if functions == used:
-        return ()
-    what = counted(functions - used, "function")
-    return (f"{path}: {what} left out: repeated, or of another frequency axis than most.",)
 
 
 def _name_losses(channels: Sequence[Channel]) -> tuple[str, ...]:

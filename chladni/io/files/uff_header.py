@@ -2,7 +2,7 @@
 
 import re
 from datetime import UTC, datetime
-from math import ceil, floor, inf, isfinite, log10
+from math import ceil, floor, isfinite, log10
 from typing import Any
 
 from chladni.signals.channel import AXES, Channel, Vector
@@ -33,16 +33,9 @@ DIRECTIONS: dict[int, Vector] = {
     for code, axis in ((1, "+x"), (-1, "-x"), (2, "+y"), (-2, "-y"), (3, "+z"), (-3, "-z"))
     for turn in (0, 3 if code > 0 else -3)
 }
-# Ordinate type: SI unit, and the powers of length and force in it.
-QUANTITIES = {
-    8: ("m", 1, 0),
-    9: ("N", 0, 1),
-    11: ("m/s", 1, 0),
-    12: ("m/s^2", 1, 0),
-    13: ("N", 0, 1),
-    15: ("Pa", -2, 1),
-}
 TYPE_OF_UNIT = {"m": 8, "m/s": 11, "m/s^2": 12, "Pa": 15}
+#: How the fifth line begins in records and functions that chladni wrote.
+OUR_LINES = ("start_time_ns=", "start_hz=")
 # Our own fifth line: the fields of the record round rate and start to six digits.
 _EXACT = re.compile(r"^start_time_ns=(?P<start>-?\d{1,19}) sample_rate_hz=(?P<rate>\d+(\.\d+)?(e[+-]\d+)?)$")
 _EXCITATION_FORCE = 13
@@ -50,6 +43,7 @@ _ID_LENGTH = 80
 _LABEL_LENGTH = 20
 _ENTITY_LENGTH = 10
 _INCREMENT_DIGITS = 6
+_FARTHEST_S = 2**61 / NS_PER_S
 
 
 def channel_of_header(header: dict[str, Any], name: str, unit: str) -> Channel:
@@ -66,37 +60,17 @@ def channel_of_header(header: dict[str, Any], name: str, unit: str) -> Channel:
     )
 
 
-def unit_of_header(header: dict[str, Any], system: dict[str, Any] | None) -> tuple[str, float]:
-    """Give the unit of a record and a factor to it.
-
-    The label of the ordinate is the unit, where there is one. Else the type of the ordinate gives an SI unit, and the
-    factor comes from dataset 164, `system`, which says by what to divide to get SI.
-
-    Examples
-    --------
-    >>> unit_of_header({"ordinate_axis_units_lab": "g", "ordinate_spec_data_type": 12}, None)
-    ('g', 1.0)
-    >>> millimetres = {"length": 1000.0, "force": 1.0}
-    >>> unit_of_header({"ordinate_axis_units_lab": "NONE", "ordinate_spec_data_type": 12}, millimetres)
-    ('m/s^2', 0.001)
-    """
-    label = str(header["ordinate_axis_units_lab"]).strip()
-    if label not in ("", "NONE"):
-        return label, 1.0
-    unit, lengths, forces = QUANTITIES.get(int(header["ordinate_spec_data_type"]), ("1", 0, 0))
-    if system is None or unit == "1":
-        return unit, 1.0
-    length, force = float(system["length"]), float(system["force"])
-    if not (0 < length < inf and 0 < force < inf):
-        raise LogError(f"dataset 164 has the factors {length:g} and {force:g} for length and force, which are none")
-    return unit, length**-lengths * force**-forces
-
-
-def rate_of_header(header: dict[str, Any]) -> float | None:
+def rate_of_header(header: dict[str, Any], second: float = 1.0) -> float | None:
     """Give the sample rate in Hz, None when the increment is no interval.
 
     The field of the increment holds six digits, 1.52588e-05 s where 1/65536 s is meant. Of all rates that round to
-    it the one with the fewest digits is taken, unless the record says the rate in full, as ours do.
+    it the one with the fewest digits is taken, unless the increment itself has fewer, as 0.3 s, or the record says
+    the rate in full, as ours do.
+
+    Parameters
+    ----------
+    second
+        What the unit of the abscissa is in seconds.
 
     Examples
     --------
@@ -108,11 +82,12 @@ def rate_of_header(header: dict[str, Any]) -> float | None:
         return None
     # Half a unit in the last of the six digits, which is how far the true increment may be.
     half = 0.5 * 10.0 ** (floor(log10(increment)) - _INCREMENT_DIGITS + 1)
-    lowest, highest = 1 / (increment + half), 1 / (increment - half)
+    lowest, highest = 1 / ((increment + half) * second), 1 / ((increment - half) * second)
     exact = _EXACT.match(str(header["id5"]).strip())
     if exact is not None and lowest <= float(exact["rate"]) <= highest:
         return float(exact["rate"])
-    return _shortest(lowest, highest, 1.0 / increment)
+    rate_hz = _shortest(lowest, highest, 1.0 / (increment * second))
+    return rate_hz if _digits(rate_hz) <= _digits(increment) else 1.0 / (increment * second)
 
 
 def says_rate(header: dict[str, Any]) -> bool:
@@ -120,15 +95,22 @@ def says_rate(header: dict[str, Any]) -> bool:
     return _EXACT.match(str(header["id5"]).strip()) is not None
 
 
-def start_of_header(header: dict[str, Any]) -> int:
+def start_of_header(header: dict[str, Any], second: float = 1.0) -> int:
     """Give the time of the first sample in ns since 1970: the date of line three, taken as UTC, and the abscissa.
 
-    0 plus the abscissa when line three holds no date.
+    0 plus the abscissa when line three holds no date; `second` is what the unit of the abscissa is in seconds.
+
+    Raises
+    ------
+    LogError
+        When the abscissa begins at no time.
     """
     exact = _EXACT.match(str(header["id5"]).strip())
     if exact is not None and abs(int(exact["start"])) < 2**62:
         return int(exact["start"])
-    offset_s = float(header["abscissa_min"]) if header["abscissa_spacing"] != 0 else 0.0
+    offset_s = float(header["abscissa_min"]) * second if header["abscissa_spacing"] != 0 else 0.0
+    if not abs(offset_s) < _FARTHEST_S:
+        raise LogError(f"begins at {offset_s:g} s, which is no time within centuries")
     try:
         date = datetime.strptime(str(header["id3"]).strip(), "%d-%b-%y %H:%M:%S").replace(tzinfo=UTC)
     except ValueError:
@@ -170,6 +152,11 @@ def header_of_channel(channel: Channel, series: TimeSeries) -> tuple[dict[str, A
         "orddenom_spec_data_type": 0,
     }
     return header, tuple(losses)
+
+
+def _digits(number: float) -> int:
+    """Decimal digits of a number, without zeros at its ends."""
+    return len(f"{number:.14e}".partition("e")[0].replace(".", "").rstrip("0"))
 
 
 def _shortest(lowest: float, highest: float, middle: float) -> float:

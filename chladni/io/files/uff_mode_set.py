@@ -21,7 +21,7 @@ _UNKNOWN = "not stated in the file"
 
 
 def mode_set_of(
-    found: Sequence[NodeMode], nodes: NodeGeometry, response: FrequencyResponse | None, *, kilogram: float
+    found: Sequence[NodeMode], nodes: NodeGeometry, response: FrequencyResponse | None
 ) -> tuple[ModeSet, tuple[str, ...]]:
     """Give the modes by channel, with the names of the functions' channels where they stand at the same place.
 
@@ -29,8 +29,6 @@ def mode_set_of(
     ----------
     found
         At least one mode.
-    kilogram
-        By what masses of the file are divided to get kg.
 
     Returns
     -------
@@ -51,7 +49,7 @@ def mode_set_of(
     # The file has no place for them, and zero would claim that they're exact.
     std = np.full(shapes.shape, complex(nan, nan))
     std[rows, pivot] = 0.0
-    scale = _scale(ordered, largest, degrees, channels, nodes, response, kilogram)
+    scale = _scale(ordered, largest, degrees, channels, nodes, response)
     references = () if response is None else response.references
     if response is None and scale is not None and scale.reference != _UNKNOWN:
         references = (Channel(name=scale.reference, unit="N", role="reference"),)
@@ -95,10 +93,9 @@ def _scale(
     channels: Sequence[Channel],
     nodes: NodeGeometry,
     response: FrequencyResponse | None,
-    kilogram: float,
 ) -> ModalScale | None:
     """Modal A over the square of what the shapes were divided by; None when no mode has one."""
-    modal_a = np.array([mode.modal_a for mode in ordered]) / largest**2 / kilogram
+    modal_a = np.array([mode.modal_a for mode in ordered]) / largest**2
     # Zero is what tools write for modes that they didn't scale.
     if not np.any(modal_a):
         return None
@@ -112,7 +109,7 @@ def _scale(
         reference=_UNKNOWN if driving is None else _reference_name(driving[1], nodes, response),
         modal_a=modal_a,
         modal_mass=(modal_a / (2j * np.array(damped))).real,
-        modal_mass_std=np.array([mode.modal_mass_std for mode in ordered]) / np.abs(largest) ** 2 / kilogram,
+        modal_mass_std=np.array([mode.modal_mass_std for mode in ordered]) / np.abs(largest) ** 2,
     )
 
 

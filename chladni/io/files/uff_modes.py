@@ -1,25 +1,39 @@
 """Modes, geometry and frequency responses in and out of universal files, for exchange with other tools."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from chladni.io.atomic import atomic_path
-from chladni.io.files.uff_functions import NodeDirection, function_datasets, read_functions
+from chladni.io.files.uff_functions import NodeDirection, function_datasets, is_read, read_functions
 from chladni.io.files.uff_header import direction_code
 from chladni.io.files.uff_mode_set import mode_set_of
-from chladni.io.files.uff_nodes import NODES, TRACE_LINES, length_and_force, node_blocks, number_points, read_nodes
-from chladni.io.files.uff_records import block_text, id_line, state_binary_sizes, text_blocks
-from chladni.io.files.uff_sets import UNITS, append_datasets, cut_off_note, open_uff, read_headers, si_units
-from chladni.io.files.uff_shapes import SHAPES, Degree, NodeMode, read_shapes, shape_blocks
+from chladni.io.files.uff_nodes import DOUBLE_NODES, NODES, TRACE_LINES, node_blocks, number_points, read_nodes
+from chladni.io.files.uff_records import UniversalFile, block_text, id_line, open_uff, state_binary_sizes, text_blocks
+from chladni.io.files.uff_sets import (
+    FUNCTION_AT_NODE,
+    HEADER,
+    LEFT_OUT,
+    UNITS,
+    Dataset,
+    append_datasets,
+    contradiction,
+    cut_off_note,
+    length_and_force,
+    listed_kinds,
+    read_headers,
+    si_units,
+)
+from chladni.io.files.uff_shapes import ANALYSIS_DATA, SHAPES, Degree, NodeMode, read_shapes, shape_blocks
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.value import Value
+from chladni.signals.wording import counted
 
-_HEADER = 151
+MODAL_DATASETS = (NODES, *DOUBLE_NODES, TRACE_LINES, SHAPES, ANALYSIS_DATA)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -100,37 +114,74 @@ def write_uff_modes(
     return losses + lost
 
 
-def read_uff_modes(path: Path | str) -> UffModes:
+def read_uff_modes(path: Path | str, *, units: Mapping[str, str] | None = None) -> UffModes:
     """Read modes, geometry and frequency responses from a universal file of any tool.
 
-    Complex modes (analysis types 3 and 7) and normal modes (2) of dataset 55 are read, in SI by dataset 164. A
-    component that's zero in all modes counts as not measured. Shapes are scaled so that their largest component is 1,
-    and modal A and mass with them.
+    Complex modes (analysis types 3 and 7) and normal modes (2) of datasets 55 and 2414 are read, nodes of 15, 781 and
+    2411, in SI by dataset 164. A component that's zero in all modes counts as not measured. Shapes are scaled so that
+    their largest component is 1, and modal A and mass with them.
+
+    Parameters
+    ----------
+    units
+        Unit by name of a function's channel, instead of that in the file.
 
     Raises
     ------
     LogError
         When the file is damaged, or holds neither modes nor nodes nor frequency responses.
+    SetupError
+        When a unit that is stated is unknown, or stands for a ratio.
     """
     path = Path(path)
     file = open_uff(path)
-    headers = read_headers(path, file)
-    system = next((header for header in headers if header["type"] == UNITS), None)
-    metre, newton = length_and_force(system)
-    blocks = text_blocks(path, (NODES, TRACE_LINES, SHAPES))
-    nodes = read_nodes(blocks, metre)
-    response, function_notes = read_functions(path, file, headers, nodes.names, system)
-    found, shape_notes = read_shapes(blocks)
-    notes = cut_off_note(path) + nodes.notes + function_notes + shape_notes
-    if not found and not nodes.positions and response is None:
-        kinds = ", ".join(sorted({str(header["type"]) for header in headers}))
-        raise LogError(
-            f"{path}: holds no mode, node or frequency response (datasets 55, 15, 58 of function type 4), but "
-            f"datasets {kinds}; chladni convert makes a log of time records, whose modes can be identified"
+    headers = read_headers(file)
+    found = modal_test(file, headers, units or {})
+    if found.modes is None and found.response is None and not found.geometry.points:
+        # Why a function can't be read says more than that there is none.
+        nothing = (
+            f"{path}: holds no mode, node or frequency response (datasets 55, 2414, 15, 2411, 58 of function type "
+            f"4), but datasets {listed_kinds(headers)}"
         )
-    _require_nodes(path, found, nodes.positions)
-    modes, mode_notes = mode_set_of(found, nodes, response, kilogram=newton / metre) if found else (None, ())
+        mistakes = [note for note in found.notes if note.endswith(LEFT_OUT)]
+        raise LogError(mistakes[0].removesuffix(LEFT_OUT) if mistakes else nothing)
+    return replace(found, notes=found.notes + _unread(path, headers))
+
+
+def modal_test(file: UniversalFile, headers: Sequence[Dataset], units: Mapping[str, str]) -> UffModes:
+    """Read what `read_uff_modes` reads, as far as there is anything."""
+    blocks = text_blocks(file, MODAL_DATASETS)
+    nodes = read_nodes(blocks, [length_and_force(header["system"])[0] for header in headers])
+    response, function_notes = read_functions(file, headers, nodes.names, units=units)
+    found, shape_notes = read_shapes(blocks, [_kilogram(header["system"]) for header in headers])
+    notes = cut_off_note(file) + nodes.notes + function_notes + shape_notes + _doubts(file.path, headers)
+    _require_nodes(file.path, found, nodes.positions)
+    modes, mode_notes = mode_set_of(found, nodes, response) if found else (None, ())
     return UffModes(modes=modes, geometry=nodes.geometry(), response=response, notes=notes + mode_notes)
+
+
+def _kilogram(system: Dataset | None) -> float:
+    metre, newton = length_and_force(system)
+    return newton / metre
+
+
+def _unread(path: Path, headers: Sequence[Dataset]) -> tuple[str, ...]:
+    """What of the file says nothing of a modal test."""
+    others = [
+        header for header in headers if header["type"] not in (*MODAL_DATASETS, FUNCTION_AT_NODE, UNITS, HEADER)
+    ]
+    records = sum("func_type" in header and not is_read(header) for header in headers)
+    listed = [f"datasets {listed_kinds(others)}"] if others else []
+    listed += [f"{counted(records, 'function')} of another kind than a frequency response"] if records else []
+    return (f"{path}: left out: {', '.join(listed)}.",) if listed else ()
+
+
+def _doubts(path: Path, headers: Sequence[Dataset]) -> tuple[str, ...]:
+    """Say where the units of the file contradict themselves."""
+    doubts = dict.fromkeys(contradiction(header) for header in headers if header["type"] == UNITS)
+    return tuple(
+        f"{path}: {doubt}; positions and modal masses were taken by these factors." for doubt in doubts if doubt
+    )
 
 
 def _channels_of(modes: ModeSet, response: FrequencyResponse | None) -> tuple[Channel, ...]:
@@ -227,7 +278,7 @@ def _header_text() -> str:
         id_line(""),
         day,
     )
-    return block_text(_HEADER, lines)
+    return block_text(HEADER, lines)
 
 
 def _require_nodes(path: Path, found: Sequence[NodeMode], positions: Mapping[int, object]) -> None:

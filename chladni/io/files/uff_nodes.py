@@ -1,21 +1,22 @@
-"""Measurement points as numbered nodes (dataset 15) and their wireframe as trace lines (dataset 82)."""
+"""Measurement points as numbered nodes (datasets 15, 781, 2411) and their wireframe as trace lines (dataset 82)."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from chladni.io.files.uff_records import TextBlock, block_text, id_line, integer_line, real_lines
 from chladni.signals.channel import Vector
-from chladni.signals.errors import LogError
 from chladni.signals.geometry import Geometry, Point
 
 NODES, TRACE_LINES = 15, 82
+#: Nodes in double precision, two lines each; 781 is the older number of 2411.
+DOUBLE_NODES = (781, 2411)
+_WIDTH, _DOUBLE_WIDTH = 13, 25
 _FIELDS = 7
 _A_LINE = 8
 _LONGEST_TRACE = 250
 _ID_LENGTH = 80
 _LARGEST_NODE = 10**9
 _NAMES_APART = " > "
-_LEAST_FACTOR = 1e-30
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,13 +105,13 @@ def node_blocks(geometry: Geometry, nodes: Mapping[str, int], unplaced: Sequence
     return text, tuple(losses)
 
 
-def read_nodes(blocks: Sequence[TextBlock], metre: float) -> NodeGeometry:
-    """Read datasets 15 and 82.
+def read_nodes(blocks: Sequence[TextBlock], metres: Sequence[float]) -> NodeGeometry:
+    """Read datasets 15, 781, 2411 and 82.
 
     Parameters
     ----------
-    metre
-        By what coordinates are divided to get metres.
+    metres
+        By what coordinates are divided to get metres, for each dataset of the file.
 
     Raises
     ------
@@ -120,8 +121,8 @@ def read_nodes(blocks: Sequence[TextBlock], metre: float) -> NodeGeometry:
     positions: dict[int, Vector] = {}
     local = False
     for block in blocks:
-        if block.kind == NODES:
-            local = _read_positions(block, metre, positions) or local
+        if block.kind in (NODES, *DOUBLE_NODES):
+            local = _read_positions(block, metres[block.number], positions) or local
     lines: list[tuple[int, ...]] = []
     names: dict[int, str] = {}
     for block in blocks:
@@ -143,15 +144,12 @@ def read_nodes(blocks: Sequence[TextBlock], metre: float) -> NodeGeometry:
 def _read_positions(block: TextBlock, metre: float, positions: dict[int, Vector]) -> bool:
     """Add the nodes of a dataset; says whether one has a coordinate system of its own."""
     local = False
-    for index, line in enumerate(block.lines):
-        if not line.strip():
-            continue
-        words = line.split()
-        # Coordinates may touch, so that blanks don't tell them apart.
-        head, tail = (" ".join(words[:4]), " ".join(words[4:])) if len(words) == _FIELDS else (line[:40], line[40:])
-        part = TextBlock(where=block.where, kind=NODES, first_line=block.first_line + index, lines=(head, tail))
-        node, definition, displacement, _ = part.integers(0, 4)
-        x, y, z = TextBlock(where=part.where, kind=NODES, first_line=part.first_line, lines=(tail,)).reals(0, 3)
+    width = _DOUBLE_WIDTH if block.kind in DOUBLE_NODES else _WIDTH
+    for (index, head), (below, tail) in _node_lines(block):
+        node, definition, displacement, _ = replace(
+            block, first_line=block.first_line + index, lines=(head,)
+        ).integers(0, 4)
+        x, y, z = replace(block, first_line=block.first_line + below, lines=(tail,)).reals(0, 3, width=width)
         place = (x / metre, y / metre, z / metre)
         if node <= 0:
             raise block.mistake(index, f"numbers a node {node}; nodes count from 1")
@@ -159,6 +157,21 @@ def _read_positions(block: TextBlock, metre: float, positions: dict[int, Vector]
             raise block.mistake(index, f"gives node {node} a second position; remove one")
         local = local or definition not in (0, 1) or displacement not in (0, 1)
     return local
+
+
+def _node_lines(block: TextBlock) -> Iterator[tuple[tuple[int, str], tuple[int, str]]]:
+    """Labels and coordinates of each node with the index of their line: one, or two in double precision."""
+    lines = [(index, line) for index, line in enumerate(block.lines) if line.strip()]
+    if block.kind in DOUBLE_NODES:
+        if len(lines) % 2:
+            raise block.mistake(lines[-1][0], "ends before the coordinates of its last node")
+        yield from zip(lines[::2], lines[1::2], strict=True)
+        return
+    for index, line in lines:
+        words = line.split()
+        # Coordinates may touch, so that blanks don't tell them apart.
+        head, tail = (" ".join(words[:4]), " ".join(words[4:])) if len(words) == _FIELDS else (line[:40], line[40:])
+        yield (index, head), (index, tail)
 
 
 def _read_trace(block: TextBlock) -> list[tuple[int, ...]]:
@@ -210,13 +223,3 @@ def _parts(line: tuple[str, ...]) -> list[tuple[str, ...]]:
 
 def _is_label(name: str) -> bool:
     return name.isascii() and name.isdecimal() and str(int(name)) == name and 0 < int(name) < _LARGEST_NODE
-
-
-def length_and_force(system: Mapping[str, float] | None) -> tuple[float, float]:
-    """By what lengths and forces of a file are divided to get metres and newtons, from dataset 164; 1 without."""
-    if system is None:
-        return 1.0, 1.0
-    length, force = float(system["length"]), float(system["force"])
-    if not (_LEAST_FACTOR < length < 1 / _LEAST_FACTOR and _LEAST_FACTOR < force < 1 / _LEAST_FACTOR):
-        raise LogError(f"dataset 164 has the factors {length:g} and {force:g} for length and force, which are none")
-    return length, force

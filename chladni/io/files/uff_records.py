@@ -1,4 +1,4 @@
-"""Text datasets of a universal file: their lines, and the fixed columns in them."""
+"""Datasets of a universal file: where they lie, their lines, and the fixed columns in them."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -6,15 +6,17 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 
+from chladni.io.files.uff_values import fortran_number, layout_of
 from chladni.signals.errors import LogError
 
 _DELIMITER = re.compile(rb"^ {4}-1[ \t]*\r?$", re.MULTILINE)
-# Binary values may end anywhere, and the delimiter follows without a line break.
-_AFTER_BINARY = re.compile(rb" {4}-1[ \t]*(?=\r?\n|\r?\Z)")
-_BINARY_HEADER_LINES = 11
-# Bytes of a number and numbers of a value, by ordinate type.
-_BINARY_VALUES = {2: (4, 1), 4: (8, 1), 5: (4, 2), 6: (8, 2)}
+# Binary values may end anywhere, and the delimiter follows without a line break, or behind one.
+_AFTER_BINARY = re.compile(rb"(?:\r?\n)? {4}-1[ \t]*(?=\r?\n|\r?\Z)")
+_LAST_OR_NEXT = re.compile(rb"(?:\r?\n)? {4}-1[ \t]*(?=[\s\0\x1a]*\Z|\r?\n *-1[ \t]*\r?\n)")
+_HEADER_LINES = 11
+_DATA_FORM_LINE = 6
 _SIZE_COLUMN = 31
+_SIZE_WIDTH = 12
 _INTEGER_WIDTH = 10
 _REAL_WIDTH = 13
 _ID_LENGTH = 80
@@ -33,6 +35,8 @@ class TextBlock:
         File name, for messages.
     kind
         Number of the dataset.
+    number
+        Its place among the datasets of the file, from 0.
     first_line
         Number of the first line in the file, from 1; 0 when binary values stand before it.
     lines
@@ -41,6 +45,7 @@ class TextBlock:
 
     where: str
     kind: int
+    number: int = 0
     first_line: int
     lines: tuple[str, ...]
 
@@ -65,7 +70,7 @@ class TextBlock:
         """Read `count` numbers of a line, up to 1e100 (below 1e-100: zero); `LogError` when they aren't there."""
         texts = _fields(self.line(index), width, count)
         try:
-            numbers = [_believable(float(text.replace("D", "E").replace("d", "e"))) for text in texts]
+            numbers = [_believable(fortran_number(text)) for text in texts]
         except ValueError:
             numbers = []
         if len(numbers) != count or not all(map(isfinite, numbers)):
@@ -78,27 +83,101 @@ class TextBlock:
         return LogError(f"{self.where}: {place}: dataset {self.kind} {what}")
 
 
-def text_blocks(path: Path, kinds: Iterable[int]) -> tuple[TextBlock, ...]:
-    """Find the text datasets of the given numbers.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Span:
+    """Offsets of one dataset in a file.
 
-    Binary values are stepped over by their announced size. What isn't closed by a -1 is left out; `cut_off_note`
-    says so.
+    Attributes
+    ----------
+    kind
+        Number of the dataset; 0 when the line behind the opening -1 holds none.
+    binary
+        Whether values follow its header in binary.
+    kind_line, body, end
+        Where its number and what follows begin, and where it's closed.
     """
-    wanted = frozenset(kinds)
+
+    kind: int
+    binary: bool
+    kind_line: int
+    body: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UniversalFile:
+    """A universal file in memory, and where its datasets lie."""
+
+    path: Path
+    content: bytes
+    spans: tuple[Span, ...]
+
+    def header(self, number: int) -> list[str]:
+        """Text of the first lines of a dataset: that with its number, and the eleven of a function's header."""
+        span = self.spans[number]
+        end = behind_header(self.content, span.body)
+        return _lines(self.content[span.kind_line : min(end, span.end)])
+
+    def values(self, number: int) -> bytes:
+        """What follows the header of a function."""
+        span = self.spans[number]
+        return self.content[behind_header(self.content, span.body) : span.end]
+
+
+def open_uff(path: Path) -> UniversalFile:
+    """Read a universal file and find its datasets.
+
+    Binary values are stepped over by the size that their header announces, so that a delimiter among them is none.
+    What isn't closed by a -1 is left out; `cut_off_note` says so.
+
+    Raises
+    ------
+    LogError
+        When there is no file, or no dataset in it.
+    """
+    if not path.is_file():
+        raise LogError(f"{path}: no such file")
     content = path.read_bytes()
+    spans = tuple(_spans(content))
+    if not spans:
+        raise LogError(
+            f"{path}: holds no whole dataset between lines of -1; is it a universal file, or was it cut off?"
+        )
+    return UniversalFile(path=path, content=content, spans=spans)
+
+
+def text_blocks(file: UniversalFile, kinds: Iterable[int]) -> tuple[TextBlock, ...]:
+    """Give the text datasets of the given numbers."""
+    wanted = frozenset(kinds)
     blocks = []
     line, counted_to, binary_seen = 1, 0, False
-    for span in _spans(content):
+    for number, span in enumerate(file.spans):
         binary_seen = binary_seen or span.binary
         if span.kind not in wanted or span.binary:
             continue
-        line += content.count(b"\n", counted_to, span.body)
+        line += file.content.count(b"\n", counted_to, span.body)
         counted_to = span.body
-        lines = content[span.body : span.end].decode("ascii", "replace").splitlines()
+        lines = _lines(file.content[span.body : span.end])
         blocks.append(
-            TextBlock(where=str(path), kind=span.kind, first_line=0 if binary_seen else line, lines=tuple(lines))
+            TextBlock(
+                where=str(file.path),
+                kind=span.kind,
+                number=number,
+                first_line=0 if binary_seen else line,
+                lines=tuple(lines),
+            )
         )
     return tuple(blocks)
+
+
+def _lines(text: bytes) -> list[str]:
+    """Lines of text: UTF-8 where it is that, else Latin-1, in which exporters on Windows write m/s²."""
+    try:
+        whole = text.decode("utf-8")
+    except UnicodeDecodeError:
+        whole = text.decode("latin-1")
+    # Not splitlines, for which some Latin-1 characters end a line.
+    return [line.removesuffix("\r") for line in whole.removesuffix("\n").split("\n")]
 
 
 def state_binary_sizes(path: Path) -> None:
@@ -106,12 +185,12 @@ def state_binary_sizes(path: Path) -> None:
 
     Pyuff states half of it for complex values, which readers that go by the size would cut short.
     """
-    content = path.read_bytes()
-    with path.open("r+b") as file:
-        for span in _spans(content):
+    file = open_uff(path)
+    with path.open("r+b") as written:
+        for number, span in enumerate(file.spans):
             if span.binary:
-                file.seek(span.kind_line + _SIZE_COLUMN)
-                file.write(b"%12d" % (span.values_end - span.values))
+                written.seek(span.kind_line + _SIZE_COLUMN)
+                written.write(b"%12d" % len(file.values(number)))
 
 
 def integer_line(*numbers: int) -> str:
@@ -157,63 +236,53 @@ def _next_line(content: bytes, position: int) -> int:
     return len(content) if found < 0 else found + 1
 
 
-def _kind(line: bytes) -> int:
+def _integer(field: bytes) -> int:
     try:
-        return int(line[:6])
+        return int(field)
     except ValueError:
         return 0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Span:
-    """Offsets of one dataset in a file; those of its values are the body's when it's text."""
-
-    kind: int
-    binary: bool
-    kind_line: int
-    body: int
-    values: int
-    values_end: int
-    end: int
+def behind_header(content: bytes, body: int) -> int:
+    """Where the values of a function begin, behind the eleven lines of its header."""
+    for _ in range(_HEADER_LINES):
+        body = _next_line(content, body)
+    return body
 
 
-def _spans(content: bytes) -> Iterator[_Span]:
+def _spans(content: bytes) -> Iterator[Span]:
     position = 0
     while (opening := _DELIMITER.search(content, position)) is not None:
         start = _next_line(content, opening.end())
         body = _next_line(content, start)
         line = content[start:body]
         binary = line[6:7].lower() == b"b"
-        values, values_end = _binary_values(content, body) if binary else (body, body)
-        closing = (_AFTER_BINARY if binary else _DELIMITER).search(content, values_end)
+        closing = _behind_binary(content, line, body) if binary else _DELIMITER.search(content, body)
         if closing is None:
             return
-        yield _Span(
-            kind=_kind(line),
-            binary=binary,
-            kind_line=start,
-            body=body,
-            values=values,
-            values_end=values_end,
-            end=closing.start(),
-        )
+        yield Span(kind=_integer(line[:6]), binary=binary, kind_line=start, body=body, end=closing.start())
         position = closing.end()
 
 
-def _binary_values(content: bytes, body: int) -> tuple[int, int]:
-    """Where the values of a binary function begin and end, by what its header announces.
+def _behind_binary(content: bytes, kind_line: bytes, body: int) -> re.Match[bytes] | None:
+    """The delimiter behind binary values: where a size that the header announces ends at one.
 
-    Both are the body when that can't be read, or the file ends before.
+    Some exporters state another size than they write, and a text-mode transfer changes it: then it's the first
+    delimiter that the next dataset follows, or nothing.
     """
-    position, header = body, []
-    for _ in range(_BINARY_HEADER_LINES):
-        following = _next_line(content, position)
-        header.append(content[position:following])
-        position = following
-    try:
-        kind, count, even = (int(header[6][10 * n : 10 * (n + 1)]) for n in range(3))
-    except ValueError:
-        return body, body
-    bytes_each, parts = _BINARY_VALUES.get(kind, (0, 0))
-    end = position + bytes_each * (parts + (0 if even else 1)) * max(count, 0)
-    return (position, end) if end <= len(content) else (body, body)
+    values = behind_header(content, body)
+    stated = _integer(kind_line[_SIZE_COLUMN : _SIZE_COLUMN + _SIZE_WIDTH])
+    for size in (stated, *_announced(content, body)):
+        closing = _AFTER_BINARY.match(content, values + size) if 0 < size <= len(content) - values else None
+        if closing is not None:
+            return closing
+    return _LAST_OR_NEXT.search(content, values)
+
+
+def _announced(content: bytes, body: int) -> tuple[int, ...]:
+    """Bytes that the values may take by their type and count; none when the header can't be read."""
+    for _ in range(_DATA_FORM_LINE):
+        body = _next_line(content, body)
+    kind, count, even = (_integer(content[body + 10 * n : body + 10 * (n + 1)]) for n in range(3))
+    layout = layout_of(kind, count, even=even != 0)
+    return () if layout is None else layout.binary_sizes()

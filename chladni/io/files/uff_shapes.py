@@ -1,8 +1,8 @@
-"""Modes as data at nodes: dataset 55 of complex eigenvalues, and of normal modes."""
+"""Modes as data at nodes: datasets 55 and 2414 of complex eigenvalues, and of normal modes."""
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, hypot, inf, isclose, isfinite, nan, pi, sqrt
 
 import numpy as np
@@ -11,10 +11,13 @@ from chladni.io.files.uff_header import TYPE_OF_UNIT
 from chladni.io.files.uff_records import TextBlock, block_text, id_line, integer_line, real_lines
 from chladni.signals.mode_set import ModeSet
 
-SHAPES = 55
+SHAPES, ANALYSIS_DATA = 55, 2414
 _STRUCTURAL = 1
 _NORMAL_MODE, _COMPLEX_FIRST, _COMPLEX_SECOND = 2, 3, 7
 _REAL, _COMPLEX = 2, 5
+# In double precision, which dataset 2414 has too.
+_REALS, _COMPLEXES = (_REAL, 4), (_COMPLEX, 6)
+_AT_NODES = 1
 _TRANSLATIONS, _SIX = 2, 3
 _ID_LINES = 5
 _UNIT_OF_TYPE = {code: unit for unit, code in TYPE_OF_UNIT.items()}
@@ -39,7 +42,7 @@ class NodeMode:
     motion
         Complex motion by node and axis, not zero.
     modal_a
-        Modal A in the scale of `motion`, 0 when unscaled; `modal_mass` likewise.
+        Modal A in the scale of `motion`, 0 when unscaled; `modal_mass` likewise, in kg.
     unit
         Of the motion that was measured, ``1`` when the file doesn't say.
     driving
@@ -86,11 +89,18 @@ def shape_blocks(
     return "".join(block_text(SHAPES, lines) for lines in rows)
 
 
-def read_shapes(blocks: Sequence[TextBlock]) -> tuple[tuple[NodeMode, ...], tuple[str, ...]]:
-    """Read the modes among datasets 55, and give sentences on those that are no modes.
+def read_shapes(
+    blocks: Sequence[TextBlock], kilograms: Sequence[float]
+) -> tuple[tuple[NodeMode, ...], tuple[str, ...]]:
+    """Read the modes among datasets 55 and 2414, and give sentences on those that are no modes.
 
     Normal modes (analysis type 2) and complex modes (3, 7) are read, real or complex, with three or six values a
     node. An eigenvalue of negative frequency is taken with the conjugate of its shape, which is the same mode.
+
+    Parameters
+    ----------
+    kilograms
+        By what masses are divided to get kg, for each dataset of the file.
 
     Raises
     ------
@@ -98,15 +108,17 @@ def read_shapes(blocks: Sequence[TextBlock]) -> tuple[tuple[NodeMode, ...], tupl
         When a dataset is cut short or holds what is no number.
     """
     modes, notes = [], []
-    for block in (one for one in blocks if one.kind == SHAPES):
-        analysis, values_a_node = _definition(block)
-        start = f"{block.where}: line {block.first_line}: a dataset 55 was left out: "
-        if analysis not in (_NORMAL_MODE, _COMPLEX_FIRST, _COMPLEX_SECOND):
-            notes.append(f"{start}its analysis type {analysis} is no mode.")
-        elif values_a_node not in (3, 6):
-            notes.append(f"{start}it has {values_a_node} values a node, where translations have 3, with rotations 6.")
+    for block in (one for one in blocks if one.kind in (SHAPES, ANALYSIS_DATA)):
+        data = _at_nodes(block) if block.kind == SHAPES else _analysis_data(block)
+        start = f"{block.where}: line {block.first_line}: a dataset {block.kind} was left out: "
+        if data.location != _AT_NODES:
+            notes.append(f"{start}its data aren't at nodes.")
+        elif data.analysis not in (_NORMAL_MODE, _COMPLEX_FIRST, _COMPLEX_SECOND):
+            notes.append(f"{start}its analysis type {data.analysis} is no mode.")
+        elif data.width not in (3, 6):
+            notes.append(f"{start}it has {data.width} values a node, where translations have 3, with rotations 6.")
         else:
-            mode = _read_mode(block, analysis)
+            mode = _read_mode(block, data, kilograms[block.number])
             if 0 < mode.frequency_hz < inf and abs(mode.damping_ratio) < 1 and mode.motion:
                 modes.append(mode)
             else:
@@ -154,30 +166,78 @@ def _scale_line(modes: ModeSet, row: int, driving: tuple[Degree, Degree] | None)
     return f"modal_mass_std={std:.9g} response={node}:{axis:+d} reference={source}:{along:+d}"
 
 
-def _definition(block: TextBlock) -> tuple[int, int]:
-    """Analysis type and values a node."""
-    _, analysis, _, _, data_type, values_a_node = block.integers(_ID_LINES, 6)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _NodeData:
+    """What a dataset announces of its data, and where these begin.
+
+    `numbers` are frequency, modal mass, viscous and hysteretic damping of a normal mode; the parts of eigenvalue and
+    modal A of a complex one.
+    """
+
+    location: int
+    analysis: int
+    quantity: int
+    complex_values: bool
+    width: int
+    numbers: Sequence[float]
+    start: int
+
+
+def _at_nodes(block: TextBlock) -> _NodeData:
+    """What a dataset 55 announces."""
+    _, analysis, _, quantity, data_type, width = block.integers(_ID_LINES, 6)
     if data_type not in (_REAL, _COMPLEX):
         raise block.mistake(_ID_LINES, f"has the data type {data_type}; 2 is real and 5 complex")
-    return analysis, values_a_node
+    numbers: Sequence[float] = ()
+    index = _ID_LINES + 2
+    if analysis in (_NORMAL_MODE, _COMPLEX_FIRST, _COMPLEX_SECOND):
+        integers, reals = block.integers(_ID_LINES + 1, 2)
+        least = 4 if analysis == _NORMAL_MODE else 6
+        if not (1 <= integers <= 10 and least <= reals <= 12):
+            raise block.mistake(
+                _ID_LINES + 1, f"announces {integers} integers and {reals} numbers, at least {least} due"
+            )
+        index = _ID_LINES + 1 + ceil((integers + 2) / 8)
+        numbers = _numbers(block, index, reals)
+        index += ceil(reals / 6)
+    return _NodeData(
+        location=_AT_NODES,
+        analysis=analysis,
+        quantity=quantity,
+        complex_values=data_type == _COMPLEX,
+        width=width,
+        numbers=numbers,
+        start=index,
+    )
 
 
-def _read_mode(block: TextBlock, analysis: int) -> NodeMode:
-    _, _, _, quantity, data_type, width = block.integers(_ID_LINES, 6)
-    integers, reals = block.integers(_ID_LINES + 1, 2)
-    least = 4 if analysis == _NORMAL_MODE else 6
-    if not (1 <= integers <= 10 and least <= reals <= 12):
-        raise block.mistake(_ID_LINES + 1, f"announces {integers} integers and {reals} numbers, at least {least} due")
-    index = _ID_LINES + 1 + ceil((integers + 2) / 8)
-    numbers = _numbers(block, index, reals)
-    motion = _motion(block, index + ceil(reals / 6), width, complex_values=data_type == _COMPLEX)
-    if analysis == _NORMAL_MODE:
-        frequency_hz, mass, viscous, hysteretic = numbers[:4]
+def _analysis_data(block: TextBlock) -> _NodeData:
+    """What a dataset 2414 announces: twelve numbers of all analysis types together, those of others zero."""
+    (location,) = block.integers(2, 1)
+    _, analysis, _, quantity, data_type, width = block.integers(8, 6)
+    reals = [number for index in (11, 12) for number in block.reals(index, 6)]
+    if location == _AT_NODES and data_type not in (*_REALS, *_COMPLEXES):
+        raise block.mistake(8, f"has the data type {data_type}; 2 and 4 are real, 5 and 6 complex")
+    return _NodeData(
+        location=location,
+        analysis=analysis,
+        quantity=quantity,
+        complex_values=data_type in _COMPLEXES,
+        width=width,
+        numbers=[reals[1], *reals[3:6]] if analysis == _NORMAL_MODE else reals[6:],
+        start=13,
+    )
+
+
+def _read_mode(block: TextBlock, data: _NodeData, kilogram: float) -> NodeMode:
+    motion = _motion(block, data.start, data.width, complex_values=data.complex_values)
+    if data.analysis == _NORMAL_MODE:
+        frequency_hz, mass, viscous, hysteretic = data.numbers[:4]
         # Hysteretic damping loses as much a cycle as viscous damping of half its ratio would, at resonance.
         damping = viscous or hysteretic / 2
         modal_a = 2j * (2 * pi * frequency_hz * sqrt(max(1 - damping**2, 0.0))) * mass
     else:
-        pole, modal_a = complex(*numbers[:2]), complex(*numbers[2:4])
+        pole, modal_a = complex(*data.numbers[:2]), complex(*data.numbers[2:4])
         if pole.imag < 0:
             # The conjugate pair is one mode; its half with rising phase is kept, with its own shape and modal A.
             pole, modal_a = pole.conjugate(), modal_a.conjugate()
@@ -185,19 +245,33 @@ def _read_mode(block: TextBlock, analysis: int) -> NodeMode:
         size = hypot(pole.real, pole.imag)
         frequency_hz, damping = size / (2 * pi), -pole.real / size if size else nan
         mass = (modal_a / (2j * pole.imag)).real if pole.imag else 0.0
-    frequency_hz, frequency_std_hz = _in_full(block.line(1), "frequency_hz", frequency_hz)
-    damping, damping_std = _in_full(block.line(2), "damping_ratio", damping)
+    mode = NodeMode(
+        frequency_hz=frequency_hz,
+        frequency_std_hz=nan,
+        damping_ratio=damping,
+        damping_std=nan,
+        motion=motion,
+        modal_a=modal_a / kilogram,
+        modal_mass=mass / kilogram,
+        modal_mass_std=nan,
+        unit=_UNIT_OF_TYPE.get(data.quantity, "1"),
+        driving=None,
+    )
+    return _with_identification(block, mode, kilogram) if block.kind == SHAPES else mode
+
+
+def _with_identification(block: TextBlock, mode: NodeMode, kilogram: float) -> NodeMode:
+    """The mode with what identification lines 2 to 4 say in full, as ours do."""
+    frequency_hz, frequency_std_hz = _in_full(block.line(1), "frequency_hz", mode.frequency_hz)
+    damping_ratio, damping_std = _in_full(block.line(2), "damping_ratio", mode.damping_ratio)
     scale = _SCALE.match(block.line(3).strip())
-    return NodeMode(
+    return replace(
+        mode,
         frequency_hz=frequency_hz,
         frequency_std_hz=frequency_std_hz,
-        damping_ratio=damping,
+        damping_ratio=damping_ratio,
         damping_std=damping_std,
-        motion=motion,
-        modal_a=modal_a,
-        modal_mass=mass,
-        modal_mass_std=float(scale[1]) if scale else nan,
-        unit=_UNIT_OF_TYPE.get(quantity, "1"),
+        modal_mass_std=float(scale[1]) / kilogram if scale else nan,
         driving=((int(scale[2]), int(scale[3])), (int(scale[4]), int(scale[5]))) if scale else None,
     )
 

@@ -79,7 +79,7 @@ class McapContainer:
         Raises
         ------
         LogError
-            When the file can't be read or is no MCAP log at all.
+            When the file can't be read, is no MCAP log at all, or was changed by a text-mode transfer.
         """
         limits = limits or Limits()
         file = LogFile(Path(path))
@@ -90,6 +90,8 @@ class McapContainer:
                 registry = ChannelRegistry(limits)
             container = cls(file, limits=limits, check_crc=check_crc, registry=registry, end=end, damage=damage)
             container._take_stock()
+            if container.damage:
+                file.require_lone_line_feeds()
         except BaseException:
             file.close()
             raise

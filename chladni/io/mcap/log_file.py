@@ -19,8 +19,19 @@ _OTHER_FORMATS = (
     (b"PK\x03\x04", "a zip archive; unpack it first"),
     (b"\x89MCAP", "another version of MCAP, of which only version 0 is known"),
 )
-DATA_SUFFIXES = (".csv", ".txt", ".wav", ".mat", ".npz", ".uff", ".unv")
-"""Data files that can be converted to a log."""
+# What programs that take a file for text make of the magic; it holds a high bit and both line ends to show this.
+_TEXT_MODE = (
+    (MAGIC.replace(b"\n", b"\r\n"), "0a became 0d 0a"),
+    (MAGIC.replace(b"\r", b"\n"), "0d became 0a"),
+    (MAGIC.replace(b"\r", b""), "0d 0a became 0a"),
+    (MAGIC.replace(b"\n", b""), "0d 0a became 0d"),
+    (bytes([MAGIC[0] & 0x7F]) + MAGIC[1:], "8 bits became 7"),
+    (MAGIC.decode("latin-1").encode(), "89 became UTF-8"),
+    ("\ufffd".encode() + MAGIC[1:], "89 became the replacement character of UTF-8"),
+)
+_SEARCHED_BYTES = 1 << 20
+#: Line feeds that all follow a carriage return, the two in the magics among them: 1 in 65 536 by chance.
+_FEWEST_LINE_FEEDS = 4
 
 
 class LogFile:
@@ -60,13 +71,32 @@ class LogFile:
         start = self.read(0, 16)
         if start.startswith(MAGIC):
             return
-        if self.path.suffix.lower() in DATA_SUFFIXES:
-            log = self.path.with_suffix(".mcap")
-            raise LogError(f"{self.path}: not an MCAP log; chladni convert {self.path} {log} makes a log of it")
+        for magic, change in _TEXT_MODE:
+            if start.startswith(magic):
+                raise self._text_mode_error(f"{change} in its first bytes")
         looks_like = [f"; it looks like {hint}" for magic, hint in _OTHER_FORMATS if start.startswith(magic)]
         raise LogError(
             f"{self.path}: not an MCAP log: starts with {start[:8].hex(' ')}, expected the MCAP magic "
             f"{MAGIC.hex(' ')}{''.join(looks_like)}"
+        )
+
+    def require_lone_line_feeds(self) -> None:
+        """Refuse a file, known to be damaged, in which every line feed follows a carriage return.
+
+        Raises
+        ------
+        LogError
+            Such are the bytes of a text; a program that took the log for one has put carriage returns everywhere.
+        """
+        start = self.read(0, _SEARCHED_BYTES)
+        feeds = start.count(b"\n")
+        if feeds >= _FEWEST_LINE_FEEDS and start.count(b"\r\n") == feeds:
+            raise self._text_mode_error(f"all {feeds} bytes 0a in its first {len(start)} stand behind 0d")
+
+    def _text_mode_error(self, sign: str) -> LogError:
+        return LogError(
+            f"{self.path}: changed by a text-mode transfer (git's autocrlf, FTP in ASCII mode): {sign}; copy the "
+            "file again in binary mode, and in git mark it as binary: '*.mcap binary' in .gitattributes"
         )
 
     def read(self, offset: int, size: int) -> bytes:

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.unit_text import in_unit
 from chladni.signals.wording import counted
-from chladni.spectral.forms import convert_form
+from chladni.spectral.forms import MOTION_ORDER, convert_form
 from chladni.spectral.peaks import find_response_peaks
 from chladni.spectral.response_advice import half_power_lines
+from chladni.spectral.uncertainty import std_or_scatter
 
 DrivingPointVerdict = Literal["sound", "reversed", "not a driving point", "phase error", "undecided"]
 Floats = NDArray[np.float64]
@@ -147,7 +149,7 @@ def check_driving_point(
         Functions in any form whose responses are motions.
     functions
         Driving points as (response, reference, sign), for channels without point and direction; default
-        `driving_points`.
+        `driving_points`, those of them whose response is a motion.
     false_alarm
         Chance that the scatter of a sound driving point gives it any wrong line or peak, 0 to 1.
 
@@ -161,7 +163,7 @@ def check_driving_point(
     Raises
     ------
     EstimateError
-        When a response is no motion, a function isn't there, or `false_alarm` is out of range.
+        When a response of `functions` is no motion, a function isn't there, or `false_alarm` is out of range.
 
     Notes
     -----
@@ -173,12 +175,24 @@ def check_driving_point(
     """
     if not 0 < false_alarm < 1:
         raise EstimateError(f"false_alarm is {false_alarm}; it must lie between 0 and 1")
-    chosen = driving_points(response.responses, response.references) if functions is None else tuple(functions)
-    if not chosen:
+    found = driving_points(response.responses, response.references) if functions is None else tuple(functions)
+    if not found:
         return DrivingPointCheck(points=(), finding=_no_driving_point(response))
+    # The power that goes in is told of motions; a response whose unit nobody knows still has its frequencies.
+    chosen = found if functions is not None else _of_motions(response, found)
+    if not chosen:
+        bare = response.responses[found[0][0]]
+        finding = f"the driving point {bare.name} isn't judged: it is {in_unit(bare.unit)}, which is no motion"
+        return DrivingPointCheck(points=(), finding=finding)
     points = tuple(_judged(_one_function(response, row, column), sign, false_alarm) for row, column, sign in chosen)
     worst = min(points, key=lambda point: _GRAVITY.index(point.verdict))
     return DrivingPointCheck(points=points, finding=worst.finding)
+
+
+def _of_motions(
+    response: FrequencyResponse, functions: Sequence[tuple[int, int, int]]
+) -> tuple[tuple[int, int, int], ...]:
+    return tuple(one for one in functions if response.responses[one[0]].unit in MOTION_ORDER)
 
 
 _GRAVITY: tuple[DrivingPointVerdict, ...] = ("reversed", "not a driving point", "phase error", "undecided", "sound")
@@ -253,12 +267,15 @@ def _judged(function: FrequencyResponse, sign: int, false_alarm: float) -> Drivi
 
 def _mobility(function: FrequencyResponse, sign: int, false_alarm: float) -> _Mobility:
     mobility = convert_form(function, "mobility")
-    values, std = mobility.values[0, 0], mobility.std[0, 0]
-    usable = mobility.excited & np.isfinite(values) & np.isfinite(std) & (mobility.frequency_hz > 0)
+    values = mobility.values[0, 0]
+    usable = mobility.excited & np.isfinite(values) & (mobility.frequency_hz > 0)
+    std = std_or_scatter(values[usable], mobility.std[0, 0, usable])
+    usable[usable] = np.isfinite(std)
     frequency_hz = mobility.frequency_hz[usable]
     # A function without any scatter, from a model, is as sure as its rounding.
-    std = np.maximum(std[usable], 1e-12 * np.abs(values[usable]).max(initial=0.0))
-    found = find_response_peaks(function, count=PEAKS_JUDGED)
+    std = np.maximum(std[np.isfinite(std)], 1e-12 * np.abs(values[usable]).max(initial=0.0))
+    # Without error bars of its own a function has peaks, and no line whose sign is sure.
+    found = find_response_peaks(function, count=PEAKS_JUDGED) if frequency_hz.size else ()
     peaks = sorted({int(np.argmin(np.abs(frequency_hz - peak.frequency_hz))) for peak in found})
     averages = function.provenance.effective_averages
     freedom = max(2 * (averages - 1), 1.0) if averages else LARGE_FREEDOM
@@ -290,9 +307,11 @@ def _antiresonances(mobility: _Mobility) -> tuple[int, tuple[tuple[float, float]
         low, high = int(peaks[first]), int(peaks[first + 1])
         # h/2 at a mode's own half-power point against h' b'/(2 delta) of its neighbour's flank, twice for safety.
         flanks = 2 * heights[first : first + 2] * widths[first : first + 2] / (high - low)
-        if not flanks[0] < heights[first + 1] or not flanks[1] < heights[first]:
+        if high - low < 2 or not flanks[0] < heights[first + 1] or not flanks[1] < heights[first]:
             continue
-        reactive = mobility.values.imag[low : high + 1] / mobility.std[low : high + 1]
+        # A resonance narrower than a line may lie on either side of its own highest line.
+        between = slice(low + 1, high)
+        reactive = mobility.values.imag[between] / mobility.std[between]
         lowest, highest = int(np.argmin(reactive)), int(np.argmax(reactive))
         if reactive[lowest] > -mobility.sure and reactive[highest] < mobility.sure:
             continue

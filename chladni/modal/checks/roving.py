@@ -13,12 +13,14 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.provenance import Provenance
 from chladni.signals.wording import counted
-from chladni.spectral.forms import form
+from chladni.spectral.forms import MOTION_ORDER, form
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Lines of parts that were measured one after another are equal but for the rounding of their rate.
 SAME_LINES = 1e-6
+# What parts a reference from a response at the same place in files that name channels by their place.
+REFERENCE = " (reference)"
 
 
 def join_references(parts: Sequence[FrequencyResponse]) -> FrequencyResponse:
@@ -112,23 +114,66 @@ def roving_hammer(parts: Sequence[FrequencyResponse]) -> FrequencyResponse:
     where a pair was measured both ways.
     """
     joined = join_references(parts)
-    measured, applied = _only_unit(joined.responses, "responses"), _only_unit(joined.references, "references")
+    coherence = np.array([_least_coherence(parts, channel) for channel in _hit(parts)])
+    turned = _turned_round(joined, coherence)
     # Fails for what is no motion: only motion per force may be turned round.
     form(joined)
-    coherence = np.array([_least_coherence(parts, channel) for channel in _hit(parts)])
+    return turned
+
+
+def over_hit_points(response: FrequencyResponse) -> FrequencyResponse:
+    """Turn functions of fewer responses than references round, so that shapes have a component for each reference.
+
+    A hammer that roved past a fixed accelerometer leaves one response over many references; its shapes would have one
+    component. Functions that have as many responses, or that reciprocity doesn't hold for (a reference that is a
+    motion, several units), stay as they are.
+
+    Examples
+    --------
+    >>> hit = [Channel(name=f"hammer{at}", unit="N", role="reference") for at in range(3)]
+    >>> row = FrequencyResponse(
+    ...     frequency_hz=np.arange(4.0), values=np.ones((1, 3, 4), complex), std=np.zeros((1, 3, 4)),
+    ...     coherence=np.ones((1, 4)), excited=np.ones(4, bool), responses=(Channel(name="a", unit="m/s^2"),),
+    ...     references=tuple(hit), provenance=Provenance(),
+    ... )
+    >>> [channel.name for channel in over_hit_points(row).responses]
+    ['hammer0', 'hammer1', 'hammer2']
+    """
+    answers, sources = response.responses, response.references
+    units = [{channel.unit for channel in channels} for channels in (answers, sources)]
+    if len(answers) >= len(sources) or any(len(unit) > 1 for unit in units) or units[1] & MOTION_ORDER.keys():
+        return response
+    turned = _turned_round(response, np.repeat(response.coherence.min(axis=0)[np.newaxis], len(sources), axis=0))
+    known = response.provenance.effective_averages
+    # Each further reference spent one average on every function.
+    averages = max(known - (len(sources) - len(answers)), 1.0) if known else 0.0
+    return replace(turned, provenance=replace(turned.provenance, effective_averages=averages))
+
+
+def _turned_round(response: FrequencyResponse, coherence: NDArray[np.float64]) -> FrequencyResponse:
+    """The transpose: places that were hit as responses, places that were measured as references."""
+    measured, applied = _only_unit(response.responses, "responses"), _only_unit(response.references, "references")
     note = (
-        f"roving hammer: {counted(len(joined.references), 'hit point')} taken as responses and "
-        f"{counted(len(joined.responses), 'accelerometer')} as reference, by reciprocity"
+        f"roving hammer: {counted(len(response.references), 'hit point')} taken as responses and "
+        f"{counted(len(response.responses), 'accelerometer')} as reference, by reciprocity"
     )
+    hit = [channel.name.removesuffix(REFERENCE) for channel in response.references]
+    fixed = [channel.name + REFERENCE if channel.name in hit else channel.name for channel in response.responses]
     return FrequencyResponse(
-        frequency_hz=joined.frequency_hz,
-        values=joined.values.transpose(1, 0, 2),
-        std=joined.std.transpose(1, 0, 2),
+        frequency_hz=response.frequency_hz,
+        values=response.values.transpose(1, 0, 2),
+        std=response.std.transpose(1, 0, 2),
         coherence=coherence,
-        excited=joined.excited,
-        responses=tuple(replace(c, unit=measured, role="response", overload=None) for c in joined.references),
-        references=tuple(replace(c, unit=applied, role="reference", overload=None) for c in joined.responses),
-        provenance=joined.provenance.with_notes(note),
+        excited=response.excited,
+        responses=tuple(
+            replace(channel, name=name, unit=measured, role="response", overload=None)
+            for channel, name in zip(response.references, hit, strict=True)
+        ),
+        references=tuple(
+            replace(channel, name=name, unit=applied, role="reference", overload=None)
+            for channel, name in zip(response.responses, fixed, strict=True)
+        ),
+        provenance=response.provenance.with_notes(note),
     )
 
 

@@ -7,11 +7,11 @@ from chladni.modal.fit.model_lines import ModelLines
 
 Complex = NDArray[np.complex128]
 
-# Distances of poles in units of decay rates. A mode further from its start answers another question than was asked;
-# two modes nearer to each other are one that the data don't split.
+# Distances of poles in units of decay rates, or of half a line where that is more. A mode further from its start
+# answers another question than was asked; two modes nearer to each other are one that the data don't split.
 LONGEST_WAY = 10.0
 NEAREST = 0.02
-# A mode whose decay rate is below this share of the distance of lines hides between them.
+# A decay rate below this share of the distance of lines hides between them: who began wider has met a line of noise.
 NARROWEST = 0.02
 
 
@@ -33,14 +33,15 @@ def lost_mode(
     frequency_hz = np.abs(poles) / (2 * np.pi)
     for mode in np.flatnonzero((frequency_hz < low) | (frequency_hz > high)):
         return int(mode), f"{_named(began[mode])} left the band from {low:.6g} to {high:.6g} Hz"
-    spacing = 2 * np.pi * float(np.median(np.diff(lines.frequency_hz))) if lines.frequency_hz.size > 1 else 0.0
-    for mode in np.flatnonzero(-poles.real < NARROWEST * spacing):
+    half_line = np.pi * float(np.median(np.diff(lines.frequency_hz))) if lines.frequency_hz.size > 1 else 0.0
+    hidden = (-poles.real < NARROWEST * 2 * half_line) & (-began.real > half_line)
+    for mode in np.flatnonzero(hidden):
         return int(mode), f"{_named(began[mode])} ran into a peak that is narrower than the lines can tell"
-    way = np.abs(poles - began) / np.maximum(-poles.real, -began.real)
+    seen = np.maximum(-poles.real, half_line)
+    way = np.abs(poles - began) / np.maximum(seen, -began.real)
     for mode in np.flatnonzero(way > LONGEST_WAY):
         return int(mode), f"{_named(began[mode])} ran away to {frequency_hz[mode]:.6g} Hz"
-    decay = np.minimum(-poles.real, -poles.real[:, np.newaxis])
-    apart = np.abs(poles - poles[:, np.newaxis]) / decay
+    apart = np.abs(poles - poles[:, np.newaxis]) / np.minimum(seen, seen[:, np.newaxis])
     met = np.argwhere(np.triu(apart < NEAREST, k=1))
     for pair in met:
         weaker = int(pair[np.argmin(strength[pair])])

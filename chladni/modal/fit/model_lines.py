@@ -16,6 +16,10 @@ from chladni.spectral.forms import ORDER, form
 # Below this share of a function's largest magnitude a standard deviation is rounding, not noise.
 ROUNDING = 1e-8
 EXACT = 1e-13
+# Steps until level and share of the variance stand still.
+ROUNDS = 60
+Floats = NDArray[np.float64]
+
 UNKNOWN_STD = "the functions carry no standard deviation: error bars rest on what the fit leaves of each function"
 
 
@@ -94,15 +98,48 @@ def model_lines(response: FrequencyResponse, band_hz: tuple[float, float] | None
 
 
 def reweighted(lines: ModelLines, residual: NDArray[np.complex128], *, parameters: int) -> ModelLines:
-    """Weigh each function by what a fit with `parameters` real coefficients a response leaves of it."""
+    """Weigh each line by what a fit with `parameters` real coefficients a response leaves of its function.
+
+    The variance is taken for a level and a share of the function's square: noise of a sensor is the same on all
+    lines, while that of a force or of a calibration follows the function over its peaks.
+    """
     used = lines.weights > 0
-    share = parameters / lines.values.shape[1]
-    freedom = np.maximum(2 * used.sum(axis=-1) - share, 1.0)
-    variance = np.sum(np.where(used, np.abs(residual) ** 2, 0.0), axis=-1) / freedom
+    count = used.sum(axis=-1, keepdims=True)
+    freedom = np.maximum(2 * count - parameters / lines.values.shape[1], 1.0)
+    squares = np.where(used, np.abs(residual) ** 2, 0.0) * count / freedom
     # A function that is fitted to the last digit must not drive all others out.
-    floor = (EXACT * np.abs(lines.values).max(axis=(-1))) ** 2
-    variance = np.maximum(variance, np.where(floor > 0, floor, floor.max()))
-    return replace(lines, weights=np.where(used, 1 / variance[..., np.newaxis], 0.0))
+    floor = (EXACT * np.abs(lines.values).max(axis=-1, keepdims=True)) ** 2
+    floor = np.where(floor > 0, floor, floor.max())
+    variance = _level_and_share(np.maximum(squares, floor), np.abs(lines.values - residual) ** 2, used)
+    return replace(lines, weights=np.where(used, 1 / np.maximum(variance, floor), 0.0))
+
+
+def _level_and_share(squares: Floats, power: Floats, used: NDArray[np.bool_]) -> Floats:
+    """``[response, reference, line]`` variances level + share x power of greatest likelihood for exponential squares.
+
+    Multiplicative steps keep both positive and raise the likelihood each time (Fevotte & Idier 2011, Neural
+    Computation 23, 2421, for the Itakura-Saito divergence).
+    """
+    count = np.maximum(used.sum(axis=-1, keepdims=True), 1)
+    level = np.sum(np.where(used, squares, 0.0), axis=-1, keepdims=True) / count
+    share = level / np.maximum(
+        np.sum(np.where(used, power, 0.0), axis=-1, keepdims=True) / count, np.finfo(float).tiny
+    )
+    for _ in range(ROUNDS):
+        variance = level + share * power
+        trust = np.where(used, 1 / variance, 0.0)
+        gain = trust**2 * squares
+        level = level * np.sqrt(_ratio(gain, trust))
+        gain, trust = gain * power, trust * power
+        share = share * np.sqrt(_ratio(gain, trust))
+    return np.asarray(level + share * power, dtype=np.float64)
+
+
+def _ratio(above: Floats, below: Floats) -> Floats:
+    """Sums over the last axis, 0 of a function without lines or without power."""
+    total = below.sum(axis=-1, keepdims=True)
+    ratio = np.divide(above.sum(axis=-1, keepdims=True), total, out=np.zeros_like(total), where=total > 0)
+    return np.asarray(ratio, dtype=np.float64)
 
 
 def _weights(

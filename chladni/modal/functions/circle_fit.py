@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from chladni.modal.functions.exponential_window import without_window_damping
 from chladni.modal.functions.nyquist_circle import NyquistCircle, fit_circle, sweep
 from chladni.modal.functions.resonance_lines import MobilityLines, Resonance, mobility_lines, resonances
-from chladni.modal.functions.single_modes import SingleMode, mode_set
+from chladni.modal.functions.single_modes import SingleMode, left_out, mode_set
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
@@ -87,7 +87,7 @@ class CircleFit:
         for resonance in found:
             mode, words = self._mode(lines, resonance)
             modes += [mode] if mode else []
-            notes += words
+            notes += words if mode else [left_out(lines, resonance)]
         found_modes = mode_set(modes, response, estimator="circle fit", notes=[*notes, *closeness(modes), UNSCALED])
         return without_window_damping(found_modes, response.provenance.window_decay_per_s)
 
@@ -103,7 +103,7 @@ class CircleFit:
                 break
             reach_hz = circle.damping_ratio * circle.frequency_hz
         if circle is None:
-            return None, [f"the lines around {centre_hz:.5g} Hz draw no circle; no mode is taken there"]
+            return None, []
         return _single_mode(circle), _words(lines, span, resonance, circle)
 
 

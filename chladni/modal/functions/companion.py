@@ -46,13 +46,15 @@ def denominators(matrix: NDArray[np.complex128], references: int, orders: range)
         yield (inverse[:size, :size].conj().T @ right[:size]).reshape(order, references, references)
 
 
-def stable_roots(coefficients: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Roots z of det(I + sum alpha_r z^r) within the unit circle.
+def stable_roots(coefficients: NDArray[np.complex128], *, beyond: float = 0.0) -> NDArray[np.complex128]:
+    """Roots z of det(I + sum alpha_r z^r) within the unit circle, or so little `beyond` it.
 
     Parameters
     ----------
     coefficients
         ``[k, reference, reference]`` alpha_1 to alpha_k.
+    beyond
+        Largest log of abs(z).
 
     Notes
     -----
@@ -67,7 +69,7 @@ def stable_roots(coefficients: NDArray[np.complex128]) -> NDArray[np.complex128]
     companion[below + references, below] = 1
     # Only eigenvalues: few of the roots are physical, and their vectors follow from A itself at less cost.
     inverse = np.linalg.eigvals(companion)
-    return np.asarray(1 / inverse[np.abs(inverse) > 1])
+    return np.asarray(1 / inverse[np.abs(inverse) > np.exp(-beyond)])
 
 
 def participation(coefficients: NDArray[np.complex128], roots: NDArray[np.complex128]) -> NDArray[np.complex128]:

@@ -10,7 +10,7 @@ from chladni.modal.functions.circle_fit import UNSCALED, closeness
 from chladni.modal.functions.exponential_window import without_window_damping
 from chladni.modal.functions.nyquist_circle import sweep
 from chladni.modal.functions.resonance_lines import MobilityLines, Resonance, mobility_lines, resonances
-from chladni.modal.functions.single_modes import SingleMode, mode_set
+from chladni.modal.functions.single_modes import SingleMode, left_out, mode_set
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
 
@@ -76,8 +76,7 @@ class HalfPower:
         for resonance in found:
             mode = _mode(lines, resonance)
             if mode is None:
-                centre_hz = lines.frequency_hz[resonance.line]
-                notes.append(f"the peak at {centre_hz:.5g} Hz has no half-power points; no mode is taken there")
+                notes.append(left_out(lines, resonance))
             else:
                 modes.append(mode)
         found_modes = mode_set(modes, response, estimator="half-power", notes=[*notes, *closeness(modes), UNSCALED])
@@ -158,8 +157,11 @@ def _lorentzian(f_hz: Floats, power: Floats, std: Floats, correlation: Floats, p
     inverse = np.linalg.pinv(weighted)
     misfit = float(residual @ residual) / (f_hz.size - 3)
     # The curve is the mode's own only; what others add makes lines miss it by more than their scatter.
-    covariance = inverse @ correlation @ inverse.T * max(misfit, 1.0)
-    return _Peak(frequency_hz=float(place[1]), half_width_hz=float(place[2]), std_hz=np.sqrt(np.diag(covariance)[1:]))
+    std_hz = np.sqrt(np.diag(inverse @ correlation @ inverse.T * max(misfit, 1.0))[1:])
+    if not np.all(std_hz < np.ptp(f_hz)):
+        # One line stands so far above its neighbours that any narrow peak fits them.
+        return None
+    return _Peak(frequency_hz=float(place[1]), half_width_hz=float(place[2]), std_hz=std_hz)
 
 
 def _curve(f_hz: Floats, place: Floats) -> tuple[Floats, Floats]:

@@ -11,6 +11,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.value import Value
 from chladni.spectral.forms import ORDER, Form
+from chladni.spectral.uncertainty import std_or_scatter
 
 # Lines over which a sigma from few averages is steadied: with three averages each, nine lines know it to a fifth.
 STEADY_LINES = 9
@@ -115,7 +116,8 @@ def judged_lines(
     finite = np.isfinite(response.values).all(axis=1)[:, None, usable]
     values = np.where(finite, response.values[..., usable], 0)
     factor = (2j * pi * frequency_hz) ** ORDER[form]
-    weight = np.where(finite, _weight(values, np.where(finite, response.std[..., usable], np.inf)), 0.0)
+    std = std_or_scatter(values, np.where(finite, response.std[..., usable], np.inf))
+    weight = np.where(finite, _weight(values, std), 0.0)
     return JudgedLines(
         frequency_hz=frequency_hz,
         values=values / factor,
@@ -131,19 +133,7 @@ def _weight(values: NDArray[np.complex128], std: NDArray[np.float64]) -> NDArray
     share = uniform_filter1d(known.astype(float), STEADY_LINES, axis=-1, mode="nearest")
     steady = uniform_filter1d(variance, STEADY_LINES, axis=-1, mode="nearest") / np.maximum(share, 1e-9)
     believed = np.where(known, np.maximum(variance, BELIEVED * steady), np.inf)
-    blind = ~known.any(axis=-1, keepdims=True)
-    believed = np.where(blind, _variance_of_differences(values), believed)
     # Exact responses have no sigma at all; rounding is what they scatter by.
     square = np.abs(values) ** 2
     believed = believed + (TOLERATED * np.abs(values)) ** 2 / 2 + 1e-24 * square.mean(axis=-1, keepdims=True)
     return np.where(believed > 0, 1 / np.sqrt(np.where(believed > 0, believed, 1.0)), 0.0)
-
-
-def _variance_of_differences(values: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Variance of the real part of functions without sigma, from how far lines are off their neighbours' mean.
-
-    The second difference of noise has six times its variance; the median of squares of complex noise is ln 2 of
-    their mean, and doesn't see the few lines in a sharp peak.
-    """
-    squares = np.abs(np.diff(values, n=2, axis=-1)) ** 2
-    return np.asarray(np.median(squares, axis=-1, keepdims=True) / (12 * np.log(2)))

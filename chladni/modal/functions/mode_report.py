@@ -1,10 +1,12 @@
 """A fit of frequency responses as a set of modes, with all that tells whether to trust it."""
 
 from dataclasses import dataclass, replace
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.modal.fit.fitted_modes import FittedModes
 from chladni.modal.fit.lsfd import least_squares_frequency_domain
 from chladni.modal.fit.modal_model import ModalModel
 from chladni.modal.fit.scaling import modal_scale
@@ -12,6 +14,7 @@ from chladni.modal.fit.synthesis import modal_fit
 from chladni.modal.functions.candidates import Candidates
 from chladni.modal.functions.cmif import complex_mode_indicator
 from chladni.modal.functions.grouped_refinement import select_modes
+from chladni.modal.functions.line_spacing import COARSE, lines_for, longest_modal_segment_s, nothing_found
 from chladni.modal.functions.pruned_fit import PrunedFit
 from chladni.modal.poles.stabilisation import StabilityLimits, stabilisation_diagram
 from chladni.signals.frequency_response import FrequencyResponse
@@ -21,15 +24,8 @@ from chladni.signals.order_spread import OrderSpread
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
 
 ESTIMATOR = "pLSCF"
-# Half-power widths in lines below which the damping rests on the window as much as on the structure.
-COARSE = 2.0
 # Chi-square above which the modes don't explain the functions within their scatter.
 INFLATED = 2.0
-NO_MODE = (
-    "no mode: no pole is both found at enough model orders and needed to explain the functions; "
-    "average longer, or look at a band where the coherence is better"
-)
-
 Rows = NDArray[np.intp]
 
 
@@ -57,10 +53,11 @@ class ModeReport:
     stability: StabilityLimits
     driving_point: tuple[str, str] | None = None
 
-    def mode_set(self, fit: PrunedFit | None, *, count: int | None, notes: tuple[str, ...]) -> ModeSet:
+    def mode_set(self, fit: PrunedFit, *, count: int | None, notes: tuple[str, ...]) -> ModeSet:
         """Give the modes asked for; an empty set, with the reason, when the data need none."""
-        if fit is None:
-            return self._empty(count, notes)
+        unresolved = self._unresolved(fit)
+        if fit.fitted is None:
+            return self._empty(count, (*notes, *(unresolved or (nothing_found(self.response),))))
         shown = self._shown(fit, count)
         fitted = select_modes(fit.fitted, np.isin(np.arange(fit.started.size), shown))
         model, started = fitted.model, fit.started[shown]
@@ -83,10 +80,11 @@ class ModeReport:
             stabilisation=self._diagram(started),
             provenance=replace(self.response.provenance, estimator=ESTIMATOR).with_notes(
                 *notes,
+                *unresolved,
                 *self.candidates.notes,
                 *fitted.notes,
                 *scaling.notes,
-                *self._advice(fit, shown),
+                *self._advice(fit, fit.fitted, shown),
                 *_shortfall(count, shown.size),
             ),
         )
@@ -120,7 +118,7 @@ class ModeReport:
             spread=self._spread(np.zeros(0, np.intp)),
             stabilisation=self._diagram(np.zeros(0, np.intp)),
             provenance=replace(self.response.provenance, estimator=ESTIMATOR).with_notes(
-                *notes, *self.candidates.notes, NO_MODE, *_shortfall(count, 0)
+                *notes, *self.candidates.notes, *_shortfall(count, 0)
             ),
         )
 
@@ -149,26 +147,51 @@ class ModeReport:
             limits=self.stability,
         )
 
-    def _advice(self, fit: PrunedFit, shown: Rows) -> tuple[str, ...]:
+    def _unresolved(self, fit: PrunedFit) -> tuple[str, ...]:
+        """Name the resonances that are left out since the lines don't tell where and how wide they are."""
+        step_hz = float(self.response.frequency_hz[1] - self.response.frequency_hz[0])
+        found = [] if fit.fitted is None else fit.fitted.model.frequency_hz.tolist()
+        told: dict[float, float] = {}
+        for pole in fit.unresolved:
+            # What is narrower than a tenth of a line is left to the next look.
+            frequency_hz, width_hz = float(abs(pole)) / (2 * pi), max(float(-pole.real) / pi, step_hz / 10)
+            # A second round may have found it, or met it again.
+            if all(abs(other_hz - frequency_hz) > max(width_hz, step_hz) for other_hz in (*found, *told)):
+                told[frequency_hz] = width_hz
+        if not told:
+            return ()
+        where, narrowest_hz = ", ".join(f"{frequency_hz:.4g}" for frequency_hz in sorted(told)), min(told.values())
+        advice = "average longer" if narrowest_hz > COARSE * step_hz else lines_for(self.response, narrowest_hz)
+        note = (
+            f"no mode is taken near {where} Hz: what stands out there isn't known to half its width, or to half of "
+            f"the {step_hz:.3g} Hz between lines; {advice}"
+        )
+        return (note,)
+
+    def _advice(self, fit: PrunedFit, fitted: FittedModes, shown: Rows) -> tuple[str, ...]:
         notes: list[str] = []
-        if fit.fitted.chi_square > INFLATED:
+        if fitted.chi_square > INFLATED:
             notes.append(
-                f"chi-square is {fit.fitted.chi_square:.3g} for each degree of freedom: the modes don't explain the "
+                f"chi-square is {fitted.chi_square:.3g} for each degree of freedom: the modes don't explain the "
                 "functions within their scatter (nonlinearity, a missing mode, a changing structure); error bars are "
                 "widened for it"
             )
         coarse = shown[fit.significance.width[shown] < COARSE]
         if coarse.size:
-            frequencies = ", ".join(f"{frequency_hz:.4g}" for frequency_hz in fit.fitted.model.frequency_hz[coarse])
-            factor = f"{COARSE / fit.significance.width[coarse].min():.2g} times"
-            # Whole periods have no window.
-            limit = (
-                f"few lines carry their damping; a period {factor} as long or more helps"
-                if self.response.provenance.averaging == "periodic"
-                else "their damping is only as good as the model of the window; "
-                f"ask for lines {factor} closer or more"
+            # As wide as they may be: a damping that is told from zero by nothing asks for no finer lines than that.
+            frequency_hz = fitted.model.frequency_hz[coarse]
+            width_hz = 2 * frequency_hz * (fitted.model.damping_ratio + fitted.damping_std)[coarse]
+            frequencies = ", ".join(f"{one_hz:.4g}" for one_hz in frequency_hz)
+            # Whole periods, hits and files have no window.
+            carried = (
+                "their damping is only as good as the model of the window"
+                if longest_modal_segment_s(self.response)
+                else "few lines carry their damping"
             )
-            notes.append(f"modes at {frequencies} Hz are less than {COARSE:g} lines wide at half power: {limit}")
+            closer = lines_for(self.response, float(np.min(width_hz)))
+            notes.append(
+                f"modes at {frequencies} Hz are less than {COARSE:g} lines wide at half power: {carried}; {closer}"
+            )
         return tuple(notes)
 
 

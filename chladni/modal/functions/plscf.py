@@ -14,6 +14,9 @@ from chladni.signals.frequency_response import FrequencyResponse
 # Companion matrices up to this size are tried at every order; beyond, every second order keeps the chart as useful
 # at half the time.
 EVERY_ORDER = 250
+# Decay rates, in lines, whose sign isn't sure: noise lets a resonance that is much narrower than a line grow by so
+# much, where surplus poles grow by lines.
+UNDECIDED = 0.05
 
 
 def polyreference_poles(
@@ -61,7 +64,8 @@ def polyreference_poles(
     Guillaume, Verboven, Vanlanduit, Van der Auweraer and Peeters (2003), *A poly-reference implementation of the
     least-squares complex frequency-domain estimator*, IMAC XXI; Peeters et al. (2004), *The PolyMAX frequency-domain
     method*, Shock and Vibration 11. The lowest coefficient is the identity, so that poles that only fit noise come
-    out unstable (Cauberghe et al. 2005). Numerators are of `max_order` at every order of the denominator.
+    out unstable (Cauberghe et al. 2005); one that grows by less than a line can tell is taken for a decaying one.
+    Numerators are of `max_order` at every order of the denominator.
     """
     if not 1 <= min_order <= max_order or (order_step is not None and order_step < 1):
         raise EstimateError(
@@ -103,8 +107,9 @@ def _pole_table(lines: WeightedLines, circle: UnitCircle, orders: range, notes: 
     matrix = reduced_normal_matrix(lines, circle, orders[-1])
     counts, poles, vectors = [], [], []
     for coefficients in denominators(matrix, references, orders):
-        roots = stable_roots(coefficients)
+        roots = stable_roots(coefficients, beyond=2 * np.pi * UNDECIDED / circle.length)
         pole = circle.pole(roots)
+        pole = -np.abs(pole.real) + 1j * pole.imag
         kept = _in_band(pole, lines.frequency_hz, circle.step_hz)
         # Roots outside the band belong to the gap of the circle and to modes that the lines don't show.
         kept = kept[np.argsort(pole[kept].imag)]

@@ -18,6 +18,7 @@ from chladni.modal.poles.stabilisation import StabilityLimits
 from chladni.signals.errors import SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
+from chladni.signals.unit_text import in_unit
 from chladni.spectral.forms import MOTION_ORDER, form
 
 Band = tuple[float, float]
@@ -26,8 +27,8 @@ CLOSER_LOOKS = 3
 
 
 def _generous() -> SelectionRules:
-    # What follows tests each mode against the data, so that few orders are enough for a candidate.
-    return SelectionRules(share=0.15)
+    # What follows tests each mode against the data, so that few orders are enough for a candidate, and any damping.
+    return SelectionRules(share=0.15, damping=(0.0, 0.2))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,7 +148,7 @@ def with_form(response: FrequencyResponse) -> tuple[FrequencyResponse, tuple[str
         return response, ()
     taken = tuple(replace(channel, unit="m/s^2", overload=None) for channel in response.responses)
     note = (
-        f"responses in {units.pop()!r} are taken as accelerations; another motion changes participation and "
+        f"responses {in_unit(units.pop())} are taken as accelerations; another motion changes participation and "
         "residuals, not frequencies and damping: state the unit in the setup file"
     )
     return replace(response, responses=taken), (note,)

@@ -26,7 +26,8 @@ Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# A pole whose sigma is this part of its half-power width isn't known to be one; the same for its damping ratio.
+# A pole whose sigma is this part of its half-power width, or of a line where that is more, isn't known to be one; the
+# same for the width.
 UNSURE = 0.5
 # Two poles within so many sigmas with shapes so much alike are one.
 SAME_SIGMAS, SAME_MAC = 2.0, 0.9
@@ -95,16 +96,19 @@ class PrunedFit:
     Attributes
     ----------
     fitted
-        Of maximum likelihood.
+        Of maximum likelihood; None when no mode is left.
     significance
         How much the data need each mode.
     started
         ``[mode]`` candidate that each mode began as.
+    unresolved
+        ``[mode]`` poles in rad/s that the data need, but whose place or width they don't tell: left out.
     """
 
-    fitted: FittedModes
+    fitted: FittedModes | None
     significance: ModeSignificance
     started: NDArray[np.intp]
+    unresolved: Complex
 
 
 def explained(
@@ -121,35 +125,32 @@ def explained(
 
 def pruned_fit(
     response: FrequencyResponse, lines: JudgedLines, candidates: Candidates, rules: SignificanceRules
-) -> PrunedFit | None:
-    """Refine candidates by maximum likelihood and leave out those that don't stand up to it, until all do.
-
-    Returns
-    -------
-    PrunedFit or None
-        None when no mode is left.
-    """
+) -> PrunedFit:
+    """Refine candidates by maximum likelihood and leave out those that don't stand up to it, until all do."""
     poles, participation, always = candidates.pole, candidates.vector, candidates.asked
     started = np.flatnonzero(needed_modes(lines, poles, participation, rules, always=always))
     poles, participation, always = poles[started], participation[started], always[started]
+    fitted: FittedModes | None = None
+    unresolved = np.zeros(0, np.complex128)
+    significance = mode_significance(lines, poles, participation, modes=np.zeros(0, np.intp))
     for _ in range(ROUNDS):
         if not poles.size:
-            return None
-        fitted = grouped_refinement(response, poles, participation, max_iterations=STEPS)
-        poles, participation = fitted.model.poles, np.asarray(fitted.model.participation, dtype=np.complex128)
-        significance = mode_significance(lines, poles, participation)
-        started, always = started[fitted.kept], always[fitted.kept]
-        stays = always | ~_doubtful(lines, fitted, significance, rules)
-        poles, participation = poles[stays], participation[stays]
-        started, always = started[stays], always[stays]
+            break
+        refined = grouped_refinement(response, poles, participation, max_iterations=STEPS)
+        poles, participation = refined.model.poles, np.asarray(refined.model.participation, dtype=np.complex128)
+        found = mode_significance(lines, poles, participation)
+        started, always = started[refined.kept], always[refined.kept]
+        stays = always | ~_doubtful(lines, refined, found, rules)
+        blurred = ~stays & found.passes(rules) & (_doubt(lines, refined) > 1)
+        unresolved = np.append(unresolved, poles[blurred])
+        # After the last round what still doesn't stand up goes, without another fit of the rest.
+        fitted, significance = select_modes(refined, stays), found.select(stays)
+        poles, participation, started, always = poles[stays], participation[stays], started[stays], always[stays]
         if stays.all():
             break
-    if started.size == fitted.kept.size:
-        return PrunedFit(fitted=fitted, significance=significance, started=started)
-    # The rounds are used up: what still doesn't stand up goes, without another fit of the rest.
-    if not started.size:
-        return None
-    return PrunedFit(fitted=select_modes(fitted, stays), significance=significance.select(stays), started=started)
+    return PrunedFit(
+        fitted=fitted if started.size else None, significance=significance, started=started, unresolved=unresolved
+    )
 
 
 def _doubtful(lines: JudgedLines, fitted: FittedModes, found: ModeSignificance, rules: SignificanceRules) -> Mask:
@@ -160,16 +161,24 @@ def _doubtful(lines: JudgedLines, fitted: FittedModes, found: ModeSignificance, 
     outside |= fitted.model.damping_ratio > rules.damping
     if outside.any():
         return np.asarray(outside)
-    unsure = fitted.frequency_std_hz / (UNSURE * 2 * fitted.model.damping_ratio * frequency_hz)
-    unsure = np.maximum(unsure, fitted.damping_std / (UNSURE * fitted.model.damping_ratio))
-    unsure = np.where(np.isfinite(unsure), unsure, np.inf)
-    failing = (unsure > 1) | ~found.passes(rules) | _twins(fitted, found)
+    failing = (_doubt(lines, fitted) > 1) | ~found.passes(rules) | _twins(fitted, found)
     # Among those that fail the least significant goes first; what its neighbour then shows decides on that.
     rows = np.flatnonzero(failing)
     worst_first = rows[np.argsort(-found.log_false_alarm[rows], kind="stable")]
     doubtful = np.zeros(frequency_hz.size, bool)
     doubtful[_one_of_each_place(fitted.model.poles, worst_first)] = True
     return doubtful
+
+
+def _doubt(lines: JudgedLines, fitted: FittedModes) -> Floats:
+    """``[mode]`` sigma of place and width over what it may be at most; above 1 the pole isn't known to be one.
+
+    Of a mode narrower than a line the lines tell where it is, and that its damping is small.
+    """
+    frequency_hz, damping_ratio = fitted.model.frequency_hz, fitted.model.damping_ratio
+    width_hz = np.maximum(2 * damping_ratio * frequency_hz, lines.step_hz)
+    doubt = np.maximum(fitted.frequency_std_hz, 2 * fitted.damping_std * frequency_hz) / (UNSURE * width_hz)
+    return np.where(np.isfinite(doubt), doubt, np.inf)
 
 
 def _twins(fitted: FittedModes, found: ModeSignificance) -> Mask:

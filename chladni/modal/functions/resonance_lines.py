@@ -165,10 +165,6 @@ def resonances(
 def _peaks(response: FrequencyResponse) -> list[tuple[Peak, int, int]]:
     """Peaks of the functions that show them best, the surest first."""
     functions = len(response.responses) * len(response.references)
-    # Where the number of averages isn't known (a file without it) the coherence can't be judged, and isn't.
-    provenance = response.provenance
-    if not provenance.effective_averages:
-        provenance = replace(provenance, effective_averages=np.inf)
     named = []
     for row, column in _telling(response):
         one = replace(
@@ -178,7 +174,6 @@ def _peaks(response: FrequencyResponse) -> list[tuple[Peak, int, int]]:
             coherence=response.coherence[row : row + 1],
             responses=response.responses[row : row + 1],
             references=response.references[column : column + 1],
-            provenance=provenance,
         )
         peaks = find_response_peaks(one, count=PEAKS_A_FUNCTION, false_alarm=0.01 / functions)
         named += [(peak, row, column) for peak in peaks]

@@ -29,17 +29,14 @@ class SignificanceRules:
     ----------
     false_alarm
         Largest probability that noise alone gives a mode so strong anywhere in the band.
-    narrowest
-        Least half-power width in lines: what is narrower rests on a single line.
     contribution
-        Least magnitude of the mode at its own frequency over what the functions have there, root mean square over
-        the functions that it is strongest in.
+        Least magnitude of the mode on the lines nearest to it over what the functions have there, root mean square
+        over the functions that it is strongest in.
     damping
         Highest damping ratio.
     """
 
     false_alarm: float = 1e-4
-    narrowest: float = 0.5
     contribution: float = 0.05
     damping: float = 0.2
 
@@ -60,7 +57,7 @@ class ModeSignificance(Value):
     log_false_alarm
         ``[mode]`` natural logarithm of the probability that noise alone gives a mode so strong in the band.
     contribution
-        ``[mode]`` magnitude of the mode over that of the functions at its frequency.
+        ``[mode]`` magnitude of the mode over that of the functions on the lines nearest to it.
     width
         ``[mode]`` half-power width in lines.
     """
@@ -83,8 +80,9 @@ class ModeSignificance(Value):
 
     def passes(self, rules: SignificanceRules) -> NDArray[np.bool_]:
         """``[mode]`` whether the data need it by these rules."""
-        strong = (self.log_false_alarm <= np.log(rules.false_alarm)) & (self.contribution >= rules.contribution)
-        return np.asarray(strong & (self.width >= rules.narrowest))
+        return np.asarray(
+            (self.log_false_alarm <= np.log(rules.false_alarm)) & (self.contribution >= rules.contribution)
+        )
 
 
 def mode_significance(
@@ -106,12 +104,13 @@ def mode_significance(
     Notes
     -----
     In the lines within some half-widths of the mode all near modes and a parabola are fitted, once with the mode and
-    once without; the gain is an F statistic, whose noise is that of the same lines where that is more than the stated
-    std and what a linear model may be off: neither a std that is too small nor a model that explains the functions
-    badly makes a mode significant. The mode's pole was looked for, so
-    that the probability of one place is multiplied by the number of places: the band over the mode's width (Gross &
-    Vitells 2010, Eur. Phys. J. C 70, 525, on the look-elsewhere effect). Lines that a window ties together count as
-    fewer.
+    once without. The line nearest to the mode isn't among them: any line that stands alone has a pole on top of it,
+    while a resonance, however narrow, has flanks that fall with the distance. The gain is an F statistic, whose noise
+    is that of the same lines where that is more than the stated std and what a linear model may be off: neither a std
+    that is too small nor a model that explains the functions badly makes a mode significant. The mode's pole was
+    looked for, so that the probability of one place is multiplied by the number of places: the band over the mode's
+    width (Gross & Vitells 2010, Eur. Phys. J. C 70, 525, on the look-elsewhere effect). Lines that a window ties
+    together count as fewer.
     """
     weighed = range(poles.size) if modes is None else modes.tolist()
     found = [_one(lines, poles, participation, mode) for mode in weighed]
@@ -123,7 +122,7 @@ def _one(lines: JudgedLines, poles: Complex, participation: Complex, mode: int) 
     half_width_hz = -poles.real / (2 * pi)
     own_hz = poles[mode].imag / (2 * pi)
     width = float(2 * half_width_hz[mode] / lines.step_hz)
-    places = _nearest_lines(lines, own_hz, REACH * half_width_hz[mode])
+    places = _beside(lines, own_hz, REACH * half_width_hz[mode])
     near = np.abs(poles.imag / (2 * pi) - own_hz) <= np.ptp(lines.frequency_hz[places]) / 2 + 2 * half_width_hz
     order = np.concatenate([[mode], np.setdiff1d(np.flatnonzero(near), [mode])])
     fit = _local_fit(lines, places, poles[order], participation[order])
@@ -155,10 +154,11 @@ def log_f_tail(ratio: float, upper: float, lower: float) -> float:
     return float(b * np.log(x) + a * np.log1p(-x) - np.log(b) - betaln(a, b) - np.log1p(-shrinking))
 
 
-def _nearest_lines(lines: JudgedLines, own_hz: float, reach_hz: float) -> NDArray[np.intp]:
+def _beside(lines: JudgedLines, own_hz: float, reach_hz: float) -> NDArray[np.intp]:
+    """Lines around a mode, without the nearest."""
     distance = np.abs(lines.frequency_hz - own_hz)
-    count = max(np.count_nonzero(distance <= reach_hz), FEWEST_LINES)
-    nearest = np.sort(np.argsort(distance, kind="stable")[:count])
+    count = max(int(np.count_nonzero(distance <= reach_hz)), FEWEST_LINES)
+    nearest = np.sort(np.argsort(distance, kind="stable")[1 : count + 1])
     # Of a mode hundreds of lines wide a part of the lines says enough, but from all of its width: the middle alone is
     # a parabola.
     return nearest[:: -(-nearest.size // MOST_LINES)]
@@ -194,9 +194,8 @@ def _local_fit(lines: JudgedLines, places: NDArray[np.intp], poles: Complex, par
     left = np.sum(squares * (data - answer @ design.T) ** 2)
     # A response whose lines are all masked has no row.
     freedom = np.sum(np.maximum(np.count_nonzero(squares, axis=1) - columns, 0))
-    at_peak = np.abs(2 * pi * lines.frequency_hz[places] - poles[0].imag) <= max(
-        -float(poles[0].real), pi * lines.step_hz
-    )
+    distance = np.abs(2 * pi * lines.frequency_hz[places] - poles[0].imag)
+    at_peak = distance <= max(-float(poles[0].real), float(distance.min()))
     peak_rows = np.repeat(np.tile(at_peak, values.shape[1]), 2)
     mode = np.sum(squares[:, peak_rows] * (own @ design[:, :2].T)[:, peak_rows] ** 2, axis=1)
     whole = np.sum(squares[:, peak_rows] * data[:, peak_rows] ** 2, axis=1)
@@ -213,8 +212,8 @@ def _design(lines: JudgedLines, places: NDArray[np.intp], poles: Complex, partic
     direct = participation[:, :, None] / (s - poles[:, None])[:, None, :]
     partner = participation.conj()[:, :, None] / (s - poles.conj()[:, None])[:, None, :]
     modes = np.stack([direct + partner, 1j * (direct - partner)], axis=1)
-    # Each mode in units of its peak, or the weak ones would sink in rounding.
-    modes = modes * -poles.real[:, None, None, None] / np.abs(participation).max(axis=1)[:, None, None, None]
+    # Each mode in units of its highest line, or the weak ones would sink in rounding.
+    modes = modes / np.abs(modes).max(axis=(1, 2, 3), keepdims=True)
     centred = (s.imag - s.imag.mean()) / max(np.ptp(s.imag), 1e-300)
     power = centred ** np.arange(BACKGROUND)[:, None]
     references = participation.shape[1]

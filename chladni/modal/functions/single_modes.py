@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.modal.functions.resonance_lines import MobilityLines, Resonance
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
 
@@ -32,6 +33,14 @@ class SingleMode:
     damping_std: float
     diameter: Complex
     diameter_std: Floats
+
+
+def left_out(lines: MobilityLines, resonance: Resonance) -> str:
+    """Say that no mode is taken at a peak, and what to do."""
+    return (
+        f"no mode is taken at {lines.frequency_hz[resonance.line]:.5g} Hz: the lines around it, "
+        f"{lines.spacing_hz:.3g} Hz apart, tell no single resonance; take plscf, which fits all modes together"
+    )
 
 
 def mode_set(

@@ -19,7 +19,7 @@ class MeanPhase(Value):
     Attributes
     ----------
     phase_deg
-        ``[mode]`` direction of the line, above -90 to 90 degrees.
+        ``[mode]`` direction of the line, above -90 to 90 degrees; NaN for a single channel, as the deviation.
     deviation_deg
         ``[mode]`` mean phase deviation (MPD) from it, weighted by amplitude: 0 for a shape in one phase, 45 for one
         whose phases are spread evenly.
@@ -47,7 +47,7 @@ def phase_collinearity(shapes: ArrayLike) -> NDArray[np.float64]:
 
     Returns
     -------
-    ``[mode]``, 0 to 1.
+    ``[mode]``, 0 to 1; NaN for a single channel, whose one component has no phase to compare with.
 
     Raises
     ------
@@ -60,6 +60,8 @@ def phase_collinearity(shapes: ArrayLike) -> NDArray[np.float64]:
     array([1., 0.])
     """
     phi = _scaled(shapes)
+    if phi.shape[1] == 1:
+        return np.full(len(phi), np.nan)
     lengths = np.sum(np.abs(phi) ** 2, axis=1)
     collinearity: NDArray[np.float64] = (np.abs(np.sum(phi**2, axis=1)) / lengths) ** 2
     return np.minimum(collinearity, 1.0)
@@ -88,6 +90,8 @@ def mean_phase(shapes: ArrayLike) -> MeanPhase:
     (array([45.]), array([0.]))
     """
     phi = _scaled(shapes)
+    if phi.shape[1] == 1:
+        return MeanPhase(phase_deg=np.full(len(phi), np.nan), deviation_deg=np.full(len(phi), np.nan))
     _, _, right = np.linalg.svd(np.stack([phi.real, phi.imag], axis=2), full_matrices=False)
     cosine, sine = right[:, 0, 0], right[:, 0, 1]
     turned = phi * (cosine - 1j * sine)[:, None]

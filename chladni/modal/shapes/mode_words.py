@@ -5,7 +5,8 @@ from math import floor, isfinite, log10
 
 from chladni.signals.mode_set import ModeSet
 
-_MOST_DECIMALS = 12
+# More are those of functions without noise, from a model, and nobody reads them.
+_MOST_DECIMALS = 9
 
 
 def mode_name(modes: ModeSet, row: int) -> str:
@@ -51,15 +52,17 @@ def with_std(number: float, std: float) -> str:
 
     Examples
     --------
-    >>> with_std(3.96214, 0.00372), with_std(1407.31, 12.0), with_std(2.5, float("nan"))
-    ('3.9621 ± 0.0037', '1407 ± 12', '2.5 (no error bar)')
+    >>> with_std(3.96214, 0.00372), with_std(1407.31, 12.0), with_std(2.5, float("nan")), with_std(51.5, 2e-13)
+    ('3.9621 ± 0.0037', '1407 ± 12', '2.5 (no error bar)', '51.5 ± 2e-13')
     """
     if not (isfinite(std) and isfinite(number)):
         return f"{number:.4g} (no error bar)"
     if std <= 0:
         return f"{number:.6g} ± 0"
     # The second digit of the error bar is the last that says anything about the number.
-    decimals = min(max(1 - floor(log10(std)), 0), _MOST_DECIMALS)
+    decimals = max(1 - floor(log10(std)), 0)
+    if decimals > _MOST_DECIMALS:
+        return f"{number:.{_MOST_DECIMALS}g} ± {std:.1g}"
     return f"{number:.{decimals}f} ± {std:.{decimals}f}"
 
 

@@ -201,7 +201,7 @@ def _wide_error_bars(modes: ModeSet) -> list[str]:
             sizes = joined([f"{100 * relative[row]:.2g}" for row in wide])
             sentences.append(
                 f"{capital(mode_names(modes, wide.tolist()))}: one sigma of the {what} is {sizes} % "
-                f"(limit {100 * limit:.0f} %): average longer, or excite that mode more."
+                f"(limit {100 * limit:.0f} %): average longer, take closer lines, or excite that mode more."
             )
     return sentences
 

@@ -66,8 +66,8 @@ class Dropper(pn.widgets.FileDropper):  # type: ignore[misc]  # panel has no typ
             self._taken(str(piece["name"]), whole)
 
 
-def private_file(content: bytes) -> Path:
-    """Write dropped bytes to a file that only this user can read; the caller removes it.
+def private_file(content: bytes, suffix: str) -> Path:
+    """Write dropped bytes to a file of this suffix that only this user can read; the caller removes it.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def private_file(content: bytes) -> Path:
         When it can't be written.
     """
     try:
-        descriptor, name = tempfile.mkstemp(prefix="chladni-", suffix=".mcap")
+        descriptor, name = tempfile.mkstemp(prefix="chladni-", suffix=suffix)
         with os.fdopen(descriptor, "wb") as file:
             file.write(content)
     except OSError as error:

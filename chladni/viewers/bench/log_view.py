@@ -88,7 +88,9 @@ class LogView:
 
     def _open_dropped(self, name: str, content: bytes) -> MeasuredLog:
         # On the thread, where waiting for a disk harms nobody.
-        path = private_file(content)
+        # The name comes from a browser: nothing of it but a plain suffix goes to the disk.
+        suffix = Path(name).suffix
+        path = private_file(content, suffix if suffix[1:].isalnum() and suffix.isascii() else "")
         try:
             return self._tools.open_log(path, name, True)
         except ChladniError:
@@ -190,5 +192,5 @@ class LogView:
 
 
 _INVITATION = (
-    "<p>Drop an MCAP log here, or choose one, to see it beside the simulation. It stays on this computer.</p>"
+    "<p>Drop a log or data file here, or choose one, to see it beside the simulation. It stays on this computer.</p>"
 )

@@ -15,6 +15,8 @@ from chladni.viewers.style import Style
 
 CONVENTION = "H = Y/X, e^{+jωt}"
 HEIGHTS_IN = (2.5, 1.35, 1.1)
+# Room for the mark on the highest peak.
+MARK_DB = 2.0
 
 
 def response_figures(study: Study) -> dict[str, Figure]:
@@ -50,6 +52,9 @@ def _figure(study: Study, panel: Panel, style: Style) -> Figure:
     phase.set_yticks([-180, -90, 0, 90, 180])
     coherence.set_ylabel(("Coherence" if len(panel.response.references) == 1 else "Multiple\ncoherence") + " [1]")
     coherence.set_ylim(0, 1.04)
+    if not any(np.isfinite(panel.coherence(row)).any() for row in panel.group.rows):
+        # An empty frame looks like a coherence of zero.
+        coherence.text(0.5, 0.5, "not in the file", transform=coherence.transAxes, ha="center", va="center")
     coherence.set_xlabel("Frequency [Hz]")
     return figure
 
@@ -57,6 +62,8 @@ def _figure(study: Study, panel: Panel, style: Style) -> Figure:
 def _draw_magnitude(axes: Axes, peaks: list[Peak], panel: Panel, style: Style) -> None:
     magnitudes = np.array([np.abs(panel.function(row)) for row in panel.group.rows])
     low, high = level_limits(decibels_of_amplitude(magnitudes))
+    # A resonance narrower than a line rises above every line.
+    high = max([high, *(20 * np.log10(peak.height) + MARK_DB for peak in peaks)])
     logarithmic(axes, 10 ** (low / 20), 10 ** (high / 20))
     frequency_hz = panel.frequency_hz()
     axes.set_xlim(frequency_hz[0], frequency_hz[-1])

@@ -46,7 +46,7 @@ def _draw(
     draw_labels(
         recording, f"{parent}/names", tips[named], [names[at] for at in named], colours=[colours[at] for at in named]
     )
-    if validation is not None:
+    if validation is not None and np.isfinite(validation.mean_phase_deg[row]):
         angle = np.deg2rad(float(validation.mean_phase_deg[row]))
         end = np.array([np.cos(angle), -np.sin(angle)])
         line = rr.LineStrips2D(
@@ -62,7 +62,7 @@ def _draw(
 
 
 def _title(validation: ModeValidation | None, row: int) -> str:
-    if validation is None:
+    if validation is None or not np.isfinite(validation.mpc[row]):
         return "Complexity"
     return f"Complexity · MPC {validation.mpc[row]:.3f}, MPD {validation.mpd_deg[row]:.1f}°"
 

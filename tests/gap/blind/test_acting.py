@@ -18,7 +18,8 @@ RIPPLE = {
 
 @pytest.fixture(scope="module")
 def case():
-    return draw_case(Order(kind="effect", words=("hysteresis",)), np.random.default_rng(4))
+    # Its log is among the shortest.
+    return draw_case(Order(kind="effect", words=("hysteresis",)), np.random.default_rng(7))
 
 
 @pytest.mark.parametrize(("share", "opens"), [(0.5, True), (1.5, True), (2.5, False), (20.0, False)])

@@ -38,6 +38,13 @@ def campaign(tmp_path_factory):
     return directory
 
 
+@pytest.fixture
+def short(monkeypatch):
+    """Logs of 2000 samples, where a claim is about effects and not about the length of a log."""
+    whole = case_draw._draw_bench
+    monkeypatch.setattr(case_draw, "_draw_bench", lambda rng: replace(whole(rng), samples=2000))
+
+
 def test_a_case_tells_nothing_of_what_it_hides(campaign):
     for case in case_folders(campaign):
         folder = campaign / "cases" / case.name
@@ -201,6 +208,7 @@ def test_every_draft_moves_the_outputs_the_more_the_larger(word, footing):
         assert change(small) < 1.02 * change(middle)
 
 
+@pytest.mark.usefixtures("short")
 @pytest.mark.parametrize("kind", ["effect", "faint"])
 def test_an_effect_has_the_severity_that_was_asked_for(kind):
     case = draw_case(Order(kind=kind, words=("coulomb_friction",)), np.random.default_rng(2))
@@ -217,6 +225,7 @@ def test_an_effect_has_the_severity_that_was_asked_for(kind):
         assert case.ratio_tuned >= 1.0
 
 
+@pytest.mark.usefixtures("short")
 def test_a_case_with_two_effects_has_both_at_different_sites():
     case = draw_case(Order(kind="two", words=("quadratic_damping", "gain_error")), np.random.default_rng(7))
     assert [one.effect for one in case.effects] == ["quadratic_damping", "gain_error"]
@@ -227,6 +236,8 @@ def test_a_case_with_two_effects_has_both_at_different_sites():
     assert min(case.ratios_tuned) >= 1.0
 
 
+@pytest.mark.usefixtures("short")
+@pytest.mark.slow
 def test_a_case_with_three_effects_has_each_at_its_own_site():
     made = orders(30, np.random.default_rng(1), {"three": 1})
     assert all(len(order.words) == 3 for order in made)
@@ -238,6 +249,7 @@ def test_a_case_with_three_effects_has_each_at_its_own_site():
     assert min(case.ratios_tuned) >= 1.0
 
 
+@pytest.mark.usefixtures("short")
 @pytest.mark.parametrize(
     ("rule", "refused", "accepted"),
     [("_left_beside", 0.9, 1.1), ("all_act", False, True)],

@@ -49,7 +49,7 @@ def test_one_sensor_that_a_third_does_not_explain_is_not_hidden_by_another_that_
     assert not explains_the_rest(two, leaving(1.0, 9.0, effects=(DRAG, GAIN, FRICTION)))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_three_causes_at_once_are_all_named() -> None:
     spring = chladni.attached("hardening_stiffness", "hand", {"cubic": 3e10})
     late = chladni.attached("time_offset", "acc_column", {"offset": 4e-4})

@@ -167,7 +167,7 @@ def test_the_simulators_own_step_is_told():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.nightly)])
 def test_no_effect_where_only_parameters_are_off(seed):
     found = diagnose_simulator(slide(), log_of([], MOVED, seed=seed))
     assert (found.verdict, found.causes) == ("none", ())

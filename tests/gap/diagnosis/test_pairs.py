@@ -20,7 +20,7 @@ from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.structures.structure_output import StructureOutput
 from tests.gap import made_log
-from tests.gap.arm import arm, measured, with_outputs
+from tests.gap.arm import all_but, arm, measured, with_outputs
 from tests.gap.made_log import band_noise, chain
 
 SPRING = chladni.attached("hardening_stiffness", "hand", {"cubic": 3e10})
@@ -46,7 +46,7 @@ def test_details_of_one_law_mustn_t_name_a_second(effects: tuple[AttachedEffect,
 
 @pytest.mark.slow
 def test_the_second_is_found_behind_the_first() -> None:
-    study = study_of(arm(), measured((SPRING, LATE), seconds=6.0, seed=4), leave_out=frozenset(), own={})
+    study = study_of(arm(), measured((SPRING, LATE), seconds=6.0, seed=4), leave_out=all_but(), own={})
     first = single_causes(study, lambda _: None).ranked[0]
     found = weighed(second_causes(study, first))[0]
     assert {one.effect for one in found.hypothesis.effects} == {"hardening_stiffness", "time_offset"}
@@ -55,7 +55,7 @@ def test_the_second_is_found_behind_the_first() -> None:
 
 @pytest.mark.slow
 def test_a_second_effect_is_kept_though_the_first_turns_out_to_be_nothing(monkeypatch) -> None:
-    study = study_of(arm(), measured((SPRING, LATE), seconds=6.0, seed=4), leave_out=frozenset(), own={})
+    study = study_of(arm(), measured((SPRING, LATE), seconds=6.0, seed=4), leave_out=all_but(), own={})
     first = study.contest.enter(hypothesis_of((WHEEL,), study.location.tuned.z))
     # As an oscillator that imitates something else is, once that isn't all of the gap any more.
     monkeypatch.setattr(
@@ -94,7 +94,7 @@ def test_of_two_sensors_laws_tell_where_two_effects_are(first) -> None:
     assert pairs._weighed_pairs(study, replace(nothing, held=np.ones_like(nothing.held)), forces) == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_laws_whose_runs_are_lost_are_followed_from_the_states_that_two_forces_tell() -> None:
     caught = chladni.attached("ripple", "j0", {"amplitude": 20.0, "period": 1e-3, "phase": 0.7})
     rubbing = chladni.attached("coulomb_friction", "j1", {"force": 5.0})

@@ -60,8 +60,12 @@ def test_the_bodies_and_both_coefficients_are_found() -> None:
     [
         ("time_offset", "acc_wrist", {"offset": 1e-4}),
         ("delay", "shaker", {"delay": 2e-4}),
-        ("mounting_resonance", "acc_arm", {"frequency": 250.0, "damping_ratio": 0.03}),
-        ("extra_mode", "arm", {"mass": 0.4, "frequency": 30.0, "damping_ratio": 0.02}),
+        pytest.param(
+            "mounting_resonance", "acc_arm", {"frequency": 250.0, "damping_ratio": 0.03}, marks=pytest.mark.nightly
+        ),
+        pytest.param(
+            "extra_mode", "arm", {"mass": 0.4, "frequency": 30.0, "damping_ratio": 0.02}, marks=pytest.mark.nightly
+        ),
         ("coulomb_friction", "elbow", {"force": 8.0}),
     ],
 )
@@ -71,7 +75,7 @@ def test_velocities_explain_no_other_effect(word: str, site: str, values: dict[s
     assert found.chi - 1.0 > 0.2 * (before - 1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_wheel_is_no_effect_of_the_catalogue_and_the_answer_says_what_fits() -> None:
     found = diagnose(arm(), [measured((Wheel(),), seed=3)])
     assert found.verdict == "unknown"

@@ -15,7 +15,9 @@ def unlike_the_model():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("force", [30.0, 100.0, 400.0])
+@pytest.mark.parametrize(
+    "force", [*(pytest.param(force, marks=pytest.mark.nightly) for force in (30.0, 400.0)), 100.0]
+)
 def test_sliding_force_is_found_however_much_of_it_sticks(force: float) -> None:
     values = {"force": force, "presliding": 2e-8}
     rubbing = unlike_the_model().with_effects(

@@ -37,7 +37,7 @@ def joint_state(rng: np.random.Generator, *, joints: int = 2, frame: bytes = b"b
 
 
 def reference(message: bytes) -> tuple[Any, ...] | None:
-    """One JointState read on its own, with every length checked against the message's end; None where malformed."""
+    """One JointState read on its own, with every length checked against the message's; None where malformed."""
     try:
         return _reference(message)
     except (struct.error, ValueError, IndexError):
@@ -67,6 +67,9 @@ def _reference(message: bytes) -> tuple[Any, ...]:
     seconds, nanoseconds, frame = number("i", 4), number("I", 4), text()
     names = [text() for _ in range(limited(number("I", 4), body, 4))]
     arrays = [[number("d", 8) for _ in range(limited(number("I", 4), body, 8))] for _ in range(3)]
+    # Writers fill up to a multiple of 4 bytes; more than that nobody has described.
+    if not 0 <= len(body) - place < 4:
+        raise ValueError("length")
     return seconds * 10**9 + nanoseconds, frame, tuple(names), *arrays
 
 
@@ -168,12 +171,6 @@ def test_a_byte_order_unlike_the_others_is_damage() -> None:
     assert decoded.columns["x"].numbers[:2].tolist() == [1.5, 1.5]
 
 
-@pytest.mark.parametrize(("form", "told"), [(2, "PL_CDR"), (7, "XCDR2"), (9, "delimited"), (11, "parameter-list")])
-def test_other_representations_are_refused_by_name(form: int, told: str) -> None:
-    with pytest.raises(LogError, match=told):
-        decoder_of("float64 x").columns(batch_of([bytes([0, form, 0, 0]) + b"\0" * 8] * 3), ["x"])
-
-
 def test_one_odd_header_marks_one_message() -> None:
     good = cdr(struct.pack("<d", 1.5))
     decoded = decoder_of("float64 x").columns(batch_of([good, b"\0\x07\0\0" + good[4:], good, b"\0"]), ["x"])
@@ -192,7 +189,6 @@ def test_elements_that_lack_only_their_padding_are_noticed() -> None:
     text = f"Part[] parts\n{SEPARATOR}\nMSG: demo/Part\nuint8 a\nfloat64 b\n"
     good = cdr(struct.pack("<IB3xdB7xd", 2, 1, 0.5, 2, 1.5))
     decoder = decoder_of(text)
-    assert decoder.informed_by(batch_of([])) is decoder
     decoded = decoder.columns(batch_of([good, good[:-4], good]), ["parts[].b"])
     assert decoded.bad.tolist() == [False, True, False]
     assert decoded.columns["parts[].b"].select(~decoded.bad).numbers.tolist() == [[0.5, 1.5]] * 2
@@ -218,7 +214,7 @@ def test_wide_strings_are_refused_only_where_they_are_in_the_way() -> None:
     decoder = decoder_of("int32 before\nwstring text\nint32 after")
     encoded = batch_of([cdr(struct.pack("<iI", 5, 0), b"\0" * 4)] * 2)
     assert values_of(decoder.columns(encoded, ["before"]), "before") == [5, 5]
-    with pytest.raises(LogError, match="wstring"):
+    with pytest.raises(LogError, match="after can't be decoded: numbers behind a wstring"):
         decoder.columns(encoded, ["after"])
 
 

@@ -126,6 +126,10 @@ def test_plain_idl_has_inheritance_enums_constants_and_dimensions() -> None:
         ("struct S { long double a; };", "isn't defined"),
         ("struct S { double a[K]; };", "constant declared before"),
         ("struct S { double a[0]; };", "at least 1"),
+        ("struct S { double a[²]; };", "constant declared before"),
+        ("const long K = ²; struct S { double a[K]; };", "constant declared before"),
+        ("struct S { double a" + "[999999999999]" * 20_000 + "; };", "a has 999999999999 elements or more"),
+        ("@bit_bound(64) enum E { A }; struct S { E a; };", "at most 32 bits"),
         ("struct S { double a", "expected"),
         ("struct S { double 1a; };", "a name"),
         ("struct Other { double a; };", "doesn't define a struct"),
@@ -147,3 +151,23 @@ def test_unclosed_comments_take_linear_time() -> None:
 
 def test_a_forward_declaration_changes_nothing() -> None:
     assert names_of("struct S; struct S { long a; };") == ["a"]
+
+
+@pytest.mark.parametrize(
+    ("annotation", "expected"),
+    [
+        ("", None), ("@final", "final"), ("@appendable", "appendable"), ("@mutable", "mutable"),
+        ("@extensibility(FINAL)", "final"), ("@extensibility(MUTABLE_EXTENSIBILITY)", "mutable"),
+        ("@nested @Appendable @verbatim(text=\"@final\")", "appendable"),
+    ],
+)  # fmt: skip
+def test_the_extensibility_of_a_struct_is_what_its_annotation_says(annotation: str, expected: str | None) -> None:
+    text = f"{annotation} struct S {{ @key double a; @optional(false) long b; }}; @final struct T {{ S s; }};"
+    assert parse_idl("S", text).extensibility == expected
+    assert parse_idl("T", text).extensibility == "final"
+
+
+@pytest.mark.parametrize(("bits", "width"), [("8", 1), ("16", 2), ("17", 4), ("32", 4)])
+def test_an_enum_has_as_many_bytes_as_its_bound_needs(bits: str, width: int) -> None:
+    record = parse_idl("S", f"@bit_bound({bits}) enum E {{ A, B }}; enum F {{ C }}; struct S {{ E e; F f; }};")
+    assert [member.type.dtype.itemsize for member in record.members] == [width, 4]

@@ -76,13 +76,12 @@ def test_without_a_schema_the_first_messages_tell_the_fields() -> None:
     first = [json.dumps({**message(index), "value": index, "empty": [], "none": None}).encode() for index in range(3)]
     decoder = decoder_of(None)
     assert decoder.fields == ()
-    informed = decoder.informed_by(batch_of([b"broken", *first]))
+    informed = decoder.informed_by([batch_of([b"broken"]), batch_of(first)])
     kinds = {info.path: (info.kind, info.dtype) for info in informed.fields}
     assert kinds["timestamp"] == ("time", np.int64)
     assert kinds["value"] == ("number", np.float64), "a later message may hold a fraction"
     assert kinds["points[].x"] == ("number", np.float64)
     assert "empty" not in kinds
-    assert informed.informed_by(batch_of([])) is informed
     with pytest.raises(LogError, match="no field 'value'"):
         decoder.columns(batch_of(first), ["value"])
 
@@ -107,9 +106,8 @@ def test_every_kind_of_field_is_read(way: str, gaps: tuple[int, ...]) -> None:
 
 
 BAD_VALUES = [
-    b'{"value": "5"}', b'{"value": Infinity}', b"null",
-    b'{"value": 1e400}', b'{"value": ' + b"1" * 400 + b"}", b'{"value": [1]}', b'{"value": {"x": 1}}',
-    b'{"value": 1', b"", b"7", b"[1]", b'{"value": 01}', b'{"value": 1.}', b'{"value": 1,}', b'{"value": 1} x',
+    b"null", b'{"value": 1', b"", b"7", b"[1]",
+    b'{"value": 01}', b'{"value": 1.}', b'{"value": 1,}', b'{"value": 1} x',
     b'{"value": 1}{"value": 2}', b'{"value": 1}\n{"value": 2}', b'{"value": 1}\x00}', b'{"value": 1, "w": "\xff"}',
     b'{"value": 1, "w": "a\nb"}', b"\xff\xfe{\x00}\x00", b'\xef\xbb\xbf{"value": 1}',
     b'{"value": 1, "w": ' + b"[" * 200_000 + b"]" * 200_001 + b"}",
@@ -164,7 +162,7 @@ def test_true_and_false_are_one_and_zero_where_the_schema_says_number(way: str) 
 
 def test_names_that_a_path_would_read_otherwise_are_quoted() -> None:
     messages = batch_of([json.dumps({"we ird": 1.5, "a.b": 2.5, "a": {"b": 3.5}, "y": 4.5}).encode()] * 3)
-    decoder = decoder_of(None).informed_by(messages)
+    decoder = decoder_of(None).informed_by([messages])
     assert [info.path for info in decoder.fields] == ['"we ird"', '"a.b"', "a.b", "y"]
     decoded = decode_all(decoder, messages)
     assert [values_of(decoded, info.path)[0] for info in decoder.fields] == [1.5, 2.5, 3.5, 4.5]
@@ -183,18 +181,50 @@ def test_messages_that_together_look_like_others_are_not_mistaken(way: str) -> N
     [
         ("timestamp", '{"sec": 1, "nsec": 2, "nanosec": 3}'), ("timestamp", '{"sec": 1.5, "nsec": 2}'),
         ("timestamp", '{"sec": 1}'), ("timestamp", '{"nsec": 1}'), ("timestamp", '{"sec": 10000000000, "nsec": 1}'),
-        ("timestamp", "7"), ("count", "1.5"), ("count", "9223372036854775808"), ("count", "1e400"),
-        ("on", "1"), ("name", '"\\ud800"'), ("name", "5"), ("samples", "[1, null]"), ("samples", "5"),
-        ("samples", '["a"]'), ("points[].x", "{}"), ("pose.x", "5"),
-        ("samples", "[1, Infinity]"), ("samples", "[[1]]"),
+        ("timestamp", "7"), ("name", '"\\ud800"'), ("name", "5"),
     ],
 )  # fmt: skip
-def test_values_of_another_type_make_the_message_bad(way: str, field: str, text: str) -> None:
-    name = field.partition(".")[0].removesuffix("[]")
+def test_times_and_texts_of_another_type_make_the_message_bad(way: str, field: str, text: str) -> None:
     good = json.dumps(message(4)).encode()
-    bad = json.dumps({**message(4), name: "HERE"}).replace('"HERE"', text).encode()
+    bad = json.dumps({**message(4), field: "HERE"}).replace('"HERE"', text).encode()
     decoded = decoder_of().columns(batch_of([good, bad, good]), [field])
     assert decoded.bad.tolist() == [False, True, False], decoded.reasons
+
+
+MISSING, FRACTION = "no number where one belongs", "the schema calls count an integer, which its values aren't"
+QUOTED, NO_LIST, NO_OBJECT = "numbers in quotes", "no list where one belongs", "no object where one belongs"
+
+
+@pytest.mark.parametrize(
+    ("field", "text", "read", "told"),
+    [
+        ("value", "Infinity", [np.inf], None), ("value", "-1e400", [-np.inf], None),
+        ("value", "1" * 400, [np.inf], None), ("value", "[1]", [np.nan], MISSING),
+        ("value", '{"x": 1}', [np.nan], MISSING), ("value", '"n/a"', [np.nan], MISSING),
+        ("value", '"0.5"', [0.5], QUOTED), ("value", '" -1e3 "', [-1000.0], QUOTED),
+        ("value", '"nan"', [np.nan], QUOTED), ("value", '"1_000"', [np.nan], MISSING),
+        ("value", '"0,5"', [np.nan], MISSING),
+        ("count", "1.5", [1.5], FRACTION), ("count", "9223372036854775808", [2.0**63], None),
+        ("count", "-1e400", [-np.inf], None), ("count", '"7"', [7], QUOTED),
+        ("on", "1", [np.nan], "no bool where one belongs"), ("pose.x", "5", [np.nan], NO_OBJECT),
+        ("samples", "[1, null]", [1.0, np.nan], None), ("samples", '["a", 2]', [np.nan, 2.0], MISSING),
+        ("samples", "[[1]]", [np.nan], MISSING), ("samples", "[1, Infinity]", [1.0, np.inf], None),
+        ("samples", "null", [], None), ("samples", "5", [], NO_LIST), ("points[].x", "{}", [], NO_LIST),
+    ],
+)  # fmt: skip
+def test_a_number_of_another_type_costs_only_itself(
+    way: str, field: str, text: str, read: list[float], told: str | None
+) -> None:
+    name = field.partition(".")[0].removesuffix("[]")
+    good = json.dumps(message(4)).encode()
+    odd = json.dumps({**message(4), name: "HERE"}).replace('"HERE"', text).encode()
+    decoded = decoder_of().columns(batch_of([good, odd, good]), [field, "timestamp"])
+    assert not decoded.bad.any(), decoded.reasons
+    found = values_of(decoded, field)[1]
+    assert np.array_equal(found if isinstance(found, list) else [found], read, equal_nan=True)
+    assert values_of(decoded, field)[::2] == values_of(decoder_of().columns(batch_of([good] * 2), [field]), field)
+    assert len(decoded.told) == (told is not None)
+    assert all(told in what for what in decoded.told if told is not None)
 
 
 def test_unusual_but_sound_messages_are_read(way: str) -> None:
@@ -242,8 +272,7 @@ def test_floats_are_rounded_as_json_rounds_them(values: list[float]) -> None:
     span = module._span(batch_of(messages), np.arange(len(messages)))
     (found,) = module.read_by_arrow(span, [decoder_of()._leaves["value"]]) or [None]
     if not np.isfinite(expected).all():
-        assert found is None  # a number beyond the largest double
-        return
+        return  # of a number beyond the largest double the parser may think as it likes
     assert found.values.tobytes() == expected.tobytes() or (found.values == expected).all()
 
 
@@ -280,23 +309,37 @@ def test_damaged_bytes_give_what_the_rules_give(content: list[bytes], at: int, c
         (json.dumps({"type": "object", "properties": {"a": {"$ref": "#"}}}).encode(), "in a circle"),
     ],
 )
-def test_malformed_schemas_are_refused(schema: bytes, told: str) -> None:
-    with pytest.raises(LogError, match=told):
-        make_decoder(message_encoding="json", schema_name="d", schema_encoding="jsonschema", schema_data=schema)
+def test_a_malformed_schema_leaves_the_fields_to_the_messages_with_a_word(schema: bytes, told: str) -> None:
+    decoder = make_decoder(message_encoding="json", schema_name="d", schema_encoding="jsonschema", schema_data=schema)
+    messages = batch_of([b'{"x": 0.5}'] * 3)
+    decoded = decode_all(decoder.informed_by([messages]), messages)
+    assert values_of(decoded, "x") == [0.5] * 3
+    ((what, count),) = decoded.told.items()
+    assert told in what
+    assert "the fields are those of the first messages" in what
+    assert count == 3
 
 
-def test_parts_that_refer_to_the_next_one_twice_are_refused_in_time() -> None:
+def test_parts_that_refer_to_the_next_one_twice_are_given_up_in_time() -> None:
     parts = {f"p{n}": {"properties": {k: {"$ref": f"#/$defs/p{n + 1}"} for k in "ab"}} for n in range(25)}
     schema = {"$defs": {**parts, "p25": {"type": "number"}}, "$ref": "#/$defs/p0"}
-    with pytest.raises(LogError, match="more than"):
-        decoder_of(schema)
+    messages = batch_of([b'{"x": 0.5}'])
+    (what,) = decode_all(decoder_of(schema).informed_by([messages]), messages).told
+    assert "more than" in what
+
+
+def test_a_schema_in_another_language_is_not_needed() -> None:
+    decoder = make_decoder(
+        message_encoding="json", schema_name="d", schema_encoding="ros2msg", schema_data=b"float64 x"
+    )
+    assert [info.path for info in decoder.informed_by([batch_of([b'{"x": 0.5}'])]).fields] == ["x"]
 
 
 @pytest.mark.parametrize("schema", [{}, {"type": "object"}, {"properties": {"a": {}}}, True, {"$ref": "other.json"}])
 def test_schemas_that_tell_nothing_leave_it_to_the_messages(schema: object) -> None:
     decoder = decoder_of(schema)
     assert decoder.fields == ()
-    informed = decoder.informed_by(batch_of([b'{"a": [1]}']))
+    informed = decoder.informed_by([batch_of([b'{"a": [1]}'])])
     assert [(info.path, info.array) for info in informed.fields] == [("a", "dynamic")]
 
 
@@ -318,3 +361,91 @@ def test_measured_logs_read_as_json_reads_them(shared_data: Path, file: str, top
     decoded = decoder.columns(batch_of(messages), ["value"])
     assert not decoded.bad.any()
     assert decoded.columns["value"].numbers.tolist() == [json.loads(one)["value"] for one in messages]
+
+
+# --- what messages show beyond their schema, or against it --------------------------------------------------------
+
+
+def informed(properties: dict[str, object] | None, messages: list[dict[str, object]]):
+    schema = None if properties is None else {"type": "object", "properties": properties}
+    encoded = batch_of([json.dumps(one).encode() for one in messages])
+    return decoder_of(schema).informed_by([encoded]), encoded
+
+
+def kind_of(stated: object, *values: object) -> tuple[str, object] | None:
+    """Kind and type of a field with such values under such a schema; None where there is no field."""
+    properties = None if stated is None else {"x": stated}
+    decoder, _ = informed(properties, [{"x": value} for value in values])
+    return next(((info.kind, info.dtype) for info in decoder.fields), None)
+
+
+INTEGER, NUMBER, BOOLEAN, STRING = ({"type": name} for name in ("integer", "number", "boolean", "string"))
+FLOAT64, INT64 = ("number", np.dtype(np.float64)), ("number", np.dtype(np.int64))
+
+
+@pytest.mark.parametrize(
+    ("stated", "values", "expected"),
+    [
+        (INTEGER, [0, 0.5], FLOAT64), (INTEGER, [0, 5.0], INT64), (INTEGER, [None, True], INT64),
+        (NUMBER, [0, 1], FLOAT64), (NUMBER, ["n/a", "0.5"], FLOAT64), (NUMBER, [True, False], FLOAT64),
+        (BOOLEAN, [False, 0.5], FLOAT64), (STRING, ["", "a"], ("string", None)), (STRING, [1.5], FLOAT64),
+        (STRING, ["0.5", "1.5"], ("string", None)), ({"type": "null"}, [None, 0.5], FLOAT64),
+        ({"type": "null"}, [None], None), ({"type": "array", "items": INTEGER}, [[1], [0.5]], FLOAT64),
+        (None, [0, 1], FLOAT64), (None, [2**53 + 1, 5], INT64), (None, [1e300, 0], FLOAT64),
+        (None, ["n/a", 0.5], FLOAT64), (None, ["0.5", "-1e3", None], FLOAT64),
+        (None, ["007", "12"], ("string", None)),
+        (None, ["0.5", "off"], ("string", None)), (None, [True, None], ("bool", np.dtype(np.bool_))),
+        (None, [True, 0.5], FLOAT64), (None, [[], [1]], FLOAT64),
+    ],
+)  # fmt: skip
+def test_values_tell_the_kind_where_the_schema_is_silent_or_wrong(
+    stated: object, values: list[object], expected: object
+) -> None:
+    assert kind_of(stated, *values) == expected
+
+
+def test_an_object_where_the_schema_says_number_is_read_with_a_word() -> None:
+    decoder, messages = informed({"x": NUMBER, "y": NUMBER}, [{"x": {"v": 0.5}, "y": 1.5}] * 3)
+    decoded = decode_all(decoder, messages)
+    assert values_of(decoded, "x.v") == [0.5] * 3
+    assert values_of(decoded, "y") == [1.5] * 3
+    assert decoded.told == {
+        "the schema calls x a number, which its values aren't; they are read as they are": 3,
+    }
+    assert decoder.columns(messages, ["y"]).told == {}
+
+
+def test_fields_that_the_schema_does_not_mention_are_read_too() -> None:
+    decoder, messages = informed(
+        {"x": NUMBER, "pose": {"properties": {"a": NUMBER}}}, [{"pose": {"b": 1.5}, "z": 2.5}]
+    )
+    assert [info.path for info in decoder.fields] == ["x", "pose.a", "pose.b", "z"]
+    assert values_of(decode_all(decoder, messages), "pose.b") == [1.5]
+
+
+def test_integers_that_turn_into_fractions_later_are_read_with_a_word(way: str) -> None:
+    first, later = ([{"x": value, "n": 5} for value in values] for values in ([0, 1], [2, 0.25, 3]))
+    decoder, _ = informed({"x": INTEGER, "n": INTEGER}, first)
+    decoded = decode_all(decoder, batch_of([json.dumps(one).encode() for one in later]))
+    assert values_of(decoded, "x") == [2.0, 0.25, 3.0]
+    assert values_of(decoded, "n") == [5, 5, 5]
+    assert decoded.told == {
+        "the schema calls x an integer, which its values aren't; they are read as they are": 3,
+    }
+
+
+def test_nanoseconds_since_1970_keep_their_last_digit_without_a_schema(way: str) -> None:
+    stamps = [1_700_000_000_123_456_789 + index for index in range(5)]
+    decoder, messages = informed(None, [{"t": stamp} for stamp in stamps])
+    assert values_of(decode_all(decoder, messages), "t") == stamps
+
+
+@pytest.mark.parametrize("content", [b"0.5", b"[0.5]", b"null", b'"text"'])
+def test_messages_that_name_no_value_are_refused(content: bytes) -> None:
+    with pytest.raises(LogError, match="none of the first 3 messages is JSON that names its values"):
+        decoder_of(None).informed_by([batch_of([content] * 3)])
+
+
+def test_messages_that_are_no_json_are_refused() -> None:
+    with pytest.raises(LogError, match="none of the first 2 messages is JSON, so"):
+        decoder_of().informed_by([batch_of([b"\x00\x01"] * 2)])

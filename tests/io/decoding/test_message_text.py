@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.io.decoding import SUPPORTED, make_decoder
+from chladni.io.decoding import SUPPORTED, definition_text, make_decoder
 from chladni.io.decoding.decoder import MAX_SCHEMA_BYTES
 from chladni.io.decoding.message_text import parse_ros1_text, parse_ros2_text
 from chladni.io.decoding.schema import Array, Primitive, Record, Stamp, Text, leaves
@@ -129,7 +129,7 @@ def test_encodings_that_are_not_supported_are_named_beside_those_that_are() -> N
 
 
 def test_schemas_that_are_no_text_or_too_long_are_refused() -> None:
-    with pytest.raises(LogError, match="isn't UTF-8"):
+    with pytest.raises(LogError, match="expected 'type name'"):
         make_decoder(message_encoding="cdr", schema_name="x", schema_encoding="ros2msg", schema_data=b"\xff")
     with pytest.raises(LogError, match="a definition may have"):
         make_decoder(
@@ -138,3 +138,13 @@ def test_schemas_that_are_no_text_or_too_long_are_refused() -> None:
             schema_encoding="ros2msg",
             schema_data=bytes(MAX_SCHEMA_BYTES + 1),
         )
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1"])
+def test_comments_in_an_old_encoding_cost_nothing(encoding: str) -> None:
+    text = "float64 x  # [m/s²]\r\nfloat64 y\r\n"
+    decoder = make_decoder(
+        message_encoding="cdr", schema_name="x", schema_encoding="ros2msg", schema_data=text.encode(encoding)
+    )
+    assert [info.path for info in decoder.fields] == ["x", "y"]
+    assert definition_text(text.encode(encoding)) == text

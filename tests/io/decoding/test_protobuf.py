@@ -205,26 +205,127 @@ def test_repeated_and_odd_forms_of_a_field_are_left_to_the_library() -> None:
 def test_a_field_of_another_wire_type_counts_as_unknown() -> None:
     decoded = PLAIN_DECODER.columns(batch_of([b"\x22\x04abcd"] * 3), ["f"])
     assert values_of(decoded, "f") == [0.0] * 3
-    assert PLAIN_DECODER.informed_by(batch_of([])) is PLAIN_DECODER
+    assert PLAIN_DECODER.informed_by([]) is PLAIN_DECODER
 
 
-def test_defaults_of_proto2_are_the_librarys() -> None:
+# --- what a message leaves out -----------------------------------------------------------------------------------
+
+
+def test_what_a_message_leaves_out_is_zero_where_it_has_no_presence_and_missing_where_it_has() -> None:
+    decoder = decoder_of(descriptor_set().SerializeToString())
+    encoded = batch_of([b"", b""])
+    # By templates, and one by one: strings are beyond templates.
+    for paths in (PLAIN, [info.path for info in decoder.fields]):
+        decoded = decoder.columns(encoded, paths)
+        assert not decoded.bad.any()
+        for path in ("f", "i", "s", "u", "x", "b"):
+            assert values_of(decoded, path) == [0, 0], path
+        for path in ("accel.x", "accel.z", "age"):
+            assert np.isnan(decoded.columns[path].numbers).all(), path
+        # A time that isn't there is told by whoever looks for stamps: it is no number.
+        assert values_of(decoded, "stamp") == [0, 0]
+        assert values_of(decoded, "samples") == [[], []]
+    assert values_of(decoded, "name") == ["", ""]
+    assert values_of(decoded, "gains[].value") == [[], []]
+
+
+def test_an_empty_message_inside_is_there_and_its_fields_are_zero() -> None:
+    sample = sample_class()()
+    sample.accel.SetInParent()
+    sample.age.SetInParent()
+    encoded = batch_of([sample.SerializeToString(), b""])
+    for paths in (["accel.x", "age"], ["accel.x", "age", "name"]):
+        decoded = PLAIN_DECODER.columns(encoded, paths)
+        for path in ("accel.x", "age"):
+            assert np.array_equal(decoded.columns[path].numbers, [0.0, np.nan], equal_nan=True), path
+
+
+NAMES = {Field.TYPE_DOUBLE: "d", Field.TYPE_FLOAT: "f", Field.TYPE_INT32: "i", Field.TYPE_BOOL: "b"}
+
+
+def optional_set(syntax: str) -> descriptor_pb2.FileDescriptorSet:
+    """opt.M: a number beside optional ones of several types, one of them in an optional message, two in a oneof."""
+    files = descriptor_pb2.FileDescriptorSet()
+    file = files.file.add(name="opt.proto", package="opt", syntax=syntax)
+    if syntax == "editions":
+        file.edition = descriptor_pb2.EDITION_2023
+    inner = file.message_type.add(name="Inner")
+    outer = file.message_type.add(name="M")
+    outer.oneof_decl.add(name="kind")
+    for name in ("volt", "ampere"):
+        outer.field.add(
+            name=name, number=20 + len(name), type=Field.TYPE_DOUBLE, label=Field.LABEL_OPTIONAL, oneof_index=0
+        )
+    for message in (inner, outer):
+        for kind, name in NAMES.items():
+            field = message.field.add(name=name, number=len(message.field) + 1, type=kind, label=Field.LABEL_OPTIONAL)
+            if syntax == "proto3":
+                field.proto3_optional = True
+                field.oneof_index = len(message.oneof_decl)
+                message.oneof_decl.add(name=f"_{name}")
+    outer.field.add(
+        name="inner", number=10, type=Field.TYPE_MESSAGE, label=Field.LABEL_OPTIONAL, type_name=".opt.Inner"
+    )
+    return files
+
+
+def optional_class(syntax: str):
+    pool = DescriptorPool()
+    pool.Add(optional_set(syntax).file[0])
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName("opt.M"))
+
+
+@pytest.mark.parametrize("syntax", ["proto3", "proto2", "editions"])
+@pytest.mark.parametrize("count", [1, 40])
+def test_an_optional_number_that_is_absent_is_missing(syntax: str, count: int) -> None:
+    made = optional_class(syntax)
+    x = 5 + np.sin(0.3 * np.arange(count))
+    messages = []
+    for index in range(count):
+        one = made()
+        if index % 4:
+            one.d, one.f, one.i, one.b, one.inner.i = x[index], 0.5, index, True, 0
+        if index % 3:
+            setattr(one, "volt" if index % 3 == 1 else "ampere", x[index])
+        messages.append(one.SerializeToString())
+    decoder = decoder_of(optional_set(syntax).SerializeToString(), "opt.M")
+    encoded = batch_of(messages)
+    absent = np.arange(count) % 4 == 0
+    for paths in (
+        ["d", "f", "i", "b", "inner.d", "inner.i"],
+        ["volt", "ampere", "d", "f", "i", "b", "inner.d", "inner.i"],
+    ):
+        decoded = decoder.columns(encoded, paths)
+        assert not decoded.bad.any(), decoded.reasons
+        columns = {path: np.asarray(decoded.columns[path].numbers, np.float64) for path in paths}
+        expected = {"d": x, "f": 0.5, "i": np.arange(count), "b": 1.0, "inner.i": 0.0, "inner.d": np.nan}
+        for path, values in expected.items():
+            assert np.array_equal(columns[path], np.where(absent, np.nan, values), equal_nan=True), path
+    assert np.array_equal(columns["volt"], np.where(np.arange(count) % 3 == 1, x, np.nan), equal_nan=True)
+    assert np.array_equal(columns["ampere"], np.where(np.arange(count) % 3 == 2, x, np.nan), equal_nan=True)
+
+
+def test_a_type_that_has_room_for_what_is_missing_keeps_its_width() -> None:
+    decoder = decoder_of(optional_set("proto3").SerializeToString(), "opt.M")
+    decoded = decoder.columns(batch_of([b"", optional_class("proto3")(f=0.5).SerializeToString()]), ["f"])
+    assert decoded.columns["f"].numbers.dtype == np.float32
+
+
+def test_an_optional_number_of_proto2_with_a_default_has_that() -> None:
     files = descriptor_pb2.FileDescriptorSet()
     file = files.file.add(name="old.proto", package="old", syntax="proto2")
-    file.message_type.add(name="M").field.add(
-        name="v", number=1, type=Field.TYPE_DOUBLE, label=Field.LABEL_OPTIONAL, default_value="2.5"
+    inner, outer = file.message_type.add(name="Inner"), file.message_type.add(name="M")
+    for message in (inner, outer):
+        message.field.add(name="v", number=1, type=Field.TYPE_DOUBLE, label=Field.LABEL_OPTIONAL, default_value="2.5")
+    outer.field.add(
+        name="inner", number=2, type=Field.TYPE_MESSAGE, label=Field.LABEL_OPTIONAL, type_name=".old.Inner"
     )
     decoder = decoder_of(files.SerializeToString(), "old.M")
-    assert values_of(decoder.columns(batch_of([b"", b""]), ["v"]), "v") == [2.5, 2.5]
-
-
-def test_what_a_message_leaves_out_is_zero() -> None:
-    decoded = decode_all(decoder_of(descriptor_set().SerializeToString()), batch_of([b"", b""]))
+    decoded = decoder.columns(batch_of([b"", b"\x12\x00"]), ["v", "inner.v"])
     assert not decoded.bad.any()
-    assert values_of(decoded, "accel.x") == [0.0, 0.0]
-    assert values_of(decoded, "stamp") == [0, 0]
-    assert values_of(decoded, "samples") == [[], []]
-    assert values_of(decoded, "name") == ["", ""]
+    assert values_of(decoded, "v") == [2.5, 2.5]
+    # Without the message inside, its default stands for nothing.
+    assert np.array_equal(decoded.columns["inner.v"].numbers, [np.nan, 2.5], equal_nan=True)
 
 
 def test_malformed_messages_are_marked_and_the_others_read() -> None:

@@ -14,6 +14,7 @@ from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
 
 START_NS = 1_700_000_000_123_456_789
+RISING = "time [s],a\n" + "".join(f"{index / 100},2\n" for index in range(60))
 
 
 def file_of(folder: Path, text: str | bytes, name: str = "a.csv") -> Path:
@@ -107,7 +108,7 @@ def test_time_columns(tmp_path: Path, title: str, times: str, options: dict[str,
 
 def test_a_first_column_that_rises_is_a_time_if_its_unit_is_said(tmp_path: Path) -> None:
     path = file_of(tmp_path, "".join(f"{10 * index}\t{index % 3}\n" for index in range(60)))
-    with pytest.raises(SetupError, match="'column_1' rises like a time but has no unit"):
+    with pytest.raises(SetupError, match=r"'column_1' rises like a time but has no unit.*--rate HZ.*--time NAME"):
         read_csv(path)
     assert only(path, time_unit="ms").sample_rate_hz == pytest.approx(100.0, rel=1e-9)
     assert only(path, sample_rate_hz=5.0).values.shape == (2, 60)
@@ -138,15 +139,17 @@ def test_empty_cells_are_gaps(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "match"),
     [
-        ("a,b\n1,2\n3,x4\n", r"line 3, column 'b': 'x4' is no number"),
-        ("a;b\n1,5;2\n3;1,2,3\n", r"line 3, column 'b': '1,2,3' is no number"),
+        ("a;b\n1,5;2\n3;1.234,5\n", r"line 3: '1.234,5' has a sign between thousands"),
+        ('a,b\n1,"1,234.5"\n3,2.5\n', r"line 2: '1,234.5' has a sign between thousands"),
+        ('a,b\n1,"1,234"\n3,"2,345"\n', r"column 2: '1,234' can be read .* \(--read decimal=,\)"),
+        ("a;b\n1,5;1.234\n2,5;2.345\n", r"column 2: '1.234' can be read"),
+        ("a;b\n1,5;2\n2.5;3\n", r"column 1: '1,5' can be read"),
         ("a,b\n1,2\n3\n", "line 3 has 1 cells where the table has 2"),
         ("a,b\n1,2\n1,2\n1,2\n3,4,5\n", "line 5 has 3 cells where the table has 2"),
         ("", "no line of numbers"),
         ("all text\nand more\n", "no line of numbers"),
         ("a,b,c\n1,2\n3,4\n", "line 2 has 2 columns, but none of the lines above it has as many names"),
-        ("a,a\n1,2\n", "column 2 has the name 'a' again"),
-        ("a,\n1,2\n", "column 2 has no name"),
+        ("a,b\n1,\0\n", "bytes that are no text"),
     ],
 )
 def test_mistakes_name_line_and_column(tmp_path: Path, text: str, match: str) -> None:
@@ -158,21 +161,30 @@ def test_mistakes_name_line_and_column(tmp_path: Path, text: str, match: str) ->
     ("text", "options", "error", "match"),
     [
         ("a\n3\n2\n", {}, SetupError, "give the sample rate"),
-        ("time,a\n1,2\n", {"sample_rate_hz": 2.0}, SetupError, "leave the sample rate out"),
-        ("time [years],a\n1,2\n", {}, SetupError, "the unit 'years'"),
-        ("a [furlongs]\n1\n", {"sample_rate_hz": 2.0}, SetupError, "channel 'a'.*furlongs"),
-        ("a\n1\n", {"sample_rate_hz": 2.0, "units": {"b": "N"}}, SetupError, "no column 'b'"),
-        ("a\n1\n", {"sample_rate_hz": 2.0, "names": ["b", "c"]}, SetupError, "1 columns, but 2 names"),
-        ("time\n1\n2\n", {}, LogError, "a time column and nothing else"),
         (
-            "time,a\n" + "".join(f"{n},2\n" for n in range(50)) + "1e9,3\n",
+            RISING,
+            {"sample_rate_hz": 2.0},
+            SetupError,
+            "times run at 100 Hz, 2 Hz was given; leave the sample rate out",
+        ),
+        ("time [years],a\n1,2\n", {}, SetupError, "'time' is a time in 'years'"),
+        ("a\n1\n", {"sample_rate_hz": 2.0, "units": {"a": "furlongs"}}, SetupError, "channel 'a'.*furlongs"),
+        ("a\n1\n", {"sample_rate_hz": 2.0, "units": {"b": "N"}}, SetupError, "no channel 'b'"),
+        ("a\n1\n", {"decimal": ";"}, SetupError, r"decimal sign is \. or ,"),
+        ("a\n1\n", {"time_unit": "years"}, SetupError, "the time unit 'years' is none of s, ms"),
+        (RISING, {"time": "b"}, SetupError, "no column 'b' to be the time; columns: time, a"),
+        ("a,b\n1,x\n2,y\n", {"time": "b"}, SetupError, "'b' holds text that is no time"),
+        ("a\n1\n", {"sample_rate_hz": 2.0, "names": ["b", "c"]}, SetupError, "1 columns, but 2 names"),
+        ("time [s]\n1\n2\n", {}, LogError, "a time column and nothing else"),
+        ("a,b\n2,x\n3,y\n", {"time": "a", "time_unit": "s"}, LogError, "a time column and nothing else"),
+        (
+            "time [s],a\n" + "".join(f"{n},2\n" for n in range(50)) + "1e9,3\n",
             {},
             LogError,
             "don't make a sampled signal",
         ),
         ("time [s from 99999999999],a\n1,2\n", {}, LogError, "within 146 years"),
-        ("time,a\n1,2\n,3\n", {}, LogError, "row 2 has no time"),
-        ("time,a\n1,2\n1e300,3\n", {}, LogError, "within 146 years"),
+        ("time [s],a\n1,2\n1e300,3\n", {}, LogError, "within 146 years"),
     ],
 )
 def test_what_is_not_said_is_asked_for(
@@ -182,10 +194,149 @@ def test_what_is_not_said_is_asked_for(
         read_csv(file_of(tmp_path, text), **options)
 
 
-def test_a_mistake_far_down_is_found_at_its_line(tmp_path: Path) -> None:
+def test_cells_that_are_no_numbers_are_gaps_and_told(tmp_path: Path) -> None:
+    contents = read_csv(file_of(tmp_path, "a,b\n1,2\n3,OL\n5,6\n7,N/A\n"), sample_rate_hz=1.0)
+    (series,) = contents.series
+    np.testing.assert_array_equal(series.values, [[1, 3, 5, 7], [2, np.nan, 6, np.nan]])
+    assert contents.notes == (
+        f"{tmp_path / 'a.csv'}: column 'b': 1 cell no number, the first 'OL' in line 3; left as gaps.",
+    )
+
+
+def test_a_cell_far_down_is_found_at_its_line(tmp_path: Path) -> None:
     text = "a,b\n" + "1,2\n" * 70_000 + "3,oops\n"
-    with pytest.raises(LogError, match="line 70002, column 'b'"):
-        read_csv(file_of(tmp_path, text), sample_rate_hz=1.0)
+    contents = read_csv(file_of(tmp_path, text), sample_rate_hz=1.0)
+    assert contents.series[0].samples == 70_001
+    assert "1 cell no number, the first 'oops' in line 70002" in contents.notes[0]
+
+
+def test_text_is_left_out_and_told(tmp_path: Path) -> None:
+    rows = "".join(f"{index / 100},run,{index},\n" for index in range(60))
+    contents = read_csv(file_of(tmp_path, f"time [s],state,a [N],remark\n{rows}"))
+    (series,) = contents.series
+    np.testing.assert_array_equal(series.values, [np.arange(60)])
+    assert contents.unread == (("state", "text, such as 'run'"), ("remark", "empty"))
+    assert contents.notes == ()
+
+
+@pytest.mark.parametrize("end", [",", ",,", ";"])
+def test_delimiters_behind_the_last_cell_are_no_columns(tmp_path: Path, end: str) -> None:
+    rows = "".join(f"{index / 100}{end[0]}{index}{end}\n" for index in range(60))
+    contents = read_csv(file_of(tmp_path, f"time [s]{end[0]}a [N]{end}\n{rows}"))
+    assert contents.series[0].channels == (Channel(name="a", unit="N"),)
+    assert (contents.notes, contents.unread) == ((), ())
+    # Only the rows end so, or only the titles.
+    for titles, tail in ((f"time [s]{end[0]}a [N]", end), (f"time [s]{end[0]}a [N]{end}", "")):
+        rows = "".join(f"{index / 100}{end[0]}{index}{tail}\n" for index in range(60))
+        assert only(file_of(tmp_path, f"{titles}\n{rows}")).samples == 60
+
+
+@pytest.mark.parametrize(
+    ("head", "names", "units"),
+    [
+        ("time,a\ns,g\n", ["a"], ["m/s^2"]),
+        ("Time,a\n(ms),(mV)\n\n", ["a"], ["V"]),
+        ("Run 5,\nOperator,Jo\ntime [s],a\n", ["a"], ["1"]),
+        ("Rate,100\nGain,2\nChannels,1\ntime [s],a\n", ["a"], ["1"]),
+        ("t / s,F / kN\n", ["F"], ["N"]),
+        ("t [s],hammer / N\n", ["hammer / N"], ["1"]),
+        ("# made by hand\n# time [s], a\n", ["a"], ["1"]),
+        ("sep=,\ntime [s],a\n", ["a"], ["1"]),
+        ("X,a\nSequence,Volt,0,5e-3\ntime [s],a\n", ["a"], ["1"]),
+    ],
+)
+def test_lines_above_the_rows(tmp_path: Path, head: str, names: list[str], units: list[str]) -> None:
+    scale = 10 if "ms" in head else 0.01
+    rows = "".join(f"{index * scale:.10g},{index}\n" for index in range(60))
+    series = only(file_of(tmp_path, head + rows))
+    assert series.sample_rate_hz == pytest.approx(100.0, rel=1e-9)
+    assert series.samples == 60
+    assert [channel.name for channel in series.channels] == names
+    assert [channel.unit for channel in series.channels] == units
+
+
+def test_a_table_that_is_padded_and_whose_head_is_repeated(tmp_path: Path) -> None:
+    head = "time [s],a,b\n"
+    rows = [f"{index / 100},{index},1\n" for index in range(60)]
+    text = "Run 5,,\nDate,2024-05-01,\nRate,100,\n" + head + "".join(rows[:20]) + head + "".join(rows[20:]) + "End\n"
+    contents = read_csv(file_of(tmp_path, text))
+    np.testing.assert_array_equal(contents.series[0].values[0], np.arange(60))
+    assert contents.series[0].valid is None
+    assert contents.notes == (f"{tmp_path / 'a.csv'}: 2 lines without numbers left out, the first is line 25.",)
+
+
+@pytest.mark.parametrize("mark", ["\f", "\v", "\x1c", "\u2028", "\x85"])
+def test_marks_that_only_look_like_ends_of_lines(tmp_path: Path, mark: str) -> None:
+    rows = "".join(f"{index / 100},{index}\n" for index in range(60))
+    series = only(file_of(tmp_path, f"# measured{mark}by me\ntime [s],a{mark}b\n{rows}"))
+    np.testing.assert_array_equal(series.values, [np.arange(60)])
+
+
+def test_rows_that_are_cut_are_gaps(tmp_path: Path) -> None:
+    rows = [f"{index},1\n" for index in range(60)]
+    rows[30] = "3\n"
+    contents = read_csv(file_of(tmp_path, "a,b\n" + "".join(rows)), sample_rate_hz=100.0)
+    (series,) = contents.series
+    # The row keeps its place, so that those after it keep their time.
+    np.testing.assert_array_equal(series.values[0], np.where(np.arange(60) == 30, np.nan, np.arange(60)))
+    assert "1 row cut short, the first in line 32" in contents.notes[0]
+
+
+def test_rows_without_a_time_are_left_out(tmp_path: Path) -> None:
+    rows = "".join(f"{index / 100 if index != 30 else ''},{index}\n" for index in range(60))
+    contents = read_csv(file_of(tmp_path, f"time [s],a\n{rows}"))
+    np.testing.assert_array_equal(contents.series[0].valid, [np.arange(60) != 30])
+    assert contents.notes[0].endswith("1 row without a time left out.")
+
+
+def test_columns_without_a_name_and_names_twice(tmp_path: Path) -> None:
+    contents = read_csv(file_of(tmp_path, ",a,a,\n0,1,2,3\n1,4,5,6\n2,7,8,9\n"), sample_rate_hz=1.0)
+    assert [channel.name for channel in contents.series[0].channels] == ["a", "a (2)", "column_4"]
+    assert contents.unread == (("unnamed", "it numbers the rows"),)
+    assert "a further column 'a' is called 'a (2)'" in contents.notes[0]
+
+
+def test_numbers_of_fortran_and_quoted_ones(tmp_path: Path) -> None:
+    series = only(file_of(tmp_path, 'a,b\n1.5D+00,"2,5"\n-1.0d-02,"0,25"\n'), sample_rate_hz=1.0)
+    np.testing.assert_array_equal(series.values, [[1.5, -0.01], [2.5, 0.25]])
+
+
+def test_three_decimals_behind_a_comma(tmp_path: Path) -> None:
+    series = only(file_of(tmp_path, "a;b\n1,234;0,500\n2,345;10,125\n"), sample_rate_hz=1.0)
+    np.testing.assert_array_equal(series.values, [[1.234, 2.345], [0.5, 10.125]])
+    doubtful = file_of(tmp_path, "a;b\n1,234;3\n2,345;4\n")
+    with pytest.raises(LogError, match="decimal=,"):
+        read_csv(doubtful, sample_rate_hz=1.0)
+    assert only(doubtful, sample_rate_hz=1.0, decimal=",").values[0, 0] == 1.234
+
+
+def test_addresses_and_numbers_of_parts_are_text(tmp_path: Path) -> None:
+    rows = "".join(f"{index};192.168.100.{index % 9};123 456;{index % 7}\n" for index in range(60))
+    contents = read_csv(file_of(tmp_path, f"n;address;part;a\n{rows}"), sample_rate_hz=100.0)
+    assert [channel.name for channel in contents.series[0].channels] == ["a"]
+    assert dict(contents.unread)["address"] == "text, such as '192.168.100.0'"
+
+
+@pytest.mark.parametrize("cell", ["1 234,5", "1'234,5", "1.234,5"])
+def test_thousands_that_are_set_apart_are_refused(tmp_path: Path, cell: str) -> None:
+    with pytest.raises(LogError, match="has a sign between thousands"):
+        read_csv(file_of(tmp_path, f"a;b\n1;{cell}\n2;{cell}\n"), sample_rate_hz=1.0)
+
+
+def test_a_table_of_thousands_of_columns(tmp_path: Path) -> None:
+    names = [f"a long name of channel {number}" for number in range(4000)]
+    row = ",".join(map(str, range(4000)))
+    series = only(file_of(tmp_path, ",".join(names) + f"\n{row}\n{row}\n"), sample_rate_hz=1.0)
+    assert [channel.name for channel in series.channels] == names
+    np.testing.assert_array_equal(series.values[:, 1], np.arange(4000))
+
+
+def test_an_unknown_unit_costs_only_the_unit(tmp_path: Path) -> None:
+    contents = read_csv(file_of(tmp_path, "a [g],b [furlongs]\n1,2\n3,4\n"), sample_rate_hz=1.0)
+    (series,) = contents.series
+    np.testing.assert_allclose(series.values, [[9.80665, 3 * 9.80665], [2, 4]])
+    assert [channel.unit for channel in series.channels] == ["m/s^2", "1"]
+    assert "channel 'b' is without unit: unit 'furlongs': not known" in contents.notes[0]
 
 
 def series_of(values: np.ndarray, valid: np.ndarray | None = None, **fields: object) -> TimeSeries:

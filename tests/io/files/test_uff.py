@@ -102,13 +102,44 @@ def test_units_without_a_label_follow_dataset_164(tmp_path: Path) -> None:
     np.testing.assert_allclose(series.values[:, 0], [1e-3, 1e3], rtol=1e-15)
 
 
+def test_an_unknown_label_costs_its_channel_the_unit(tmp_path: Path) -> None:
+    (tmp_path / "a.uff").write_text(text_set(unit="furlongs") + text_set(id1="b"))
+    contents = read_uff(tmp_path / "a.uff")
+    (series,) = contents.series
+    assert [channel.unit for channel in series.channels] == ["1", "m/s^2"]
+    np.testing.assert_array_equal(series.values[0], [1.0, 2.0, -0.5])
+    (note,) = contents.notes
+    assert all(words in note for words in ("acc: ", "'furlongs'", "--read units=NAME:UNIT"))
+
+
 def test_units_can_be_stated(tmp_path: Path) -> None:
     (tmp_path / "a.uff").write_text(text_set(unit="furlongs"))
-    with pytest.raises(SetupError, match=r"channel 'acc'.*furlongs"):
-        read_uff(tmp_path / "a.uff")
-    assert read_uff(tmp_path / "a.uff", units={"acc": "mm"}).series[0].channels[0].unit == "m"
+    contents = read_uff(tmp_path / "a.uff", units={"acc": "mm"})
+    assert contents.series[0].channels[0].unit == "m"
+    assert contents.notes == ()
     with pytest.raises(SetupError, match="no channel 'x' to give a unit"):
         read_uff(tmp_path / "a.uff", units={"x": "mm"})
+    with pytest.raises(SetupError, match=r"\(acc\): unit 'fathoms'"):
+        read_uff(tmp_path / "a.uff", units={"acc": "fathoms"})
+    # The type says that it's a force, whose pound is one of force.
+    (tmp_path / "b.uff").write_text(text_set(quantity=13))
+    (series,) = read_uff(tmp_path / "b.uff", units={"acc": "lb"}).series
+    np.testing.assert_allclose(series.values[0], 4.4482216152605 * np.array([1.0, 2.0, -0.5]), rtol=1e-15)
+
+
+def test_one_record_that_cannot_be_read_costs_no_other(tmp_path: Path) -> None:
+    broken = text_set(id1="broken").replace("2.00000e+00", "2.0000ze+00")
+    header = text_set(id1="header").replace("         2         3         1", "         x         3         1")
+    (tmp_path / "a.uff").write_text(broken + text_set(id1="whole") + header + text_set(id1="nodes", kind=4))
+    contents = read_uff(tmp_path / "a.uff")
+    assert [channel.name for series in contents.series for channel in series.channels] == ["whole"]
+    told = "\n".join(contents.notes)
+    for words in (
+        "dataset 1 has '2.0000ze+00' where a number is due",
+        "dataset 3 (type 58) can't be read",
+        "frequency response",
+    ):
+        assert words in told
 
 
 def test_other_functions_are_left_out_with_a_word(tmp_path: Path) -> None:
@@ -148,6 +179,8 @@ def test_what_is_written_comes_back(tmp_path: Path, binary: bool) -> None:
             Channel(name="force", unit="N", point="12", direction=(1.0, 0.0, 0.0), role="reference"),
             Channel(name="turn", unit="rad/s", direction=(0.0, 1.0, 0.0)),
             Channel(name="plain"),
+            # Labels of other programs leave open whether C is charge or temperature, ours don't.
+            Channel(name="charge", unit="C"),
         ]
     )
     losses = write_uff(series, tmp_path / "a.uff", binary=binary)
@@ -199,6 +232,11 @@ def test_the_rate_is_restored_from_six_digits(rate: float) -> None:
     assert rate_of_header({"abscissa_inc": float(f"{1 / rate:.5e}"), "id5": "NONE"}) == rate
 
 
+@pytest.mark.parametrize("increment", [0.3, 0.7, 1.1e-3, 1e-2 / 3 * 3])
+def test_an_increment_of_few_digits_is_meant_as_it_stands(increment: float) -> None:
+    assert rate_of_header({"abscissa_inc": increment, "id5": "NONE"}) == pytest.approx(1 / increment, rel=1e-15)
+
+
 def test_a_rate_that_contradicts_the_record_is_not_believed() -> None:
     header = {"abscissa_inc": 0.001, "id5": "start_time_ns=0 sample_rate_hz=2000.0"}
     assert rate_of_header(header) == 1000.0
@@ -215,7 +253,7 @@ def test_a_rate_that_contradicts_the_record_is_not_believed() -> None:
         (text_set(form=3), "of type 3"),
         (text_set(form=5), "complex values|holds 1"),
         (text_set(step=0.0), "is no sample interval"),
-        (text_set().replace("2.00000e+00", "2.0000ze+00"), "the values of dataset 1 can't be read"),
+        (text_set().replace("2.00000e+00", "2.0000ze+00"), "dataset 1 has '2.0000ze.00' where a number"),
         (text_set().replace("         2         3", "         x         3"), "can't be read"),
     ],
 )

@@ -13,14 +13,17 @@ from hypothesis import strategies as st
 
 from chladni.io.files.uff_modes import UffModes, read_uff_modes, write_uff_modes
 from chladni.io.files.uff_nodes import number_points
+from chladni.io.log import open_log
+from chladni.io.setup import Setup, load_setup
 from chladni.signals.channel import AXES, Channel
-from chladni.signals.errors import ChladniError, LogError
+from chladni.signals.errors import ChladniError, LogError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry, Point
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.provenance import Provenance
 from chladni.signals.testing import assert_close
 from tests import strategies as ours
+from tests.io.files.uff_makers import response_set
 from tests.modal.mode_makers import mode_set
 from tests.modal.shapes.test_joint_treatment import GEOMETRY, arm, scaled_modes
 
@@ -176,6 +179,133 @@ def test_a_normal_mode_written_by_hand(tmp_path: Path) -> None:
     np.testing.assert_allclose(modes.scale.modal_mass, [0.75])
     hysteretic = modes_of(read(tmp_path, text.replace("2.00000E-02  0.00000E+00", "0.00000E+00  2.00000E-02")))
     assert hysteretic.damping_ratio[0] == 0.01
+
+
+# The same as BY_HAND in datasets 2411 and 2414.
+NEWER = """\
+    -1
+  2411
+         1         0         0        11
+   0.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00
+         2         0         0        11
+   1.0000000000000000D+00  -2.5000000000000000D-01   3.0000000000000000D+00
+    -1
+    -1
+  2414
+         1
+Mode shape record 1
+         1
+NONE
+NONE
+NONE
+NONE
+NONE
+         1         3         2         8         5         3
+         0         0         1         0         0         1         0         0
+         0         0
+  0.00000E+00  0.00000E+00  0.00000E+00  0.00000E+00  0.00000E+00  0.00000E+00
+ -1.00000E+00  1.00000E+02  0.00000E+00  2.00000E+02  2.00000E+04  2.00000E+02
+         1
+  1.00000E+00  0.00000E+00  5.00000E-01 -2.50000E-01  0.00000E+00  0.00000E+00
+         2
+  0.00000E+00  0.00000E+00  0.00000E+00  0.00000E+00  0.00000E+00  2.00000E+00
+    -1
+"""
+NORMAL = (
+    NEWER.replace(
+        "         1         3         2         8         5         3",
+        "         1         2         2        12         4         3",
+    )
+    .replace(
+        "  0.00000E+00  0.00000E+00  0.00000E+00  0.00000E+00  0.00000E+00  0.00000E+00\n -1.0",
+        "  0.00000E+00  1.25000E+01  0.00000E+00  3.00000E+00  0.00000E+00  4.00000E-02\n -1.0",
+    )
+    .replace(
+        "  1.00000E+00  0.00000E+00  5.00000E-01 -2.50000E-01  0.00000E+00  0.00000E+00",
+        "  0.00000E+00  2.00000E+00  0.00000E+00",
+    )
+    .replace(
+        "  0.00000E+00  0.00000E+00  0.00000E+00  0.00000E+00  0.00000E+00  2.00000E+00\n    -1",
+        "  0.00000E+00 -1.00000E+00  0.00000E+00\n    -1",
+    )
+)
+
+
+def test_newer_datasets_say_the_same(tmp_path: Path) -> None:
+    older, newer = read(tmp_path, BY_HAND), read(tmp_path, NEWER)
+    assert_close(modes_of(newer), modes_of(older), rtol=1e-15)
+    assert newer.geometry.points == older.geometry.points
+    assert read(tmp_path, NEWER.replace("  2411\n", "   781\n")).geometry == newer.geometry
+    millimetres = read(tmp_path, UNITS_MM + NEWER)
+    assert millimetres.geometry.position("2") == (0.001, -0.00025, 0.003)
+
+
+def test_a_normal_mode_of_a_newer_dataset(tmp_path: Path) -> None:
+    assert NORMAL.count("E+01") == 1
+    modes = modes_of(read(tmp_path, NORMAL))
+    # Hysteretic damping of 4 % loses what viscous damping of 2 % does.
+    assert (modes.frequency_hz[0], modes.damping_ratio[0]) == (12.5, 0.02)
+    np.testing.assert_array_equal(modes.shapes, [[1.0, -0.5]])
+    assert {one.unit for one in modes.channels} == {"m/s^2"}
+    assert modes.scale is not None
+    np.testing.assert_allclose(modes.scale.modal_mass, [0.75])
+
+
+def test_another_program_writes_newer_datasets(tmp_path: Path) -> None:
+    nodes = {
+        "type": 2411, "node_nums": [4, 9], "def_cs": [0, 0], "disp_cs": [0, 0], "color": [8, 8],
+        "x": [0.1, 0.2], "y": [0.0, 1.0], "z": [-3.0, 4.0],
+    }  # fmt: skip
+    pyuff.UFF(str(tmp_path / "a.uff")).write_sets(nodes, mode="overwrite")
+    geometry = read_uff_modes(tmp_path / "a.uff").geometry
+    assert [(point.name, point.position) for point in geometry.points] == [
+        ("4", (0.1, 0.0, -3.0)),
+        ("9", (0.2, 1.0, 4.0)),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "         1         3         2         8",
+            "         1         1         2         8",
+            "analysis type 1 is no mode",
+        ),
+        ("record 1\n         1\n", "record 1\n         2\n", "its data aren't at nodes"),
+        ("         8         5         3\n", "         8         5         9\n", "9 values a node"),
+    ],
+)
+def test_newer_data_that_are_no_modes_are_left_out_and_said(tmp_path: Path, old: str, new: str, words: str) -> None:
+    assert old in NEWER
+    found = read(tmp_path, NEWER.replace(old, new, 1))
+    assert found.modes is None
+    assert len(found.geometry.points) == 2
+    assert any("a dataset 2414 was left out" in note and words in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("         8         5         3\n", "         8         7         3\n", "data type 7; 2 and 4 are real"),
+        ("  1.0000000000000000D+00  -2.5", "  1.00000000000x0000D+00  -2.5", "line 6: dataset 2411 found"),
+        (
+            "   1.0000000000000000D+00  -2.5000000000000000D-01   3.0000000000000000D+00\n",
+            "",
+            "coordinates of its last node",
+        ),
+    ],
+)
+def test_damage_of_newer_datasets_is_named(tmp_path: Path, old: str, new: str, words: str) -> None:
+    assert old in NEWER
+    with pytest.raises(LogError, match=words):
+        read(tmp_path, NEWER.replace(old, new, 1))
+
+
+def test_what_is_not_read_is_told(tmp_path: Path) -> None:
+    elements = "    -1\n  2412\n         1        11         2         1         7         2\n    -1\n"
+    found = read(tmp_path, BY_HAND + elements + elements)
+    assert any("left out: datasets 2412 (2)." in note for note in found.notes)
 
 
 def test_what_is_no_mode_is_left_out_and_said(tmp_path: Path) -> None:
@@ -545,11 +675,17 @@ def test_functions_that_make_no_grid_are_left_out_and_said(tmp_path: Path) -> No
 
 
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
-def test_functions_with_impossible_axes_or_units_are_refused(tmp_path: Path) -> None:
+def test_functions_with_impossible_axes_are_left_out_and_unknown_units_told(tmp_path: Path) -> None:
+    falling = frf_set(abscissa_spacing=0, x=np.array([1.0, 3.0, 2.0]))
     with pytest.raises(LogError, match="dataset 1: its frequencies don't rise"):
-        written(tmp_path / "a.uff", frf_set(abscissa_spacing=0, x=np.array([1.0, 3.0, 2.0])))
-    with pytest.raises(LogError, match=r"dataset 1: .*furlong"):
-        written(tmp_path / "b.uff", frf_set(ordinate_axis_units_lab="furlong"))
+        written(tmp_path / "a.uff", falling)
+    both = written(tmp_path / "b.uff", falling, frf_set(rsp_node=4, ordinate_axis_units_lab="furlong"))
+    assert both.response is not None
+    assert both.response.unit(0, 0) == "1/N"
+    np.testing.assert_allclose(both.response.values[0, 0], [1 + 1j, 2, 3j], rtol=1e-11)
+    told = "\n".join(both.notes)
+    assert "its frequencies don't rise; the file is damaged; it was left out" in told
+    assert "4:+3: unit 'furlong'" in told
 
 
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
@@ -561,6 +697,63 @@ def test_values_that_are_no_numbers_are_masked(tmp_path: Path) -> None:
     masked = read_uff_modes(path).response
     assert masked is not None
     assert masked.excited.tolist() == [True, False, True]
+
+
+def setup_of(tmp_path: Path, text: str) -> Setup:
+    (tmp_path / "setup.toml").write_text(f'format = "chladni.setup/1"\n{text}')
+    return load_setup(tmp_path / "setup.toml")
+
+
+LINES = np.exp(1j * np.arange(40) / 7)
+PLACED = """
+[[point]]
+name = "tip"
+position = [1.0, 0.0, 0.0]
+[[point]]
+name = "1"
+position = [0.0, 0.0, 0.0]
+[[line]]
+points = ["1", "tip"]
+[[channel]]
+path = "1:+3"
+unit = "g"
+point = "tip"
+direction = "-z"
+range = "50 g"
+[[channel]]
+path = "1:+3 (reference)"
+unit = "lbf"
+"""
+
+
+def test_a_setup_file_says_what_the_functions_do_not(tmp_path: Path) -> None:
+    path = tmp_path / "a.uff"
+    path.write_bytes(response_set(LINES, type=0, below_type=0, label="NONE"))
+    bare, found = open_log(path), open_log(path, setup=setup_of(tmp_path, PLACED))
+    assert bare.functions is not None
+    assert bare.functions.unit(0, 0) == "1"
+    assert found.functions is not None
+    np.testing.assert_allclose(found.functions.values, bare.functions.values * 9.80665 / 4.4482216152605, rtol=1e-15)
+    assert found.functions.unit(0, 0) == "(m/s^2)/N"
+    (channel,) = found.functions.responses
+    assert (channel.name, channel.point, channel.direction) == ("1:+3", "tip", AXES["-z"])
+    assert channel.overload == pytest.approx(490.3325)
+    assert found.geometry.lines == (("1", "tip"),)
+
+
+def test_a_setup_file_that_does_not_fit_the_functions_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.uff"
+    path.write_bytes(response_set(LINES))
+    wrong = setup_of(tmp_path, '[[channel]]\npath = "1:+2"\nunit = "g"\n')
+    with pytest.raises(SetupError, match=r"setup.toml:2: .* has no channel '1:\+2'; did you mean 1:\+3"):
+        open_log(path, setup=wrong)
+    path.write_bytes(response_set(LINES, label="g/N", type=12))
+    of_ratio = setup_of(tmp_path, '[[channel]]\npath = "1:+3"\nunit = "g"\n')
+    with pytest.raises(SetupError, match="labels the ratio of response and reference; leave it out"):
+        open_log(path, setup=of_ratio)
+    half = setup_of(tmp_path, '[[channel]]\npath = "1:+3"\nrange = "50 N"\n')
+    with pytest.raises(SetupError, match="range: it is in N, the channel in m/s"):
+        open_log(path, setup=half)
 
 
 def nodes_set() -> list[dict[str, object]]:

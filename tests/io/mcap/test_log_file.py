@@ -2,6 +2,8 @@
 
 import gzip
 import os
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import lz4.frame
@@ -10,6 +12,7 @@ import zstandard
 
 from chladni.io.mcap.container import McapContainer
 from chladni.signals.errors import LogError
+from tests.io.mcap import log_bytes
 
 
 @pytest.mark.parametrize(
@@ -38,6 +41,47 @@ def test_what_the_file_looks_like_is_said(tmp_path: Path, content: bytes, hint: 
     assert "\n" not in message
 
 
+IN_TEXT_MODE = [
+    (lambda content: content.replace(b"\r\n", b"\n"), "0d 0a became 0a in its first bytes"),
+    (lambda content: content.replace(b"\n", b"\r\n"), "0a became 0d 0a in its first bytes"),
+    (lambda content: content.replace(b"\r\n", b"\r"), "0d 0a became 0d in its first bytes"),
+    (lambda content: content.replace(b"\r", b"\n"), "0d became 0a in its first bytes"),
+    (lambda content: bytes(byte & 0x7F for byte in content), "8 bits became 7 in its first bytes"),
+    (lambda content: content.decode("latin-1").encode(), "89 became UTF-8 in its first bytes"),
+    (lambda content: content.decode("utf-8", "replace").encode(), "89 became the replacement character of UTF-8"),
+    # As git writes files that it takes for text: what has a carriage return already keeps it, the magic does.
+    (lambda content: re.sub(rb"(?<!\r)\n", b"\r\n", content), "bytes 0a in its first"),
+]
+
+
+@pytest.mark.parametrize(("transfer", "told"), IN_TEXT_MODE, ids=range(len(IN_TEXT_MODE)))
+@pytest.mark.parametrize("suffix", [".mcap", ".csv"])
+def test_a_text_mode_transfer_is_told_in_those_words(
+    tmp_path: Path, transfer: Callable[[bytes], bytes], told: str, suffix: str
+) -> None:
+    sound = log_bytes.sample_log()
+    path = tmp_path / f"log{suffix}"
+    path.write_bytes(transfer(sound))
+    with pytest.raises(LogError) as refused:
+        McapContainer.open(path)
+    message = str(refused.value)
+    assert message.startswith(f"{path}: changed by a text-mode transfer (git's autocrlf, FTP in ASCII mode): ")
+    assert told in message
+    assert message.endswith(
+        "; copy the file again in binary mode, and in git mark it as binary: '*.mcap binary' in .gitattributes"
+    )
+    assert "\n" not in message
+
+
+def test_a_damaged_log_with_lone_line_feeds_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+    sound = log_bytes.sample_log()
+    assert sound.count(b"\n") > sound.count(b"\r\n")
+    path = tmp_path / "log.mcap"
+    path.write_bytes(sound[: len(sound) * 3 // 4])
+    with McapContainer.open(path) as log:
+        assert log.damage
+
+
 def test_other_bytes_are_shown(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     path.write_bytes(b"hello")
@@ -61,15 +105,6 @@ def test_a_folder_a_pipe_and_nothing_are_no_logs(tmp_path: Path) -> None:
         os.mkfifo(tmp_path / "pipe")
         with pytest.raises(LogError, match="not a file"):
             McapContainer.open(tmp_path / "pipe")
-
-
-@pytest.mark.parametrize("suffix", [".csv", ".UFF", ".wav", ".mat", ".npz"])
-def test_a_data_file_is_no_log_but_can_be_made_one(tmp_path: Path, suffix: str) -> None:
-    path = tmp_path / f"run{suffix}"
-    path.write_bytes(b"0.1, 0.2\n0.3, 0.4\n")
-    with pytest.raises(LogError, match="not an MCAP log") as caught:
-        McapContainer.open(path)
-    assert str(caught.value).endswith(f"; chladni convert {path} {path.with_suffix('.mcap')} makes a log of it")
 
 
 def test_only_the_magic_is_a_log_cut_off(tmp_path: Path) -> None:

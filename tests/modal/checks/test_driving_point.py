@@ -8,6 +8,8 @@ import pytest
 from chladni.modal.checks.driving_point import check_driving_point, driving_points
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
+from chladni.signals.provenance import Provenance
+from tests.modal import truth
 from tests.modal.made_responses import chain, functions, reversed_channel
 
 F_HZ = np.arange(2.0, 60.0, 0.05)
@@ -118,3 +120,19 @@ def test_functions_without_a_setup_can_be_named():
         check_driving_point(bare, functions=[(7, 0, 1)])
     with pytest.raises(EstimateError, match="false_alarm"):
         check_driving_point(bare, false_alarm=0.0)
+
+
+def test_exact_functions_of_a_file_with_resonances_narrower_than_a_line_are_sound():
+    # 0.02 % of damping at 1 Hz lines; each highest line lies below or above its resonance.
+    structure, lines_hz = truth.chain(first_hz=51.3, damping=2e-4), np.arange(0.0, 400.0)
+    exact = truth.noisy_response(structure, lines_hz, (0,), noise=0.0, rng=np.random.default_rng(0))
+    file = replace(
+        exact,
+        std=np.full(exact.std.shape, np.inf),
+        coherence=np.full(exact.coherence.shape, np.nan),
+        provenance=Provenance(estimator="as in the file"),
+    )
+    point = only(check_driving_point(file))
+    assert (point.verdict, point.peaks, point.pairs, point.missing_hz) == ("sound", 5, 4, ())
+    upside_down = replace(file, values=-file.values)
+    assert only(check_driving_point(upside_down)).verdict == "reversed"

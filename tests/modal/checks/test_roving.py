@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.modal.checks.driving_point import driving_points
-from chladni.modal.checks.roving import join_references, roving_hammer
+from chladni.modal.checks.roving import join_references, over_hit_points, roving_hammer
 from chladni.modal.functions.half_power import HalfPower
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
@@ -131,3 +131,56 @@ def test_only_motion_per_force_is_turned_round():
     mixed = replace(mixed, responses=(mixed.responses[0], replace(mixed.responses[1], unit="m")))
     with pytest.raises(EstimateError, match=r"responses in m and m/s\^2 can't be turned round together"):
         roving_hammer([mixed])
+
+
+def row_of(*, response="m2", unit="m/s^2", hits=BODIES):
+    """One accelerometer over several hit points, as a file holds them."""
+    return replace(
+        made := functions(chain(), F_HZ, references=hits, responses=(response,)),
+        responses=tuple(replace(channel, unit=unit) for channel in made.responses),
+    )
+
+
+def test_one_response_over_several_forces_is_turned_round():
+    row = row_of()
+    turned = over_hit_points(row)
+    np.testing.assert_array_equal(turned.values, row.values.transpose(1, 0, 2))
+    np.testing.assert_array_equal(turned.std, row.std.transpose(1, 0, 2))
+    assert [channel.point for channel in turned.responses] == list(BODIES)
+    assert [channel.point for channel in turned.references] == ["m2"]
+    assert turned.coherence.shape == (5, F_HZ.size)
+    assert any("5 hit points taken as responses and 1 accelerometer" in note for note in turned.provenance.notes)
+    # Turned once: what has more responses stays.
+    assert over_hit_points(turned) is turned
+
+
+def test_places_keep_their_names_and_a_reference_is_told_from_a_response():
+    row = row_of(hits=("m1", "m2"))
+    named = replace(
+        row,
+        responses=(replace(row.responses[0], name="2:+1"),),
+        references=tuple(replace(c, name=f"{at}:+1 (reference)") for at, c in enumerate(row.references, start=1)),
+    )
+    turned = over_hit_points(named)
+    assert [channel.name for channel in turned.responses] == ["1:+1", "2:+1"]
+    assert [channel.name for channel in turned.references] == ["2:+1 (reference)"]
+
+
+def test_a_sensor_of_anything_tells_shapes_over_the_forces_but_motions_are_no_forces():
+    # What a strain gauge sees of a mode is a factor of all its hit points alike.
+    assert len(over_hit_points(row_of(unit="V")).responses) == 5
+    row = row_of()
+    shaken = replace(row, references=tuple(replace(channel, unit="m/s^2") for channel in row.references))
+    assert over_hit_points(shaken) is shaken
+    mixed = replace(row, references=(replace(row.references[0], unit="N m"), *row.references[1:]))
+    assert over_hit_points(mixed) is mixed
+    square = functions(chain(), F_HZ, references=("m1", "m2"), responses=("m1", "m2"))
+    assert over_hit_points(square) is square
+
+
+def test_each_further_reference_has_spent_an_average():
+    row = row_of()
+    counted = replace(row, provenance=replace(row.provenance, effective_averages=20.0))
+    assert over_hit_points(counted).provenance.effective_averages == 16.0
+    unknown = replace(row, provenance=replace(row.provenance, effective_averages=0.0))
+    assert over_hit_points(unknown).provenance.effective_averages == 0.0

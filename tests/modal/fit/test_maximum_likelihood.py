@@ -179,8 +179,16 @@ def binomial_limits(trials):
         (few_periods, (0,), 90, {"lines": 200}),
         (averaged_random, (0,), 40, {"cycles": 600, "resolution_hz": 1 / 40}),
         # Few long segments, as they are chosen for modes: leakage nearly cancels in frequencies.
-        (averaged_random, (0,), 25, {"cycles": 2000, "resolution_hz": 1 / 250}),
-        (averaged_random, (0,), 25, {"cycles": 2000, "resolution_hz": 1 / 250, "force_noise": 0.0}),
+        pytest.param(
+            averaged_random, (0,), 25, {"cycles": 2000, "resolution_hz": 1 / 250}, marks=pytest.mark.nightly
+        ),
+        pytest.param(
+            averaged_random,
+            (0,),
+            25,
+            {"cycles": 2000, "resolution_hz": 1 / 250, "force_noise": 0.0},
+            marks=pytest.mark.nightly,
+        ),
     ],
 )
 def test_intervals_hold_the_truth(make, at, runs, options):

@@ -112,3 +112,12 @@ def test_participation_is_the_left_null_vector():
 def test_a_matrix_that_is_not_positive_definite_is_refused():
     with pytest.raises(np.linalg.LinAlgError):
         next(denominators(-np.eye(4, dtype=complex), 1, range(1, 4)))
+
+
+def test_roots_a_little_beyond_the_circle_are_given_when_asked_for():
+    # The third grows by 0.001 in the logarithm of its magnitude.
+    inverse = np.array([1 / 0.5, 1 / (np.exp(0.001) * 1j), 1 / 2])
+    coefficients = np.poly(inverse)[1:].reshape(3, 1, 1).astype(complex)
+    assert stable_roots(coefficients).size == 1
+    assert stable_roots(coefficients, beyond=0.0009).size == 1
+    assert stable_roots(coefficients, beyond=0.0011).size == 2

@@ -14,6 +14,7 @@ from chladni.signals.provenance import Provenance
 from chladni.spectral.frequency_response import frequency_response
 from chladni.spectral.impact import find_impacts, impact_cross_spectra
 from chladni.spectral.periodic import find_period, periodic_cross_spectra
+from tests.modal import truth
 from tests.modal.made_responses import chain, functions, one_mass
 from tests.spectral.aircraft import ACCELEROMETERS, SHAKER, aircraft
 from tests.spectral.measured_logs import hammer
@@ -146,7 +147,7 @@ def test_where_there_is_no_resonance_none_is_claimed(method):
     falling = replace(made, values=made.values * 0 + 1 / TWO_HZ, std=made.std * 0 + 1e-3)
     modes = method.identify(falling, frequencies_hz=(20.0,))
     assert modes.frequency_hz.size == 0
-    assert any("no mode is taken there" in note for note in modes.provenance.notes)
+    assert any("no mode is taken at" in note for note in modes.provenance.notes)
 
 
 def test_bands_and_lines_that_can_not_be_fitted(method):
@@ -239,3 +240,18 @@ def test_the_measured_impact_test_has_its_published_peaks(method, shared_data):
         nearest = np.min(np.abs(modes.frequency_hz - published))
         assert nearest < 0.005 * published, published
     assert np.all(modes.damping_std < modes.damping_ratio)
+
+
+def test_exact_peaks_narrower_than_a_line_are_read_or_told(method):
+    # 0.02 % at lines 1 Hz apart: 0.02 to 0.14 lines wide.
+    structure, lines_hz = truth.chain(first_hz=51.3, damping=2e-4), np.arange(0.0, 400.0)
+    exact = truth.noisy_response(structure, lines_hz, (0,), noise=0.0, rng=np.random.default_rng(0))
+    file = replace(exact, std=np.full(exact.std.shape, np.inf), provenance=Provenance(estimator="as in the file"))
+    modes = method.identify(file)
+    told = [note for note in modes.provenance.notes if note.startswith("no mode is taken at")]
+    assert modes.frequency_hz.size + len(told) == 5
+    assert all("1 Hz apart" in note and "plscf" in note for note in told)
+    nearest = np.min(np.abs(modes.frequency_hz[:, None] - structure.frequency_hz), axis=1)
+    assert np.all(nearest < 3 * modes.frequency_std_hz)
+    # What is claimed is known better than to a line.
+    assert np.all(modes.frequency_std_hz < 0.5)

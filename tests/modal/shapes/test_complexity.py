@@ -17,7 +17,7 @@ EPSILON = float(np.finfo(float).eps)
 @given(st.data())
 def test_a_real_shape_in_any_phase_is_collinear(data: st.DataObject) -> None:
     phase = data.draw(st.floats(-1.5, 1.5))
-    real = np.array(data.draw(st.lists(st.floats(-1, 1, allow_subnormal=False), min_size=1, max_size=9).filter(any)))
+    real = np.array(data.draw(st.lists(st.floats(-1, 1, allow_subnormal=False), min_size=2, max_size=9).filter(any)))
     shape = real * np.exp(1j * phase)
     np.testing.assert_allclose(phase_collinearity(shape), [1.0], atol=20 * EPSILON)
     found = mean_phase(shape)
@@ -56,6 +56,9 @@ def test_a_complex_factor_changes_only_the_mean_phase(modes, exponent, phase) ->
     tolerance = 100 * EPSILON
     collinearity = phase_collinearity(modes.shapes)
     np.testing.assert_allclose(phase_collinearity(factor * modes.shapes), collinearity, atol=tolerance)
+    if len(modes.channels) == 1:
+        assert np.all(np.isnan(collinearity))
+        return
     assert np.all((collinearity >= 0) & (collinearity <= 1))
     deviation = mean_phase(modes.shapes).deviation_deg
     assert np.all((deviation >= 0) & (deviation <= 90))
@@ -97,3 +100,11 @@ def test_what_has_no_phase_is_refused(wrong: list[float]) -> None:
 def test_shapes_without_channels_are_refused() -> None:
     with pytest.raises(EstimateError, match="at least one channel"):
         phase_collinearity(np.zeros((2, 0)))
+
+
+def test_a_single_channel_has_no_phase_to_compare() -> None:
+    shapes = np.array([[1.0], [0.3 + 0.4j]])
+    assert np.all(np.isnan(phase_collinearity(shapes)))
+    found = mean_phase(shapes)
+    assert np.all(np.isnan(found.phase_deg))
+    assert np.all(np.isnan(found.deviation_deg))

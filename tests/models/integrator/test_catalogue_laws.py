@@ -49,12 +49,13 @@ SMOOTH = {
     "hardening stiffness": (at_joint(law(0, hardening_stiffness.cubic, 2e6)), 20.0),
     "smooth saturation": (at_command(law(0, saturation.smooth, 1.0)), 0.02),
 }
-# SciPy takes 1 s for these and up to 5 s for the others.
+# SciPy takes 1 s for these, up to 3 s for the next; the others take up to 5 s.
 QUICK = ("saturation", "dead zone", "smooth saturation")
+IN_THE_GATE = ("backlash", "coulomb friction", "hysteresis")
 
 
 def named(laws):
-    return [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in laws]
+    return [pytest.param(name, marks=() if name in (*QUICK, *IN_THE_GATE) else pytest.mark.nightly) for name in laws]
 
 
 def tones(amplitude):

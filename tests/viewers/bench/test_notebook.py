@@ -249,7 +249,7 @@ def test_private_copies_are_removed(page: Any, tmp_path: Path, monkeypatch: pyte
 def test_no_room_for_a_private_copy_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
     with pytest.raises(Exception, match="the dropped log can't be kept"):
-        private_file(b"log")
+        private_file(b"log", ".mcap")
 
 
 class Upload:
