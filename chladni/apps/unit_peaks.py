@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
-from chladni.spectral.peaks import find_peaks
+from chladni.spectral.peaks import find_peaks, judged_above_hz
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,11 +19,14 @@ class UnitPeaks:
         Their names.
     peaks
         What `find_peaks` names in them.
+    above_hz
+        Where they were looked for; 0 for everywhere.
     """
 
     unit: str
     channels: tuple[str, ...]
     peaks: tuple[Peak, ...]
+    above_hz: float
 
 
 def unit_peaks(density: PowerSpectralDensity) -> tuple[UnitPeaks, ...]:
@@ -32,6 +35,11 @@ def unit_peaks(density: PowerSpectralDensity) -> tuple[UnitPeaks, ...]:
     for channel in density.channels:
         groups.setdefault(channel.unit, []).append(channel.name)
     return tuple(
-        UnitPeaks(unit=unit, channels=tuple(names), peaks=find_peaks(density.select(names)))
+        UnitPeaks(
+            unit=unit,
+            channels=tuple(names),
+            peaks=find_peaks(density.select(names)),
+            above_hz=judged_above_hz(density),
+        )
         for unit, names in groups.items()
     )

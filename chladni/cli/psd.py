@@ -52,14 +52,14 @@ def psd(
         told = reading_sentences(opened, everything=channel is None)
         geometry = opened.geometry
     document = psd_document(found)
-    named = [(density, group) for density in found for group in unit_peaks(density)]
+    named = [group for density in found for group in unit_peaks(density)]
     for density in found:
         _print_levels(out, density, document)
-    for density, group in named:
-        _print_peaks(out, density, group)
+    for group in named:
+        _print_peaks(out, group)
     notes = tuple(note for density in found for note in density.provenance.notes)
     out.lines((*told, *notes))
-    peaks = tuple(peak for _, group in named for peak in group.peaks)
+    peaks = tuple(peak for group in named for peak in group.peaks)
     study = Study(title=log.name, densities=found, peaks=peaks, geometry=geometry, findings=told + notes)
     out.pictures(study, figures=figures, report=report)
     out.json(document)
@@ -88,12 +88,11 @@ def _highest(channel: "Document") -> list[str]:
     return [number(peak["frequency_hz"], digits=6), number(peak["psd"]), unit(channel["psd_unit"])]
 
 
-def _print_peaks(out: Output, density: "PowerSpectralDensity", found: "UnitPeaks") -> None:
-    from chladni.spectral.peaks import MOST_PEAKS, judged_above_hz
+def _print_peaks(out: Output, found: "UnitPeaks") -> None:
+    from chladni.spectral.peaks import MOST_PEAKS
 
     where = "" if found.unit == "1" else f" in {found.unit}"
-    low_hz = judged_above_hz(density)
-    judged = f", above {number(low_hz)} Hz" if low_hz else ""
+    judged = f", above {number(found.above_hz)} Hz" if found.above_hz else ""
     if not found.peaks:
         out.line(f"No peak stands out of the scatter{where}{judged}.")
         return

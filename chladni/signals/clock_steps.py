@@ -188,7 +188,7 @@ def sample_period(stamps_ns: Ints, before: Ints | None, back: Ints) -> float:
         Messages that go back: intervals across one are left out as far as there are enough others.
     """
     every = max(1, stamps_ns.size // _SAMPLE)
-    moved = np.count_nonzero(stamps_ns[1::every] != stamps_ns[:-1:every])
+    moved = int(np.count_nonzero(stamps_ns[1::every] != stamps_ns[:-1:every]))
     # As many samples as share a stamp are one interval, and a few of them tell no mean.
     shared = -(-stamps_ns.size // every) // max(1, int(moved))
     lag = max(1, min(_LAG * shared, (stamps_ns.size - 1) // 2))

@@ -276,8 +276,12 @@ def _still_ringing(series: TimeSeries, impacts: Impacts, decay_per_s: float) -> 
     if not names:
         return []
     advised = np.log(100) / impacts.record_s
+    if impacts.record_s < 0.95 * impacts.longest_s:
+        longer = f"ask for a resolution of {rounded_up(1 / impacts.longest_s)} Hz"
+    else:
+        longer = "hit at longer intervals"
     note = (
-        f"{', '.join(names)}: not died away at the end of the record, which smears peaks; take longer records or an "
-        f"exponential window of {advised:.3g}/s (1 % at the end)"
+        f"{', '.join(names)}: not died away at the end of the record, which smears peaks; {longer}, or give "
+        f"impact_cross_spectra an exponential window of {advised:.3g}/s (1 % at the end) in Python"
     )
     return [note]

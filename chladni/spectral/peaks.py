@@ -1,6 +1,7 @@
 """Named peaks of spectra and frequency responses: where, how high, how sure, on which channels."""
 
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 import scipy.ndimage
@@ -303,7 +304,7 @@ def _significant(curve: _Curve, min_prominence_db: float, false_alarm: float) ->
     chance = false_alarm / (2 * power.size)
     loud = (scipy.special.chdtrc(freedom, freedom * over_floor) <= chance) & curve.trusted & (curve.relative_std <= 1)
     # Once for all peaks: inverting the chi-squared distribution is most of the work here.
-    sure = power * freedom / scipy.special.chdtri(freedom, 1 - UPPER_BOUND_CHANCE)
+    sure = _upper_bound(power, freedom)
     # Of the line at 0 Hz, whose mean is taken off, any slow motion would stand out.
     lowest = int(curve.first_hz > 0 and curve.frequency_hz[0] < 0.5 * curve.spacing_hz)
     found = []
@@ -314,6 +315,10 @@ def _significant(curve: _Curve, min_prominence_db: float, false_alarm: float) ->
         if surprise * pairs <= chance and 10 * np.log10(ratio) >= min_prominence_db:
             found.append(_located(curve, int(line), float(over_floor[line])))
     return found
+
+
+def _upper_bound(power: Floats, freedom: Floats) -> Floats:
+    return np.asarray(power * freedom / scipy.special.chdtri(freedom, 1 - UPPER_BOUND_CHANCE), dtype=np.float64)
 
 
 def _maxima(curve: _Curve) -> NDArray[np.bool_]:
@@ -361,7 +366,7 @@ def _located(curve: _Curve, line: int, over_floor: float) -> _Found:
         std_hz = curve.spacing_hz / np.sqrt(12)
     else:
         run = _above_half(curve, line)
-        narrow = run.size <= 2 * noise_bandwidth_bins(curve.window) + 1
+        narrow = run.size <= 2 * noise_bandwidth_bins(curve.window) + 1 or _falls_with_the_window(curve, line)
         if narrow and curve.sampled:
             # Three points of a lone resonance tell all of it, however narrow it is.
             run, narrow = np.arange(line - 1, line + 2), False
@@ -373,6 +378,16 @@ def _located(curve: _Curve, line: int, over_floor: float) -> _Found:
         relative_std=relative_std,
         over_floor=over_floor,
     )
+
+
+def _falls_with_the_window(curve: _Curve, line: int) -> bool:
+    """Whether the lines a noise bandwidth away surely lie below half of a peak, however few the averages."""
+    reach = ceil(noise_bandwidth_bins(curve.window))
+    if not reach <= line < curve.power.size - reach:
+        return False
+    flanks = [line - reach, line + reach]
+    bounds = _upper_bound(curve.power[flanks], 2 / curve.relative_std[flanks] ** 2)
+    return bool(np.all(bounds < curve.power[line] / 2))
 
 
 def _above_half(curve: _Curve, line: int) -> NDArray[np.int64]:

@@ -120,14 +120,10 @@ def _level_and_share(squares: Floats, power: Floats, used: NDArray[np.bool_]) ->
     Multiplicative steps keep both positive and raise the likelihood each time (Fevotte & Idier 2011, Neural
     Computation 23, 2421, for the Itakura-Saito divergence).
     """
-    count = np.maximum(used.sum(axis=-1, keepdims=True), 1)
-    level = np.sum(np.where(used, squares, 0.0), axis=-1, keepdims=True) / count
-    share = level / np.maximum(
-        np.sum(np.where(used, power, 0.0), axis=-1, keepdims=True) / count, np.finfo(float).tiny
-    )
+    ones = used.astype(np.float64)
+    level, share = _ratio(squares * ones, ones), _ratio(squares * ones, power * ones)
     for _ in range(ROUNDS):
-        variance = level + share * power
-        trust = np.where(used, 1 / variance, 0.0)
+        trust = ones / np.where(used, level + share * power, 1.0)
         gain = trust**2 * squares
         level = level * np.sqrt(_ratio(gain, trust))
         gain, trust = gain * power, trust * power

@@ -36,8 +36,10 @@ def response_figures(study: Study) -> dict[str, Figure]:
 
 def _figure(study: Study, panel: Panel, style: Style) -> Figure:
     peaks = _peaks(study, panel)
-    figure, (magnitude, phase, coherence) = sheet(
-        HEIGHTS_IN, above_points=STRIP_POINTS if peaks else 0.0, sharex=True
+    # A file needn't hold a coherence.
+    coherent = any(np.isfinite(panel.coherence(row)).any() for row in panel.group.rows)
+    figure, (magnitude, phase, *below) = sheet(
+        HEIGHTS_IN if coherent else HEIGHTS_IN[:2], above_points=STRIP_POINTS if peaks else 0.0, sharex=True
     )
     _draw_magnitude(magnitude, peaks, panel, style)
     for row in panel.group.rows:
@@ -46,16 +48,15 @@ def _figure(study: Study, panel: Panel, style: Style) -> Figure:
         breaks = np.union1d(line_breaks(panel.frequency_hz()), phase_wraps(angle))
         phase.plot(*with_breaks(panel.frequency_hz(), angle, breaks), color=colour)
         breaks = line_breaks(panel.frequency_hz())
-        coherence.plot(*with_breaks(panel.frequency_hz(), panel.coherence(row), breaks), color=colour)
+        for axes in below:
+            axes.plot(*with_breaks(panel.frequency_hz(), panel.coherence(row), breaks), color=colour)
     phase.set_ylabel(f"Phase [deg]\n{CONVENTION}")
     phase.set_ylim(-190, 190)
     phase.set_yticks([-180, -90, 0, 90, 180])
-    coherence.set_ylabel(("Coherence" if len(panel.response.references) == 1 else "Multiple\ncoherence") + " [1]")
-    coherence.set_ylim(0, 1.04)
-    if not any(np.isfinite(panel.coherence(row)).any() for row in panel.group.rows):
-        # An empty frame looks like a coherence of zero.
-        coherence.text(0.5, 0.5, "not in the file", transform=coherence.transAxes, ha="center", va="center")
-    coherence.set_xlabel("Frequency [Hz]")
+    for axes in below:
+        axes.set_ylabel(("Coherence" if len(panel.response.references) == 1 else "Multiple\ncoherence") + " [1]")
+        axes.set_ylim(0, 1.04)
+    figure.axes[-1].set_xlabel("Frequency [Hz]")
     return figure
 
 
