@@ -13,7 +13,7 @@ from chladni.io import log_clocks
 from chladni.io.clocks import Stamped, clocks_of
 from chladni.io.convert import convert
 from chladni.io.log import Log, open_log
-from chladni.io.placement import digests_of, repeats_of
+from chladni.io.repeats import digests_of, repeats_of
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.testing import assert_close
 from chladni.signals.time_base import fit_time_base
