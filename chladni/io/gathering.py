@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from chladni.io.arrival import Arrivals, arrival_order, stored_late
 from chladni.io.clocks import Key, Stamped, StreamClock
-from chladni.io.placement import Placement, StatedRate, digests_of, place_stream, without_grid
+from chladni.io.placement import Placement, StatedRate, place_stream, without_grid
 from chladni.io.publishers import at_once, count_by_stamps, evenly_in_turn, told_apart
+from chladni.io.repeats import digests_of
 from chladni.io.stream import Piece, Stream
 from chladni.io.untimed import SLACK_NS, untimed
 from chladni.signals.clock_steps import LEAP_NS, ClockSteps

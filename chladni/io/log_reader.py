@@ -19,10 +19,10 @@ from chladni.io.placement import (
     Group,
     Placement,
     StatedRate,
-    digests_of,
     group_placements,
     lowest_index,
 )
+from chladni.io.repeats import digests_of
 from chladni.io.stream import Piece, Stream, read_pieces
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.gathering import Gathering
-from chladni.io.placement import digests_of
+from chladni.io.repeats import digests_of
 from chladni.io.stream import Piece
 from chladni.signals.channel import Channel
 from chladni.signals.sensor_quality import SensorFault, sensor_quality

@@ -159,15 +159,12 @@ def _count_untold(tangled: Untangled, mean_ns: float, quantum_ns: float, *, burs
     time_ns, steps, cuts = tangled.time_ns, tangled.steps, tangled.clock.message
     if bursts:
         yield from _count_bursts(tangled, mean_ns, quantum_ns)
-    # A stamp that others have too tells no sample's place.
-    if int(np.count_nonzero(steps == 0)) > _SHARED * steps.size:
-        return
     some = steps[:: max(1, steps.size // SAMPLE)]
     guess = float(np.median(some[some > 0]))
     by_phase = count_by_phase(time_ns, steps, guess, cuts)
     # Records of a few samples each, with pauses of any length, look like bursts; of two or three any grid is chance.
     told = not bursts or time_ns.size >= SHORT * by_phase.resumed.size
-    # Places told by a stamp that others have too would be those of the bursts.
+    # A stamp that others have too tells no sample's place.
     told &= int(np.count_nonzero(steps == 0)) <= _SHARED * steps.size
     # Chance gives a coherence of 0.055 over windows of 256.
     if told and by_phase.coherence > 0.09 + 2.5 / np.sqrt(time_ns.size) and _mostly_filled(steps, guess):

@@ -1,8 +1,7 @@
 """Time base: rate, start and soundness of a clock, from the stamps of messages."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
 from math import inf, isfinite, pi
 from typing import Any, Literal
 
@@ -15,16 +14,11 @@ from chladni.signals.clock_fit import Clock, cut_by_one, fit_clock, measure_wand
 from chladni.signals.clock_steps import LONGEST_NS, ClockSteps
 from chladni.signals.clock_verdict import EVENTS, advice, ticking, uneven, verdict, with_nominal, with_round_rate
 from chladni.signals.errors import EstimateError
-from chladni.signals.grid_index import choose_smoothing, grid_index
-from chladni.signals.stamp_gaps import list_gaps, spans_between
+from chladni.signals.grid_places import place_by_phase, place_in_order, straight_pieces
+from chladni.signals.stamp_gaps import spans_between
 from chladni.signals.stamp_order import Untangled, require_stamps, untangle
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.value import Value, require_shape
-
-# Share of a period below which the second of two messages has no point of its own.
-_AT_ONCE = 0.05
-# Share of the messages that may find no free point; with more, the source was faster than the grid for a while.
-_CROWD = 0.01
 
 Verdict = Literal["regular", "jittered", "coarse", "bursts", "irregular", "still", "short", "stated"]
 
@@ -279,7 +273,7 @@ def _on_grid(
     if tangled.clock.count and not settled:
         tangled, counted, clock = _running_on(tangled, counted, clock)
     base = _measured(tangled, counted, clock)
-    base = _in_order(base, tangled, sizes, counted, clock) if counted.in_order else _by_phase(base, tangled)
+    base = place_in_order(base, tangled, sizes, counted, clock) if counted.in_order else place_by_phase(base, tangled)
     # Over a long gap even a small step of the rate would move what comes after.
     nearest = with_round_rate(base) if nominal_hz is None else with_nominal(base, nominal_hz)
     for one in (nearest, base):
@@ -296,9 +290,9 @@ def _stated(tangled: Untangled, rate_hz: float) -> TimeBase:
     # How the stamps depart from a rate that they don't keep is no wander.
     base = replace(_measured(tangled, counted, clock), verdict="stated", snapped=True, rate_std_hz=inf, wander_s=0.0)
     if counted.in_order:
-        base = _in_order(base, tangled, np.ones(1, dtype=np.int64), counted, clock)
+        base = place_in_order(base, tangled, np.ones(1, dtype=np.int64), counted, clock)
     else:
-        base = _by_phase(base, tangled)
+        base = place_by_phase(base, tangled)
     return replace(base, rate_hz=rate_hz, advice=advice(base))
 
 
@@ -320,7 +314,7 @@ def _measured(tangled: Untangled, counted: Counted, clock: Clock) -> TimeBase:
     index = count.index + clock.shift[count.stretch]
     # Messages of a burst are late, none is early: the last one of a burst is the most punctual.
     early_ns = (counted.burst_size - 1) * clock.period_ns
-    knots_ns, knots_index = _knots(wander.line_ns - early_ns, index - index[0], wander.pieces, first_ns)
+    knots_ns, knots_index = straight_pieces(wander.line_ns - early_ns, index - index[0], wander.pieces, first_ns)
     # Late by a tenth of a batch is little, though it be many samples.
     relative_jitter = wander.jitter_ns / (clock.period_ns * counted.item_size)
     # Where the clock was set: the first index that is left out, and the first one after.
@@ -344,125 +338,6 @@ def _measured(tangled: Untangled, counted: Counted, clock: Clock) -> TimeBase:
         knots_index=knots_index,
         cuts=cuts,
     )
-
-
-def _in_order(
-    base: TimeBase, tangled: Untangled, sizes: NDArray[np.int64], counted: Counted, clock: Clock
-) -> TimeBase:
-    """Add the stretches and the gaps between them."""
-    first = counted.count.resumed
-    if counted.burst_starts is not None:
-        first = counted.burst_starts[first]
-    samples = first if sizes.size == 1 else np.append(0, np.cumsum(sizes))[first]
-    total = tangled.time_ns.size if sizes.size == 1 else int(sizes.sum())
-    # A stretch that seems to begin before the one before has ended is late delivery, not time running back.
-    shift = np.maximum.accumulate(clock.shift)
-    base = replace(base, resumed=samples, resumed_shift=shift)
-    gap = np.flatnonzero(np.diff(shift) > 0) + 1
-    begin, end = samples[gap] + shift[gap], samples[gap] + shift[gap - 1]
-    return _with_gaps(base, tangled, sizes, first[gap], begin, end, total + int(shift[-1]))
-
-
-def _by_phase(base: TimeBase, tangled: Untangled) -> TimeBase:
-    """Add the smoothing and the gaps that remain with it."""
-    rising_ns = tangled.time_ns
-    clock = partial(
-        grid_index,
-        knots_ns=base.knots_ns,
-        knots_index=base.knots_index,
-        rate_hz=base.rate_hz,
-        cut_order=tangled.clock.message,
-        cuts=base.cuts,
-    )
-    smoothing = choose_smoothing(rising_ns, clock, repeats=base.duplicates)
-    lost = _points_lost(base, rising_ns, clock, smoothing)
-    if smoothing > 1 and lost < 0:
-        # Two messages for one point of the grid, though not with the very same stamp, are a repeat as well.
-        repeats = int(np.count_nonzero(tangled.steps < _AT_ONCE * NS_PER_S / base.rate_hz))
-        if repeats > base.duplicates and repeats + lost >= 0:
-            base = replace(base, duplicates=repeats)
-            smoothing = choose_smoothing(rising_ns, clock, repeats=repeats)
-            lost = _points_lost(base, rising_ns, clock, smoothing)
-    crowded = -lost > max(1, _CROWD * rising_ns.size)
-    one, set_at = np.ones(1, dtype=np.int64), tangled.clock.message
-    if smoothing > 1 and (crowded or -1 <= lost <= 0) and not base.duplicates:
-        # As many samples as grid points: their order tells their places better than scattered stamps. With a few
-        # more they follow the stamps and leave those out; with many more this is no grid, as the check will find.
-        shift = np.append(0, np.cumsum(base.cuts[:, 1] - base.cuts[:, 0]))
-        base = replace(base, resumed=np.append(0, set_at), resumed_shift=shift)
-        begin, end = set_at + shift[1:], set_at + shift[:-1]
-        return _with_gaps(base, tangled, one, set_at, begin, end, rising_ns.size + int(shift[-1]))
-    after = np.union1d(np.flatnonzero(tangled.steps > 1.5 * NS_PER_S / base.rate_hz) + 1, set_at)
-    if smoothing == 1:
-        begin, end = (clock(rising_ns[place], place) for place in (after, after - 1))
-    else:
-        index = clock(rising_ns, np.arange(rising_ns.size), smoothing=smoothing)
-        begin, end = index[after], index[after - 1]
-    gap = begin - end > 1
-    last = rising_ns.size + lost + _cut_out(base)
-    base = _with_gaps(base, tangled, one, after[gap], begin[gap], end[gap] + 1, last)
-    return replace(base, missing=max(0, lost + base.duplicates), smoothing=smoothing)
-
-
-def _with_gaps(
-    base: TimeBase,
-    tangled: Untangled,
-    sizes: NDArray[np.int64],
-    message: NDArray[np.int64],
-    begin: NDArray[np.int64],
-    end: NDArray[np.int64],
-    last: int,
-) -> TimeBase:
-    """Add gaps, breaks and the longest stretch between them.
-
-    Parameters
-    ----------
-    base, tangled, sizes
-        What is known; samples of each message, or a single number for all.
-    message
-        First message after each place where samples don't follow each other.
-    begin, end
-        Grid index of its first sample, and one more than that of the last sample before.
-    last
-        One more than the last index of all.
-    """
-    spans_s = spans_between(tangled.time_ns, message, sizes, NS_PER_S / base.rate_hz)
-    cut = np.isin(message, tangled.clock.message)
-    lengths = np.append(end, last) - np.append(0, begin)
-    gaps = list_gaps(spans_s[~cut], float(lengths.sum()) / base.rate_hz)
-    breaks_s = np.concatenate((spans_s[cut], gaps.leaps))
-    return replace(
-        base,
-        gaps=gaps.longest,
-        gap_count=gaps.count,
-        missing=int((begin - end)[~cut].sum()),
-        breaks_s=breaks_s[np.argsort(breaks_s[:, 0], kind="stable")],
-        longest_stretch_s=float(lengths.max()) / base.rate_hz,
-    )
-
-
-def _cut_out(base: TimeBase) -> int:
-    """Grid points left out where the clock was set."""
-    return int((base.cuts[:, 1] - base.cuts[:, 0]).sum())
-
-
-def _points_lost(
-    base: TimeBase, rising_ns: NDArray[np.int64], clock: Callable[..., NDArray[np.int64]], smoothing: int
-) -> int:
-    """Grid points that no message has, beside those left out on purpose; negative with more messages than points."""
-    end = np.arange(max(0, rising_ns.size - 4 * smoothing), rising_ns.size)
-    return int(clock(rising_ns[end], end, smoothing=smoothing)[-1]) + 1 - rising_ns.size - _cut_out(base)
-
-
-def _knots(
-    line_ns: NDArray[np.float64], index: NDArray[np.int64], pieces: NDArray[np.int64], first_ns: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Both ends of each straight piece of the clock, in rising order."""
-    ends = np.append(pieces[1:], index.size) - 1
-    both = np.unique(np.concatenate((pieces, ends)))
-    knots = np.rint(line_ns[both]).astype(np.int64) + first_ns
-    rising = np.concatenate(([True], knots[1:] > np.maximum.accumulate(knots)[:-1]))
-    return knots[rising], index[both][rising].astype(np.float64)
 
 
 def _stands_still(steps: NDArray[np.int64]) -> bool:

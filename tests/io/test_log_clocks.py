@@ -13,12 +13,12 @@ from chladni.io import log_clocks
 from chladni.io.clocks import Stamped, clocks_of
 from chladni.io.convert import convert
 from chladni.io.log import Log, open_log
-from chladni.io.placement import digests_of, repeats_of
+from chladni.io.repeats import digests_of, repeats_of
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.testing import assert_close
 from chladni.signals.time_base import fit_time_base
 from tests.io.test_log import together
-from tests.make_logs import START_NS, LogMaker, header, write_scalars
+from tests.make_logs import START_NS, LogMaker, header, write_scalars, write_stored
 from tests.signals.stamp_makers import stamps
 
 SAMPLE = """std_msgs/Header header
@@ -354,3 +354,15 @@ def test_series_of_a_broken_log_survive_conversion(tmp_path: Path) -> None:
         before, after = one.read(), other.read()
         np.testing.assert_allclose(after.values, before.values)
         assert after.sample_rate_hz == before.sample_rate_hz
+
+
+def test_a_window_of_a_large_log_whose_own_clock_was_set_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(log_clocks, "READ_WHOLE_BYTES", 0)
+    number = np.arange(8000)
+    write_stored(tmp_path / "a.mcap", START_NS + number % 2000 * 10_000_000, number.astype(float), chunk_size=4096)
+    with open_log(tmp_path / "a.mcap") as log:
+        # Chunks say that log times go back; three samples are left out before the fourth stretch.
+        part = log.read(["/s.data"], start_s=65.0, end_s=66.0)
+        np.testing.assert_array_equal(part.values[0], np.arange(6500, 6600) - 3)
