@@ -15,13 +15,6 @@ settings.register_profile("chladni", deadline=None)
 settings.load_profile("chladni")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Leave slow tests out of coverage: counting lines doubles the time of a search, quick tests reach the same."""
-    for item in items:
-        if item.get_closest_marker("slow"):
-            item.add_marker("no_cover")
-
-
 @pytest.fixture(scope="session", autouse=True)
 def one_thread_a_worker(request: pytest.FixtureRequest) -> Iterator[None]:
     """Where tests run on all cores already, a diagnosis takes one; tests of its threads ask for them."""
