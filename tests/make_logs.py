@@ -282,6 +282,22 @@ def write_stored(path: Path, log_ns: np.ndarray, values: np.ndarray, **options: 
             log.write(channel, {"data": value}, time_ns)
 
 
+#: Of `write_driven`: how late its state is, and how large against the command.
+LATE_S, GAIN = 0.012, 0.5
+
+
+def write_driven(path: Path) -> None:
+    """Write commands at 50 Hz, and a state at 250 Hz that is half of what was commanded three samples before."""
+    commands = np.random.default_rng(4).standard_normal(6000)
+    with LogMaker(path) as maker:
+        command = maker.ros2("/drive", "my_msgs/msg/MotorCommand", FLOAT64)
+        encoder = maker.ros2("/encoder", "std_msgs/msg/Float64", FLOAT64)
+        for number, value in enumerate(commands):
+            maker.write(command, {"data": value}, START_NS + number * 20_000_000)
+        for number, value in enumerate(GAIN * np.repeat(commands, 5)):
+            maker.write(encoder, {"data": value}, START_NS + number * 4_000_000 + round(LATE_S * 1e9))
+
+
 def protobuf_log(path: Path, values: Iterable[float], *, rate_hz: float = 100.0) -> None:
     """Write a protobuf topic ``/sensor`` with google.protobuf.Timestamp and a double, encoded by hand."""
     from google.protobuf import descriptor_pb2, timestamp_pb2

@@ -10,7 +10,7 @@ from chladni.signals.errors import EstimateError, LogError
 from chladni.signals.testing import assert_close
 from chladni.signals.time_series import TimeSeries
 from tests.arm import FORCE, TOOL, WRIST, write_arm
-from tests.make_logs import FLOAT64, LogMaker
+from tests.make_logs import GAIN, LATE_S, write_driven
 
 
 @pytest.fixture(scope="module")
@@ -105,23 +105,10 @@ def test_responses_default_to_what_moves_on_the_references_clock(tmp_path):
     assert any("2 sampling grids joined: brought to 100 Hz by band-limited" in one for one in named.provenance.notes)
 
 
-LATE_S, GAIN = 0.012, 0.5
-
-
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory):
-    """Commands at 50 Hz, and a state at 250 Hz that is half of what was commanded three samples before."""
     path = tmp_path_factory.mktemp("driven") / "drive.mcap"
-    commands = np.random.default_rng(4).standard_normal(6000)
-    state = GAIN * np.repeat(commands, 5)
-    start_ns = 1_700_000_000_000_000_000
-    with LogMaker(path) as maker:
-        command = maker.ros2("/drive", "my_msgs/msg/MotorCommand", FLOAT64)
-        encoder = maker.ros2("/encoder", "std_msgs/msg/Float64", FLOAT64)
-        for number, value in enumerate(commands):
-            maker.write(command, {"data": value}, start_ns + number * 20_000_000)
-        for number, value in enumerate(state):
-            maker.write(encoder, {"data": value}, start_ns + number * 4_000_000 + round(LATE_S * 1e9))
+    write_driven(path)
     return path
 
 

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from tests.arm import FORCE, TOOL, WRIST, short_arm
+from tests.make_logs import write_driven
 
 
 def test_the_document_holds_what_was_promised(run, arm_log):
@@ -64,3 +65,28 @@ def test_bad_options_are_told_in_one_line(run, arm_log, arguments, words):
     assert outcome.code == 2
     assert words in outcome.err
     assert outcome.err.count("\n") == 1
+
+
+def test_commands_are_held_by_themselves_and_other_ways_can_be_named(run, tmp_path):
+    path = tmp_path / "drive.mcap"
+    write_driven(path)
+    named = [
+        "frf",
+        path,
+        "--reference",
+        "/drive.data",
+        "--response",
+        "/encoder.data",
+        "--resolution",
+        0.5,
+        "--json",
+        "-",
+    ]
+    held = run(*named)
+    assert held.code == 0, held.err
+    assert "/drive.data: held between samples at 250 Hz (its message type is a command)" in " ".join(held.err.split())
+    assert held.document["frequency_hz"][-1] == 125.0
+    smooth = run(*named, "--join", "band-limited")
+    assert smooth.document["frequency_hz"][-1] == 25.0
+    assert "band-limited resampling" in " ".join(smooth.err.split())
+    assert run(*named, "--join", "linear").code == 2
