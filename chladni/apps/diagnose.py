@@ -161,7 +161,7 @@ def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
             f"{name}: holds no channel that model {model.name!r} listens to; it holds "
             f"{some_of(held, count=NAMES_TOLD)}, the model listens to {some_of(sorted(wanted), count=NAMES_TOLD)}"
         )
-    series, notes = joined(log, chosen, span)
+    series, notes = joined(log, chosen, span, exact=True)
     damage = reading_sentences(log, everything=False)
     begins_s = (series.start_time_ns - log.start_time_ns) / NS_PER_S
     found = matched_log(model, series, log=name, held=held, begins_s=begins_s, damage=damage)

@@ -169,7 +169,7 @@ def _shared(ours: Log, theirs: Log) -> list[str]:
 
 
 def _read(log: Log, names: Sequence[str], span: Span) -> tuple[TimeSeries, tuple[str, ...]]:
-    series, notes = joined(log, names, span)
+    series, notes = joined(log, names, span, exact=True)
     if not (series.all_valid() and np.isfinite(series.values).all()):
         raise LogError(f"{log.path.name}: samples are missing; choose a part without gaps with --start and --end")
     return series, notes

@@ -2,12 +2,15 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.log import Log
+from chladni.io.log_reader import several_grids
+from chladni.signals.errors import LogError
 from chladni.signals.resampling import JoinMethod, join_note, join_resampled
 from chladni.signals.time_series import TimeSeries
 
@@ -129,14 +132,26 @@ def on_one_grid(log: Log, names: Sequence[str], span: Span, *, progress: Progres
     return Watched(names, (series,), duration_s=series.duration_s, progress=progress, notes=notes)
 
 
-def joined(log: Log, names: Sequence[str], span: Span) -> tuple[TimeSeries, tuple[str, ...]]:
-    """Read named channels in memory, and join them where they have several sampling grids; a note says how."""
+def joined(log: Log, names: Sequence[str], span: Span, *, exact: bool = False) -> tuple[TimeSeries, tuple[str, ...]]:
+    """Read named channels in memory, and join them where they have several sampling grids; a note says how.
+
+    Raises
+    ------
+    LogError
+        When the log is too large for that; with `exact`, when samples had to be computed and nobody asked for it.
+    """
     if not is_small(log):
         return log.read(names, start_s=span.start_s, end_s=span.end_s), ()
     groups = log.read_groups(names, start_s=span.start_s, end_s=span.end_s)
     if len(groups) == 1:
         return groups[0], ()
     found = join_resampled(groups, method=span.join)
+    if exact and span.join == "auto" and isfinite(found.attenuation_db):
+        told = [(one.channels, one.sample_rate_hz, one.start_time_ns) for one in groups]
+        raise LogError(
+            f"{several_grids(log.path.name, told)}; or --join band-limited, whose error near half the lowest rate a "
+            "diagnosis takes for one of the model"
+        )
     note = join_note(groups, found)
     return found.series.select(list(names)), (
         f"{len(groups)} sampling grids joined: {note}; --join chooses another way",

@@ -181,3 +181,22 @@ def test_measured_logs_find_their_models_signals(
 def test_a_model_of_another_machine_is_refused(engine: StandIn, shared_data: Path) -> None:
     with pytest.raises(LogError, match=r"emps\.mcap: holds no channel that model 'silverbox' listens to"):
         chladni.diagnose_gap(shared_data / "models" / "silverbox.toml", shared_data / "emps.mcap")
+
+
+def slow_force(tmp_path: Path) -> Path:
+    """The arm's log with a force that was commanded at half the rate, and stands still for samples on end."""
+    series, path = made.log_series(), tmp_path / "slow.mcap"
+    stairs = np.repeat(series.values[:1, ::20], 10, axis=1)[:, : series.samples // 2]
+    force = replace(series, values=stairs, channels=series.channels[:1], sample_rate_hz=made.RATE_HZ / 2)
+    write_mcap([force, replace(series, values=series.values[1:], channels=series.channels[1:])], path)
+    return path
+
+
+def test_a_command_of_a_lower_rate_is_held_on_the_grid_of_the_sensors(
+    engine: StandIn, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    found = chladni.diagnose_gap(files[0], slow_force(tmp_path))
+    assert engine.measurements[0].sample_rate_hz == made.RATE_HZ
+    inputs = engine.measurements[0].inputs[0]
+    np.testing.assert_allclose(inputs, np.repeat(made.log_series().values[0, ::20], 20)[: inputs.size])
+    assert any("held between samples at 500 Hz (its samples are a staircase)" in one for one in found.remarks)

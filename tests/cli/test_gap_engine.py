@@ -65,7 +65,7 @@ def test_the_same_files_give_the_same_document_to_the_byte(
     assert b'"gain_error"' in written[0].read_bytes()
 
 
-def test_channels_at_different_rates_are_joined_and_it_is_said(
+def test_channels_at_different_rates_are_refused_with_what_to_do(
     run: Run, files: tuple[Path, Path], tmp_path: Path
 ) -> None:
     series, slow = made.log_series(), tmp_path / "slow.mcap"
@@ -74,7 +74,8 @@ def test_channels_at_different_rates_are_joined_and_it_is_said(
     seen = replace(series, values=series.values[1:, ::2], channels=series.channels[1:], sample_rate_hz=half)
     write_mcap([driven, seen], slow)
     outcome = run("gap", files[0], slow)
-    assert outcome.code == 0
-    told = " ".join(outcome.out.split())
-    assert "2 sampling grids joined: brought to 250 Hz by band-limited resampling" in told
-    assert "--join chooses another way" in told
+    assert (outcome.code, outcome.out, outcome.err.count("\n")) == (2, "", 1)
+    assert "/shaker.wrench.force.x at 500 Hz" in outcome.err
+    assert "at 250 Hz; bring them to one" in outcome.err
+    assert "chladni convert slow.mcap OUT.mcap --resample 500" in outcome.err
+    assert "--join band-limited" in outcome.err

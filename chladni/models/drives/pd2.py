@@ -22,7 +22,7 @@ PD2_PARAMETERS: Final = Parameters(
         ),
         Parameter(
             name="pd2_second_derivative", value=2.05e-5, unit="s^2", low=0.0, high=4e-4, minimum=-100.0, maximum=1e2,
-            symbol="T_2", shown_unit="ms^2", tolerance=0.0, meaning="weight of the second derivative",
+            symbol="T_2", shown_unit="(ms)^2", tolerance=0.0, meaning="weight of the second derivative",
         ),
         # The paper prints none; without it a step would ask for an impulse of flow.
         Parameter(
