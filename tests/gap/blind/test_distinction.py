@@ -68,6 +68,7 @@ def test_what_no_number_imitates_stays(scene):
     assert left(scene, change) == pytest.approx(5.0, rel=0.05)
 
 
+@pytest.mark.nightly
 def test_what_more_of_another_effect_does_is_imitated_by_it(scene):
     bench, numbers, drive, _, noise = scene
     # One number of the machine's is enough beside that of the other effect.

@@ -237,7 +237,7 @@ def test_a_case_with_two_effects_has_both_at_different_sites():
 
 
 @pytest.mark.usefixtures("short")
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_case_with_three_effects_has_each_at_its_own_site():
     made = orders(30, np.random.default_rng(1), {"three": 1})
     assert all(len(order.words) == 3 for order in made)

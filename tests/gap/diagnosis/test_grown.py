@@ -23,7 +23,7 @@ def seen_twice(model):
     return replace(model, outputs=model.outputs[1:])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_second_play_grows_beside_the_first() -> None:
     plays = tuple(chladni.attached("backlash", site, {"gap": gap}) for site, gap in GAPS.items())
     machine = seen_twice(chain([2.1, 2.5, 3.0], [4.9e5, 6.1e5, 4e5], [40.0, 66.0, 50.0], at=2)).with_effects(plays)

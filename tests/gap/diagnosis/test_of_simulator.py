@@ -156,7 +156,7 @@ def test_a_clipped_sensor_is_named():
     assert cause.parameters["limit"].value == pytest.approx(0.1, rel=0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_simulators_own_step_is_told():
     # Euler's steps of 5 ms against 1.25 ms: late by about 2 ms, which looks like a delay.
     found = diagnose_simulator(slide(), log_of([], MOVED, step_s=1 / RATE_HZ / 4))

@@ -44,7 +44,7 @@ def test_details_of_one_law_mustn_t_name_a_second(effects: tuple[AttachedEffect,
     assert nats(*effects) == 100.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_second_is_found_behind_the_first() -> None:
     study = study_of(arm(), measured((SPRING, LATE), seconds=6.0, seed=4), leave_out=all_but(), own={})
     first = single_causes(study, lambda _: None).ranked[0]

@@ -38,7 +38,7 @@ def test_alone_it_is_named() -> None:
     assert found.tuned_parameters["j0.damping"].value == pytest.approx(DAMPING, rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_beside_friction_nothing_is_missing_would_be_wrong() -> None:
     found = diagnosed(chladni.attached("coulomb_friction", "j0", {"force": 8.0}))
     assert found.verdict == "unknown"

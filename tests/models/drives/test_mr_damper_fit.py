@@ -195,7 +195,7 @@ def test_fitted_on_two_currents_the_third_and_another_stroke_are_predicted(share
     assert 100 * mr_error(fit.coefficients, measured(shared_data, "mr_1A")).of_rms_force < 10.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_extension_follows_a_log(shared_data):
     fit = fit_mr_damper([measured(shared_data, "mr_0.5A")], asymmetry=True, starts=1, rate_hz=50.0)
     assert 100 * fit.errors[0].of_rms_force < 4.6
