@@ -11,6 +11,7 @@ from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, LogError, SetupError
 from chladni.signals.geometry import Geometry
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
     from chladni.signals.frequency_response import FrequencyResponse
@@ -160,7 +161,7 @@ def placed_rows(
     notes = [] if base.verdict == "regular" else [f"{where}: the times are {base.verdict}: {base.advice}."]
     lost = int(np.isfinite(rows).any(axis=0).sum() - np.isfinite(grid.values).any(axis=0).sum())
     if lost:
-        notes.append(f"{where}: {lost} samples came at the same time as another one and are left out.")
+        notes.append(f"{where}: {counted(lost, 'sample')} left out: another one came at the same time.")
     return FileContents(series=(series,), notes=tuple(notes), time_bases=(base,))
 
 
