@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from made_messages import ENCODINGS, Encoding, Record, TypeMaker, declared_paths, draw, numbers
+from made_messages import ENCODINGS, Encoding, Record, TypeMaker, declared_paths, draw, json_text, numbers
 from mcap.reader import NonSeekingReader
 from mcap.writer import CompressionType, IndexType, Writer
 
@@ -63,8 +63,9 @@ def make_log(rng: random.Random) -> MadeLog:
     """Write a random valid log; all topics have one rate, and each message its own time."""
     topics = []
     for number in range(rng.randint(1, 3)):
-        kind = TypeMaker(rng).record()
-        topics.append(Topic(f"/t{number}", kind, rng.choice(ENCODINGS)(kind), rng.choice((1, 1, 2, 3))))
+        written = rng.choice(ENCODINGS)
+        kind = TypeMaker(rng, lists_in_lists=written is json_text).record()
+        topics.append(Topic(f"/t{number}", kind, written(kind), rng.choice((1, 1, 2, 3))))
     settings: dict[str, Any] = {
         "compression": rng.choice(list(CompressionType)),
         "chunk_size": rng.choice((200, 1500, 1 << 20)),

@@ -50,7 +50,7 @@ class Text:
 class Array:
     """Elements of one kind: ``length`` of them, or up to `LONGEST` where that is None."""
 
-    element: "Number | Record | Text"
+    element: "Type"
     length: int | None
 
 
@@ -66,10 +66,10 @@ Type = Number | Text | Array | Record
 
 
 class TypeMaker:
-    """Makes random message types of distinct names."""
+    """Makes random message types of distinct names; lists in lists are JSON's alone."""
 
-    def __init__(self, rng: random.Random) -> None:
-        self._rng = rng
+    def __init__(self, rng: random.Random, *, lists_in_lists: bool) -> None:
+        self._rng, self._lists_in_lists = rng, lists_in_lists
         self._names = 0
 
     def record(self, depth: int = 0) -> Record:
@@ -86,7 +86,9 @@ class TypeMaker:
             return Array(inner, self._length()) if self._rng.random() < 0.6 else inner
         if chance < 0.45:
             return Text()
-        element = Number(self._rng.choice(list(NUMBERS)))
+        element: Type = Number(self._rng.choice(list(NUMBERS)))
+        if self._lists_in_lists and self._rng.random() < 0.3:
+            element = Array(element, self._length())
         return Array(element, self._length()) if self._rng.random() < 0.4 else element
 
     def _length(self) -> int | None:
