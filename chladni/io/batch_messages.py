@@ -1,5 +1,6 @@
 """Batch messages: one message holds many samples of several columns (a DAQ block, an IMU's FIFO)."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -7,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.decoding.columns import Decoded, Strings
+from chladni.io.decoding.columns import Decoded, StringValue
 from chladni.io.decoding.schema import FieldInfo
 from chladni.io.known_schemas import message_type
 from chladni.signals.errors import LogError
@@ -139,8 +140,8 @@ def _sample_block(leaves: Mapping[str, FieldInfo]) -> BatchLayout | None:
     return None
 
 
-def column_names(layout: BatchLayout, decoded: Decoded) -> tuple[str, ...]:
-    """Names of the columns, as the first good message (or the layout) gives them.
+def column_names(layout: BatchLayout, heads: Sequence[Decoded]) -> tuple[str, ...]:
+    """Names of the columns, as most of the first good messages (or the layout) give them.
 
     Raises
     ------
@@ -151,7 +152,7 @@ def column_names(layout: BatchLayout, decoded: Decoded) -> tuple[str, ...]:
         case None:
             names = layout.samples
         case str(leaf):
-            names = _first_list(decoded.columns[leaf].strings, decoded.bad)
+            names = _usual_list(heads, leaf)
         case _:
             names = layout.names
     repeated = sorted({name for name in names if names.count(name) > 1})
@@ -163,19 +164,20 @@ def column_names(layout: BatchLayout, decoded: Decoded) -> tuple[str, ...]:
     return names
 
 
-def column_units(layout: BatchLayout, decoded: Decoded) -> tuple[str, ...]:
-    """Units of the columns as the first good message gives them; empty when it gives none."""
-    if layout.units is None:
-        return ()
-    return _first_list(decoded.columns[layout.units].strings, decoded.bad)
+def column_units(layout: BatchLayout, heads: Sequence[Decoded]) -> tuple[str, ...]:
+    """Units of the columns as most of the first good messages give them; empty when they give none."""
+    return () if layout.units is None else _usual_list(heads, layout.units)
 
 
-def _first_list(strings: Strings, bad: NDArray[np.bool_]) -> tuple[str, ...]:
-    good = np.flatnonzero(~bad)
-    if not good.size:
-        return ()
-    entry = strings[int(good[0])]
-    return (entry,) if isinstance(entry, str) else entry
+def _usual_list(heads: Sequence[Decoded], leaf: str) -> tuple[str, ...]:
+    """The list of strings that most messages have; one that says otherwise may be damaged."""
+    found = Counter[StringValue]()
+    for decoded in heads:
+        strings = decoded.columns[leaf].strings
+        found.update(strings.table[code] for code in strings.codes[~decoded.bad].tolist())
+    for entry, _ in found.most_common(1):
+        return (entry,) if isinstance(entry, str) else entry
+    return ()
 
 
 # --- expanding ---------------------------------------------------------------------------------------------------

@@ -84,7 +84,7 @@ _COMMAND_WORDS = frozenset(["command", "commands", "cmd", "cmds", "setpoint", "s
 
 _BOOKKEEPING = re.compile(
     r"(^|\.)(header|stamp|timestamp\w*|time|seq|sequence\w*|device_id|\w*_?id|frame|\w*covariance\w*|variance"
-    r"|error_count|clip_counter|calibration_count|samples|status|\w*flags?|ORB_QUEUE_LENGTH)(\[\])?(\.|$)"
+    r"|error_count|clip_counter|calibration_count|samples|status|\w*flags?|ORB_QUEUE_LENGTH)(\[\])*(\.|$)"
 )
 _FORCE_NAME = re.compile(r"(?:^|[^a-z])(hammer|shaker|force|torque|effort|thrust)(?:[^a-z]|$)")
 
@@ -167,8 +167,6 @@ def is_signal(info: FieldInfo) -> bool:
     All other numbers can still be read by naming them.
     """
     if info.kind != "number" or info.dtype is None or _BOOKKEEPING.search(info.path):
-        return False
-    if isinstance(info.array, int) and info.array > MAX_LISTED_ELEMENTS:
         return False
     # Counted bytes are pictures and packed clouds.
     return not (info.array == "dynamic" and info.dtype.itemsize == 1)

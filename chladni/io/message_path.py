@@ -17,6 +17,7 @@ _FILTER = re.compile(
     r"""\{\s*(?P<field>[^\s=!<>{}"']+)\s*(?P<operator>==|!=|<=|>=|<|>)\s*"""
     r"""(?:"(?P<double>(?:[^"\\]|\\.)*)"|'(?P<single>(?:[^'\\]|\\.)*)'|(?P<bare>[^\s{}"']+))\s*\}"""
 )
+_PLAIN_KEY = re.compile(r'(?![0-9]+$)[^\[\]:"\s-](?:[^\[\]:"]*[^\[\]:"\s])?')
 _PLAIN_NAME = re.compile(r'(?!@)[^.\[\]{}"\s]+')
 
 
@@ -128,6 +129,21 @@ def quoted(name: str) -> str:
     """
     if _PLAIN_NAME.fullmatch(name):
         return name
+    return _in_quotes(name)
+
+
+def element_key(name: str) -> str:
+    """Write the name of an element so that it parses back to itself in brackets.
+
+    Examples
+    --------
+    >>> element_key("left elbow"), element_key("7")
+    ('left elbow', '"7"')
+    """
+    return name if _PLAIN_KEY.fullmatch(name) else _in_quotes(name)
+
+
+def _in_quotes(name: str) -> str:
     escaped = name.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'
 

@@ -191,7 +191,7 @@ class Stream:
         lost: dict[str, int],
         arrivals: Arrivals,
     ) -> Piece:
-        columns = [_column(decoded, source) for source in self.sources]
+        columns = [_column(decoded, source, keep, lost) for source in self.sources]
         somewhere = [present for _, present in columns if present is not None]
         if len(somewhere) == len(columns):
             keep = keep & np.logical_or.reduce(somewhere)
@@ -261,11 +261,15 @@ def _span_ns(counts: NDArray[np.int64], periods_s: NDArray[np.float64] | float) 
     return whole
 
 
-def _column(decoded: Decoded, source: ChannelSource) -> tuple[NDArray[np.floating[Any]], NDArray[np.bool_] | None]:
+def _column(
+    decoded: Decoded, source: ChannelSource, wanted: NDArray[np.bool_], lost: dict[str, int]
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.bool_] | None]:
     """Floating point and SI; single precision stays single unless a factor calls for more."""
     if source.selector is None:
         raise AssertionError("a channel of single samples has a selector")
-    numbers, present = select(decoded, source.selector)
+    selected = select(decoded, source.selector, wanted)
+    lost.update(selected.lost)
+    numbers, present = selected.values, selected.present
     floating = numbers if numbers.dtype in (np.float32, np.float64) else numbers.astype(np.float64)
     if source.factor != 1.0:
         floating = floating * floating.dtype.type(source.factor)

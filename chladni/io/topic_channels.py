@@ -1,23 +1,36 @@
 """The channels of one topic: all that are listed, and any that a path names."""
 
-from collections.abc import Iterator
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.batch_messages import BatchLayout, column_names, column_units, recognised_layout
 from chladni.io.channel_source import ChannelSource, channel_of, measured_fields
 from chladni.io.decoding import FieldInfo
-from chladni.io.decoding.columns import Strings
-from chladni.io.field_selector import FieldFilter, FieldSelector, names_beside, resolve_fields
+from chladni.io.decoding.columns import Column, Strings
+from chladni.io.decoding.schema import Dimension
+from chladni.io.field_selector import (
+    ElementChoice,
+    FieldFilter,
+    FieldSelector,
+    element_names,
+    list_places,
+    names_beside,
+    resolve_fields,
+    select,
+)
 from chladni.io.known_schemas import MAX_LISTED_ELEMENTS, has_signals, is_signal
 from chladni.io.loss import Unread
-from chladni.io.message_path import FieldStep, IndexStep, MessagePath, near_matches, quoted
+from chladni.io.message_path import FieldStep, IndexStep, MessagePath, element_key, near_matches, quoted
 from chladni.io.publishers import at_once
 from chladni.io.topic import Topic
 from chladni.signals.errors import LogError
+
+_MARK: Final = re.compile(r'"(?:[^"\\]|\\.)*"|\[\]')
 
 FRAME_FIELDS: Final = ("header.frame_id", "frame_id")
 """Where messages say which of several sensors of one kind they come from."""
@@ -35,10 +48,12 @@ class TopicChannels:
         How its batch messages are laid out; None when each message holds one sample.
     names, units
         Names of the columns of batch messages, and their units where the messages say (else empty).
-    lengths
-        Longest length seen of each array that is counted in the message.
+    elements
+        Indices of the elements of each array of numbers, in each list that it's in: those that the schema fixes, or
+        that the head holds. None for an array of more than are listed.
     joints
-        Names of array elements, by the leaf that holds them: every distinct list of names that the head holds.
+        Names of array elements, by the leaf that holds them: every distinct list of names that the head holds, but
+        for lists with a name that only one message holds.
     frames
         Filters on the frame's name, one for each of several publishers that send at once; else empty.
     """
@@ -47,7 +62,7 @@ class TopicChannels:
     layout: BatchLayout | None
     names: tuple[str, ...]
     units: tuple[str, ...]
-    lengths: dict[str, int]
+    elements: dict[str, tuple[tuple[int, ...], ...] | None]
     joints: dict[str, tuple[tuple[str, ...], ...]]
     frames: tuple[FieldFilter, ...] = ()
 
@@ -77,7 +92,8 @@ class TopicChannels:
             return self._column_source(path)
         if path.rest in self.topic.unread:
             raise LogError(f"{path.text!r} {self.topic.unread[path.rest]}")
-        selector = resolve_fields(path, self.topic.fields)
+        selector = self._called(resolve_fields(path, self.topic.fields), path)
+        self._require_one_element(selector, path)
         return self._leaf_source(selector, field=self._spelling(path, selector), name=path.text)
 
     @property
@@ -116,7 +132,7 @@ class TopicChannels:
     def _long_arrays(self) -> Iterator[str]:
         """Numeric arrays that are too long to be listed element by element."""
         for info in self.topic.fields if self.layout is None else ():
-            if info.kind == "number" and info.array is not None and self._length(info) > MAX_LISTED_ELEMENTS:
+            if info.kind == "number" and info.path in self.elements and self.elements[info.path] is None:
                 yield info.path
 
     # --- batch messages ---
@@ -150,27 +166,78 @@ class TopicChannels:
 
     def _leaves(self) -> Iterator[ChannelSource]:
         for info in self.topic.fields if has_signals(self.topic.schema_name) else ():
-            if not is_signal(info) or self._length(info) > MAX_LISTED_ELEMENTS:
-                continue
-            if info.array is None:
+            if is_signal(info) and not info.dims:
                 yield self._listed(info.path, FieldSelector(leaf=info))
-            else:
+            elif is_signal(info):
                 yield from self._elements(info)
 
     def _elements(self, info: FieldInfo) -> Iterator[ChannelSource]:
-        names_leaf = names_beside(info.path, {one.path: one for one in self.topic.fields})
-        lists = self.joints.get(names_leaf, ()) if names_leaf is not None else ()
-        if info.path.count("[]") > 1 or self._identified_by_text(info):
+        elements = self.elements.get(info.path) or ()
+        if self._identified_by_text(info):
             # Which element is which differs from message to message: they can be read by filter.
             return
-        if names_leaf is not None and len(lists) > 1 and self._length(info):
+        names_leaf = names_beside(info, {one.path: one for one in self.topic.fields})
+        lists = self.joints.get(names_leaf, ()) if names_leaf is not None else ()
+        if names_leaf is not None and len(lists) > 1 and len(info.dims) == 1 and elements:
             for joint in dict.fromkeys(joint for names in lists for joint in names):
                 by_name = FieldFilter(leaf=names_leaf, operator="==", value=joint)
-                yield self._listed(f"{info.path}[{joint}]", FieldSelector(leaf=info, element_filters=(by_name,)))
+                selector = FieldSelector(leaf=info, elements=((by_name,),))
+                yield self._listed(f"{info.path}[{element_key(joint)}]", selector)
             return
-        for index in range(self._length(info)):
-            selector = FieldSelector(leaf=info, index=index, names_leaf=names_leaf)
-            yield self._listed(_with_index(info.path, index), selector)
+        for indices in elements:
+            selector = FieldSelector(leaf=info, elements=indices, names_leaf=names_leaf)
+            yield self._listed(_with_indices(info.path, indices), self._with_name(selector, self._names_at(selector)))
+
+    def _called(self, selector: FieldSelector, path: MessagePath) -> FieldSelector:
+        """Say what the names call the element at an index.
+
+        Raises
+        ------
+        LogError
+            When they call it differently in different messages.
+        """
+        called = self._names_at(selector)
+        if len(called) > 1:
+            told = " and ".join(sorted(called)[:4])
+            raise LogError(
+                f"{path.text!r}: element {selector.elements[-1]} is called {told} in different messages; read it by "
+                f"name, {selector.leaf.path}[{element_key(min(called))}]"
+            )
+        return self._with_name(selector, called)
+
+    def _names_at(self, selector: FieldSelector) -> tuple[str, ...]:
+        """All names that the first messages give the element at an index."""
+        if selector.names_leaf is None:
+            return ()
+        lists = self.joints.get(selector.names_leaf, ())
+        if len(selector.elements) > 1:
+            return self._names_inside(selector, frozenset(name for names in lists for name in names))
+        index = selector.elements[0]
+        found = [names[index] for names in lists if isinstance(index, int) and index < len(names)]
+        return tuple(dict.fromkeys(found))
+
+    def _names_inside(self, selector: FieldSelector, known: Collection[str]) -> tuple[str, ...]:
+        """The same of an array in an array, which another one beside it may name otherwise."""
+        found: dict[str | None, None] = {}
+        for decoded in self.topic.decode_head(selector.leaves):
+            names, codes = element_names(decoded, selector, ~decoded.bad)
+            found |= dict.fromkeys(names[code] for code in codes.tolist())
+        return tuple(name for name in found if name is not None and name in known)
+
+    def _with_name(self, selector: FieldSelector, called: tuple[str, ...]) -> FieldSelector:
+        return replace(selector, called=called[0]) if len(called) == 1 else selector
+
+    def _require_one_element(self, selector: FieldSelector, path: MessagePath) -> None:
+        """Refuse filters that leave several elements, in most of the first messages."""
+        if not selector.element_filters:
+            return
+        messages, several = 0, Counter[str]()
+        for decoded in self.topic.decode_head(selector.leaves):
+            messages += len(decoded.bad)
+            several.update(select(decoded, selector, ~decoded.bad).lost)
+        for reason, count in several.most_common(1):
+            if 2 * count > messages:
+                raise LogError(f"{path.text!r}: {reason}")
 
     def _listed(self, field: str, selector: FieldSelector) -> ChannelSource:
         return self._leaf_source(selector, field=field, name=f"{self.topic.name}.{field}")
@@ -192,9 +259,6 @@ class TopicChannels:
             one.kind == "string" and one.path.startswith(f"{prefix}[].") for one in self.topic.fields
         )
 
-    def _length(self, info: FieldInfo) -> int:
-        return info.array if isinstance(info.array, int) else self.lengths.get(info.path, 0)
-
     def _leaf_source(self, selector: FieldSelector, *, field: str, name: str) -> ChannelSource:
         leaf = selector.leaf
         # A log's writer knows fields, and no filter on whose they are.
@@ -208,14 +272,19 @@ class TopicChannels:
         """Field in the spelling of the list: by index where a name always stands in the same place."""
         if selector.message_filters or selector.publisher is not None:
             return path.rest
-        if selector.index is not None:
-            return _with_index(selector.leaf.path, selector.index)
-        if len(selector.element_filters) == 1:
-            only = selector.element_filters[0]
-            lists = self.joints.get(only.leaf, ())
-            if only.operator == "==" and len(lists) == 1 and lists[0].count(str(only.value)) == 1:
-                return _with_index(selector.leaf.path, lists[0].index(str(only.value)))
-        return path.rest
+        indices = [self._index_of(choice) for choice in selector.elements]
+        known = tuple(index for index in indices if index is not None)
+        return _with_indices(selector.leaf.path, known) if len(known) == len(indices) else path.rest
+
+    def _index_of(self, choice: ElementChoice) -> int | None:
+        """Index of the element that is chosen, where that's the same in all messages."""
+        if isinstance(choice, int):
+            return choice
+        only = choice[0]
+        lists = self.joints.get(only.leaf, ())
+        if len(choice) == len(lists) == 1 and only.operator == "==" and lists[0].count(str(only.value)) == 1:
+            return lists[0].index(str(only.value))
+        return None
 
 
 def _written(frame: FieldFilter) -> str:
@@ -223,8 +292,12 @@ def _written(frame: FieldFilter) -> str:
     return f'{{{frame.leaf}=="{escaped}"}}'
 
 
-def _with_index(leaf: str, index: int) -> str:
-    return leaf.replace("[]", f"[{index}]") if "[]" in leaf else f"{leaf}[{index}]"
+def _with_indices(leaf: str, indices: tuple[int, ...]) -> str:
+    """Path of an element: an index for each list on the way, and behind the leaf for its own."""
+    rest = iter(indices)
+    # A quoted name may hold brackets of its own.
+    marked = _MARK.sub(lambda found: found[0] if found[0] != "[]" else f"[{next(rest)}]", leaf)
+    return marked + "".join(f"[{index}]" for index in rest)
 
 
 def topic_channels(topic: Topic, layout: BatchLayout | None = None) -> TopicChannels:
@@ -246,33 +319,51 @@ def topic_channels(topic: Topic, layout: BatchLayout | None = None) -> TopicChan
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
     if layout is not None:
-        for decoded in topic.decode_head(layout.leaves):
-            names = names or column_names(layout, decoded)
-            units = units or column_units(layout, decoded)
-        if not names and not isinstance(layout.names, str):
-            names = layout.samples if layout.names is None else layout.names
+        heads = topic.decode_head(layout.leaves)
+        names, units = column_names(layout, heads), column_units(layout, heads)
     return TopicChannels(
         topic=topic,
         layout=layout,
         names=names,
         units=units,
-        lengths={} if layout is not None else _lengths(topic),
+        elements={} if layout is not None else _elements(topic),
         joints={} if layout is not None else _joints(topic),
         frames=() if layout is not None else _frames(topic),
     )
 
 
-def _lengths(topic: Topic) -> dict[str, int]:
-    counted = [info.path for info in topic.fields if info.array == "dynamic" and info.kind == "number"]
-    lengths = dict.fromkeys(counted, 0)
-    if not counted:
-        return lengths
-    for decoded in topic.decode_head(counted):
+def _elements(topic: Topic) -> dict[str, tuple[tuple[int, ...], ...] | None]:
+    """Indices of the elements of each array of numbers, as far as there aren't too many."""
+    arrays = [info for info in topic.fields if info.dims and info.kind == "number"]
+    counted = [info.path for info in arrays if "dynamic" in info.dims]
+    seen: dict[str, list[Column]] = {path: [] for path in counted}
+    for decoded in topic.decode_head(counted) if counted else ():
         for path in counted:
-            _, counts = decoded.columns[path].per_message()
-            good = counts[~decoded.bad]
-            lengths[path] = max(lengths[path], int(good.max(initial=0)))
-    return lengths
+            seen[path].append(decoded.columns[path].select(~decoded.bad))
+    return {info.path: _indices(info.dims, seen.get(info.path, ())) for info in arrays}
+
+
+def _indices(dims: Sequence[Dimension], seen: Sequence[Column]) -> tuple[tuple[int, ...], ...] | None:
+    """Indices that the schema fixes, or that lists of these lengths have; None for more than are listed."""
+    found: list[tuple[int, ...]] = [()]
+    for size in dims:
+        below: list[tuple[int, ...]] = []
+        for above in found:
+            longest = size if isinstance(size, int) else max((_longest(column, above) for column in seen), default=0)
+            if len(below) + longest > MAX_LISTED_ELEMENTS:
+                return None
+            below += [(*above, index) for index in range(longest)]
+        found = below
+    return tuple(found)
+
+
+def _longest(column: Column, above: Sequence[int]) -> int:
+    """Length of the longest of the lists that lie in the elements at these indices."""
+    lengths = column.lengths
+    messages = len(lengths[0])
+    place, present = list_places(column, [np.full(messages, index) for index in above], messages)
+    own = lengths[len(above)]
+    return int(own[place[present]].max(initial=0)) if own.size else 0
 
 
 def _frames(topic: Topic) -> tuple[FieldFilter, ...]:
@@ -281,8 +372,11 @@ def _frames(topic: Topic) -> tuple[FieldFilter, ...]:
     head = [] if leaf is None else topic.head_with([leaf])
     if leaf is None or not head:
         return ()
-    names = np.array([name for part in topic.decode_head([leaf]) for name in _texts(part.columns[leaf].strings)])
-    logged = np.concatenate([batch.log_time_ns for batch in head])
+    parts = topic.decode_head([leaf])
+    names = np.array([name for part in parts for name in _texts(part.columns[leaf].select(~part.bad).strings)])
+    logged = np.concatenate([batch.log_time_ns[~part.bad] for batch, part in zip(head, parts, strict=True)])
+    recurring = np.isin(names, _recurring(Counter(names.tolist())))
+    names, logged = names[recurring], logged[recurring]
     order = np.argsort(logged, kind="stable")
     known, label = np.unique(names[order], return_inverse=True)
     if len(known) < 2 or not at_once(logged[order], label):
@@ -295,16 +389,24 @@ def _texts(strings: Strings) -> list[str]:
 
 
 def _joints(topic: Topic) -> dict[str, tuple[tuple[str, ...], ...]]:
+    """Distinct lists of names, but for those with a name that only one message holds: it's damaged, or a guest."""
     known = {info.path: info for info in topic.fields}
-    leaves = {names_beside(info.path, known) for info in topic.fields if info.array is not None}
+    leaves = {names_beside(info, known) for info in topic.fields if info.dims}
     wanted = sorted(leaf for leaf in leaves if leaf is not None)
-    seen: dict[str, dict[tuple[str, ...], None]] = {leaf: {} for leaf in wanted}
-    for decoded in topic.decode_head(wanted) if wanted else ():
-        for leaf in wanted:
-            seen[leaf].update(dict.fromkeys(_lists(decoded.columns[leaf].strings, ~decoded.bad)))
-    return {leaf: tuple(lists) for leaf, lists in seen.items()}
+    heads = topic.decode_head(wanted) if wanted else []
+    joints = {}
+    for leaf in wanted:
+        lists = [names for part in heads for names in _lists(part.columns[leaf].select(~part.bad).strings)]
+        recurring = frozenset(_recurring(Counter(name for names in lists for name in set(names))))
+        joints[leaf] = tuple(dict.fromkeys(names for names in lists if recurring.issuperset(names)))
+    return joints
 
 
-def _lists(strings: Strings, good: NDArray[np.bool_]) -> list[tuple[str, ...]]:
-    entries = [strings.table[code] for code in np.unique(strings.codes[good])]
+def _recurring(names: Counter[str]) -> list[str]:
+    """Names that come more than once; all of them where none does."""
+    return [name for name, count in names.items() if count > 1] or list(names)
+
+
+def _lists(strings: Strings) -> list[tuple[str, ...]]:
+    entries = [strings.table[code] for code in strings.codes.reshape(-1).tolist()]
     return [(entry,) if isinstance(entry, str) else entry for entry in entries]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.io.batch_messages import BatchLayout, expand, recognised_layout
+from chladni.io.batch_messages import BatchLayout, column_names, column_units, expand, recognised_layout
 from chladni.io.decoding import Column, Decoded, FieldInfo, Strings
 from chladni.io.decoding.schema import FieldKind
 from chladni.signals.errors import LogError
@@ -11,7 +11,7 @@ from chladni.signals.errors import LogError
 
 def field(path: str, kind: FieldKind = "number", *, array: bool = False) -> FieldInfo:
     dtype = None if kind == "string" else np.dtype(np.float64)
-    return FieldInfo(path=path, kind=kind, dtype=dtype, array="dynamic" if array else None)
+    return FieldInfo(path=path, kind=kind, dtype=dtype, dims=("dynamic",) if array else ())
 
 
 def ragged(parts: list[list[float]]) -> Column:
@@ -140,3 +140,17 @@ def test_counts_cut_an_array_of_all_columns(order: str) -> None:
     found = expand(layout, decoded(columns, messages=3), ("a", "b"), [0, 1])
     np.testing.assert_array_equal(found.values, np.concatenate((block, block[:, :3]), axis=1))
     np.testing.assert_array_equal(found.bad, [False, False, True])
+
+
+@pytest.mark.parametrize("odd", [0, 1, 4])
+def test_names_of_columns_are_those_of_most_messages(odd: int) -> None:
+    layout = BatchLayout(samples=("s",), period=0.1, names="names", units="units")
+    codes = np.array([index == odd for index in range(5)], np.int32)
+    columns = {
+        "names": Column(values=Strings(codes=codes, table=(("a", "b"), ("a", "c")))),
+        "units": Column(values=Strings(codes=codes, table=(("g", "N"), ("g", "M")))),
+    }
+    heads = [decoded(columns, messages=5)]
+    assert column_names(layout, heads) == ("a", "b")
+    assert column_units(layout, heads) == ("g", "N")
+    assert column_names(layout, [decoded(columns, messages=5, bad=(0, 1, 2, 3, 4))]) == ()

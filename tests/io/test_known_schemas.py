@@ -55,7 +55,7 @@ def test_units_that_a_type_leaves_open(schema: str, leaf: str, units: tuple[str,
 
 
 def field(path: str, kind: str = "number", dtype: str = "f8", array: object = None) -> FieldInfo:
-    return FieldInfo(path=path, kind=kind, dtype=np.dtype(dtype), array=array)  # type: ignore[arg-type]
+    return FieldInfo(path=path, kind=kind, dtype=np.dtype(dtype), dims=() if array is None else (array,))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def field(path: str, kind: str = "number", dtype: str = "f8", array: object = No
         (field("device_id", dtype="u4"), False),
         (field("error_count", dtype="u4"), False),
         (field("data", dtype="u1", array="dynamic"), False),
-        (field("ranges", dtype="f4", array=1000), False),
+        (field("covariance[][]", array=3), False),
     ],
 )
 def test_what_is_a_signal(info: FieldInfo, listed: bool) -> None:

@@ -53,15 +53,21 @@ def joined(
     counts : int64 array [message] or None
         Elements of each message in the second case.
     """
-    element_shape = empty.shape[1:]
-    if _is_whole(pieces, len(bad), 2 + len(element_shape)):
+    if _is_whole(pieces, len(bad), 1 + empty.ndim):
         return pieces[0].values, None
+    return dense_if_even(*gathered(pieces, bad, empty=empty), bad)
+
+
+def gathered(
+    pieces: Sequence[Piece], bad: NDArray[np.bool_], *, empty: NDArray[np.generic]
+) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
+    """All elements of the sound messages, ``[element, ...]`` in the order of `joined`, and how many each has."""
+    element_shape = empty.shape[1:]
     flat = np.concatenate([empty, *(piece.values.reshape(-1, *element_shape) for piece in pieces)])
     owner = np.concatenate([np.empty(0, np.int64), *(_owners(piece, element_shape) for piece in pieces)])
     order = np.argsort(owner, kind="stable")
     order = order[~bad[owner[order]]]
-    flat, counts = flat[order], np.bincount(owner[order], minlength=len(bad)).astype(np.int64)
-    return dense_if_even(flat, counts, bad)
+    return flat[order], np.bincount(owner[order], minlength=len(bad)).astype(np.int64)
 
 
 def _is_whole(pieces: Sequence[Piece], messages: int, dimensions: int) -> bool:

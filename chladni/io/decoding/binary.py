@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from chladni.io.decoding.assemble import joined, scattered
+from chladni.io.decoding.assemble import gathered, joined, scattered
 from chladni.io.decoding.cdr_forms import ENCAPSULATIONS, HEADER_BYTES, forms_of, ros1_form
 from chladni.io.decoding.columns import Column, Decoded, Strings, outside_buffer, require_known
 from chladni.io.decoding.cursor import Cursor, uniform
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from chladni.io.decoding.cdr_forms import Encapsulation, Form
     from chladni.io.decoding.columns import EncodedMessages, StringValue
-    from chladni.io.decoding.piece import Piece
     from chladni.io.decoding.schema import FieldInfo, Leaf, Record, Tree
     from chladni.io.decoding.walk import WireRules
 
@@ -189,7 +188,7 @@ class BinaryDecoder:
         walk = _entered(cursor, self._form)
         walk.read(self._form.root, tree, last=True)
         walk.drop_other_lengths()
-        columns = {path: self._column(self._leaves[path], walk.pieces.get(path, []), batch, cursor) for path in paths}
+        columns = {path: self._column(self._leaves[path], walk, batch) for path in paths}
         told = {self._form.note: len(cursor)} if self._form.note else {}
         return Decoded(columns=columns, bad=batch.bad, reasons=dict(batch.reasons), told=told)
 
@@ -212,21 +211,30 @@ class BinaryDecoder:
             f" them{lengths}"
         )
 
-    def _column(self, leaf: Leaf, pieces: list[Piece], batch: _Batch, cursor: Cursor) -> Column:
-        info, bad = leaf.info, batch.bad
-        if info.kind != "string":
-            if info.array is None:
-                return Column(values=scattered(pieces, len(bad)))
-            values, counts = joined(pieces, bad, empty=np.empty(0, info.dtype))
-            return Column(values=values, counts=counts)
-        # A list of strings is one value of a message; only a list of messages makes several of them.
-        if "[]" in info.path:
-            blocks, counts = joined(pieces, bad, empty=np.empty((0, 2), np.int64))
+    def _column(self, leaf: Leaf, walk: Walk, batch: _Batch) -> Column:
+        pieces, is_text = walk.pieces.get(leaf.info.path, []), leaf.info.kind == "string"
+        empty: NDArray[np.generic] = np.empty((0, 2), np.int64) if is_text else np.empty(0, leaf.info.dtype)
+        counts: NDArray[np.int64] | None = None
+        nested: tuple[NDArray[np.int64], ...] = ()
+        if leaf.depth == 0:
+            values = scattered(pieces, len(batch.bad))
+        elif leaf.depth == 1:
+            values, counts = joined(pieces, batch.bad, empty=empty)
         else:
-            blocks, counts = scattered(pieces, len(bad)), None
-        listed = partial(_decoded_list, byte_order=cursor.byte_order, rules=self._form.rules)
+            values, counts = gathered(pieces, batch.bad, empty=empty)
+            nested = self._nested(leaf, walk, batch)
+        if not is_text:
+            return Column(values=values, counts=counts, nested=nested)
+        listed = partial(_decoded_list, byte_order=walk.cursor.byte_order, rules=self._form.rules)
         decode = listed if isinstance(leaf.type, Array) else _decoded
-        return Column(values=batch.strings(cursor.buffer, blocks, counts, decode), counts=counts)
+        return Column(values=batch.strings(walk.cursor.buffer, values, counts, decode), counts=counts, nested=nested)
+
+    def _nested(self, leaf: Leaf, walk: Walk, batch: _Batch) -> tuple[NDArray[np.int64], ...]:
+        levels = walk.lengths.get(leaf.info.path, [[]] * leaf.depth)
+        outermost, *inner = (gathered(level, batch.bad, empty=np.empty(0, np.int64))[0] for level in levels)
+        of_all = np.zeros(len(batch.bad), np.int64)
+        of_all[~batch.bad] = outermost
+        return (of_all, *(one.astype(np.int64, copy=False) for one in inner))
 
 
 def _before_wide_text(known: Sequence[Leaf]) -> tuple[Leaf, ...]:

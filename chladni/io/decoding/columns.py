@@ -69,6 +69,9 @@ class Column:
         ``[element]``, one message after another, for arrays of different length.
     counts : int64 array, optional
         Elements in each message, where the lengths differ; None where `values` has a row for each message.
+    nested : tuple of int64 arrays
+        Of lists in lists, length of every list of each level, in the order of the messages: of one list a message,
+        then of one list an element of those, and so on. Empty for a single list, and for no list.
 
     Examples
     --------
@@ -80,6 +83,17 @@ class Column:
 
     values: NDArray[np.generic] | Strings
     counts: NDArray[np.int64] | None = None
+    nested: tuple[NDArray[np.int64], ...] = ()
+
+    @property
+    def lengths(self) -> tuple[NDArray[np.int64], ...]:
+        """Length of every list, level by level as in `nested`; empty for one value a message."""
+        if self.nested:
+            return self.nested
+        if self.counts is not None:
+            return (self.counts,)
+        shape = self.values.codes.shape if isinstance(self.values, Strings) else self.values.shape
+        return (np.full(shape[0], shape[1], np.int64),) if len(shape) > 1 else ()
 
     @property
     def numbers(self) -> NDArray[np.generic]:
@@ -134,8 +148,13 @@ class Column:
         """
         if self.counts is None:
             return Column(values=_taken(self.values, messages))
-        counts = self.counts[messages]
-        values = _taken(self.values, np.repeat(messages, self.counts))
+        counts, chosen, nested = self.counts[messages], messages, []
+        for lengths in self.lengths:
+            nested.append(lengths[chosen])
+            chosen = np.repeat(chosen, lengths)
+        values = _taken(self.values, chosen)
+        if self.nested:
+            return Column(values=values, counts=counts, nested=tuple(nested))
         even = len(counts) > 0 and bool((counts == counts[0]).all())
         return Column(values=_reshaped(values, len(counts))) if even else Column(values=values, counts=counts)
 

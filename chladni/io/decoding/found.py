@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from chladni.io.decoding.columns import StringValue
     from chladni.io.decoding.schema import Leaf
 
+Number = TypeVar("Number", bound=np.generic)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Found:
@@ -28,12 +30,54 @@ class Found:
     ----------
     values : ndarray or Strings [element]
         One after another.
-    counts : int64 array, optional
-        Elements in each sound message; None where each has exactly one.
+    lengths : tuple of int64 arrays
+        Length of every list, level by level as in `Column`; empty where each sound message has exactly one value.
     """
 
     values: NDArray[np.generic] | Strings
-    counts: NDArray[np.int64] | None = None
+    lengths: tuple[NDArray[np.int64], ...] = ()
+
+    @property
+    def counts(self) -> NDArray[np.int64] | None:
+        """Elements in each sound message; None where each has exactly one."""
+        return totals(self.lengths) if self.lengths else None
+
+
+@dataclass(slots=True, kw_only=True)
+class Row:
+    """What one message holds of a leaf.
+
+    Parameters
+    ----------
+    values : list
+        One after another; where the leaf is an array of numbers or of strings, each is a sequence of them.
+    lengths : list of list of int
+        Length of every list on the way to them, level by level.
+    """
+
+    values: list[object]
+    lengths: list[list[int]] = field(default_factory=list)
+
+    def open(self, lists: Sequence[Sequence[object]]) -> None:
+        """Go on with the elements of the lists that the values are."""
+        self.lengths.append([len(one) for one in lists])
+        self.values = [element for one in lists for element in one]
+
+
+def totals(lengths: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
+    """Elements that lie in each list of the outermost level, in lists of all levels below it.
+
+    Examples
+    --------
+    >>> totals([np.array([2, 0, 1]), np.array([3, 1, 2])])
+    array([4, 0, 2])
+    """
+    found = lengths[-1]
+    for above in reversed(lengths[:-1]):
+        before = np.append(0, np.cumsum(found))
+        ends = np.cumsum(above)
+        found = before[ends] - before[ends - above]
+    return found
 
 
 def interned(values: Iterable[StringValue]) -> Strings:
@@ -49,27 +93,28 @@ def interned(values: Iterable[StringValue]) -> Strings:
     return Strings(codes=codes, table=tuple(known))
 
 
-def found_of(leaf: Leaf, rows: Sequence[Sequence[object]]) -> Found:
+def found_of(leaf: Leaf, rows: Sequence[Row]) -> Found:
     """Collect values that were read message by message.
 
     Parameters
     ----------
     leaf : Leaf
-    rows : sequence [message] of sequences
-        Values of the leaf in each sound message, several where lists lie on the way; where the leaf is an array of
-        numbers, each is a sequence of them.
+    rows : sequence [message] of Row
+        What each sound message holds of the leaf.
     """
-    values = [value for row in rows for value in row]
-    counts = np.array([len(row) for row in rows], np.int64) if any(leaf.lists) else None
+    values = [value for row in rows for value in row.values]
+    levels = [[length for row in rows for length in row.lengths[level]] for level in range(sum(leaf.lists))]
+    lengths = tuple(np.array(level, np.int64) for level in levels)
     if leaf.info.kind == "string":
-        return Found(values=interned(cast("list[StringValue]", values)), counts=counts)
+        return Found(values=interned(cast("list[StringValue]", values)), lengths=lengths)
     if not isinstance(leaf.type, Array):
-        return Found(values=np.array(values, _roomy(leaf, values)), counts=counts)
-    # Elements of all arrays of a message belong to it.
-    arrays = cast("Sequence[Sequence[Sequence[float]]]", rows)
-    counts = np.array([sum(map(len, row)) for row in arrays], np.int64)
-    parts = [np.asarray(one, _roomy(leaf, one)) for row in arrays for one in row]
-    return Found(values=np.concatenate([np.empty(0, leaf.info.dtype), *parts]), counts=counts)
+        return Found(values=np.array(values, _roomy(leaf, values)), lengths=lengths)
+    arrays = cast("Sequence[Sequence[float]]", values)
+    parts = [np.asarray(one, _roomy(leaf, one)) for one in arrays]
+    return Found(
+        values=np.concatenate([np.empty(0, leaf.info.dtype), *parts]),
+        lengths=(*lengths, np.array([len(one) for one in arrays], np.int64)),
+    )
 
 
 def _roomy(leaf: Leaf, values: Iterable[object]) -> np.dtype[np.generic] | None:
@@ -115,25 +160,29 @@ def joined_column(found: Sequence[Found], bad: NDArray[np.bool_], *, empty: NDAr
     else:
         parts = [np.asarray(one.values) for one in found]
     flat = np.concatenate([empty.codes if isinstance(empty, Strings) else empty, *parts])
-    values, counts = _placed(flat, [one.counts for one in found], bad)
+    lengths = [np.concatenate(level) for level in zip(*(one.lengths for one in found), strict=True)]
+    values, counts, nested = _placed(flat, lengths, bad)
     if isinstance(empty, Strings):
-        return Column(values=Strings(codes=values.astype(np.int32, copy=False), table=table or ("",)), counts=counts)
-    return Column(values=values, counts=counts)
+        coded = Strings(codes=values.astype(np.int32, copy=False), table=table or ("",))
+        return Column(values=coded, counts=counts, nested=nested)
+    return Column(values=values, counts=counts, nested=nested)
 
 
 def _placed(
-    flat: NDArray[np.generic], counts: Sequence[NDArray[np.int64] | None], bad: NDArray[np.bool_]
-) -> tuple[NDArray[np.generic], NDArray[np.int64] | None]:
-    given = [count for count in counts if count is not None]
-    if given:
-        of_all = np.zeros(len(bad), np.int64)
-        of_all[~bad] = np.concatenate(given)
-        return dense_if_even(flat, of_all, bad)
-    if not bad.any():
-        return flat, None
-    values = np.zeros(len(bad), flat.dtype)
-    values[~bad] = flat
-    return values, None
+    flat: NDArray[np.generic], lengths: list[NDArray[np.int64]], bad: NDArray[np.bool_]
+) -> tuple[NDArray[np.generic], NDArray[np.int64] | None, tuple[NDArray[np.int64], ...]]:
+    if not lengths:
+        return (_of_all(flat, bad) if bad.any() else flat), None, ()
+    if len(lengths) > 1:
+        return flat, _of_all(totals(lengths), bad), (_of_all(lengths[0], bad), *lengths[1:])
+    return *dense_if_even(flat, _of_all(lengths[0], bad), bad), ()
+
+
+def _of_all(sound: NDArray[Number], bad: NDArray[np.bool_]) -> NDArray[Number]:
+    """A value for each message, 0 for the bad ones."""
+    values = np.zeros(len(bad), sound.dtype)
+    values[~bad] = sound
+    return values
 
 
 def _one_table(parts: Sequence[Strings]) -> tuple[list[NDArray[np.generic]], tuple[StringValue, ...]]:

@@ -345,16 +345,19 @@ class _Resolver:
         kind = self._type(declared.type, above)
         if not declared.sizes:
             return kind
-        # Several dimensions lie on the wire as one, the last index running fastest.
         length = 1
         for size in declared.sizes:
             length *= size
             # Checked on the way: a product of many sizes would take hours.
             if length > MAX_FIXED_BYTES:
                 raise LogError(f"schema {self.schema}: {declared.name} has {length} elements or more; it is refused")
+        shape = declared.sizes
         if isinstance(kind, Array) and kind.length is not None:
-            return Array(element=kind.element, length=length * kind.length)
-        return Array(element=kind, length=length)
+            # A typedef of an array gives further dimensions.
+            shape += kind.shape or (kind.length,)
+            length *= kind.length
+            kind = kind.element
+        return Array(element=kind, length=length, shape=shape if len(shape) > 1 else ())
 
     def _type(self, reference: _Reference, above: tuple[str, ...]) -> FieldType:
         if reference.element is not None:

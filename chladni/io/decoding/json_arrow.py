@@ -139,7 +139,7 @@ def _of_lists(array: pa.Array) -> Found | None:
     if elements is None:
         return None
     counts = np.diff(array.offsets.to_numpy()).astype(np.int64)
-    return Found(values=_of_numbers(elements).values, counts=counts)
+    return Found(values=_of_numbers(elements).values, lengths=(counts,))
 
 
 def _of_times(array: pa.Array) -> Found | None:

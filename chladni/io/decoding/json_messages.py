@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from chladni.io.decoding.columns import Decoded, Strings, outside_buffer, require_known
-from chladni.io.decoding.found import Found, found_of, joined_column, nothing
+from chladni.io.decoding.found import Found, Row, found_of, joined_column, nothing
 from chladni.io.decoding.json_arrow import read_by_arrow
 from chladni.io.decoding.json_schema import Settled, parse_json_schema
 from chladni.io.decoding.json_stream import Span
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from chladni.io.decoding.columns import Column, EncodedMessages
-    from chladni.io.decoding.json_values import Value
     from chladni.io.decoding.schema import FieldInfo, Leaf, Record
 
 FIRST_MESSAGES: Final = 32
@@ -163,7 +162,7 @@ class _Block:
 
     def _one_by_one(self, contents: Sequence[bytes]) -> None:
         bad = np.zeros(len(contents), np.bool_)
-        rows: list[list[list[Value]]] = []
+        rows: list[list[Row]] = []
         extract = Extractor(self.leaves, self.told)
         for index, content in enumerate(contents):
             try:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from chladni.io.decoding.found import Row
 from chladni.io.decoding.json_schema import NANOSECONDS, SECONDS, number_in
 from chladni.io.decoding.schema import Array, FieldType, Primitive, Stamp, Text
 
@@ -60,7 +61,7 @@ class Extractor:
         self._leaves = leaves
         self._told = told
 
-    def __call__(self, message: object) -> list[list[Value]]:
+    def __call__(self, message: object) -> list[Row]:
         """Give the values of each leaf: one, or, below a list of objects, any number.
 
         Parameters
@@ -74,21 +75,20 @@ class Extractor:
             Says that the message is no object, or which time or text is missing.
         """
         if isinstance(message, dict):
-            return [
-                [self._value(one, leaf.type, leaf) for one in self._reached(message, leaf)] for leaf in self._leaves
-            ]
+            return [self._row(message, leaf) for leaf in self._leaves]
         raise ValueError("the message is no object")
 
     def _odd(self, leaf: Leaf, what: str) -> None:
         self._told[f"{leaf.info.path}: {what}"] += 1
 
-    def _reached(self, message: object, leaf: Leaf) -> list[object]:
-        places = [message]
+    def _row(self, message: object, leaf: Leaf) -> Row:
+        row = Row(values=[message])
         for name, lists in zip(leaf.names, leaf.lists, strict=True):
-            places = [self._member(place, name, leaf) for place in places]
+            row.values = [self._member(place, name, leaf) for place in row.values]
             for _ in range(lists):
-                places = [element for place in places for element in self._list(place, leaf)]
-        return places
+                row.open([self._list(place, leaf) for place in row.values])
+        row.values = [self._value(one, leaf.type, leaf) for one in row.values]
+        return row
 
     def _member(self, place: object, name: str, leaf: Leaf) -> object:
         if isinstance(place, dict):

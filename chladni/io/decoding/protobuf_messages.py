@@ -13,7 +13,7 @@ import numpy as np
 
 from chladni.io.decoding.assemble import joined, scattered
 from chladni.io.decoding.columns import Column, Decoded, outside_buffer, require_known
-from chladni.io.decoding.found import Found, found_of, joined_column, nothing
+from chladni.io.decoding.found import Found, Row, found_of, joined_column, nothing
 from chladni.io.decoding.piece import Piece
 from chladni.io.decoding.protobuf_schema import fields_of, has_no_defaults, load_descriptor, record_of
 from chladni.io.decoding.protobuf_template import (
@@ -27,7 +27,7 @@ from chladni.io.decoding.protobuf_template import (
 from chladni.io.decoding.schema import Array, FieldType, Primitive, Stamp, Text, leaves
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Sequence
 
     from google.protobuf.descriptor import Descriptor, FieldDescriptor
     from google.protobuf.message import Message
@@ -251,7 +251,7 @@ def _read(table: NDArray[np.uint8], slot: Slot | None, dtype: np.dtype[np.generi
     return np.zeros(len(table), dtype) if slot is None else read_slot(table, slot, dtype)
 
 
-def _reader(chosen: _Chosen) -> Callable[[Message], Sequence[object]]:
+def _reader(chosen: _Chosen) -> Callable[[Message], Row]:
     """Function that gives the values of a leaf in one message: one, or, below a list of messages, any number."""
     leaf, fields = chosen
     if any(leaf.lists) or not isinstance(leaf.type, Primitive | Text):
@@ -259,16 +259,16 @@ def _reader(chosen: _Chosen) -> Callable[[Message], Sequence[object]]:
     # The common case: plain numbers, reached by attributes alone.
     if not any(map(_is_optional, fields)):
         reach = attrgetter(".".join(leaf.names))
-        return lambda message: (reach(message),)
+        return lambda message: Row(values=[reach(message)])
     way = [(field.name, _is_optional(field)) for field in fields]
-    missing = (_value(None, leaf.type),)
+    missing = Row(values=[_value(None, leaf.type)])
 
-    def read(message: Any) -> Sequence[object]:
+    def read(message: Any) -> Row:
         for name, optional in way:
             if optional and not message.HasField(name):
                 return missing
             message = getattr(message, name)
-        return (message,)
+        return Row(values=[message])
 
     return read
 
@@ -278,12 +278,14 @@ def _is_optional(field: FieldDescriptor) -> bool:
     return field.has_presence and not field.has_default_value
 
 
-def _values(message: Message, chosen: _Chosen) -> Sequence[object]:
-    places: list[object] = [message]
+def _values(message: Message, chosen: _Chosen) -> Row:
+    row = Row(values=[message])
     for field, lists in zip(chosen.fields, chosen.leaf.lists, strict=True):
-        below = [_member(place, field) for place in places]
-        places = [element for one in below for element in _elements(one)] if lists else below
-    return [_value(place, chosen.leaf.type) for place in places]
+        row.values = [_member(place, field) for place in row.values]
+        if lists:
+            row.open([_elements(one) for one in row.values])
+    row.values = [_value(place, chosen.leaf.type) for place in row.values]
+    return row
 
 
 def _member(place: Any, field: FieldDescriptor) -> object:
@@ -302,10 +304,10 @@ class _Entry(NamedTuple):
     value: object
 
 
-def _elements(field: object) -> Iterable[object]:
+def _elements(field: object) -> Sequence[object]:
     if isinstance(field, Mapping):
         return [_Entry(key, value) for key, value in field.items()]
-    return () if field is None else cast("Iterable[object]", field)
+    return () if field is None else cast("Sequence[object]", field)
 
 
 def _value(found: object, kind: FieldType) -> object:

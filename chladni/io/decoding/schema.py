@@ -30,6 +30,9 @@ MAX_FIXED_BYTES: Final = 2**32
 PADDING_MEMBER: Final = "structure_needs_at_least_one_member"
 """Name of the byte that ROS 2 puts into a message without fields."""
 
+Dimension = int | Literal["dynamic"]
+"""Elements of a list, where the schema fixes them."""
+
 FieldKind = Literal["number", "bool", "string", "time", "duration"]
 Extensibility = Literal["final", "appendable", "mutable"]
 
@@ -64,11 +67,20 @@ class Stamp:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Array:
-    """Elements of one type: ``length`` of them, or, where that is None, a counted number up to ``bound``."""
+    """Elements of one type: ``length`` of them, or, where that is None, a counted number up to ``bound``.
+
+    Those of an array of several dimensions lie one after another, the last index running fastest; ``shape`` has them.
+    """
 
     element: FieldType
     length: int | None = None
     bound: int | None = None
+    shape: tuple[int, ...] = ()
+
+    @property
+    def dims(self) -> tuple[Dimension, ...]:
+        """Length of each of its dimensions, the outermost first."""
+        return self.shape or ("dynamic" if self.length is None else self.length,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -108,20 +120,25 @@ class FieldInfo:
     ----------
     path : str
         Names joined by dots, in quotes where a path would read them otherwise; a
-        list of messages on the way is marked: ``transforms[].transform.translation.x``.
-        An array of numbers or strings is one leaf and carries no mark: ``position``.
+        list of messages or of lists on the way is marked: ``transforms[].transform.translation.x``.
+        An array of numbers or strings is one leaf and carries no mark: ``position``, or ``grid[]`` of two dimensions.
     kind : {"number", "bool", "string", "time", "duration"}
         Times and durations are whole nanoseconds, whatever the wire holds.
     dtype : numpy.dtype or None
         Type of the values; None for strings.
-    array : int or "dynamic" or None
-        Length of the innermost array that the leaf is in; None for a scalar.
+    dims : tuple of int or "dynamic"
+        Length of each list that the leaf is in, the outermost first; a path names an element of each.
     """
 
     path: str
     kind: FieldKind
     dtype: np.dtype[np.generic] | None
-    array: int | Literal["dynamic"] | None = None
+    dims: tuple[Dimension, ...] = ()
+
+    @property
+    def array(self) -> Dimension | None:
+        """Length of the innermost list; None for a single value."""
+        return self.dims[-1] if self.dims else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,6 +160,13 @@ class Leaf:
     names: tuple[str, ...]
     lists: tuple[int, ...]
     type: FieldType
+
+    @property
+    def depth(self) -> int:
+        """Lists whose elements are values of their own; an array of strings is one value."""
+        if isinstance(self.type, Array) and isinstance(self.type.element, Text):
+            return len(self.info.dims) - len(self.type.dims)
+        return len(self.info.dims)
 
 
 def leaves(record: Record) -> tuple[Leaf, ...]:
@@ -194,28 +218,31 @@ class _Way:
     path: str = ""
     names: tuple[str, ...] = ()
     lists: tuple[int, ...] = ()
-    array: int | Literal["dynamic"] | None = None
+    dims: tuple[Dimension, ...] = ()
 
     def into(self, member: Member) -> _Way:
         # JSON keys may hold dots and blanks.
         name = quoted(member.name)
         path = f"{self.path}.{name}" if self.path else name
-        return _Way(path, (*self.names, member.name), (*self.lists, 0), self.array)
+        return _Way(path, (*self.names, member.name), (*self.lists, 0), self.dims)
 
-    def opened(self, length: int | None, *, marked: bool) -> _Way:
-        array: int | Literal["dynamic"] = "dynamic" if length is None else length
-        if not marked:
-            return _Way(self.path, self.names, self.lists, array)
-        return _Way(f"{self.path}[]", self.names, (*self.lists[:-1], self.lists[-1] + 1), array)
+    def onto(self, array: Array) -> _Way:
+        """To an array that is a leaf itself."""
+        return _Way(self.path + "[]" * (len(array.dims) - 1), self.names, self.lists, (*self.dims, *array.dims))
+
+    def opened(self, array: Array) -> _Way:
+        """To the elements of an array."""
+        lists = (*self.lists[:-1], self.lists[-1] + 1)
+        return _Way(self.path + "[]" * len(array.dims), self.names, lists, (*self.dims, *array.dims))
 
 
 def _leaves_of(kind: FieldType, way: _Way) -> Iterator[Leaf]:
     match kind:
-        case Array(element=Primitive() | Text() | Stamp() as element, length=length):
-            info = _field_info(element, way.opened(length, marked=False))
+        case Array(element=Primitive() | Text() | Stamp() as element):
+            info = _field_info(element, way.onto(kind))
             yield Leaf(info=info, names=way.names, lists=way.lists, type=kind)
-        case Array(element=element, length=length):
-            yield from _leaves_of(element, way.opened(length, marked=True))
+        case Array(element=element):
+            yield from _leaves_of(element, way.opened(kind))
         case Delimited(content=content):
             yield from _leaves_of(content, way)
         case Record(members=members):
@@ -230,11 +257,11 @@ def _field_info(kind: Primitive | Text | Stamp, way: _Way) -> FieldInfo:
     match kind:
         case Primitive(dtype=dtype):
             number: FieldKind = "bool" if dtype == np.bool_ else "number"
-            return FieldInfo(path=way.path, kind=number, dtype=dtype, array=way.array)
+            return FieldInfo(path=way.path, kind=number, dtype=dtype, dims=way.dims)
         case Text():
-            return FieldInfo(path=way.path, kind="string", dtype=None, array=way.array)
+            return FieldInfo(path=way.path, kind="string", dtype=None, dims=way.dims)
         case Stamp(kind=stamp):
-            return FieldInfo(path=way.path, kind=stamp, dtype=np.dtype(np.int64), array=way.array)
+            return FieldInfo(path=way.path, kind=stamp, dtype=np.dtype(np.int64), dims=way.dims)
 
 
 def smallest_size(kind: FieldType, known: dict[FieldType, int]) -> int:

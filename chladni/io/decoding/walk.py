@@ -87,6 +87,9 @@ class Walk:
         self.rules = rules
         self.layouts = layouts
         self.pieces: dict[str, list[Piece]] = {}
+        # Of leaves in lists in lists, by path: lengths of the lists of each level.
+        self.lengths: dict[str, list[list[Piece]]] = {}
+        self.level = 0
         self.smallest: dict[FieldType, int] = {}
         self.steps_left = MAX_ELEMENT_STEPS
         self.strict = False
@@ -220,15 +223,32 @@ class Walk:
 
     def _array(self, array: Array, wanted: Tree | Leaf | None) -> None:
         counts = self._counts(array)
+        if wanted is not None:
+            self._note_lengths(array, counts, wanted)
+        self.level += len(array.dims)
         match array.element:
             case Primitive(dtype=dtype):
                 self._numbers(dtype, counts, wanted)
             case Text() if wanted is not None:
                 self._texts(array.element, counts, wanted)
             case _ if not self.strict and self._fixed_elements(array.element, counts, wanted):
-                return
+                pass
             case _:
                 self._each_element(array.element, counts, wanted)
+        self.level -= len(array.dims)
+
+    def _note_lengths(self, array: Array, counts: int | NDArray[np.int64], wanted: Tree | Leaf) -> None:
+        """Keep the lengths of the lists that are about to be read, for leaves that lie in several."""
+        rows = self.cursor.rows
+        each = [np.broadcast_to(np.asarray(counts), rows.shape)]
+        if array.shape:
+            lists = np.cumprod((1, *array.shape[:-1]))
+            each = [np.full((len(rows), many), size) for many, size in zip(lists, array.shape, strict=True)]
+        for _, leaf in _leaves(wanted):
+            if leaf.depth > 1:
+                known = self.lengths.setdefault(leaf.info.path, [[] for _ in range(leaf.depth)])
+                for level, values in zip(range(self.level, leaf.depth), each, strict=False):
+                    known[level].append(Piece(rows=rows, values=values))
 
     def _counts(self, array: Array) -> int | NDArray[np.int64]:
         """Elements in each message; what can't fit into the message is dropped before anything is allocated."""

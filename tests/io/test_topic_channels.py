@@ -1,0 +1,145 @@
+"""What is listed of a topic: arrays in arrays, and names that one damaged message changes."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from chladni.io.log import open_log
+from chladni.signals.errors import LogError
+from tests.make_logs import JOINT_STATE, START_NS, LogMaker, joint_state
+
+STEP_NS = 10_000_000
+SEPARATOR = "=" * 80
+GRID = f"Row[] rows\nfloat64 x\n{SEPARATOR}\nMSG: test/Row\nfloat64[2] pair\nfloat64[] more\n"
+
+
+def write_json(path: Path, messages: Sequence[Any], topic: str = "/a") -> Path:
+    with LogMaker(path) as maker:
+        channel = maker.json(topic)
+        for index, one in enumerate(messages):
+            maker.write(channel, one, START_NS + index * STEP_NS)
+    return path
+
+
+def grid_log(path: Path, rows: int, more: int) -> Path:
+    """Row r of message k holds 1000 r + k and so on: each number tells where it stood."""
+    with LogMaker(path) as maker:
+        channel = maker.ros2("/a", "test/msg/Grid", GRID)
+        for index in range(100):
+            content = {
+                "rows": [
+                    {
+                        "pair": [1000.0 * row + index, 1000.0 * row + 500 + index],
+                        "more": [1e6 * (k + 1) + 1000 * row + index for k in range(more if row else 1)],
+                    }
+                    for row in range(rows)
+                ],
+                "x": index,
+            }
+            maker.write(channel, content, START_NS + index * STEP_NS)
+    return path
+
+
+def test_elements_of_arrays_in_arrays_are_listed_and_right(tmp_path: Path) -> None:
+    with open_log(grid_log(tmp_path / "a.mcap", rows=2, more=2)) as log:
+        names = [channel.name for channel in log.channels]
+        assert names == [
+            "/a.rows[0].pair[0]", "/a.rows[0].pair[1]", "/a.rows[1].pair[0]", "/a.rows[1].pair[1]",
+            "/a.rows[0].more[0]", "/a.rows[1].more[0]", "/a.rows[1].more[1]", "/a.x",
+        ]  # fmt: skip
+        first = [0, 500, 1000, 1500, 1e6, 1e6 + 1000, 2e6 + 1000, 0]
+        np.testing.assert_array_equal(log.read(names).values, np.add.outer(first, np.arange(100.0)))
+        assert not log.info().unread
+
+
+def test_what_is_listed_of_arrays_in_arrays_is_bounded_and_told(tmp_path: Path) -> None:
+    with open_log(grid_log(tmp_path / "a.mcap", rows=33, more=3)) as log:
+        assert [channel.name for channel in log.channels] == ["/a.x"]
+        told = {one.name: one.reason for one in log.info().unread}
+        assert set(told) == {"/a.rows[].pair", "/a.rows[].more"}
+        assert all("this long isn't listed; single elements can be read by path" in one for one in told.values())
+        np.testing.assert_array_equal(log.read(["/a.rows[32].pair[1]"]).values[0], 32_500 + np.arange(100.0))
+
+
+def test_keys_with_brackets_of_their_own_are_not_indices(tmp_path: Path) -> None:
+    with open_log(
+        write_json(tmp_path / "a.mcap", [{"a[]": [[k, 1], [2]], "b": [{"c.[]": k}]} for k in range(9)])
+    ) as log:
+        names = [channel.name for channel in log.channels]
+        assert names == ['/a."a[]"[0][0]', '/a."a[]"[0][1]', '/a."a[]"[1][0]', '/a.b[0]."c.[]"']
+        assert log.read(names).values[:, 8].tolist() == [8, 1, 2, 8]
+
+
+# --- one message that names things otherwise ---------------------------------------------------------------------
+
+
+def joints_log(path: Path, odd: int, names: Sequence[str] = ("axis", "arm"), wrong: Sequence[str] = ("axiq", "arm")):
+    values = np.random.default_rng(1).normal(size=(2, 300))
+    with LogMaker(path) as maker:
+        channel = maker.ros2("/js", "sensor_msgs/msg/JointState", JOINT_STATE)
+        for index in range(300):
+            stamp_ns = START_NS + index * STEP_NS
+            said = list(wrong if index == odd else names)
+            maker.write(channel, joint_state(stamp_ns, said, values[:, index]), stamp_ns)
+    return values
+
+
+@pytest.mark.parametrize("odd", [0, 1, 40, 63, 64, 150, 299])
+def test_a_name_that_one_message_changes_costs_only_its_element(tmp_path: Path, odd: int) -> None:
+    values = joints_log(tmp_path / "a.mcap", odd)
+    with open_log(tmp_path / "a.mcap") as log:
+        names = ["/js.position[0]", "/js.position[1]"]
+        assert [channel.name for channel in log.channels] == names
+        read = log.read(names).values
+        np.testing.assert_array_equal(read[1], values[1])
+        assert np.isnan(read[0, odd])
+        np.testing.assert_array_equal(np.delete(read[0], odd), np.delete(values[0], odd))
+        (lost,) = log.damage
+        assert lost.lost_messages == 1
+        assert lost.what == "/js: element 0 of name is called 'axiq', in the first messages 'axis'; read it by name"
+        assert [one.what for one in log.info().damage] == [lost.what]
+
+
+def test_a_name_that_one_message_changes_is_read_by_name(tmp_path: Path) -> None:
+    values = joints_log(tmp_path / "a.mcap", 100)
+    with open_log(tmp_path / "a.mcap") as log:
+        read = log.read(["/js.position[axis]"]).values[0]
+        np.testing.assert_array_equal(np.delete(read, 100), np.delete(values[0], 100))
+        assert np.isnan(read[100])
+
+
+def test_names_that_change_places_are_read_by_name(tmp_path: Path) -> None:
+    """No name is odd here: reading by number would mix two joints."""
+    values = joints_log(tmp_path / "a.mcap", 40, wrong=("arm", "axis"))
+    with open_log(tmp_path / "a.mcap") as log:
+        names = ["/js.position[axis]", "/js.position[arm]"]
+        assert [channel.name for channel in log.channels] == names
+        values[:, 40] = values[::-1, 40]
+        np.testing.assert_array_equal(log.read(names).values, values)
+        with pytest.raises(LogError, match=r"'/js.position\[0\]': element 0 is called arm and axis in different"):
+            log.read(["/js.position[0]"])
+
+
+def test_names_of_elements_parse_back(tmp_path: Path) -> None:
+    joints_log(tmp_path / "a.mcap", 1, names=("7", "a]b"), wrong=("a]b", "7"))
+    with open_log(tmp_path / "a.mcap") as log:
+        names = [channel.name for channel in log.channels]
+        assert names == ['/js.position["7"]', '/js.position["a]b"]']
+        assert log.read(names).values.shape == (2, 300)
+
+
+@pytest.mark.parametrize("odd", [0, 30, 200])
+def test_a_frame_that_one_message_names_makes_no_second_publisher(tmp_path: Path, odd: int) -> None:
+    with LogMaker(tmp_path / "a.mcap") as maker:
+        channel = maker.ros2("/js", "sensor_msgs/msg/JointState", JOINT_STATE)
+        for index in range(300):
+            stamp_ns = START_NS + index * STEP_NS
+            content = joint_state(stamp_ns, ["a"], np.array([float(index)]))
+            content["header"]["frame_id"] = "basf" if index == odd else "base"
+            maker.write(channel, content, stamp_ns)
+    with open_log(tmp_path / "a.mcap") as log:
+        assert [channel.name for channel in log.channels] == ["/js.position[0]"]
+        np.testing.assert_array_equal(log.read(["/js.position[0]"]).values[0], np.arange(300.0))
