@@ -12,13 +12,17 @@ Operator = Literal["==", "!=", "<", "<=", ">", ">="]
 FilterValue = str | float | bool
 
 _NAME = re.compile(r'\.(?:"((?:[^"\\]|\\.)*)"|([^.\[\]{}"\s]+))')
-_BRACKET = re.compile(r'\[\s*(?:(\d+)|(:)|"((?:[^"\\]|\\.)*)"|([^\[\]:"\s-][^\[\]:"]*?))\s*\]')
+_BRACKET = re.compile(r'\[\s*(?:([0-9]+)|(:)|"((?:[^"\\]|\\.)*)"|([^\[\]:"\s-][^\[\]:"]*?))\s*\]')
 _FILTER = re.compile(
     r"""\{\s*(?P<field>[^\s=!<>{}"']+)\s*(?P<operator>==|!=|<=|>=|<|>)\s*"""
     r"""(?:"(?P<double>(?:[^"\\]|\\.)*)"|'(?P<single>(?:[^'\\]|\\.)*)'|(?P<bare>[^\s{}"']+))\s*\}"""
 )
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_INDEX_DIGITS = 18
+"""Digits of an index that 64 bits hold."""
+
 _PLAIN_KEY = re.compile(r'(?![0-9]+$)[^\[\]:"\s-](?:[^\[\]:"]*[^\[\]:"\s])?')
-_PLAIN_NAME = re.compile(r'(?!@)[^.\[\]{}"\s]+')
+_PLAIN_NAME = re.compile(r'(?!@)[^.\[\]{}"\\\s]+')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,7 +184,7 @@ def _next_step(text: str, position: int) -> tuple[Step, int]:
             raise LogError(f"{text!r}: functions such as .{name} aren't supported in a path; name the field itself")
         return FieldStep(name=name), found.end()
     if found := _BRACKET.match(text, position):
-        return _bracket_step(found), found.end()
+        return _bracket_step(text, found), found.end()
     if found := _FILTER.match(text, position):
         return _filter_step(text, found), found.end()
     raise LogError(
@@ -189,9 +193,11 @@ def _next_step(text: str, position: int) -> tuple[Step, int]:
     )
 
 
-def _bracket_step(found: re.Match[str]) -> Step:
+def _bracket_step(text: str, found: re.Match[str]) -> Step:
     index, everything, in_quotes, bare = found.groups()
     if index is not None:
+        if len(index) > _INDEX_DIGITS:
+            raise LogError(f"{text!r}: no array has an element {index[:20]}...")
         return IndexStep(index=int(index))
     if everything is not None:
         return IndexStep(index=None)
@@ -210,12 +216,11 @@ def _filter_value(text: str, found: re.Match[str]) -> FilterValue:
     bare = found["bare"]
     if bare in ("true", "false"):
         return bare == "true"
-    try:
-        return float(bare)
-    except ValueError:
+    if _NUMBER.fullmatch(bare) is None:
         raise LogError(
             f"{text!r}: {bare!r} in the filter is neither a number nor true or false; put text into quotes"
-        ) from None
+        )
+    return float(bare)
 
 
 def _unescaped(text: str) -> str:

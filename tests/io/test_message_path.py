@@ -11,6 +11,7 @@ from chladni.io.message_path import (
     FilterStep,
     IndexStep,
     KeyStep,
+    element_key,
     near_matches,
     parse_message_path,
     quoted,
@@ -42,6 +43,7 @@ def test_fields_and_elements() -> None:
     assert steps("/imu.position[elbow]") == (FieldStep(name="position"), KeyStep(name="elbow"))
     assert steps('/imu.position["left elbow"]') == (FieldStep(name="position"), KeyStep(name="left elbow"))
     assert steps("/imu[3]") == (IndexStep(index=3),)
+    assert steps("/imu[٣]") == (KeyStep(name="٣"),)
     assert steps("/imu") == ()
 
 
@@ -79,6 +81,11 @@ def test_open_slice_before_a_filter() -> None:
         ("/imu.x[1:3]", r"'\[1:3\]' isn't understood"),
         ("/imu.x[-1]", r"'\[-1\]' isn't understood"),
         ("/imu.x{y}", r"'\{y\}' isn't understood"),
+        ("/imu.x[" + "9" * 5000 + "]", "no array has an element 99999999999999999999"),
+        ("/imu.x[9223372036854775808]", "no array has an element 9223372036854775808"),
+        ("/imu{a==1_0}", "'1_0' in the filter is neither a number"),
+        ("/imu{a==٣}", "in the filter is neither a number"),
+        ("/imu{a==nan}", "'nan' in the filter is neither a number"),
         ("/imu{a==b}", "'b' in the filter is neither a number nor true or false"),
         ("/imu{a==$v}", r"'\$v' in the filter"),
         ("/imu.x.@derivative", "functions such as .@derivative aren't supported"),
@@ -113,3 +120,8 @@ def test_any_text_is_parsed_or_refused(text: str) -> None:
 def test_near_matches_of_nothing_and_of_far() -> None:
     assert near_matches("a", []) == "there are none"
     assert near_matches("qqq", [f"/topic{i}" for i in range(10)]).endswith("/topic7 and 2 more")
+
+
+@given(st.text(min_size=1, max_size=20) | st.sampled_from(["7", " a", "a ", "-1", ":", 'a"b', "²"]))
+def test_the_name_of_an_element_parses_to_itself(name: str) -> None:
+    assert steps(f"/imu.x[{element_key(name)}]") == (FieldStep(name="x"), KeyStep(name=name))

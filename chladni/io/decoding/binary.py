@@ -105,8 +105,10 @@ class BinaryDecoder:
         self.record = record
         self._encapsulated = encapsulated
         # Until messages tell another.
-        self._form = next(forms_of(record, "plain")) if encapsulated else ros1_form(record)
         known = leaves(record)
+        self._form = next(forms_of(record, "plain")) if encapsulated else ros1_form(record)
+        # Last bit of the number in the header; None until messages tell.
+        self._order: int | None = None
         located = _before_wide_text(known)
         self._leaves = {leaf.info.path: leaf for leaf in located}
         self.fields: tuple[FieldInfo, ...] = tuple(leaf.info for leaf in located)
@@ -173,7 +175,9 @@ class BinaryDecoder:
         numbers = Counter(number for head in heads for number in _header_numbers(head))
         if not numbers:
             return iter([self._form])
-        ((number, _),) = numbers.most_common(1)
+        ((number, _),) = Counter(number & ~1 for number in numbers.elements()).most_common(1)
+        # One writer has one byte order: a message that differs from most is damaged, not foreign.
+        self._order = int(numbers[number | 1] >= numbers[number])
         if number not in ENCAPSULATIONS:
             begin = f"{number >> 8:02x} {number & 0xFF:02x}"
             raise LogError(f"{self.record.name}: messages begin with {begin}, which no header of CDR does")
@@ -185,7 +189,7 @@ class BinaryDecoder:
         batch = _Batch(messages)
         cursor = batch.cursor()
         cursor.compact(COMPACT_BYTES * len(paths))
-        walk = _entered(cursor, self._form)
+        walk = _entered(cursor, self._form, self._order)
         walk.read(self._form.root, tree, last=True)
         walk.drop_other_lengths()
         columns = {path: self._column(self._leaves[path], walk, batch) for path in paths}
@@ -250,9 +254,9 @@ def _before_wide_text(known: Sequence[Leaf]) -> tuple[Leaf, ...]:
 
 
 def _header_numbers(messages: EncodedMessages) -> list[int]:
-    """What the headers of CDR messages name, without the bit for the byte order."""
+    """What the headers of CDR messages name; the last bit is the byte order."""
     places = messages.offsets[~outside_buffer(messages) & (messages.lengths >= HEADER_BYTES)]
-    numbers = messages.buffer[places].astype(int) << 8 | messages.buffer[places + 1] & 0xFE
+    numbers = messages.buffer[places].astype(int) << 8 | messages.buffer[places + 1]
     return [int(number) for number in numbers]
 
 
@@ -289,28 +293,28 @@ def _read_ordinarily(form: Form, tree: Tree, heads: Sequence[EncodedMessages]) -
     return 2 * read >= most and bool(inside.all()) and not halved
 
 
-def _entered(cursor: Cursor, form: Form) -> Walk:
-    """Move to the first field of messages that have this form's header."""
+def _entered(cursor: Cursor, form: Form, order: int | None = None) -> Walk:
+    """Move to the first field of messages that have this form's header, and this byte order or that of most."""
     if form.encapsulation is not None:
-        _pass_header(cursor, form.encapsulation, form.rules.origin)
+        _pass_header(cursor, form.encapsulation, form.rules.origin, order)
     return Walk(cursor, rules=form.rules, layouts=form.layouts)
 
 
-def _pass_header(cursor: Cursor, encapsulation: Encapsulation, origin: int) -> None:
-    """Move to the bodies of CDR messages; the header gives the byte order."""
+def _pass_header(cursor: Cursor, encapsulation: Encapsulation, origin: int, order: int | None) -> None:
+    """Move to the bodies of CDR messages; the last bit of the header's number gives the byte order."""
     # The header is big-endian, whatever comes behind it.
     cursor.byte_order = ">"
     cursor.claim(HEADER_BYTES, "the CDR header")
     numbers = uniform(cursor.take(_UINT16).astype(np.int64))
-    if isinstance(numbers, int) and ENCAPSULATIONS.get(numbers & ~1) == encapsulation:
+    alike = isinstance(numbers, int) and order in (None, numbers & 1)
+    if isinstance(numbers, int) and alike and ENCAPSULATIONS.get(numbers & ~1) == encapsulation:
         order = numbers & 1
     else:
         numbers = np.broadcast_to(numbers, len(cursor))
         expected = [number for number, name in ENCAPSULATIONS.items() if name == encapsulation]
         kept = cursor.drop(~np.isin(numbers & ~1, expected), f"the header doesn't name {encapsulation} CDR")
         orders = (numbers if kept is None else numbers[kept]) & 1
-        # One writer has one byte order: a message that differs from most is damaged, not foreign.
-        order = 1 if 2 * np.count_nonzero(orders) >= len(orders) else 0
+        order = int(2 * np.count_nonzero(orders) >= len(orders)) if order is None else order
         cursor.drop(orders != order, "the byte order differs from most messages")
     cursor.enter(HEADER_BYTES - origin, "<" if order else ">")
     cursor.position = origin

@@ -38,6 +38,10 @@ _TOKEN: Final = re.compile(
     re.MULTILINE | re.DOTALL | re.VERBOSE,
 )
 
+_NAME: Final = re.compile(r"[A-Za-z_]")
+# As long as a size can be.
+_WHOLE: Final = re.compile(r"0[0-7]{0,12}|[1-9][0-9]{0,11}|0[xX][0-9a-fA-F]{1,10}")
+
 _NUMBERS: Final = {
     "boolean": np.bool_, "octet": np.uint8, "char": np.uint8, "float": np.float32, "double": np.float64,
     "int8": np.int8, "uint8": np.uint8, "int16": np.int16, "uint16": np.uint16, "int32": np.int32,
@@ -157,7 +161,7 @@ class _Reader:
 
     def _name(self) -> str:
         token = self._next("a name")
-        if not (token[0].isalpha() or token[0] == "_"):
+        if not _NAME.match(token):
             self.place -= 1
             raise self._wrong("a name")
         return token
@@ -223,8 +227,8 @@ class _Reader:
         self._accept(";")
 
     def _enum(self) -> None:
-        bits = self.annotations.get("bit_bound", "32")
-        dtype = next((kind for most, kind in _ENUM_TYPES if _is_number(bits) and int(bits) <= most), None)
+        bits = _whole_number(self.annotations.get("bit_bound", "32"))
+        dtype = next((kind for most, kind in _ENUM_TYPES if bits is not None and bits <= most), None)
         if dtype is None:
             raise self._wrong("an enum bound to at most 32 bits")
         kind = Primitive(dtype=np.dtype(dtype), enumerated=True)
@@ -246,8 +250,9 @@ class _Reader:
         while (token := self._next("';'")) != ";":
             value.append(token)
         # Only whole numbers can be sizes; other constants don't matter to the wire.
-        if len(value) == 1 and _is_number(value[0]):
-            self.constants[self._full(name)] = int(value[0][:12])
+        number = _whole_number(value[0]) if len(value) == 1 else None
+        if number is not None:
+            self.constants[self._full(name)] = number
 
     def _fields(self) -> list[_Field]:
         """One declaration: a type and one or several names, each with its own array sizes."""
@@ -266,7 +271,8 @@ class _Reader:
 
     def _size(self) -> int:
         token = self._next("a size")
-        size = int(token[:12]) if _is_number(token) else self._constant_size(token)
+        number = _whole_number(token)
+        size = self._constant_size(token) if number is None else number
         if size < 1:
             raise self._wrong("a size of at least 1")
         return size
@@ -302,9 +308,18 @@ class _Reader:
         return _Reference(name=name, scope=self.scope)
 
 
-def _is_number(token: str) -> bool:
-    # isdigit alone takes superscripts, too.
-    return token.isascii() and token.isdigit()
+def _whole_number(token: str) -> int | None:
+    """Number that a token of IDL is: decimal, octal or hexadecimal; None where it's none, or no size can be so large.
+
+    Examples
+    --------
+    >>> _whole_number("12"), _whole_number("012"), _whole_number("0x12"), _whole_number("1_2"), _whole_number("²")
+    (12, 10, 18, None, None)
+    """
+    if _WHOLE.fullmatch(token) is None:
+        return None
+    is_octal = len(token) > 1 and token[1].isdigit() and token[0] == "0"
+    return int(token, 8) if is_octal else int(token, 0)
 
 
 class _Resolver:

@@ -12,10 +12,10 @@ import numpy as np
 from chladni.io.decoding.columns import Decoded, Strings, outside_buffer, require_known
 from chladni.io.decoding.found import Found, Row, found_of, joined_column, nothing
 from chladni.io.decoding.json_arrow import read_by_arrow
-from chladni.io.decoding.json_schema import Settled, parse_json_schema
+from chladni.io.decoding.json_schema import Settled, is_unicode, parse_json_schema
 from chladni.io.decoding.json_stream import Span
 from chladni.io.decoding.json_values import Extractor, load_message
-from chladni.io.decoding.schema import leaves
+from chladni.io.decoding.schema import MAX_NESTING, leaves
 from chladni.signals.errors import LogError
 
 if TYPE_CHECKING:
@@ -66,11 +66,16 @@ class JsonDecoder:
         self, name: str, stated: Record | None, *, note: str = "", heads: Sequence[EncodedMessages] = ()
     ) -> None:
         self.name = name
-        self.unread: Mapping[str, str] = {}
         self._stated, self._note = stated, note
         settled = Settled(name, stated, self._first(heads))
         self._contradicted = settled.contradicted
-        self._leaves = {leaf.info.path: leaf for leaf in leaves(settled.record)}
+        known = {leaf.info.path: leaf for leaf in leaves(settled.record)}
+        self._leaves = {path: leaf for path, leaf in known.items() if is_unicode(path)}
+        self.unread = {
+            path.encode("utf-8", "backslashreplace").decode(): "can't be read: its name holds half a character"
+            for path, leaf in known.items()
+            if path not in self._leaves and leaf.info.kind == "number"
+        } | dict.fromkeys(settled.too_deep, f"is nested deeper than {MAX_NESTING}, and isn't read")
         self.fields: tuple[FieldInfo, ...] = tuple(leaf.info for leaf in self._leaves.values())
 
     @classmethod

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -31,6 +32,8 @@ LARGEST_EXACT: Final = 2**53
 _NUMBER: Final = re.compile(
     r"\s*[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|inf(?:inity)?)\s*", re.ASCII | re.IGNORECASE
 )
+_SURROGATES: Final = re.compile("[\ud800-\udfff]")
+_CONTAINERS: Final[dict[type, str]] = {list: "list", dict: "object"}
 _SCALARS: Final[dict[str, FieldType]] = {"number": FLOAT, "integer": INTEGER, "boolean": BOOLEAN, "string": Text()}
 
 
@@ -149,7 +152,10 @@ class Settled:
     Attributes
     ----------
     record : Record
-        All fields. Of a key whose values differ in kind, numbers count before others, and else the first.
+        All fields. A key has lists, objects or single values, as most messages do; of those numbers count before
+        others, and else the first.
+    too_deep : list of str
+        Paths of what is nested too deep to be read.
     contradicted : dict
         What the schema calls a field, by its path, where messages show otherwise.
 
@@ -163,6 +169,7 @@ class Settled:
     def __init__(self, name: str, stated: Record | None, values: Iterable[object]) -> None:
         self._name = name
         self.contradicted: dict[str, str] = {}
+        self.too_deep: list[str] = []
         self.record = self._merged(stated, [value for value in values if isinstance(value, dict)], "", 0)
 
     def _merged(self, stated: Record | None, objects: list[dict[str, object]], path: str, depth: int) -> Record:
@@ -176,6 +183,8 @@ class Settled:
 
     def _type_of(self, stated: FieldType | None, values: list[object], path: str, depth: int) -> FieldType | None:
         given = [value for value in values if value is not None]
+        if depth > MAX_NESTING and given:
+            self.too_deep.append(path)
         if depth > MAX_NESTING or not given:
             return stated
         shown = self._shown(stated, given, path, depth)
@@ -184,22 +193,25 @@ class Settled:
         return shown or stated
 
     def _shown(self, stated: FieldType | None, given: list[object], path: str, depth: int) -> FieldType | None:
-        if isinstance(given[0], list):
+        # One message of another kind may be damaged.
+        ((usual, _),) = Counter(_CONTAINERS.get(type(value)) for value in given).most_common(1)
+        if usual == "list":
             elements = [element for value in given if isinstance(value, list) for element in value]
             inner = stated.element if isinstance(stated, Array) else None
             element = self._type_of(inner, elements, path, depth + 1)
             return None if element is None else Array(element=element)
-        if isinstance(given[0], dict):
-            if isinstance(stated, Stamp) or (stated is None and is_stamp(given[0])):
+        if usual == "object":
+            objects = [value for value in given if isinstance(value, dict)]
+            stamps = sum(map(is_stamp, objects))
+            if isinstance(stated, Stamp) or (stated is None and 2 * stamps > len(objects)):
                 return stated or TIME
             inner_record = stated if isinstance(stated, Record) else None
-            objects = [value for value in given if isinstance(value, dict)]
             return self._merged(inner_record, objects, path, depth + 1)
-        return _scalar_of(stated, given)
+        return _scalar_of(stated, [value for value in given if type(value) not in _CONTAINERS])
 
 
 def _scalar_of(stated: FieldType | None, given: list[object]) -> FieldType:
-    """Type of values of which the first is no list and no object."""
+    """Type of values that are no lists and no objects."""
     numbers = [value for value in given if isinstance(value, int | float) and not isinstance(value, bool)]
     if numbers and stated == INTEGER:
         return INTEGER if all(isinstance(value, int) or value.is_integer() for value in numbers) else FLOAT
@@ -214,6 +226,17 @@ def _scalar_of(stated: FieldType | None, given: list[object]) -> FieldType:
     # Whole numbers in quotes are as often names: only a point or an exponent shows a measured value.
     numeric = stated is None and all(number_in(text) is not None for text in texts)
     return FLOAT if numeric and any(sign in text for text in texts for sign in ".eE") else Text()
+
+
+def is_unicode(text: str) -> bool:
+    """Whether a text can be written at all: escapes of JSON may name half a character.
+
+    Examples
+    --------
+    >>> is_unicode("é"), is_unicode(chr(0xD800))
+    (True, False)
+    """
+    return text.isascii() or not _SURROGATES.search(text)
 
 
 def number_in(text: str) -> float | None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from chladni.io.decoding.found import Row
-from chladni.io.decoding.json_schema import NANOSECONDS, SECONDS, number_in
-from chladni.io.decoding.schema import Array, FieldType, Primitive, Stamp, Text
+from chladni.io.decoding.json_schema import NANOSECONDS, SECONDS, is_unicode, number_in
+from chladni.io.decoding.schema import Array, FieldType, Primitive, Text
 
 if TYPE_CHECKING:
     from collections import Counter
@@ -35,11 +37,22 @@ def load_message(content: bytes) -> object:
     ValueError
         If it isn't JSON in UTF-8, or is nested too deep to be parsed.
     """
+    text = content.decode("utf-8")
     try:
-        parsed: object = json.loads(content.decode("utf-8"))
+        parsed: object = json.loads(text)
     except RecursionError as error:
         raise ValueError("nested too deep") from error
+    except json.JSONDecodeError:
+        raise
+    except ValueError:
+        parsed = json.loads(text, parse_int=_int_or_double)
     return parsed
+
+
+def _int_or_double(digits: str) -> float:
+    """JSON bounds no number; Python takes an integer of so many digits only."""
+    most = sys.get_int_max_str_digits()
+    return float(digits) if 0 < most < len(digits) else int(digits)
 
 
 class Extractor:
@@ -48,7 +61,8 @@ class Extractor:
     A number that is absent or null is NaN, whatever its type: fields of JSON objects are optional, and one that a
     message lacks says nothing against those beside it. So is what isn't a number, with a word. True and false are 1
     and 0 where a number belongs, and numbers in quotes are numbers, with a word. What is called an integer and isn't
-    one is a float.
+    one is a float. A text that is absent is empty, and so is what isn't one, with a word. A time that a list lacks is
+    NaN; one that the message itself lacks leaves the message without time.
 
     Parameters
     ----------
@@ -72,7 +86,7 @@ class Extractor:
         Raises
         ------
         ValueError
-            Says that the message is no object, or which time or text is missing.
+            Says that the message is no object, or which time is missing.
         """
         if isinstance(message, dict):
             return [self._row(message, leaf) for leaf in self._leaves]
@@ -114,14 +128,25 @@ class Extractor:
     def _scalar(self, found: object, kind: FieldType, leaf: Leaf) -> Scalar:
         if isinstance(kind, Primitive):
             return self._number(found, kind, leaf)
-        if isinstance(kind, Text) and isinstance(found, str):
-            found.encode("utf-8")  # a lone surrogate parses, but is no text: nothing could write it
+        if isinstance(kind, Text):
+            return self._text(found, leaf)
+        parts = found if isinstance(found, dict) else {}
+        if not leaf.info.dims:
+            return _nanoseconds(parts, leaf)
+        if found is None:
+            return math.nan
+        with suppress(ValueError):
+            return _nanoseconds(parts, leaf)
+        self._odd(leaf, f"no {leaf.info.kind} where one belongs; it counts as missing")
+        return math.nan
+
+    def _text(self, found: object, leaf: Leaf) -> str:
+        # A lone surrogate parses, but is no text: nothing could write it.
+        if isinstance(found, str) and is_unicode(found):
             return found
-        if isinstance(kind, Stamp) and isinstance(found, dict):
-            return _nanoseconds(found, leaf)
-        raise ValueError(
-            f"no value for {leaf.info.path}" if found is None else f"{leaf.info.path} is no {leaf.info.kind}"
-        )
+        if found is not None:
+            self._odd(leaf, "no text where one belongs; it counts as missing")
+        return ""
 
     def _number(self, found: object, kind: Primitive, leaf: Leaf) -> Scalar:
         if isinstance(found, str) and (quoted := number_in(found)) is not None:

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 _SEPARATOR: Final = re.compile(r"^={3,}\s*$", re.MULTILINE)
 _HEADING: Final = re.compile(r"\s*MSG:\s*(\S+)[^\n]*\n?")
 _TYPE: Final = re.compile(
-    r"(?P<base>[A-Za-z][\w/]*)(?:<=(?P<text_bound>\d{1,10}))?"
-    r"(?P<array>\[(?:(?P<length>\d{1,10})|<=(?P<bound>\d{1,10}))?\])?"
+    r"(?P<base>[A-Za-z][\w/]*)(?:<=(?P<text_bound>[0-9]{1,10}))?"
+    r"(?P<array>\[(?:(?P<length>[0-9]{1,10})|<=(?P<bound>[0-9]{1,10}))?\])?"
 )
 _NAME: Final = re.compile(r"[A-Za-z_]\w*")
 
@@ -131,7 +131,8 @@ class _Parser:
         if len(above) > MAX_NESTING:
             raise LogError(f"schema {self.name}: types nested deeper than {MAX_NESTING}; the definition is refused")
         members = []
-        for line in text.splitlines():
+        # Comments may hold what else ends a line for Unicode.
+        for line in text.split("\n"):
             declaration = _uncommented(line)
             if declaration:
                 member = self._member(declaration, name, above)

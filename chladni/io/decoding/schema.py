@@ -6,6 +6,7 @@ the path of a channel know nothing else.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Final, Literal
@@ -175,8 +176,10 @@ def leaves(record: Record) -> tuple[Leaf, ...]:
     Raises
     ------
     LogError
-        If there are more than `MAX_FIELDS`, or the fixed part alone takes more than `MAX_FIXED_BYTES`.
+        If there are more than `MAX_FIELDS`, the fixed part alone takes more than `MAX_FIXED_BYTES`, types are nested
+        too deep, or two fields of one type have the same name.
     """
+    _height(record, 0, {})
     smallest_size(record, {})
     found = tuple(islice(_leaves_of(record, _Way()), MAX_FIELDS + 1))
     if len(found) > MAX_FIELDS:
@@ -262,6 +265,31 @@ def _field_info(kind: Primitive | Text | Stamp, way: _Way) -> FieldInfo:
             return FieldInfo(path=way.path, kind="string", dtype=None, dims=way.dims)
         case Stamp(kind=stamp):
             return FieldInfo(path=way.path, kind=stamp, dtype=np.dtype(np.int64), dims=way.dims)
+
+
+def _height(kind: FieldType, above: int, known: dict[int, int]) -> int:
+    """How many types and lists lie inside each other from here on; all that walks a definition goes as deep.
+
+    By identity: hashing a list hashes what it lists, and so on.
+    """
+    height = known.get(id(kind), 0)
+    # Each type may be in a list.
+    if above + height > 2 * MAX_NESTING:
+        raise LogError(f"schema: types are nested deeper than {MAX_NESTING}; the definition is refused")
+    if not height:
+        match kind:
+            case Array(element=element):
+                height = _height(element, above + 1, known)
+            case Delimited(content=content):
+                height = _height(content, above + 1, known)
+            case Record(name=name, members=members):
+                twice = [one for one, count in Counter(member.name for member in members).items() if count > 1]
+                if twice:
+                    raise LogError(f"schema {name}: two fields are called {twice[0]!r}; the definition is refused")
+                height = max((_height(member.type, above + 1, known) for member in members), default=0)
+        height += 1
+        known[id(kind)] = height
+    return height
 
 
 def smallest_size(kind: FieldType, known: dict[FieldType, int]) -> int:

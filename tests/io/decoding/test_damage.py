@@ -1,6 +1,8 @@
 """Damaged messages: marked, never crashing, never read beyond their own bytes."""
 
 import struct
+from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -8,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from chladni.io.decoding import make_decoder
 from chladni.io.decoding import walk as walk_module
 from chladni.signals.errors import LogError
 from tests.io.decoding.definitions import ros2_types
@@ -221,3 +224,63 @@ def test_wide_strings_are_refused_only_where_they_are_in_the_way() -> None:
 def test_an_unknown_path_is_refused_with_its_neighbours() -> None:
     with pytest.raises(LogError, match="no field 'positions'; near: position"):
         decoder_of(JOINT_STATE).columns(batch_of([]), ["positions"])
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_a_message_of_the_other_byte_order_is_damaged_though_it_stands_alone(order: int) -> None:
+    """Its numbers would read, and be wrong: the first messages tell the order of all batches."""
+    sound = bytes([0, order, 0, 0]) + struct.pack("<d" if order else ">d", 4.5)
+    decoder = decoder_of("float64 x").informed_by([batch_of([sound] * 5)])
+    odd = bytes([0, 1 - order, 0, 0]) + sound[4:]
+    for messages in ([odd], [odd, odd, sound]):
+        decoded = decoder.columns(batch_of(messages), ["x"])
+        assert decoded.bad.tolist() == [one is odd for one in messages]
+        assert "byte order" in next(iter(decoded.reasons))
+
+
+@pytest.mark.parametrize("bit", range(32))
+def test_a_flipped_header_costs_one_message(bit: int) -> None:
+    sound = cdr(struct.pack("<d", 4.5))
+    odd = bytearray(sound)
+    odd[bit // 8] ^= 1 << bit % 8
+    for heads in ([sound] * 9, [sound, bytes(odd), sound]):
+        decoder = decoder_of("float64 x").informed_by([batch_of(heads)])
+        decoded = decoder.columns(batch_of([bytes(odd)]), ["x"])
+        # Two bytes of the header are options, which say nothing of the numbers.
+        assert decoded.bad[0] == (bit < 16)
+        assert decoded.bad[0] or values_of(decoded, "x") == [4.5]
+
+
+def nested_definitions(depth: int) -> Iterator[tuple[str, str, bytes]]:
+    """Definitions as deep as this, made of types that each are read before: no one of them is deep by itself."""
+    many = range(1, depth)
+    parts = "".join(f"{SEPARATOR}\nMSG: demo/T{k}\nT{k - 1} a\n" for k in many)
+    yield (
+        "cdr",
+        "ros2msg",
+        f"{''.join(f'T{k} a{k}{chr(10)}' for k in many)}{parts}{SEPARATOR}\nMSG: demo/T0\nint8 a\n".encode(),
+    )
+    structs = "".join(f"struct T{k} {{ T{k - 1} a; }};" for k in many)
+    fields = "".join(f"T{k} a{k}; " for k in many)
+    yield "cdr", "omgidl", f"struct T0 {{ long a; }}; {structs} struct Demo {{ {fields} }};".encode()
+    lists = "".join(f"typedef sequence<T{k - 1}> T{k};" for k in many)
+    yield "cdr", "omgidl", f"typedef long T0; {lists} struct Demo {{ {fields} }};".encode()
+
+
+@pytest.mark.parametrize("depth", [20, 200, 3000])
+def test_types_nested_too_deep_are_refused(depth: int) -> None:
+    for encoding, schema_encoding, data in nested_definitions(depth):
+        make = partial(
+            make_decoder, message_encoding=encoding, schema_name="demo/Demo", schema_encoding=schema_encoding,
+            schema_data=data,
+        )  # fmt: skip
+        if depth < 64:
+            assert make().fields
+        else:
+            with pytest.raises(LogError):
+                make()
+
+
+def test_two_fields_of_one_name_are_refused() -> None:
+    with pytest.raises(LogError, match="two fields are called 'x'"):
+        decoder_of("float64 x\nfloat64 y\nint32 x\n")

@@ -171,3 +171,24 @@ def test_the_extensibility_of_a_struct_is_what_its_annotation_says(annotation: s
 def test_an_enum_has_as_many_bytes_as_its_bound_needs(bits: str, width: int) -> None:
     record = parse_idl("S", f"@bit_bound({bits}) enum E {{ A, B }}; enum F {{ C }}; struct S {{ E e; F f; }};")
     assert [member.type.dtype.itemsize for member in record.members] == [width, 4]
+
+
+def test_sizes_are_the_numbers_of_idl() -> None:
+    text = "const long K = 0x10; struct S { double a[012]; double b[K]; sequence<long, 0XA> c; };"
+    a, b, c = (member.type for member in parse_idl("S", text).members)
+    assert (a.length, b.length, c.bound) == (10, 16, 10)
+
+
+@pytest.mark.parametrize("size", ["²", "1_0", "٣", "+3", "08", "0x", "1.5", "3L", "9" * 13, "9" * 5000, "-1"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "struct S { double a[%s]; };",
+        "struct S { sequence<long, %s> a; };",
+        "const long K = %s; struct S { double a[K]; };",
+        "struct S { string<%s> a; };",
+    ],
+)
+def test_what_isn_t_a_size_in_idl_is_refused(size: str, text: str) -> None:
+    with pytest.raises(LogError, match="schema S: "):
+        parse_idl("S", text % size)

@@ -181,10 +181,10 @@ def test_messages_that_together_look_like_others_are_not_mistaken(way: str) -> N
     [
         ("timestamp", '{"sec": 1, "nsec": 2, "nanosec": 3}'), ("timestamp", '{"sec": 1.5, "nsec": 2}'),
         ("timestamp", '{"sec": 1}'), ("timestamp", '{"nsec": 1}'), ("timestamp", '{"sec": 10000000000, "nsec": 1}'),
-        ("timestamp", "7"), ("name", '"\\ud800"'), ("name", "5"),
+        ("timestamp", "7"), ("timestamp", "null"),
     ],
 )  # fmt: skip
-def test_times_and_texts_of_another_type_make_the_message_bad(way: str, field: str, text: str) -> None:
+def test_a_message_without_its_time_is_bad(way: str, field: str, text: str) -> None:
     good = json.dumps(message(4)).encode()
     bad = json.dumps({**message(4), field: "HERE"}).replace('"HERE"', text).encode()
     decoded = decoder_of().columns(batch_of([good, bad, good]), [field])
@@ -449,3 +449,95 @@ def test_messages_that_name_no_value_are_refused(content: bytes) -> None:
 def test_messages_that_are_no_json_are_refused() -> None:
     with pytest.raises(LogError, match="none of the first 2 messages is JSON, so"):
         decoder_of().informed_by([batch_of([b"\x00\x01"] * 2)])
+
+
+# --- one odd value, or message, among many -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("text", ["null", "5", '"\\ud800"', "[]", "{}"])
+def test_what_is_no_text_is_empty_and_costs_no_number(way: str, text: str) -> None:
+    odd = json.dumps({**message(4), "name": "HERE"}).replace('"HERE"', text).encode()
+    decoded = decoder_of().columns(batch_of([json.dumps(message(4)).encode(), odd]), ["name", "value"])
+    assert not decoded.bad.any(), decoded.reasons
+    assert values_of(decoded, "name") == ["sensor é 1", ""]
+    assert values_of(decoded, "value") == [0.4, 0.4]
+    assert list(decoded.told) == ([] if text == "null" else ["name: no text where one belongs; it counts as missing"])
+
+
+ELEMENTS = {
+    "numbers": ([1.5, 2.5], [np.nan]), "integers": ([2**60, 3], [np.nan]), "switches": ([True, False], [np.nan]),
+    "texts": (["a", "b"], [""]), "times": ([{"sec": 1, "nsec": 2}, {"sec": 3, "nsec": 4}], [np.nan]),
+    "lists": ([[1.0, 2.0], [3.0]], []), "objects": ([{"x": 1.0}, {"x": 2.0}], [np.nan]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ELEMENTS)
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_null_in_a_list_leaves_the_other_elements(way: str, kind: str, place: int) -> None:
+    """Null is no value: NaN, an empty text, an empty list."""
+    elements, missing = ELEMENTS[kind]
+    whole, odd = list(elements), list(elements)
+    odd.insert(place, None)
+    messages = batch_of([json.dumps({"a": one}).encode() for one in (whole, odd, whole)])
+    decoder = decoder_of(None).informed_by([messages])
+    (path,) = (info.path for info in decoder.fields)
+    decoded = decoder.columns(messages, [path])
+    assert not decoded.bad.any(), decoded.reasons
+    first, second, third = ([*one[0]] if isinstance(one, list) and one and isinstance(one[0], tuple) else list(one)
+                            for one in values_of(decoded, path))  # fmt: skip
+    assert first == third
+    lengths = [len(one) if isinstance(one, list) else 1 for one in elements]
+    before = sum(lengths[:place])
+    np.testing.assert_array_equal(second, [*first[:before], *missing, *first[before:]])
+    assert [lengths_of[1].tolist() for lengths_of in [decoded.columns[path].lengths] if kind == "lists"] == (
+        [[2, 1, *[*lengths[:place], 0, *lengths[place:]], 2, 1]] if kind == "lists" else []
+    )
+
+
+@pytest.mark.parametrize("odd", [0, 1, 5])
+@pytest.mark.parametrize("what", [1.5, "text", [1], {"y": 1}, None, True])
+def test_one_message_of_another_kind_hides_no_field(way: str, odd: int, what: object) -> None:
+    """The kind that most of the first messages show counts."""
+    for usual, path in (({"x": 2.5}, "a.x"), ([2.5], "a"), (2.5, "a")):
+        contents = [{"a": what if index == odd else usual, "b": index} for index in range(6)]
+        messages = batch_of([json.dumps(one).encode() for one in contents])
+        decoder = decoder_of(None).informed_by([messages])
+        assert {"b", path} <= {info.path for info in decoder.fields}
+        decoded = decoder.columns(messages, [path, "b"])
+        assert not decoded.bad.any()
+        assert values_of(decoded, "b") == list(range(6))
+        values = [one if isinstance(one, list) else [one] for one in values_of(decoded, path)]
+        assert all(one == [2.5] for index, one in enumerate(values) if index != odd)
+
+
+def test_names_that_are_no_unicode_are_told_and_cost_nothing_else(way: str) -> None:
+    contents = [b'{"a\\ud800": 1, "a\\udc00": {"x": 2}, "a\\\\ud800": 3, "b": 4, "\\ud83d\\ude00": 5}'] * 3
+    decoder = decoder_of(None).informed_by([batch_of(contents)])
+    assert [info.path for info in decoder.fields] == ['"a\\\\ud800"', "b", "\U0001f600"]
+    assert list(decoder.unread) == ["a\\ud800", "a\\udc00.x"]
+    assert all("half a character" in why for why in decoder.unread.values())
+    decoded = decode_all(decoder, batch_of(contents))
+    assert [values_of(decoded, info.path)[0] for info in decoder.fields] == [3.0, 4.0, 5.0]
+
+
+@pytest.mark.parametrize("digits", [400, 4300, 5000])
+def test_numbers_of_any_length_are_read(way: str, digits: int) -> None:
+    contents = [b'{"a": %s, "b": 1}' % (b"1" * digits), b'{"a": -%s, "b": 2}' % (b"9" * digits), b'{"a": 3, "b": 3}']
+    decoder = decoder_of(None).informed_by([batch_of(contents[2:])])
+    decoded = decode_all(decoder, batch_of(contents))
+    assert values_of(decoded, "a") == [np.inf, -np.inf, 3.0]
+    assert values_of(decoded, "b") == [1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize(("opened", "closed"), [('{"a": ', "}"), ("[", "]")])
+def test_what_is_nested_too_deep_costs_only_itself(way: str, opened: str, closed: str) -> None:
+    for depth in (80, 20_000):
+        odd = b'{"b": 1, "deep": %s1%s}' % (opened.encode() * depth, closed.encode() * depth)
+        messages = batch_of([odd, b'{"b": 2, "deep": null}', b'{"b": 3}'])
+        decoder = decoder_of(None).informed_by([messages])
+        decoded = decoder.columns(messages, ["b"])
+        sound = np.flatnonzero(~decoded.bad).tolist()
+        assert sound[-2:] == [1, 2]
+        assert [values_of(decoded, "b")[index] for index in sound] == [index + 1.0 for index in sound]
+        # What Python can parse is told to be too deep; what it can't tells nothing of itself.
+        assert bool(decoder.unread) == (depth == 80)

@@ -148,3 +148,16 @@ def test_comments_in_an_old_encoding_cost_nothing(encoding: str) -> None:
     )
     assert [info.path for info in decoder.fields] == ["x", "y"]
     assert definition_text(text.encode(encoding)) == text
+
+
+@pytest.mark.parametrize("size", ["²", "1_0", "٣", "+3", "-1", " 3", "9" * 11, "0x3"])
+@pytest.mark.parametrize("line", ["float64[%s] x", "float64[<=%s] x", "string<=%s x"])
+def test_what_isn_t_a_size_is_refused(size: str, line: str) -> None:
+    with pytest.raises(LogError, match="expected 'type name'"):
+        parse_ros2_text("demo/Demo", line % size)
+
+
+@pytest.mark.parametrize("sign", ["\x0b", "\x0c", "\x1c", "\x85", "\u2028", "\u2029", "\r"])
+def test_only_a_newline_ends_a_line(sign: str) -> None:
+    record = parse_ros2_text("demo/Demo", f"float64 x # left{sign}float64 hidden\nfloat64 y{sign}\n")
+    assert [member.name for member in record.members] == ["x", "y"]
