@@ -114,8 +114,7 @@ class TopicChannels:
             return
         for path, reason in self.topic.unread.items():
             yield Unread(topic=self.topic.name, field=path, reason=reason)
-        for path in self._long_arrays():
-            reason = "an array this long isn't listed; single elements can be read by path"
+        for path, reason in self._unlisted():
             yield Unread(topic=self.topic.name, field=path, reason=reason)
 
     def _nothing_listed(self, messages: int | None) -> Unread:
@@ -129,11 +128,15 @@ class TopicChannels:
             reason = "holds no number"
         return Unread(topic=self.topic.name, reason=reason, messages=messages, complete=hidden is None)
 
-    def _long_arrays(self) -> Iterator[str]:
-        """Numeric arrays that are too long to be listed element by element."""
+    def _unlisted(self) -> Iterator[tuple[str, str]]:
+        """Numeric arrays that aren't listed element by element, and why."""
         for info in self.topic.fields if self.layout is None else ():
-            if info.kind == "number" and info.path in self.elements and self.elements[info.path] is None:
-                yield info.path
+            if info.kind != "number" or not info.dims:
+                continue
+            if self.elements[info.path] is None:
+                yield info.path, "an array this long isn't listed; single elements can be read by path"
+            elif is_signal(info) and self._identified_by_text(info):
+                yield info.path, "elements with text in them aren't listed; single ones can be read by path or filter"
 
     # --- batch messages ---
 

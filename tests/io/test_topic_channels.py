@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from google.protobuf import descriptor_pb2, message_factory
+from google.protobuf.descriptor_pool import DescriptorPool
 
 from chladni.io.log import open_log
 from chladni.signals.errors import LogError
@@ -143,3 +145,42 @@ def test_a_frame_that_one_message_names_makes_no_second_publisher(tmp_path: Path
     with open_log(tmp_path / "a.mcap") as log:
         assert [channel.name for channel in log.channels] == ["/js.position[0]"]
         np.testing.assert_array_equal(log.read(["/js.position[0]"]).values[0], np.arange(300.0))
+
+
+def test_elements_told_apart_by_text_are_told_beside_other_channels(tmp_path: Path) -> None:
+    motors = [{"name": "left", "current": 1.5}, {"name": "right", "current": 2.5}]
+    messages = [{"voltage": 48.0 + k, "motors": motors[:: (-1) ** k]} for k in range(9)]
+    with open_log(write_json(tmp_path / "a.mcap", messages)) as log:
+        assert [channel.name for channel in log.channels] == ["/a.voltage"]
+        (one,) = log.info().unread
+        assert (one.name, "by path or filter" in one.reason) == ("/a.motors[].current", True)
+        assert log.read(['/a.motors[:]{name=="left"}.current']).values.tolist() == [[1.5] * 9]
+
+
+def test_entries_of_a_map_keep_their_places(tmp_path: Path) -> None:
+    """Protobuf gives the entries of a map in any order; by their keys they have one."""
+    file = descriptor_pb2.FileDescriptorProto(name="m.proto", package="demo", syntax="proto3")
+    field = descriptor_pb2.FieldDescriptorProto
+    message = file.message_type.add(name="M")
+    entry = message.nested_type.add(name="GainsEntry")
+    entry.options.map_entry = True
+    entry.field.add(name="key", number=1, type=field.TYPE_INT32, label=field.LABEL_OPTIONAL)
+    entry.field.add(name="value", number=2, type=field.TYPE_DOUBLE, label=field.LABEL_OPTIONAL)
+    message.field.add(
+        name="gains", number=1, type=field.TYPE_MESSAGE, label=field.LABEL_REPEATED, type_name=".demo.M.GainsEntry"
+    )
+    pool = DescriptorPool()
+    pool.Add(file)
+    kind = message_factory.GetMessageClass(pool.FindMessageTypeByName("demo.M"))
+    data = descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
+    keys = [7, -3, 10**6, 0, 12]
+    with LogMaker(tmp_path / "a.mcap") as maker:
+        channel = maker.raw("/a", encoding="protobuf", schema=("demo.M", "protobuf", data))
+        for index in range(40):
+            one = kind()
+            for key in np.random.default_rng(index).permutation(keys).tolist():
+                one.gains[key] = key + index / 64
+            maker.write(channel, one.SerializeToString(), START_NS + index * STEP_NS)
+    with open_log(tmp_path / "a.mcap") as log:
+        values = log.read([f"/a.gains[{place}].value" for place in range(5)]).values
+        np.testing.assert_array_equal(values, np.add.outer(sorted(keys), np.arange(40) / 64))

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from functools import partial
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
@@ -207,6 +207,8 @@ class _Batch:
                 values.append([read(message) for read in readers])
             except decode_error:
                 self._mark(index, "not a protobuf message of this type")
+            except UnicodeError:
+                self._mark(index, "a string isn't UTF-8")
             except OverflowError:
                 self._mark(index, _TIME_OVERFLOW)
         return [found_of(leaf, [one[i] for one in values]) for i, (leaf, _) in enumerate(self.chosen)]
@@ -254,7 +256,7 @@ def _read(table: NDArray[np.uint8], slot: Slot | None, dtype: np.dtype[np.generi
 def _reader(chosen: _Chosen) -> Callable[[Message], Row]:
     """Function that gives the values of a leaf in one message: one, or, below a list of messages, any number."""
     leaf, fields = chosen
-    if any(leaf.lists) or not isinstance(leaf.type, Primitive | Text):
+    if any(leaf.lists) or not isinstance(leaf.type, Primitive):
         return partial(_values, chosen=chosen)
     # The common case: plain numbers, reached by attributes alone.
     if not any(map(_is_optional, fields)):
@@ -306,7 +308,8 @@ class _Entry(NamedTuple):
 
 def _elements(field: object) -> Sequence[object]:
     if isinstance(field, Mapping):
-        return [_Entry(key, value) for key, value in field.items()]
+        # The library gives them in any order.
+        return [_Entry(key, value) for key, value in sorted(field.items(), key=itemgetter(0))]
     return () if field is None else cast("Sequence[object]", field)
 
 
@@ -320,6 +323,8 @@ def _value(found: object, kind: FieldType) -> object:
             return 0  # no time at all, as one that nobody set
         case Text() if found is None:
             return ""
+        case Text() if isinstance(found, bytes):
+            raise UnicodeError(found)  # proto2 lets any bytes pass for a string
         case _ if found is None:
             return math.nan
         case Stamp():

@@ -387,3 +387,18 @@ def test_too_many_files_are_refused() -> None:
         files.file.add(name=f"{index}.proto")
     with pytest.raises(LogError, match="more than 2000"):
         decoder_of(files.SerializeToString())
+
+
+@pytest.mark.parametrize("syntax", ["proto2", "proto3"])
+@pytest.mark.parametrize("label", [Field.LABEL_OPTIONAL, Field.LABEL_REPEATED])
+def test_a_string_that_is_no_unicode_costs_one_message(syntax: str, label: int) -> None:
+    file = descriptor_pb2.FileDescriptorProto(name="t.proto", package="demo", syntax=syntax)
+    message = file.message_type.add(name="T")
+    message.field.add(name="s", number=1, type=Field.TYPE_STRING, label=label)
+    message.field.add(name="x", number=2, type=Field.TYPE_DOUBLE, label=Field.LABEL_OPTIONAL)
+    decoder = decoder_of(descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString(), "demo.T")
+    sound, odd = (b"\x0a\x02" + text + b"\x11" + struct.pack("<d", 2.5) for text in (b"ab", b"\xff\xfe"))
+    decoded = decode_all(decoder, batch_of([sound, odd, sound]))
+    assert decoded.bad.tolist() == [False, True, False]
+    assert values_of(decoded, "x")[::2] == [2.5, 2.5]
+    assert all(isinstance(one, str) for entry in decoded.columns["s"].strings.table for one in entry)
