@@ -291,6 +291,7 @@ class Selected:
     lost: Mapping[str, int] = field(default_factory=dict)
 
 
+@np.errstate(invalid="ignore")  # a damaged number may be a NaN that signals
 def select(decoded: Decoded, selector: FieldSelector, wanted: NDArray[np.bool_]) -> Selected:
     """Take one number out of each message.
 
@@ -309,9 +310,8 @@ def select(decoded: Decoded, selector: FieldSelector, wanted: NDArray[np.bool_])
     chosen, lost = _chosen(decoded, selector.elements, wanted)
     values, present = _elements(column, chosen)
     if selector.names_leaf is not None:
-        # Names that a message doesn't give contradict nothing.
         names, codes = element_names(decoded, selector, present & wanted)
-        other = np.array([name not in (None, selector.called) for name in names])[codes]
+        other = np.array([name is not None and name != selector.called for name in names])[codes]
         if other.any():
             found = {names[code] for code in np.unique(codes[other]).tolist()}
             lost[_otherwise_called(selector, found)] = int(np.count_nonzero(other))
@@ -344,7 +344,7 @@ def element_names(
     Returns
     -------
     names : list
-        Distinct ones; None for no name, and for messages that aren't wanted.
+        Distinct ones; None for no name, which contradicts nothing, and for messages that aren't wanted.
     codes : int array ``[message]``
         Index into `names`.
     """
@@ -353,7 +353,7 @@ def element_names(
         return [None], np.zeros(len(wanted), np.int32)
     column = decoded.columns[selector.names_leaf]
     place, present = list_places(column, _chosen(decoded, above, wanted)[0], len(wanted))
-    names = [entry[index] if index < len(entry) else None for entry in column.strings.table]
+    names = [(entry[index] or None) if index < len(entry) else None for entry in column.strings.table]
     codes = np.append(column.strings.codes.reshape(-1), np.int32(len(names)))
     return [*names, None], codes[np.where(present & wanted, place, -1)]
 

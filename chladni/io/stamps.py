@@ -207,6 +207,7 @@ class TopicHead:
         return self.times.get(choice.kind, (nothing, nothing))
 
 
+@np.errstate(invalid="ignore")  # a damaged number may be a NaN that signals
 def head_of(batches: Sequence[MessageBatch], own: OwnStamp | None, decoded: Sequence[Decoded]) -> TopicHead:
     """Collect the times of the first batches of a topic, with the own stamps' unit found out."""
     publish = np.concatenate([batch.publish_time_ns for batch in batches])

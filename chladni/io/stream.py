@@ -129,6 +129,11 @@ class Stream:
         return self.topic.name if whole else self.sources[0].channel.name
 
     @property
+    def no_time(self) -> str:
+        """What is said of messages without a possible stamp."""
+        return f"{self.choice.label} is no time between 1970 and 2116"
+
+    @property
     def key(self) -> tuple[str, ...]:
         """Tells streams of one log apart."""
         return (self.topic.name, *(f"{source.field} {source.channel.name}" for source in self.sources))
@@ -143,6 +148,7 @@ class Stream:
         """Leaves that the stamps and the filters need."""
         return tuple(dict.fromkeys((*self.choice.leaves, *(one.leaf for one in self.filters))))
 
+    @np.errstate(invalid="ignore")  # a damaged number may be a NaN that signals
     def piece(self, batch: MessageBatch, decoded: Decoded, *, stretch: int = 0, with_values: bool = True) -> Piece:
         """Take the stream's samples out of a batch of its topic.
 
@@ -155,7 +161,7 @@ class Stream:
         lost = dict(decoded.reasons)
         unstamped = int(np.count_nonzero(wanted & ~usable))
         if unstamped:
-            lost[f"{self.choice.label} is no time between 1970 and 2116"] = unstamped
+            lost[self.no_time] = unstamped
         if self.layout is not None:
             piece = self._blocks(decoded, stamps_ns, usable, lost, arrivals, with_values=with_values)
         else:
@@ -312,8 +318,25 @@ def read_pieces(
         yield from ((index, streams[index].without(len(batch), why)) for index, why in reader.refused.items())
         if reader.streams:
             decoded = streams[reader.streams[0]].topic.decode(batch, reader.leaves)
+            counted = _Counted()
             for index in reader.streams:
-                yield index, streams[index].piece(batch, decoded, stretch=stretch, with_values=with_values)
+                piece = streams[index].piece(batch, decoded, stretch=stretch, with_values=with_values)
+                yield index, counted.once(piece, streams[index])
+                decoded = replace(decoded, reasons={}, told={})
+
+
+class _Counted:
+    """What the streams of a topic have in common of one batch is counted once."""
+
+    def __init__(self) -> None:
+        self._filters: set[tuple[FieldFilter, ...]] = set()
+
+    def once(self, piece: Piece, stream: Stream) -> Piece:
+        """Leave out the messages without time, where a stream of the same messages has told them."""
+        if stream.filters not in self._filters:
+            self._filters.add(stream.filters)
+            return piece
+        return replace(piece, lost={reason: lost for reason, lost in piece.lost.items() if reason != stream.no_time})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -182,7 +182,7 @@ class TopicChannels:
         names_leaf = names_beside(info, {one.path: one for one in self.topic.fields})
         lists = self.joints.get(names_leaf, ()) if names_leaf is not None else ()
         if names_leaf is not None and len(lists) > 1 and len(info.dims) == 1 and elements:
-            for joint in dict.fromkeys(joint for names in lists for joint in names):
+            for joint in filter(None, dict.fromkeys(joint for names in lists for joint in names)):
                 by_name = FieldFilter(leaf=names_leaf, operator="==", value=joint)
                 selector = FieldSelector(leaf=info, elements=((by_name,),))
                 yield self._listed(f"{info.path}[{element_key(joint)}]", selector)
@@ -217,7 +217,7 @@ class TopicChannels:
             return self._names_inside(selector, frozenset(name for names in lists for name in names))
         index = selector.elements[0]
         found = [names[index] for names in lists if isinstance(index, int) and index < len(names)]
-        return tuple(dict.fromkeys(found))
+        return tuple(filter(None, dict.fromkeys(found)))
 
     def _names_inside(self, selector: FieldSelector, known: Collection[str]) -> tuple[str, ...]:
         """The same of an array in an array, which another one beside it may name otherwise."""

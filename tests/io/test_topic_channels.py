@@ -1,5 +1,6 @@
 """What is listed of a topic: arrays in arrays, and names that one damaged message changes."""
 
+import struct
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from google.protobuf import descriptor_pb2, message_factory
 from google.protobuf.descriptor_pool import DescriptorPool
+from mcap_ros2._dynamic import serialize_dynamic
 
 from chladni.io.log import open_log
 from chladni.signals.errors import LogError
@@ -184,3 +186,34 @@ def test_entries_of_a_map_keep_their_places(tmp_path: Path) -> None:
     with open_log(tmp_path / "a.mcap") as log:
         values = log.read([f"/a.gains[{place}].value" for place in range(5)]).values
         np.testing.assert_array_equal(values, np.add.outer(sorted(keys), np.arange(40) / 64))
+
+
+def test_damage_is_counted_once_however_many_streams_a_topic_has(tmp_path: Path) -> None:
+    """Joints that are read by name are streams of their own; a message that none of them can read is one message."""
+    encode = serialize_dynamic("sensor_msgs/msg/JointState", JOINT_STATE)["sensor_msgs/msg/JointState"]
+    with LogMaker(tmp_path / "a.mcap") as maker:
+        schema = ("sensor_msgs/msg/JointState", "ros2msg", JOINT_STATE.encode())
+        channel = maker.raw("/js", encoding="cdr", schema=schema)
+        for index in range(100):
+            stamp_ns = START_NS + index * STEP_NS
+            content = joint_state(stamp_ns, ["a", "b"] if index % 2 else ["b", "a"], [1.0, 2.0])
+            if index == 50:
+                content["header"]["stamp"]["sec"] = -5
+            maker.write(channel, encode(content)[: 8 if index == 70 else None], stamp_ns)
+    with open_log(tmp_path / "a.mcap") as log:
+        assert [channel.name for channel in log.channels] == ["/js.position[b]", "/js.position[a]"]
+        log.info()
+        assert [one.lost_messages for one in log.damage] == [1, 1]
+
+
+def test_a_signalling_nan_is_missing_without_a_warning(tmp_path: Path) -> None:
+    signalling = 0x7FA00000
+    with LogMaker(tmp_path / "a.mcap") as maker:
+        channel = maker.raw("/a", encoding="cdr", schema=("test/F", "ros2msg", b"float32 x\nfloat64 y\nfloat32 t\n"))
+        for index in range(100):
+            x = signalling if index in (3, 70) else 0x3F800000
+            content = struct.pack("<BBBBIxxxxdI", 0, 1, 0, 0, x, index, x)
+            maker.write(channel, content, START_NS + index * STEP_NS)
+    with open_log(tmp_path / "a.mcap") as log:
+        log.info()
+        assert np.flatnonzero(np.isnan(log.read(["/a.x", "/a.y"]).values[0])).tolist() == [3, 70]
