@@ -4,7 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -32,6 +32,8 @@ from chladni.signals.errors import LogError
 
 _MARK: Final = re.compile(r'"(?:[^"\\]|\\.)*"|\[\]')
 
+Names = TypeVar("Names", str, tuple[str, ...])
+
 FRAME_FIELDS: Final = ("header.frame_id", "frame_id")
 """Where messages say which of several sensors of one kind they come from."""
 
@@ -53,7 +55,7 @@ class TopicChannels:
         that the head holds. None for an array of more than are listed.
     joints
         Names of array elements, by the leaf that holds them: every distinct list of names that the head holds, but
-        for lists with a name that only one message holds.
+        for those that only one message has.
     frames
         Filters on the frame's name, one for each of several publishers that send at once; else empty.
     """
@@ -378,7 +380,7 @@ def _frames(topic: Topic) -> tuple[FieldFilter, ...]:
     parts = topic.decode_head([leaf])
     names = np.array([name for part in parts for name in _texts(part.columns[leaf].select(~part.bad).strings)])
     logged = np.concatenate([batch.log_time_ns[~part.bad] for batch, part in zip(head, parts, strict=True)])
-    recurring = np.isin(names, _recurring(Counter(names.tolist())))
+    recurring = np.isin(names, _recurring(names.tolist()))
     names, logged = names[recurring], logged[recurring]
     order = np.argsort(logged, kind="stable")
     known, label = np.unique(names[order], return_inverse=True)
@@ -392,7 +394,7 @@ def _texts(strings: Strings) -> list[str]:
 
 
 def _joints(topic: Topic) -> dict[str, tuple[tuple[str, ...], ...]]:
-    """Distinct lists of names, but for those with a name that only one message holds: it's damaged, or a guest."""
+    """Distinct lists of names, but for those that only one message has: it may be damaged."""
     known = {info.path: info for info in topic.fields}
     leaves = {names_beside(info, known) for info in topic.fields if info.dims}
     wanted = sorted(leaf for leaf in leaves if leaf is not None)
@@ -400,14 +402,15 @@ def _joints(topic: Topic) -> dict[str, tuple[tuple[str, ...], ...]]:
     joints = {}
     for leaf in wanted:
         lists = [names for part in heads for names in _lists(part.columns[leaf].select(~part.bad).strings)]
-        recurring = frozenset(_recurring(Counter(name for names in lists for name in set(names))))
-        joints[leaf] = tuple(dict.fromkeys(names for names in lists if recurring.issuperset(names)))
+        joints[leaf] = _recurring(lists)
     return joints
 
 
-def _recurring(names: Counter[str]) -> list[str]:
-    """Names that come more than once; all of them where none does."""
-    return [name for name, count in names.items() if count > 1] or list(names)
+def _recurring(values: Sequence[Names]) -> tuple[Names, ...]:
+    """Distinct values, but for those that come once, where most come more often."""
+    counts = Counter(values)
+    once = [value for value, count in counts.items() if count == 1]
+    return tuple(value for value in counts if 2 * len(once) > len(values) or counts[value] > 1)
 
 
 def _lists(strings: Strings) -> list[tuple[str, ...]]:

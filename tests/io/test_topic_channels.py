@@ -1,7 +1,7 @@
 """What is listed of a topic: arrays in arrays, and names that one damaged message changes."""
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import pytest
 from google.protobuf import descriptor_pb2, message_factory
 from google.protobuf.descriptor_pool import DescriptorPool
 from mcap_ros2._dynamic import serialize_dynamic
+from numpy.typing import NDArray
 
 from chladni.io.log import open_log
 from chladni.signals.errors import LogError
@@ -80,20 +81,23 @@ def test_keys_with_brackets_of_their_own_are_not_indices(tmp_path: Path) -> None
 # --- one message that names things otherwise ---------------------------------------------------------------------
 
 
-def joints_log(path: Path, odd: int, names: Sequence[str] = ("axis", "arm"), wrong: Sequence[str] = ("axiq", "arm")):
+def joints_log(
+    path: Path, odd: Collection[int], names: Sequence[str] = ("axis", "arm"), wrong: Sequence[str] = ("axiq", "arm")
+) -> NDArray[np.float64]:
+    """Messages in `odd` have the wrong names."""
     values = np.random.default_rng(1).normal(size=(2, 300))
     with LogMaker(path) as maker:
         channel = maker.ros2("/js", "sensor_msgs/msg/JointState", JOINT_STATE)
         for index in range(300):
             stamp_ns = START_NS + index * STEP_NS
-            said = list(wrong if index == odd else names)
+            said = list(wrong if index in odd else names)
             maker.write(channel, joint_state(stamp_ns, said, values[:, index]), stamp_ns)
     return values
 
 
 @pytest.mark.parametrize("odd", [0, 1, 40, 63, 64, 150, 299])
 def test_a_name_that_one_message_changes_costs_only_its_element(tmp_path: Path, odd: int) -> None:
-    values = joints_log(tmp_path / "a.mcap", odd)
+    values = joints_log(tmp_path / "a.mcap", [odd])
     with open_log(tmp_path / "a.mcap") as log:
         names = ["/js.position[0]", "/js.position[1]"]
         assert [channel.name for channel in log.channels] == names
@@ -108,7 +112,7 @@ def test_a_name_that_one_message_changes_costs_only_its_element(tmp_path: Path, 
 
 
 def test_a_name_that_one_message_changes_is_read_by_name(tmp_path: Path) -> None:
-    values = joints_log(tmp_path / "a.mcap", 100)
+    values = joints_log(tmp_path / "a.mcap", [100])
     with open_log(tmp_path / "a.mcap") as log:
         read = log.read(["/js.position[axis]"]).values[0]
         np.testing.assert_array_equal(np.delete(read, 100), np.delete(values[0], 100))
@@ -116,22 +120,49 @@ def test_a_name_that_one_message_changes_is_read_by_name(tmp_path: Path) -> None
 
 
 def test_names_that_change_places_are_read_by_name(tmp_path: Path) -> None:
-    """No name is odd here: reading by number would mix two joints."""
-    values = joints_log(tmp_path / "a.mcap", 40, wrong=("arm", "axis"))
+    """By number two joints would be mixed."""
+    odd = range(0, 300, 3)
+    values = joints_log(tmp_path / "a.mcap", odd, wrong=("arm", "axis"))
     with open_log(tmp_path / "a.mcap") as log:
-        names = ["/js.position[axis]", "/js.position[arm]"]
+        names = ["/js.position[arm]", "/js.position[axis]"]
         assert [channel.name for channel in log.channels] == names
-        values[:, 40] = values[::-1, 40]
-        np.testing.assert_array_equal(log.read(names).values, values)
+        values[:, odd] = values[::-1, odd]
+        np.testing.assert_array_equal(log.read(names).values, values[::-1])
         with pytest.raises(LogError, match=r"'/js.position\[0\]': element 0 is called arm and axis in different"):
             log.read(["/js.position[0]"])
 
 
+def test_names_that_change_places_once_are_told_and_read_by_name(tmp_path: Path) -> None:
+    values = joints_log(tmp_path / "a.mcap", [40], wrong=("arm", "axis"))
+    with open_log(tmp_path / "a.mcap") as log:
+        assert [channel.name for channel in log.channels] == ["/js.position[0]", "/js.position[1]"]
+        assert np.flatnonzero(np.isnan(log.read().values[0])).tolist() == [40]
+        assert "is called 'arm', in the first messages 'axis'; read it by name" in log.damage[0].what
+        values[:, 40] = values[::-1, 40]
+        np.testing.assert_array_equal(log.read(["/js.position[axis]", "/js.position[arm]"]).values, values)
+
+
+def test_lists_that_all_differ_are_read_by_name(tmp_path: Path) -> None:
+    """Names in random order: hardly any two of the first messages have the same list."""
+    joints = [f"j{number}" for number in range(7)]
+    with LogMaker(tmp_path / "a.mcap") as maker:
+        channel = maker.ros2("/js", "sensor_msgs/msg/JointState", JOINT_STATE)
+        for index in range(100):
+            order = np.random.default_rng(index % 60).permutation(7)
+            stamp_ns = START_NS + index * STEP_NS
+            said, values = [joints[place] for place in order], order + index / 128
+            maker.write(channel, joint_state(stamp_ns, said, values), stamp_ns)
+    with open_log(tmp_path / "a.mcap") as log:
+        names = [f"/js.position[{joint}]" for joint in joints]
+        assert {channel.name for channel in log.channels} == set(names)
+        np.testing.assert_array_equal(log.read(names).values, np.add.outer(np.arange(7), np.arange(100) / 128))
+
+
 def test_names_of_elements_parse_back(tmp_path: Path) -> None:
-    joints_log(tmp_path / "a.mcap", 1, names=("7", "a]b"), wrong=("a]b", "7"))
+    joints_log(tmp_path / "a.mcap", range(0, 300, 2), names=("7", "a]b"), wrong=("a]b", "7"))
     with open_log(tmp_path / "a.mcap") as log:
         names = [channel.name for channel in log.channels]
-        assert names == ['/js.position["7"]', '/js.position["a]b"]']
+        assert names == ['/js.position["a]b"]', '/js.position["7"]']
         assert log.read(names).values.shape == (2, 300)
 
 
