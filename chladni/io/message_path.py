@@ -21,8 +21,8 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _INDEX_DIGITS = 18
 """Digits of an index that 64 bits hold."""
 
-_PLAIN_KEY = re.compile(r'(?![0-9]+$)[^\[\]:"\s-](?:[^\[\]:"]*[^\[\]:"\s])?')
-_PLAIN_NAME = re.compile(r'(?!@)[^.\[\]{}"\\\s]+')
+# Not with a backslash, which only begins an escape outside quotes: a name that holds one stands in quotes.
+_PLAIN_NAME = re.compile(r'(?!@)[^.\[\]{}"\s\\]+')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,20 +131,19 @@ def quoted(name: str) -> str:
     >>> quoted("ch1"), quoted("top floor")
     ('ch1', '"top floor"')
     """
-    if _PLAIN_NAME.fullmatch(name):
-        return name
-    return _in_quotes(name)
+    return name if _PLAIN_NAME.fullmatch(name) else _in_quotes(name)
 
 
-def element_key(name: str) -> str:
-    """Write the name of an element so that it parses back to itself in brackets.
+def element_text(name: str) -> str:
+    r"""Write the brackets that choose an element by its name; in quotes where they would mean something else.
 
     Examples
     --------
-    >>> element_key("left elbow"), element_key("7")
-    ('left elbow', '"7"')
+    >>> element_text("elbow"), element_text("3"), element_text("a]")
+    ('[elbow]', '["3"]', '["a]"]')
     """
-    return name if _PLAIN_KEY.fullmatch(name) else _in_quotes(name)
+    bare = _BRACKET.fullmatch(f"[{name}]")
+    return f"[{name}]" if bare and bare[4] == name and "\\" not in name else f"[{_in_quotes(name)}]"
 
 
 def _in_quotes(name: str) -> str:

@@ -25,7 +25,7 @@ from chladni.io.field_selector import (
 )
 from chladni.io.known_schemas import MAX_LISTED_ELEMENTS, has_signals, is_signal
 from chladni.io.loss import Unread
-from chladni.io.message_path import FieldStep, IndexStep, MessagePath, element_key, near_matches, quoted
+from chladni.io.message_path import FieldStep, IndexStep, MessagePath, element_text, near_matches, quoted
 from chladni.io.publishers import at_once
 from chladni.io.topic import Topic
 from chladni.signals.errors import LogError
@@ -187,7 +187,7 @@ class TopicChannels:
             for joint in filter(None, dict.fromkeys(joint for names in lists for joint in names)):
                 by_name = FieldFilter(leaf=names_leaf, operator="==", value=joint)
                 selector = FieldSelector(leaf=info, elements=((by_name,),))
-                yield self._listed(f"{info.path}[{element_key(joint)}]", selector)
+                yield self._listed(f"{info.path}{element_text(joint)}", selector)
             return
         for indices in elements:
             selector = FieldSelector(leaf=info, elements=indices, names_leaf=names_leaf)
@@ -206,7 +206,7 @@ class TopicChannels:
             told = " and ".join(sorted(called)[:4])
             raise LogError(
                 f"{path.text!r}: element {selector.elements[-1]} is called {told} in different messages; read it by "
-                f"name, {selector.leaf.path}[{element_key(min(called))}]"
+                f"name, {selector.leaf.path}{element_text(min(called))}"
             )
         return self._with_name(selector, called)
 

