@@ -17,6 +17,7 @@ from chladni.gap.records.measurement import Measurement
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import LogError
+from chladni.signals.number_range import rms
 from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import counted
@@ -181,7 +182,7 @@ def _played_back(first: TimeSeries, second: TimeSeries) -> tuple[str, ...]:
     same = []
     for row, channel in enumerate(first.channels):
         ours, theirs = first.values[row, :samples], second.values[row, :samples]
-        if np.sqrt(np.mean((ours - theirs) ** 2)) <= PLAYED_BACK * np.sqrt(np.mean(ours**2)):
+        if rms(ours - theirs) <= PLAYED_BACK * rms(ours):
             same.append(channel.name)
     return tuple(same)
 

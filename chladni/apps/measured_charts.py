@@ -9,6 +9,7 @@ from chladni.apps.spectra import frf, psd
 from chladni.models.core.reading import Chart, Curve, Quantity
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
+from chladni.signals.number_range import rms
 from chladni.signals.time_series import TimeSeries
 from chladni.viewers.drawing import thin
 
@@ -63,12 +64,12 @@ def scores(measured: TimeSeries, simulated: TimeSeries) -> tuple[Quantity, ...]:
     """Give the NRMSE of each output in percent; None where nothing but zero was measured."""
     found = []
     for channel, real, made in zip(measured.channels, measured.values, simulated.values, strict=True):
-        size = float(np.sqrt(np.mean(real**2)))
-        gap = float(np.sqrt(np.mean((real - made) ** 2)))
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            percent = float(100 * rms(real - made) / rms(real))
         found.append(
             Quantity(
                 name=f"NRMSE {channel.name}",
-                value=100 * gap / size if size > 0 else None,
+                value=percent if np.isfinite(percent) else None,
                 unit="%",
                 definition="RMS of measured less simulated over RMS of measured; simulated from rest",
             )

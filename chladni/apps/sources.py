@@ -94,10 +94,10 @@ def _with_moments(known: tuple[int, float, float], row: NDArray[np.floating[Any]
     if not finite.size:
         return known
     samples, mean, squares = known
-    fresh_mean = float(finite.mean())
-    apart, total = fresh_mean - mean, samples + finite.size
     # Values too large to square are refused by name when they are averaged; here they only make an infinite variance.
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
+        fresh_mean = float(finite.mean())
+        apart, total = fresh_mean - mean, samples + finite.size
         squares += float(np.square(finite - fresh_mean).sum()) + apart * apart * samples * finite.size / total
     return total, mean + apart * finite.size / total, squares
 

@@ -156,10 +156,12 @@ def _usual_level(instrument: "Instrument", at: str | None) -> float:
 
 
 def _rows(series: "TimeSeries", names: "Mapping[str, str]") -> list[list[str]]:
+    from chladni.signals.number_range import rms
+
     roles = {"reference": "input", "response": "output"}
     return [
-        [names[channel.name], roles[channel.role], f"{float((row**2).mean() ** 0.5):.4g}", channel.unit]
-        for channel, row in zip(series.channels, series.values, strict=True)
+        [names[channel.name], roles[channel.role], f"{size:.4g}", channel.unit]
+        for channel, size in zip(series.channels, rms(series.values).tolist(), strict=True)
     ]
 
 

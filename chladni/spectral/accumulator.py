@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from chladni.signals.channel import Channel
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError, SetupError
+from chladni.signals.number_range import LARGEST, largest_magnitudes, require_in_range
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import rounded_up
@@ -34,9 +35,6 @@ BYTES_TOGETHER = 20 << 20
 MOST_RESULT_BYTES = 2 << 30
 # More threads than this wait for memory.
 MOST_THREADS = 8
-
-# The transform of N samples has N times their summed squares at most, and squares of many segments are added up.
-MOST_POWER = 1e290
 
 
 class CrossSpectraAccumulator:
@@ -107,6 +105,8 @@ class CrossSpectraAccumulator:
         # Samples of the unbroken run that later segments still need, and the number its next segment has in the run.
         self._held = HeldSamples()
         self._position = 0
+        # A stream may begin or end as quietly as it likes: what counts is the largest of all.
+        self.largest = np.zeros(len(self.channels))
 
     @property
     def averages(self) -> int:
@@ -125,7 +125,7 @@ class CrossSpectraAccumulator:
         # All that can be refused is refused before anything is changed: a caller may mend the block and go on.
         self._require_agreement(block)
         runs = valid_runs(block)
-        require_finite(block, runs)
+        self.largest = np.maximum(self.largest, require_finite(block, runs))
         with _threads() as executor:
             if self.stretch.breaks_at(block.start_time_ns, block.sample_rate_hz):
                 self._end_run(executor)
@@ -157,6 +157,7 @@ class CrossSpectraAccumulator:
         self.average.merge(flushed.average)
         self.count.merge(flushed.count)
         self.stretch.merge(flushed.stretch)
+        self.largest = np.maximum(self.largest, flushed.largest)
 
     def result(self) -> CrossSpectra:
         """Give the average so far; more blocks may follow.
@@ -164,13 +165,15 @@ class CrossSpectraAccumulator:
         Raises
         ------
         EstimateError
-            When not a single whole segment of valid samples has come.
+            When not a single whole segment of valid samples has come, or a channel's values are too small to be
+            squared.
         """
         # A copy is finished, not this one: a live display asks often, and batches are to fill as before.
         with _threads() as executor:
             flushed = self.flushed(executor)
         if flushed.count.segments == 0:
             raise EstimateError(self._nothing_averaged())
+        require_in_range(self.channels, self.largest)
         samples, rate = self.segmentation.samples, self.sample_rate_hz
         density = flushed.average.mean()
         density *= one_sided_weights(samples) / (rate * np.sum(self._window**2))
@@ -332,25 +335,30 @@ def require_fitting_result(channels: int, samples: int) -> None:
         )
 
 
-def require_finite(block: TimeSeries, runs: Sequence[tuple[int, int]]) -> None:
-    """Raise `EstimateError` naming the channel when samples within the runs aren't finite, or too large to square."""
-    for first, last in runs:
-        values = block.values[:, first:last]
-        # One sum a channel is many times cheaper than asking each sample; what isn't finite stays so.
-        with np.errstate(over="ignore", invalid="ignore"):
-            power = np.einsum("ij,ij->i", values, values, dtype=np.float64)
-        for row in np.flatnonzero(~(power < MOST_POWER)):
-            bad = np.flatnonzero(~np.isfinite(values[row]))
-            if not bad.size:
-                raise EstimateError(
-                    f"channel {block.channels[row].name!r} holds values up to {np.abs(values[row]).max():.3g}, whose "
-                    "squares are too large for a number; leave the channel out"
-                )
-            raise EstimateError(
-                f"channel {block.channels[row].name!r} is {values[row, bad[0]]} at "
-                f"{block.times_ns()[first + bad[0]] / NS_PER_S:.6f} s and {bad.size - 1} more times without "
-                "being marked invalid; mark such samples in `valid`"
-            )
+def require_finite(block: TimeSeries, runs: Sequence[tuple[int, int]]) -> NDArray[np.float64]:
+    """Give ``[channel]`` largest magnitudes within the runs.
+
+    Raises
+    ------
+    EstimateError
+        Naming the channel, when one of its samples isn't finite, or too large to be squared. What is too small is
+        known at the end of a stream only: see `require_in_range`.
+    """
+    largest = largest_magnitudes(block.values, runs)
+    for row in np.flatnonzero(~np.isfinite(largest)):
+        first, bad = next(
+            (first, places)
+            for first, last in runs
+            if (places := np.flatnonzero(~np.isfinite(block.values[row, first:last]))).size
+        )
+        more = sum(int(np.sum(~np.isfinite(block.values[row, one:end]))) for one, end in runs) - 1
+        raise EstimateError(
+            f"channel {block.channels[row].name!r} is {block.values[row, first + bad[0]]} at "
+            f"{block.times_ns()[first + bad[0]] / NS_PER_S:.6f} s and {more} more times without "
+            "being marked invalid; mark such samples in `valid`"
+        )
+    require_in_range(block.channels, np.where(largest > LARGEST, largest, 0.0))
+    return largest
 
 
 def _names(channels: Sequence[Channel]) -> str:

@@ -6,10 +6,11 @@ from numpy.typing import NDArray
 
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
+from chladni.signals.number_range import require_in_range
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import rounded_up
-from chladni.spectral.accumulator import line_frequencies_hz, one_sided_weights
+from chladni.spectral.accumulator import line_frequencies_hz, one_sided_weights, require_finite
 from chladni.spectral.force_pulses import (
     LONGEST_PULSE_S,
     NOISE_SIGMAS,
@@ -18,6 +19,7 @@ from chladni.spectral.force_pulses import (
     typical_peak,
 )
 from chladni.spectral.hits import Hit, Impacts, Judge, Rejection
+from chladni.spectral.stretches import valid_runs
 
 # Widths of the pulse after the trigger during which the force window is one, and then falls to zero.
 FORCE_WINDOW_PULSES = 4
@@ -161,7 +163,7 @@ def impact_cross_spectra(
     Raises
     ------
     EstimateError
-        When no hit was accepted, or the decay is negative.
+        When no hit was accepted, the decay is negative, or values are too large or too small to be squared.
 
     Notes
     -----
@@ -172,6 +174,7 @@ def impact_cross_spectra(
         raise EstimateError(f"no hit of {impacts.force!r} was accepted{_why_none(impacts)}")
     if not 0 <= decay_per_s < np.inf:
         raise EstimateError(f"decay_per_s is {decay_per_s}; it must be 0 or positive")
+    require_in_range(series.channels, require_finite(series, valid_runs(series)))
     rate_hz = series.sample_rate_hz
     length = round(impacts.record_s * rate_hz)
     windows = _windows(series, impacts, length, force_window=force_window, decay_per_s=decay_per_s)

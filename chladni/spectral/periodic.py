@@ -10,6 +10,7 @@ from scipy import fft
 
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
+from chladni.signals.number_range import largest_magnitudes, require_in_range
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.spectral.accumulator import (
@@ -48,7 +49,8 @@ def periodic_cross_spectra(source: Source, period: Period) -> CrossSpectra:
     Raises
     ------
     EstimateError
-        When the period is no whole number of samples, or fewer than two whole periods are there.
+        When the period is no whole number of samples, fewer than two whole periods are there, or values are too large
+        or too small to be squared.
 
     Examples
     --------
@@ -66,7 +68,7 @@ def periodic_cross_spectra(source: Source, period: Period) -> CrossSpectra:
         )
     (first, *_), blocks = leading_part(source, 1)
     require_fitting_result(len(first.channels), period.samples)
-    scatter = _PeriodScatter(row=first.index(period.channel))
+    scatter = _PeriodScatter(row=first.index(period.channel), largest=np.zeros(len(first.channels)))
     # A period at a time: memory holds one, and the matrix, however long the log is.
     for cut in _periods(blocks, period):
         scatter.add(cut)
@@ -75,6 +77,7 @@ def periodic_cross_spectra(source: Source, period: Period) -> CrossSpectra:
             f"{scatter.count} whole periods of {period.period_s:g} s repeat; their scatter needs two, so take a "
             "longer record or average with a window"
         )
+    require_in_range(first.channels, scatter.largest)
     return _spectra(first, period, scatter)
 
 
@@ -83,6 +86,7 @@ class _PeriodScatter:
     """Running mean of period spectra ``[channel, frequency]`` and sum of products about it (Welford 1962)."""
 
     row: int
+    largest: NDArray[np.float64]
     count: int = 0
     skipped: int = 0
     mean: NDArray[np.complex128] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.complex128))
@@ -92,6 +96,7 @@ class _PeriodScatter:
         if period is None:
             self.skipped += 1
             return
+        self.largest = np.maximum(self.largest, largest_magnitudes(period))
         spectra = fft.rfft(period - period.mean(axis=-1, keepdims=True), axis=-1)
         if self.count == 0:
             self.mean = np.zeros_like(spectra)

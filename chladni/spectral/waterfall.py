@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.errors import EstimateError
+from chladni.signals.number_range import LARGEST, require_in_range
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.waterfall import Waterfall
@@ -52,14 +53,15 @@ def waterfall(
     Returns
     -------
     Waterfall
-        ``[channel, time, frequency]`` in unit^2/Hz, single precision: each slice is the Welch estimate of its
-        segments. NaN in every slice, and of those channels only, that touches an invalid sample or a gap between
-        blocks.
+        ``[channel, time, frequency]`` in unit^2/Hz, in single precision where that holds them: each slice is the
+        Welch estimate of its segments. NaN in every slice, and of those channels only, that touches an invalid sample
+        or a gap between blocks.
 
     Raises
     ------
     EstimateError
-        When there is no sample, blocks don't fit together, or `max_slices` is below 2.
+        When there is no sample, blocks don't fit together, values are too large or too small to be squared, or
+        `max_slices` is below 2.
     SetupError
         When an option is out of its range, or the source is shorter than a segment.
 
@@ -114,12 +116,13 @@ class _Slices:
             if len(self._pending) == self.group:
                 self._close()
 
-    def slices(self) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    def slices(self) -> tuple[Samples, NDArray[np.float64]]:
         """Give ``[channel, slice, frequency]`` and the mean segment number of each slice."""
         means = [*self._means, *([np.mean(self._pending, axis=0)] if self._pending else [])]
         first = np.arange(len(means)) * self.group
         last = np.minimum(first + self.group, self.count) - 1
-        return np.stack(means, axis=1).astype(np.float32), (first + last) / 2
+        power = np.stack(means, axis=1)
+        return power.astype(_precision(power)), (first + last) / 2
 
     def _close(self) -> None:
         if len(self._means) == self.most:
@@ -132,12 +135,24 @@ class _Slices:
         self._pending = []
 
 
+def _precision(power: NDArray[np.float64]) -> type[np.float32 | np.float64]:
+    """Single precision where it holds the powers ``[channel, slice, frequency]``, and those 16 digits below them."""
+    single = np.finfo(np.float32)
+    largest = np.fmax.reduce(power, axis=(1, 2), initial=0.0)
+    fits = (largest == 0) | ((largest > single.tiny / np.finfo(np.float64).eps) & (largest < single.max))
+    return np.float32 if fits.all() else np.float64
+
+
 def _segments(
     blocks: Iterator[TimeSeries], first: TimeSeries, plan: Segmentation, window: NDArray[np.float64]
 ) -> Iterator[NDArray[np.float64]]:
     """Powers ``[segment, channel, frequency]`` of portion after portion, the segments that span two portions too."""
     held = np.empty((len(first.channels), 0))
+    largest = np.zeros(len(first.channels))
     for values in _portions(blocks, first):
+        # NaN stands for what is missing, and is passed over.
+        largest = np.fmax(largest, np.fmax.reduce(np.abs(values), axis=1, initial=0.0))
+        require_in_range(first.channels, np.where(largest > LARGEST, largest, 0.0))
         held = np.concatenate([held, values], axis=1)
         count = plan.count(held.shape[1])
         if not count:
@@ -146,6 +161,7 @@ def _segments(
         yield np.abs(spectra.transpose(1, 2, 0)) ** 2
         # What the next segment begins with stays; it overlaps the last one done.
         held = held[:, count * plan.hop :]
+    require_in_range(first.channels, largest)
 
 
 def _portions(blocks: Iterator[TimeSeries], first: TimeSeries) -> Iterator[NDArray[np.float64]]:
@@ -185,7 +201,7 @@ def _assembled(first: TimeSeries, plan: Segmentation, window: NDArray[np.float64
     return Waterfall(
         time_s=(number * plan.hop + plan.samples / 2) / rate_hz,
         frequency_hz=line_frequencies_hz(plan.samples, rate_hz),
-        values=power * scale.astype(np.float32),
+        values=power * scale.astype(power.dtype),
         channels=first.channels,
         start_time_ns=first.start_time_ns,
         bandwidth_hz=noise_bandwidth_bins(window) * rate_hz / plan.samples,

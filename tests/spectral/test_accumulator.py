@@ -242,3 +242,19 @@ def test_values_whose_squares_overflow_are_refused_by_name():
     name = WHOLE.channels[1].name
     with pytest.raises(EstimateError, match=rf"'{name}' holds values up to \d\.\d+e\+200.*leave the channel out"):
         accumulate([replace(WHOLE, values=values)])
+
+
+def test_a_stream_may_begin_quietly_but_not_stay_so():
+    # A tone that fades in from nothing: its first block alone is too small to be squared.
+    quiet, loud = 1e-300 * noise(1, 400), noise(1, 400)
+    both = series(np.concatenate([quiet, loud], axis=1), rate_hz=100.0)
+    early, late = both.window(end_s=4.0), both.window(start_s=4.0)
+    average = CrossSpectraAccumulator(both.channels, 100.0, Segmentation(samples=100, hop=100))
+    average.update(early)
+    with pytest.raises(EstimateError, match=r"holds \d\.\d+e-300 at most"):
+        average.result()
+    average.update(late)
+    # Half of the segments hold next to nothing.
+    alone = CrossSpectraAccumulator(both.channels, 100.0, Segmentation(samples=100, hop=100))
+    alone.update(late)
+    np.testing.assert_allclose(average.result().density, alone.result().density / 2, rtol=1e-12)

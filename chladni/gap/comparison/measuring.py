@@ -16,6 +16,7 @@ from chladni.models.core.model import Model
 from chladni.models.core.port import Terminal
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, ModelError, SetupError
+from chladni.signals.number_range import out_of_range
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import si_factor
 from chladni.signals.wording import counted
@@ -112,8 +113,8 @@ def matched_log(
     Raises
     ------
     LogError
-        When the log hasn't got the channel of an input, holds none of the outputs, or has no stretch without gaps
-        that is long enough.
+        When the log hasn't got the channel of an input, or holds numbers there that can't be squared; when it holds
+        none of the outputs, or has no stretch without gaps that is long enough.
     ModelError
         When no input of the model could ever be found in a log, or units don't fit.
     """
@@ -123,6 +124,7 @@ def matched_log(
     inputs = [_matched(terminal, recording) for terminal in compiled.inputs]
     _require_inputs(inputs, model.name, log, held=told)
     driving = [match.row for match in inputs if match.row is not None]
+    _require_inputs_in_range(recording, driving, log)
     outputs, remarks = _usable_outputs(compiled, recording, log, driving)
     _require_outputs(outputs, remarks, model.name, log, held=told)
     rows = [*driving, *(match.row for match in outputs if match.row is not None)]
@@ -210,7 +212,16 @@ def _why_unusable(match: _Match, recording: TimeSeries, log: str, driving: Seque
     values = recording.values[match.row][good]
     if values.min() == values.max():
         return f"channel {match.wanted!r} never changes from {values[0]:g}"
-    return None
+    fault = out_of_range(float(np.abs(values).max()))
+    return None if fault is None else f"channel {match.wanted!r} {fault}"
+
+
+def _require_inputs_in_range(recording: TimeSeries, driving: Sequence[int], log: str) -> None:
+    for row in driving:
+        good = good_samples(recording, [row])
+        fault = out_of_range(float(np.abs(recording.values[row][good]).max(initial=0.0)))
+        if fault is not None:
+            raise LogError(f"{log}: input channel {recording.channels[row].name!r} {fault}")
 
 
 def _span(recording: TimeSeries, row: int) -> str:

@@ -1,10 +1,13 @@
 """What a log holds of a model's inputs and outputs."""
 
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.errors import EstimateError
+from chladni.signals.number_range import largest_magnitudes, out_of_range
 from chladni.signals.value import Value, require_shape
 
 Matrix = NDArray[np.float64]
@@ -13,6 +16,8 @@ Matrix = NDArray[np.float64]
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Measurement(Value):
     """Inputs and outputs of a model as one log holds them, on one clock, whole: no sample is missing.
+
+    All numbers can be squared twice (`chladni.signals.number_range`): whatever is estimated from them is a number.
 
     Attributes
     ----------
@@ -48,6 +53,8 @@ class Measurement(Value):
         samples = self.outputs.shape[-1]
         require_shape("inputs", self.inputs, (len(self.input_names), samples), "the model's inputs")
         require_shape("outputs", self.outputs, (len(self.output_names), samples), "the measured outputs")
+        _require_in_range(self.log, self.input_names, self.inputs)
+        _require_in_range(self.log, self.output_names, self.outputs)
         self._freeze()
 
     @property
@@ -59,3 +66,10 @@ class Measurement(Value):
     def duration_s(self) -> float:
         """Length in seconds."""
         return self.samples / self.sample_rate_hz
+
+
+def _require_in_range(log: str, names: tuple[str, ...], signals: Matrix) -> None:
+    for name, largest in zip(names, largest_magnitudes(signals).tolist(), strict=True):
+        fault = out_of_range(largest) if isfinite(largest) else "holds values that aren't finite; leave it out"
+        if fault is not None:
+            raise EstimateError(f"{log}: {name!r} {fault}")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from chladni.modal.responses.lag_sums import LagSums, SpectralSums, plan_lags
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, SetupError
+from chladni.signals.number_range import require_in_range
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.value import Value, require_shape
 from chladni.spectral.accumulator import require_finite
@@ -171,6 +172,7 @@ class CorrelationAccumulator:
         self._units_in_block = max(usable // self.plan.hop // blocks, 1)
         self._offset: Floats | None = None
         self._samples = 0
+        self._largest = np.zeros(len(self.channels))
 
     def update(self, block: TimeSeries) -> None:
         """Take the next block of the stream.
@@ -187,7 +189,7 @@ class CorrelationAccumulator:
                 f"{len(self.channels)} channels at {self.sample_rate_hz:g} Hz; give consecutive blocks of one series"
             )
         runs = valid_runs(block)
-        require_finite(block, runs)
+        self._largest = np.maximum(self._largest, require_finite(block, runs))
         if self._stretch.breaks_at(block.start_time_ns, block.sample_rate_hz):
             self._end_run()
         self._stretch.extend(block, runs)
@@ -207,8 +209,10 @@ class CorrelationAccumulator:
         Raises
         ------
         EstimateError
-            When there are too few samples for the scatter between blocks.
+            When there are too few samples for the scatter between blocks, or a channel's values are too small to be
+            squared.
         """
+        require_in_range(self.channels, self._largest)
         parts = self._parts()
         count = np.array([part.count for part in parts], dtype=np.float64)
         if len(parts) < min(FEWEST_BLOCKS, self.blocks):

@@ -8,6 +8,7 @@ import scipy.special
 from numpy.typing import NDArray
 
 from chladni.signals.errors import EstimateError
+from chladni.signals.number_range import require_in_range
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.accumulator import require_finite
 from chladni.spectral.segment_spectra import segment_spectra
@@ -65,7 +66,7 @@ def narrow_bands(series: TimeSeries, samples: int) -> NarrowBands:
     plan = Segmentation(samples=samples, hop=samples // 2, window="hann", detrend="linear")
     window = window_samples("hann", samples)
     runs = valid_runs(series)
-    require_finite(series, runs)
+    require_in_range(series.channels, require_finite(series, runs))
     # Sums only: the segments of a long record would take as much memory as the record.
     second = np.zeros((samples // 2 + 1, len(series.channels)))
     fourth, count = np.zeros_like(second), 0

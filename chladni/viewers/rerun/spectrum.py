@@ -45,11 +45,14 @@ def _draw_channel(
     abscissa = waterfall.frequency_hz[::lines] + (lines - 1) / 2 * _step(waterfall.frequency_hz)
     widths = np.full(abscissa.size, lines * _step(waterfall.frequency_hz), dtype=np.float32)
     _log_look(recording, path, abscissa, widths, style.on_dark(channel))
-    _log_bars(recording, path, _starts_ns(waterfall, style)[::times], np.sqrt(slices))
+    bars = np.sqrt(slices)
+    fits = _held_by_bars(bars)
+    _log_bars(recording, path, _starts_ns(waterfall, style)[::times], bars if fits else np.full(bars.shape, np.nan))
     return rrb.BarChartView(
         origin=path,
         name=f"{style.labels[channel.name]} at the time cursor [{amplitude_density_unit(channel.unit)}] over Hz"
-        + reduction(times, lines),
+        + reduction(times, lines)
+        + ("" if fits else ", not drawn: rerun's bars hold numbers of single precision only"),
         plot_legend=rrb.PlotLegend(visible=False),
     )
 
@@ -75,6 +78,12 @@ def _log_bars(recording: rr.RecordingStream, path: str, starts_ns: NDArray[np.in
     tensors = TensorColumn(bars[known].astype(np.float32))
     column = rr.ComponentColumn(rr.BarChart.descriptor_values(), tensors, lengths=known.astype(np.int32))
     send_columns(recording, path, time_index(starts_ns), rr.ComponentColumnList([column]))
+
+
+def _held_by_bars(bars: NDArray[np.floating[Any]]) -> bool:
+    single = np.finfo(np.float32)
+    largest = np.fmax.reduce(bars, axis=None, initial=0.0)
+    return bool(largest == 0 or single.tiny <= largest <= single.max)
 
 
 def _starts_ns(waterfall: Waterfall, style: Style) -> NDArray[np.int64]:
