@@ -22,6 +22,7 @@ from chladni.models.core.simulation import Simulation
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.simulate import simulate
 from chladni.signals.errors import LogError, SetupError
+from chladni.signals.number_range import LARGEST, rms
 from chladni.signals.time_series import TimeSeries
 
 TRUTH_FORMAT = "chladni.truth/1"
@@ -68,8 +69,8 @@ class Drive:
 
     def __post_init__(self) -> None:
         for name, value in (("level", self.level), ("noise", self.noise)):
-            if not np.isfinite(value):
-                raise SetupError(f"{name} {value} must be finite")
+            if not abs(value) <= LARGEST:
+                raise SetupError(f"{name} {value:g} must be finite, and {LARGEST:.2g} at most")
         if self.noise < 0:
             raise SetupError(f"noise {self.noise} must not be negative; it's a share of each output's RMS")
         if self.seed < 0:
@@ -229,7 +230,7 @@ def _recorded(done: Simulation, drive: Drive) -> TimeSeries:
     outputs = done.outputs.values
     # A stream of its own: the noise of a run doesn't depend on how much the excitation drew.
     rng = np.random.default_rng([drive.seed, 1])
-    deviation = drive.noise * np.sqrt(np.mean(outputs**2, axis=1, keepdims=True))
+    deviation = drive.noise * rms(outputs)[:, np.newaxis]
     noisy = outputs + deviation * rng.standard_normal(outputs.shape)
     return replace(
         done.outputs,

@@ -12,6 +12,7 @@ from chladni.models.core.port_law import PortLaw
 from chladni.models.core.resolvent import resolvent
 from chladni.models.core.state_space import StateSpace
 from chladni.signals.errors import ModelError
+from chladni.signals.number_range import LARGEST_OF_MODEL
 from chladni.signals.value import Value
 
 Matrix = NDArray[np.float64]
@@ -239,9 +240,13 @@ class CompiledModel(Value):
             if matrix.shape != shape:
                 raise ModelError(f"compiled model: {name} has shape {matrix.shape}, {shape} was expected")
         # All at once: a model is compiled thousands of times.
-        if not np.isfinite(np.concatenate([getattr(self, name).ravel() for name in expected])).all():
-            name = next(name for name in expected if not np.isfinite(getattr(self, name)).all())
-            raise ModelError(f"compiled model: {name} holds a number that is not finite")
+        together = np.concatenate([getattr(self, name).ravel() for name in expected])
+        if not (np.abs(together) <= LARGEST_OF_MODEL).all():
+            name = next(name for name in expected if not (np.abs(getattr(self, name)) <= LARGEST_OF_MODEL).all())
+            raise ModelError(
+                f"compiled model: {name} holds a number that is not finite, or above {LARGEST_OF_MODEL:.1g}; one of "
+                "the model's numbers is far too large or far too small beside the others, check their units"
+            )
         for name, values, count in (
             ("input_delays_s", self.input_delays_s, len(self.inputs)),
             ("output_offsets_s", self.output_offsets_s, p),

@@ -8,6 +8,7 @@ from math import inf, isfinite
 from typing import Literal, Self
 
 from chladni.signals.errors import ModelError
+from chladni.signals.number_range import LARGEST_OF_MODEL, SMALLEST_OF_MODEL
 
 Role = Literal["construction", "function"]
 
@@ -42,7 +43,7 @@ class Parameter:
     Raises
     ------
     ModelError
-        When the value is not finite or outside its possible range.
+        When the value is not finite, outside its possible range, or of a size that can't be computed with.
     """
 
     name: str
@@ -63,6 +64,11 @@ class Parameter:
         unit = "" if self.unit == "1" else f" {self.unit}"
         if not isfinite(self.value):
             raise ModelError(f"{self.name}: {self.value} is not finite; give a number{unit and f' in{unit}'}")
+        if not (self.value == 0 or SMALLEST_OF_MODEL <= abs(self.value) <= LARGEST_OF_MODEL):
+            raise ModelError(
+                f"{self.name}: {self.value:g}{unit} is too {'large' if abs(self.value) > 1 else 'small'} to work "
+                f"with; give a size from {SMALLEST_OF_MODEL:.1g} to {LARGEST_OF_MODEL:.1g}, or 0"
+            )
         if not self.minimum <= self.value <= self.maximum:
             raise ModelError(
                 f"{self.name}: {self.value:g}{unit} is not possible; "

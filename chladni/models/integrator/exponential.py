@@ -10,6 +10,7 @@ from scipy.linalg import block_diag, expm
 
 from chladni.models.core.balance import balance
 from chladni.models.integrator.hold import Hold
+from chladni.signals.errors import ModelError
 
 Matrix = NDArray[np.float64]
 #: Port forces run inside a step as polynomials of degree 2.
@@ -54,6 +55,11 @@ def responses(
         ``[kink]`` where the kinks fall, as a fraction of this step.
     fractions
         ``[instant]`` from 0 to 1.
+
+    Raises
+    ------
+    ModelError
+        When a number doesn't hold the response: the model is too unstable, or too fast, for the step.
     """
     matrix = _augmented(a, b, g, hold, step_s)
     since = np.concatenate([fractions[None], fractions[None] - kink_at[:, None]])
@@ -142,7 +148,13 @@ def _exponentials(matrix: Matrix, times_s: Matrix) -> Matrix:
     # Balanced by powers of two (exact): stiffness over mass and one stand side by side in A, which would cost digits.
     balanced, scale = balance(matrix)
     distinct, places = np.unique(times_s, return_inverse=True)
-    found = expm(balanced * distinct[:, None, None]) * (scale[:, None] / scale[None, :])
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = expm(balanced * distinct[:, None, None]) * (scale[:, None] / scale[None, :])
+    if not np.isfinite(found).all():
+        raise ModelError(
+            f"the model leaves all numbers within a step of {float(distinct[-1]):.3g} s: it is unstable and far "
+            "faster than the rate, or one of its numbers is wrong; check their units, or ask for a higher rate"
+        )
     return np.asarray(found[places], dtype=np.float64)
 
 

@@ -16,6 +16,7 @@ from chladni.models.integrator.port_plan import LawTable, PortPlan, law_table, p
 from chladni.models.integrator.run import Run, RunResult
 from chladni.models.integrator.step_tables import StepTables
 from chladni.signals.errors import ModelError
+from chladni.signals.number_range import LARGEST, largest_magnitudes
 from chladni.signals.value import Value
 
 Matrix = NDArray[np.float64]
@@ -133,31 +134,31 @@ class Integrator:
         Raises
         ------
         ModelError
-            When shapes don't fit, a sample isn't finite, memory wouldn't do, or the model diverges.
+            When shapes don't fit, a sample isn't finite, memory wouldn't do, or the model diverges: a state or an
+            output leaves the numbers that can be squared (`chladni.signals.number_range`).
         """
         signals = self._checked(signals)
         count = signals.shape[1]
         extra = max([0, *(-whole for whole, fraction in self._late)]) + 1
         rows = input_rows(self._compiled, self._hold, signals, self._sample_rate_hz, extra)
         start = initial_state(self._compiled, initial)
-        if self._plan.ports:
-            result = self._run_laws(rows, start)
-        else:
-            result = self._run_linear(rows, start)
-        _require_finite(result.state, self._compiled, self._sample_rate_hz)
-        return self._integration(result, rows, count)
+        # What grows beyond all numbers is told in words once the run is over, with its name and time.
+        with np.errstate(over="ignore", invalid="ignore"):
+            result = self._run_laws(rows, start) if self._plan.ports else self._run_linear(rows, start)
+            found = self._integration(result, rows, count)
+            _require_in_range(result, found.outputs, self._compiled, self._sample_rate_hz)
+        return found
 
     def _checked(self, signals: Matrix) -> Matrix:
         signals = np.asarray(signals, dtype=np.float64)
         inputs = self._compiled.inputs
         if signals.ndim != 2 or signals.shape[0] != len(inputs) or signals.shape[1] < 1:
             raise ModelError(f"signals have shape {signals.shape}; [{len(inputs)} inputs, samples] was expected")
-        bad = np.argwhere(~np.isfinite(signals))
-        if bad.size:
-            row, sample = bad[0]
+        if not np.all(largest_magnitudes(signals) <= LARGEST):
+            row, sample = np.argwhere(~(np.abs(signals) <= LARGEST))[0]
             raise ModelError(
-                f"input {inputs[row].name!r}: sample {sample} is {signals[row, sample]}; "
-                "a simulation needs finite numbers, take a window without gaps"
+                f"input {inputs[row].name!r}: sample {sample} is {signals[row, sample]:.3g}; a simulation needs "
+                f"finite numbers of {LARGEST:.2g} at most, take a window without gaps or a smaller excitation"
             )
         require_memory(self._compiled, signals.shape[1], self._sample_rate_hz)
         return signals
@@ -273,11 +274,22 @@ def initial_state(compiled: CompiledModel, initial: Mapping[str, float] | Matrix
     return start
 
 
-def _require_finite(state: Matrix, compiled: CompiledModel, sample_rate_hz: float) -> None:
-    if np.all(np.isfinite(state)):
-        return
-    sample, place = np.argwhere(~np.isfinite(state))[0]
-    raise ModelError(
-        f"the model diverges: state {compiled.states[place]!r} grows beyond all numbers at "
-        f"{sample / sample_rate_hz:g} s; a loop is unstable, lower its gain or simulate less time"
-    )
+def _require_in_range(result: RunResult, outputs: Matrix, compiled: CompiledModel, sample_rate_hz: float) -> None:
+    """Refuse a run that leaves the numbers which can be squared, naming what did so first, and when."""
+    outputs = outputs.T
+    for kind, names, signals in (
+        ("state", compiled.states, result.state),
+        ("output", [one.name for one in compiled.outputs], outputs),
+    ):
+        if np.all(largest_magnitudes(signals.T) <= LARGEST):
+            continue
+        sample, place = np.argwhere(~(np.abs(signals) <= LARGEST))[0]
+        if sample == 0:
+            raise ModelError(
+                f"{kind} {names[place]!r} is {signals[0, place]:.3g} at 0 s, and {LARGEST:.2g} is the most that can "
+                "be worked with; a parameter, the start or the excitation is too large, check their units"
+            )
+        raise ModelError(
+            f"the model diverges: {kind} {names[place]!r} grows beyond {LARGEST:.2g} at "
+            f"{sample / sample_rate_hz:g} s; a loop is unstable, lower its gain or simulate less time"
+        )

@@ -13,6 +13,7 @@ from chladni.models.core.port import Terminal
 from chladni.models.integrator.integrator import Integrator, integrate
 from chladni.models.structures.robot_arm import robot_arm
 from chladni.signals.errors import ModelError
+from chladni.signals.number_range import LARGEST
 from tests.models.integrator.systems import compiled_structure, cubic, law, oscillator, plain_model
 
 RATE_HZ = 1000.0
@@ -253,10 +254,42 @@ def test_a_run_that_would_not_fit_is_refused_before_memory_is_taken():
         integrate(compiled, np.broadcast_to(0.0, (1, 10**8)), RATE_HZ)
 
 
-def test_an_unstable_linear_model_is_told_with_its_time():
-    compiled = plain_model([[2000.0]], [[1.0]], [[1.0]], [[0.0]])
-    with pytest.raises(ModelError, match=r"diverges: state 'x0' .* at 0\.3"):
+@pytest.mark.parametrize("growth", [2000.0, 300.0])
+def test_an_unstable_linear_model_is_told_with_its_time(growth):
+    compiled = plain_model([[growth]], [[1.0]], [[1.0]], [[0.0]])
+    # x = (e^(a t) - 1)/a under a step; the first sample at which that is too large to be squared twice.
+    first = math.ceil(RATE_HZ * math.log(growth * LARGEST) / growth)
+    with pytest.raises(ModelError, match=rf"diverges: state 'x0' grows .* at {first / RATE_HZ:g} s; a loop is unst"):
         integrate(compiled, np.ones((1, 600)), RATE_HZ)
+
+
+def test_a_state_that_diverges_late_is_told_though_the_outputs_see_nothing_of_it():
+    compiled = plain_model([[-1.0, 0.0], [0.0, 2000.0]], [[1.0], [1.0]], [[1.0, 0.0]], [[0.0]])
+    with pytest.raises(ModelError, match="diverges: state 'x1'"):
+        integrate(compiled, np.ones((1, 600)), RATE_HZ)
+
+
+@pytest.mark.parametrize(
+    ("c", "d", "words"),
+    [(1e80, 0.0, r"diverges: output 'y0' grows .* at 0\.001 s"), (0.0, 1e80, r"output 'y0' is 1e\+80 at 0 s")],
+)
+def test_outputs_that_leave_all_numbers_are_told_where_the_states_do_not(c, d, words):
+    compiled = plain_model([[-1.0]], [[1.0]], [[c]], [[d]])
+    with pytest.raises(ModelError, match=words):
+        integrate(compiled, np.ones((1, 10)), RATE_HZ)
+
+
+def test_a_pole_that_no_step_can_follow_is_told():
+    compiled = plain_model([[1e6]], [[1.0]], [[1.0]], [[0.0]])
+    with pytest.raises(ModelError, match=r"leaves all numbers within a step of 0\.001 s"):
+        integrate(compiled, np.ones((1, 10)), RATE_HZ)
+
+
+@pytest.mark.parametrize("size", [1e200, math.inf, math.nan])
+def test_inputs_that_no_estimator_could_square_are_refused(size):
+    compiled = plain_model([[-1.0]], [[1.0]], [[1.0]], [[0.0]])
+    with pytest.raises(ModelError, match="input 'u0': sample 3 is"):
+        integrate(compiled, np.where(np.arange(10) == 3, size, 1.0)[None], RATE_HZ)
 
 
 def test_negative_delays_and_tolerances_are_refused():
