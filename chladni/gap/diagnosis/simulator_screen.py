@@ -164,10 +164,9 @@ def _visible_force(
     wanted = max(0.5 * float(np.sqrt(np.mean(missed**2))), 1.0)
     force = site.force
     for _ in range(_FORCE_RUNS):
-        friction = attached(
-            "coulomb_friction", site.name, {"force": force, "creep_speed": _CREEP * site.rate}, variant="regularised"
-        )
+        values = {"force": force, "creep_speed": _CREEP * site.rate}
         try:
+            friction = attached("coulomb_friction", site.name, values, variant="regularised")
             change = runs.over_noise(runs.simulated(z, [*known, friction]) - base)
         except ModelError:
             force *= 0.1

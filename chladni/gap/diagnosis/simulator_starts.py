@@ -1,7 +1,7 @@
 """Values that a search starts from, for any effect at any site: from its parameters' units and the signals there."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import pi
@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.models.core.parameter import Parameter
-from chladni.models.effects.attached_effect import AttachedEffect, attached
+from chladni.models.effects.attached_effect import AttachedEffect, attached_if_possible
 from chladni.models.effects.effect_kind import EffectKind, Variant
-from chladni.signals.errors import ModelError
 
 Matrix = NDArray[np.float64]
 SiteKind = Literal["input", "output", "joint"]
@@ -75,19 +74,11 @@ def starts(kind: EffectKind, variant: Variant, site: SiteScales, others: Sequenc
         grids[name] = allowed or (parameter.value,)
     sources: Sequence[str | None] = others if kind.needs_source else (None,)
     for source, numbers in product(sources, product(*grids.values())):
-        effect = _made(kind, variant, site.name, dict(zip(grids, numbers, strict=True)), source)
+        values = dict(zip(grids, numbers, strict=True))
+        # A combination that contradicts itself is none to try.
+        effect = attached_if_possible(kind, site.name, values, variant=variant.name, source=source)
         if effect is not None:
             yield effect
-
-
-def _made(
-    kind: EffectKind, variant: Variant, site: str, values: Mapping[str, float], source: str | None
-) -> AttachedEffect | None:
-    try:
-        return attached(kind, site, values, variant=variant.name, source=source)
-    except ModelError:
-        # A combination that contradicts itself is none to try.
-        return None
 
 
 def _of_joint(parameter: Parameter, site: SiteScales, rank: int | None, *, own: bool) -> tuple[float, ...]:

@@ -16,7 +16,7 @@ from chladni.gap.side_by_side import side_by_side
 from chladni.gap.tuning.effect_scale import usually_fitted
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.core.parameter import Parameter
-from chladni.models.effects.attached_effect import AttachedEffect, attached
+from chladni.models.effects.attached_effect import AttachedEffect, attached_if_possible
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.signals.errors import ModelError
 
@@ -91,9 +91,8 @@ def effect_of(one: Screened, own: Mapping[str, EffectKind]) -> AttachedEffect | 
     """Give the effect of a screened trial, its values held inside their possible ranges; None when it's none."""
     trial = one.trial
     kind = own.get(trial.effect, trial.effect)
-    try:
-        plain = attached(kind, trial.site.name, one.values, variant=trial.variant, source=trial.source)
-    except ModelError:
+    plain = attached_if_possible(kind, trial.site.name, one.values, variant=trial.variant, source=trial.source)
+    if plain is None:
         return None
     values = {name: _inside(plain.parameters[name]) for name in plain.values}
     return replace(plain, values=values)
@@ -138,9 +137,15 @@ def _moved(effect: AttachedEffect, places: Sequence[Place]) -> Iterator[Attached
 
 def _other_frictions(found: Contestant, run: FreeRun, one: AttachedEffect) -> list[AttachedEffect]:
     if one.effect == "stribeck_friction":
-        return [_coulomb_beside(one)]
-    if one.effect != "coulomb_friction":
-        return []
+        others = [_coulomb_beside(one)]
+    elif one.effect == "coulomb_friction":
+        others = _stribecks_beside(found, run, one)
+    else:
+        others = []
+    return [other for other in others if other is not None]
+
+
+def _stribecks_beside(found: Contestant, run: FreeRun, one: AttachedEffect) -> list[AttachedEffect | None]:
     try:
         velocity = run.motion(found.fit.z, found.fit.effects, site=one.site).velocity
     except ModelError:
@@ -149,17 +154,17 @@ def _other_frictions(found: Contestant, run: FreeRun, one: AttachedEffect) -> li
     return [_stribeck_beside(one, share * speed) for share in _STRIBECK_SPEEDS]
 
 
-def _coulomb_beside(curve: AttachedEffect) -> AttachedEffect:
+def _coulomb_beside(curve: AttachedEffect) -> AttachedEffect | None:
     """Give the Coulomb friction of the same size and form as a Stribeck friction that slides."""
-    return attached(
+    return attached_if_possible(
         "coulomb_friction", curve.site, {"force": curve.values["coulomb"], **_bristles(curve)}, variant=curve.variant
     )
 
 
-def _stribeck_beside(plain: AttachedEffect, speed: float) -> AttachedEffect:
+def _stribeck_beside(plain: AttachedEffect, speed: float) -> AttachedEffect | None:
     """Give the Stribeck friction of the same size and form as a Coulomb friction, somewhat higher at rest."""
     force = plain.values["force"]
-    return attached(
+    return attached_if_possible(
         "stribeck_friction",
         plain.site,
         {"coulomb": 0.9 * force, "static": 1.3 * force, "speed": speed, **_bristles(plain)},

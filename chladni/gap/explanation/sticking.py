@@ -9,7 +9,7 @@ from chladni.gap.explanation.hypothesis import Hypothesis
 from chladni.gap.location.locate import Located, Location
 from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.places import Site
-from chladni.models.effects.attached_effect import attached
+from chladni.models.effects.attached_effect import attached_if_possible
 
 #: Misfit over the best place's up to which a place is looked at, and most joints that are.
 _PLAUSIBLE, _MOST = 3.0, 3
@@ -24,7 +24,8 @@ def sticking_hypotheses(location: Location) -> list[Hypothesis]:
     Of a joint that sticks sensors tell the whole force, friction with spring and damper: what they miss of the way
     goes to the one as it comes from the other.
     """
-    return [_sticking(location, located, site) for located, site in list(_joints(location))[:_MOST]]
+    found = [_sticking(location, located, site) for located, site in list(_joints(location))[:_MOST]]
+    return [one for one in found if one is not None]
 
 
 def _joints(location: Location) -> Iterator[tuple[Located, Site]]:
@@ -34,7 +35,7 @@ def _joints(location: Location) -> Iterator[tuple[Located, Site]]:
             yield from ((located, site) for site in located.places[0].sites if site.kind == "joint")
 
 
-def _sticking(location: Location, located: Located, site: Site) -> Hypothesis:
+def _sticking(location: Location, located: Located, site: Site) -> Hypothesis | None:
     problem = location.problem
     motion = recovered(problem, located.profile, site)
     compiled = problem.view(motion.z).compiled
@@ -44,5 +45,5 @@ def _sticking(location: Location, located: Located, site: Site) -> Hypothesis:
         "force": float(np.quantile(np.abs(passed - np.median(passed)), _SLIDING)),
         "creep_speed": _CREEP * float(np.std(motion.velocity)),
     }
-    effect = attached("coulomb_friction", site.name, values, variant="regularised")
-    return hypothesis_of((effect,), located.profile.z)
+    effect = attached_if_possible("coulomb_friction", site.name, values, variant="regularised")
+    return None if effect is None else hypothesis_of((effect,), located.profile.z)

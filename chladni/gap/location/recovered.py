@@ -194,7 +194,9 @@ def _transient(transients: Spectrum, pattern: Spectrum, residual: Spectrum, held
     weighted = transients - pattern * (held * along)[:, None]
     normal = np.einsum("aol,bol->ab", weighted.conj(), transients).real
     toward = np.einsum("aol,ol->a", weighted.conj(), residual).real
-    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    # Of a transient that lies along the force all but rounding is taken away: it is measured by what it was.
+    own = np.finfo(np.float64).eps * np.sum(np.abs(transients) ** 2, axis=(1, 2))
+    size = np.sqrt(np.maximum(np.maximum(np.diag(normal), own), 1e-300))
     scaled = np.linalg.lstsq(normal / size[:, None] / size, toward / size, rcond=1e-9)[0]
     return np.asarray(scaled / size, dtype=np.float64)[:, None]
 

@@ -158,6 +158,21 @@ def attached(
     return AttachedEffect(kind=effect, site=site, values=dict(values), variant=name, source=source)
 
 
+def attached_if_possible(
+    effect: str | EffectKind,
+    site: str,
+    values: Mapping[str, float],
+    *,
+    variant: str | None = None,
+    source: str | None = None,
+) -> AttachedEffect | None:
+    """Give what `attached` gives, None where the numbers make no such effect: of a guess that's an answer."""
+    try:
+        return attached(effect, site, values, variant=variant, source=source)
+    except ModelError:
+        return None
+
+
 def _sites(compiled: CompiledModel, kind: PortKind) -> list[str]:
     """Names of all sites of one kind; inputs and outputs need no port to be one."""
     names = [port.name for port in compiled.ports if port.kind == kind]
