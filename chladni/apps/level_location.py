@@ -14,6 +14,7 @@ from chladni.gap.records.measurement import Measurement
 from chladni.io.log import Log
 from chladni.signals.errors import EstimateError, LogError
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.mode_set import ModeSet
 
 FEWEST_LEVELS = 2
@@ -39,6 +40,7 @@ class LevelLocation:
     responses: tuple[FrequencyResponse, ...]
 
 
+@in_one_thread()
 def locate_from_levels(
     logs: Sequence[Log],
     *,

@@ -27,6 +27,7 @@ from chladni.modal.responses.subspace import CovarianceDrivenSubspace
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.machine_harmonic import MachineHarmonic
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.time_series import TimeSeries
@@ -71,6 +72,7 @@ class Wanted:
         )
 
 
+@in_one_thread()
 def identify_modes(
     source: Log | TimeSeries | FrequencyResponse | CrossSpectra,
     *,

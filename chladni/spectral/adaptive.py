@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.linear_algebra import in_one_thread
+from chladni.signals.number_range import require_in_range
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.accumulator import require_finite
 from chladni.spectral.blocks import Source, leading_part
@@ -23,6 +25,7 @@ DEFAULT_OVERLAP = 0.5
 SAMPLES_EXAMINED = 1 << 19
 
 
+@in_one_thread()
 def adaptive_cross_spectra(
     source: Source,
     *,
@@ -61,7 +64,9 @@ def adaptive_cross_spectra(
     lead, blocks = leading_part(source, SAMPLES_EXAMINED)
     start = _joined(lead)
     # Said once and by name, before periods and hits are looked for in what no number holds.
-    require_finite(start, valid_runs(start))
+    largest = require_finite(start, valid_runs(start))
+    if isinstance(source, TimeSeries):
+        require_in_range(source.channels, largest)
     hammer = _hammer(start, references)
     if hammer is not None and window is None and overlap is None:
         return _hits(tuple(blocks), hammer, resolution_hz)

@@ -1,6 +1,7 @@
 """Averaged cross-spectra of a series or a stream of blocks."""
 
 from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.linear_algebra import in_one_thread
 from chladni.spectral.accumulator import CrossSpectraAccumulator, SegmentAveraging
 from chladni.spectral.blocks import Source, leading_part, samples_known
 from chladni.spectral.segmentation import SAMPLES_TO_CHOOSE_FROM, Detrend, plan_segmentation
@@ -8,6 +9,7 @@ from chladni.spectral.stretches import run_lengths
 from chladni.spectral.windows import Window
 
 
+@in_one_thread()
 def cross_spectra(
     source: Source,
     *,

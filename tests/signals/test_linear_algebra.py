@@ -5,7 +5,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import chladni
-from chladni.gap.linear_algebra import in_one_thread
+from chladni.signals.linear_algebra import in_one_thread
 from tests import made_diagnosis as made
 
 

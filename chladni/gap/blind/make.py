@@ -14,12 +14,12 @@ from chladni.gap.blind.composition import DEFAULT, orders
 from chladni.gap.blind.model_text import model_text
 from chladni.gap.blind.performance import measured
 from chladni.gap.blind.seal import seal_case, write_json
-from chladni.gap.linear_algebra import in_one_thread
 from chladni.io.atomic import atomic_write
 from chladni.io.folder import made_folder
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
 from chladni.signals.errors import SetupError
+from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.time_series import TimeSeries
 
 Progress = Callable[[float], None]

@@ -27,7 +27,6 @@ from chladni.gap.diagnosis.other_logs import tried_elsewhere
 from chladni.gap.diagnosis.remarks import remarks_on
 from chladni.gap.diagnosis.rounds import causes_found
 from chladni.gap.diagnosis.study import Study, study_of
-from chladni.gap.linear_algebra import in_one_thread
 from chladni.gap.location.locate import Located, Location, explained_share
 from chladni.gap.location.recovered import Recovered
 from chladni.gap.plant.places import Site
@@ -45,6 +44,7 @@ from chladni.gap.tuning.output_error import fit_output_error
 from chladni.models.core.model import Model
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.signals.errors import EstimateError, ModelError
+from chladni.signals.linear_algebra import in_one_thread
 
 Matrix = NDArray[np.float64]
 StepProgress = Callable[[str, float], None]

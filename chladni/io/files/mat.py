@@ -77,6 +77,10 @@ def read_mat(
     return series_of_arrays(flat, options, where=str(path), units=units, unread=unread)
 
 
+#: Of a header: a text for people, padded with spaces.
+_TEXT_BYTES = 116
+
+
 def write_mat(
     series: TimeSeries | Sequence[TimeSeries], path: Path | str, *, overwrite: bool = True
 ) -> tuple[str, ...]:
@@ -104,6 +108,9 @@ def write_mat(
         content[f"series_{number}"] = {name: _as_matlab(array) for name, array in series_fields(part).items()}
     with atomic_path(path, overwrite=overwrite) as temporary:
         savemat(str(temporary), content, appendmat=False, do_compression=True)
+        with temporary.open("r+b") as file:
+            # SciPy writes the time here, and the platform; without them the same series give the same file.
+            file.write(b"MATLAB 5.0 MAT-file, by chladni".ljust(_TEXT_BYTES))
     return ()
 
 

@@ -17,6 +17,7 @@ from chladni.models.core.model import Model
 from chladni.models.core.parameter import Parameter
 from chladni.models.core.reading import InfluenceTable
 from chladni.signals.errors import ModelError
+from chladni.signals.linear_algebra import in_one_thread
 
 Matrix = NDArray[np.float64]
 
@@ -52,6 +53,7 @@ class Strongest:
     of_columns: tuple[int | None, ...]
 
 
+@in_one_thread()
 def influence(
     system: Model | Instrument,
     values: Values | None = None,

@@ -15,6 +15,7 @@ from chladni.models.core.model import Model
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.reading import Quantity
 from chladni.signals.errors import ModelError
+from chladni.signals.linear_algebra import in_one_thread
 
 Matrix = NDArray[np.float64]
 BoundsByName = Mapping[str, tuple[float, float]]
@@ -62,6 +63,7 @@ class Optimum:
     model: Model
 
 
+@in_one_thread()
 def optimise(
     system: Model | Instrument,
     parameters: Sequence[str],

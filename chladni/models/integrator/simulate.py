@@ -12,6 +12,7 @@ from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import PortMotion, Simulation
 from chladni.signals.channel import Channel
 from chladni.signals.errors import ModelError
+from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.time_series import TimeSeries
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ class Samples(Protocol):
 Excitation = TimeSeries | Mapping[str, Samples] | Samples
 
 
+@in_one_thread()
 def simulate(
     model: Model,
     excitation: Excitation,
