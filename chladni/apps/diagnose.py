@@ -22,6 +22,7 @@ from chladni.models.files.model_file import load_model
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.visible import visible
 
 StepProgress = Callable[[str, float], None]
 Recording = Log | TimeSeries | Path | str
@@ -155,7 +156,7 @@ def _of_log(model: Model, log: Log, name: str, span: Span) -> _Read:
     held = [channel.name for channel in log.channels]
     wanted = _listened_to(model)
     require_channels(log, name)
-    chosen = [channel for channel in held if channel in wanted]
+    chosen = [channel for channel in held if visible(channel) in wanted]
     if not chosen:
         raise LogError(
             f"{name}: holds no channel that model {model.name!r} listens to; it holds "
@@ -188,7 +189,8 @@ def _with_use(found: MatchedLog, series: TimeSeries, told: tuple[str, ...] = ())
 def _listened_to(model: Model) -> set[str]:
     compiled = model.compile()
     terminals = (*compiled.inputs, *compiled.outputs)
-    return {name for terminal in terminals for name in (terminal.channel, terminal.name) if name is not None}
+    names = {name for terminal in terminals for name in (terminal.channel, terminal.name) if name is not None}
+    return set(map(visible, names))
 
 
 def _names(logs: Sequence[Recording]) -> list[str]:

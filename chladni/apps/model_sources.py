@@ -14,6 +14,7 @@ from chladni.models.instruments.catalogue import INSTRUMENTS
 from chladni.models.instruments.of_model import instrument_of
 from chladni.signals.errors import ModelError
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.visible import visible
 
 
 def named_instrument(text: str) -> Instrument:
@@ -66,7 +67,7 @@ def recording_for(model: Model, log: Log) -> tuple[TimeSeries, tuple[str, ...]]:
             f"model {model.name!r}: no input names a channel of a log; give its [[input]] a line such as "
             'channel = "/hammer.wrench.force.x"'
         )
-    measured = {terminal.channel for terminal in compiled.outputs if terminal.channel is not None}
-    held = [channel.name for channel in log.channels if channel.name in measured]
+    measured = {visible(terminal.channel) for terminal in compiled.outputs if terminal.channel is not None}
+    held = [channel.name for channel in log.channels if visible(channel.name) in measured]
     recording = log.read(list(dict.fromkeys([*driving, *held])))
     return recording, reading_sentences(log, everything=False)

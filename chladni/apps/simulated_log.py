@@ -24,6 +24,7 @@ from chladni.models.integrator.simulate import simulate
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.number_range import LARGEST, rms
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.visible import visible_json
 
 TRUTH_FORMAT = "chladni.truth/1"
 METADATA_NAME = "chladni.truth"
@@ -148,7 +149,7 @@ def write_simulated_log(log: SimulatedLog, path: Path) -> tuple[WrittenLog, Path
         What was written, and the path of the truth.
     """
     require_place(path)
-    text = json.dumps(log.truth, indent=1, allow_nan=False, ensure_ascii=False)
+    text = visible_json(json.dumps(log.truth, indent=1, allow_nan=False, ensure_ascii=False))
     written = write_mcap(log.recorded, path, metadata={METADATA_NAME: {"format": TRUTH_FORMAT, "truth": text}})
     beside = path.with_suffix(".truth.json")
     with atomic_write(beside) as file:

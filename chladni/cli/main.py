@@ -23,6 +23,7 @@ from chladni.cli.psd import psd
 from chladni.cli.simulate import simulate
 from chladni.cli.view import view
 from chladni.signals.errors import ChladniError
+from chladni.signals.visible import visible
 from chladni.signals.wording import counted
 
 SUCCESS, DEFECT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
@@ -87,11 +88,13 @@ def _fail(error: Exception, code: int) -> int:
     if os.environ.get("CHLADNI_TRACEBACK"):
         import traceback
 
-        traceback.print_exception(error)
+        for line in "".join(traceback.format_exception(error)).split("\n"):
+            print(visible(line), file=sys.stderr)  # noqa: T201
     text = error.format_message() if isinstance(error, typer.TyperException) else str(error)
     # Typer hands on how its own validation calls a wrong choice.
     text = text.replace("Value error, ", "")
-    line = " ".join((_mistakes(text.splitlines()) if isinstance(error, ChladniError) else text).split())
+    lines = [visible(line) for line in text.split("\n")]
+    line = " ".join((_mistakes(lines) if isinstance(error, ChladniError) else " ".join(lines)).split())
     if code == DEFECT:
         line = f"defect of chladni ({type(error).__name__}): {line}; CHLADNI_TRACEBACK=1 shows where"
     print(f"chladni: {line}", file=sys.stderr)  # noqa: T201  # the one line that a failure prints

@@ -14,6 +14,8 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from chladni.signals.visible import visible, visible_json
+
 if TYPE_CHECKING:
     from chladni.signals.study import Study
 
@@ -48,12 +50,12 @@ class Output:
 
     def line(self, text: str = "", *, style: str = "") -> None:
         """Print one line, wrapped at the terminal's width."""
-        self.console.print(Text(text), style=style)
+        self.console.print(Text(visible(text)), style=style)
 
     def lines(self, texts: Sequence[str]) -> None:
         """Print sentences as a list."""
         for text in texts:
-            self.console.print(Text(f"- {text}"), style="yellow" if text.startswith("Warning") else "")
+            self.console.print(Text(f"- {visible(text)}"), style="yellow" if text.startswith("Warning") else "")
 
     def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """Print a table; the first column is text, the others line up to the right."""
@@ -65,9 +67,9 @@ class Output:
             collapse_padding=True,
         )
         for number, column in enumerate(columns):
-            table.add_column(escape(column), justify="right" if number else "left", overflow="fold")
+            table.add_column(escape(visible(column)), justify="right" if number else "left", overflow="fold")
         for row in rows:
-            table.add_row(*(escape(cell) for cell in row))
+            table.add_row(*(escape(visible(cell)) for cell in row))
         # Not as the table's own title, which would wrap at the table's width.
         self.line(title, style="bold")
         self.console.print(table)
@@ -92,7 +94,7 @@ class Output:
         """Write `content` where ``--json`` said; nothing when it wasn't given."""
         if self.json_target is None:
             return
-        text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+        text = visible_json(json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)) + "\n"
         if self.json_target == "-":
             sys.stdout.write(text)
             return
@@ -114,13 +116,14 @@ class Output:
         columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(),
                    TimeElapsedColumn())  # fmt: skip
         bar = Bar(*columns, console=console, transient=True, disable=not console.is_terminal)
+        title = visible(title)
         task = bar.add_task(escape(title), total=1.0)
         begun = monotonic()
 
         def show(share: float, step: str = "") -> None:
             if not bar.disable and not bar.live.is_started and monotonic() - begun > PROGRESS_AFTER_S:
                 bar.start()
-            bar.update(task, completed=share, description=escape(f"{title}: {step}" if step else title))
+            bar.update(task, completed=share, description=escape(f"{title}: {visible(step)}" if step else title))
 
         try:
             yield show

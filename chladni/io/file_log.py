@@ -23,6 +23,7 @@ from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.geometry import Geometry
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.visible import place_of
 from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
@@ -39,7 +40,8 @@ def open_file(path: Path, kind: str, *, setup: Setup, stamp: StampRequest, optio
         )
     if setup.batches:
         raise SetupError(f"{setup.path}: [[batch]] {next(iter(setup.batches))}: {path.name} holds no messages")
-    return FileLog(path, kind, _refined(path, _contents(path, kind, setup, options), setup), geometry=setup.geometry)
+    contents, setup = _contents(path, kind, setup, options)
+    return FileLog(path, kind, _refined(contents, setup), geometry=setup.geometry)
 
 
 class FileLog(Log):
@@ -116,9 +118,10 @@ class FileLog(Log):
     ) -> tuple[TimeSeries, ...]:
         """Give channels, one series for each sampling grid; see `Log.read_groups`."""
         window = self._window_ns(start_s, end_s)
+        paths = None if paths is None else self.names(paths)
         groups = on_common_grids(self._selected(paths))
         found = [_ordered(part, paths) for group in groups if (part := _within(group, *window)) is not None]
-        missing = [] if paths is None else _without(self.names(paths), found)
+        missing = [] if paths is None else _without(paths, found)
         if missing or not found:
             told = f"between {start_s or 0.0} s and {'its end' if end_s is None else f'{end_s} s'}"
             raise LogError(f"{self._path.name}: {some_of(missing) + ' has ' if missing else ''}no sample {told}")
@@ -154,15 +157,17 @@ class FileLog(Log):
         )
 
     def names(self, paths: Sequence[str]) -> tuple[str, ...]:
-        """Give the names themselves; `LogError` when the file doesn't hold one."""
+        """Names of channels that are called so or shown so; `LogError` when the file doesn't hold one."""
         known = [channel.name for channel in self.channels]
         if not paths:
             raise LogError(f"{self._path.name}: no channel is asked for; name one, or None for all")
         self._require_samples()
+        found: dict[str, None] = {}
         for name in paths:
-            if name not in known:
+            if (place := place_of(name, known)) is None:
                 raise LogError(f"{self._path.name}: no channel {name!r}; {near_matches(name, known)}")
-        return tuple(dict.fromkeys(paths))
+            found[known[place]] = None
+        return tuple(found)
 
     def info(self) -> LogInfo:
         """Look at all samples once and tell whether the file is sound."""
@@ -259,23 +264,35 @@ def _without(names: Sequence[str], found: Sequence[TimeSeries]) -> list[str]:
 # --- setup -------------------------------------------------------------------------------------------------------
 
 
-def _contents(path: Path, kind: str, setup: Setup, options: Mapping[str, Any]) -> FileContents:
-    """Read the file, with the units that the setup file states: only the reader knows the numbers as they stand."""
+def _contents(path: Path, kind: str, setup: Setup, options: Mapping[str, Any]) -> tuple[FileContents, Setup]:
+    """Read the file, with the units that the setup file states: only the reader knows the numbers as they stand.
+
+    Returns
+    -------
+    contents : FileContents
+    setup : Setup
+        With the names that the file has for channels.
+    """
     stated = {one.path: one.unit for one in setup.channels if one.unit is not None}
     if not stated:
-        return read_file(path, kind=kind, **options)
+        contents = read_file(path, kind=kind, **options)
+        return contents, _as_held(path, contents, setup)
     try:
-        return read_file(path, kind=kind, **{**options, "units": stated | dict(options.get("units", {}))})
+        contents = read_file(path, kind=kind, **{**options, "units": stated | dict(options.get("units", {}))})
+        return contents, _as_held(path, contents, setup)
     except SetupError:
         # A channel that isn't there is told with the line of the setup file; all else as it was.
-        _require_known(path, read_file(path, kind=kind, **options), setup)
-        raise
+        held = _as_held(path, read_file(path, kind=kind, **options), setup)
+        if held.channels == setup.channels:
+            raise
+    return _contents(path, kind, held, options)
 
 
-def _require_known(path: Path, contents: FileContents, setup: Setup) -> None:
-    """Raise `SetupError` naming every channel of the setup file that the data file doesn't hold."""
+def _as_held(path: Path, contents: FileContents, setup: Setup) -> Setup:
+    """Give the names that the data file has; `SetupError` naming every channel of the setup file that it hasn't."""
     known = [channel.name for channel in _all_channels(contents)]
-    unknown = [one for one in setup.channels if one.path not in known]
+    places = [place_of(one.path, known) for one in setup.channels]
+    unknown = [one for one, place in zip(setup.channels, places, strict=True) if place is None]
     if unknown:
         raise SetupError(
             "\n".join(
@@ -284,6 +301,8 @@ def _require_known(path: Path, contents: FileContents, setup: Setup) -> None:
                 for one in unknown
             )
         )
+    held = zip(setup.channels, places, strict=True)
+    return replace(setup, channels=tuple(replace(one, path=known[place]) for one, place in held if place is not None))
 
 
 def _all_channels(contents: FileContents) -> list[Channel]:
@@ -292,12 +311,11 @@ def _all_channels(contents: FileContents) -> list[Channel]:
     return [*(channel for part in contents.series for channel in part.channels), *held]
 
 
-def _refined(path: Path, contents: FileContents, setup: Setup) -> FileContents:
+def _refined(contents: FileContents, setup: Setup) -> FileContents:
     """Refine channels by what the setup file says of them besides their units, and guess excitations before."""
     contents = replace(contents, series=_with_likely_roles(contents.series))
     if not setup.channels:
         return contents
-    _require_known(path, contents, setup)
     # The reader has brought the numbers to the unit that is stated.
     stated = {one.path: replace(one, unit=None) for one in setup.channels}
     functions = contents.functions

@@ -11,6 +11,7 @@ from chladni.io.stamps import StampKind
 from chladni.signals.channel import Channel
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.time_base import TimeBase
+from chladni.signals.visible import visible
 from chladni.signals.wording import counted
 
 INFO_FORMAT: Final = "chladni.info/1"
@@ -156,7 +157,7 @@ def _positive(number: float) -> float | None:
 
 
 def some_of(names: Sequence[str], *, count: int = 3) -> str:
-    """Name the first few and count the rest.
+    """Name the first few, as they are shown, and count the rest.
 
     Examples
     --------
@@ -164,7 +165,7 @@ def some_of(names: Sequence[str], *, count: int = 3) -> str:
     'a, b, c and 2 more'
     """
     more = f" and {len(names) - count} more" if len(names) > count else ""
-    return ", ".join(names[:count]) + more
+    return ", ".join(map(visible, names[:count])) + more
 
 
 def unread_sentences(unread: Iterable[Unread]) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from typing import Literal
 
 from chladni.signals.errors import LogError
+from chladni.signals.visible import as_meant, visible
 
 Operator = Literal["==", "!=", "<", "<=", ">", ">="]
 FilterValue = str | float | bool
@@ -70,12 +71,12 @@ Step = FieldStep | IndexStep | KeyStep | FilterStep
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MessagePath:
-    """A topic and the steps from its message down to one number.
+    r"""A topic and the steps from its message down to one number.
 
     Attributes
     ----------
     text
-        The path as it was written.
+        The path as it was written, escapes such as ``\x1b`` taken for the characters that they show.
     topic
         Topic of the log.
     steps
@@ -89,7 +90,7 @@ class MessagePath:
     @property
     def rest(self) -> str:
         """What follows the topic, without the dot."""
-        return self.text.removeprefix('"').removeprefix(self.topic).removeprefix('"').removeprefix(".")
+        return self.text[_length_of(self.topic, self.text) :].removeprefix(".")
 
 
 def parse_message_path(text: str, topics: Collection[str]) -> MessagePath:
@@ -100,6 +101,7 @@ def parse_message_path(text: str, topics: Collection[str]) -> MessagePath:
     text
         Such as ``/imu/wrist.linear_acceleration.x``, ``/axis.position[0]``, ``/joints.position[elbow]``,
         ``/log{name=="a"}.value`` or ``/tf.transforms[:]{child_frame_id=="tip"}.transform.translation.x``.
+        What `chladni.signals.visible.visible` shows of a path is read as the path.
     topics
         Topics of the log; the longest one that the path starts with is meant, since topics may hold dots.
 
@@ -115,6 +117,7 @@ def parse_message_path(text: str, topics: Collection[str]) -> MessagePath:
     >>> parse_message_path("/a.x[2]", ["/a"]).steps
     (FieldStep(name='x'), IndexStep(index=2))
     """
+    text = as_meant(text)
     topic, position = _topic_of(text, topics)
     steps: list[Step] = []
     while position < len(text):
@@ -132,6 +135,17 @@ def quoted(name: str) -> str:
     ('ch1', '"top floor"')
     """
     return name if _PLAIN_NAME.fullmatch(name) else _in_quotes(name)
+
+
+def topic_text(topic: str) -> str:
+    r"""Write a topic as paths begin with it: as it is, unless a backslash in it could be taken for an escape.
+
+    Examples
+    --------
+    >>> topic_text("/imu"), topic_text(r"/imu\x1b")
+    ('/imu', '"/imu\\\\x1b"')
+    """
+    return _in_quotes(topic) if "\\" in topic else topic
 
 
 def element_text(name: str) -> str:
@@ -152,7 +166,7 @@ def _in_quotes(name: str) -> str:
 
 
 def near_matches(word: str, known: Collection[str], *, count: int = 3) -> str:
-    """Name what comes near `word`, or the first few of what there is.
+    """Name what comes near `word`, or the first few of what there is, as they are shown.
 
     Examples
     --------
@@ -161,19 +175,28 @@ def near_matches(word: str, known: Collection[str], *, count: int = 3) -> str:
     """
     near = get_close_matches(word, dict.fromkeys(known), n=count, cutoff=0.6)
     if near:
-        return f"did you mean {' or '.join(near)}?"
+        return f"did you mean {' or '.join(map(visible, near))}?"
     first = sorted(known)[:8]
     more = f" and {len(known) - len(first)} more" if len(known) > len(first) else ""
-    return f"there are: {', '.join(first)}{more}" if first else "there are none"
+    return f"there are: {', '.join(map(visible, first))}{more}" if first else "there are none"
 
 
 def _topic_of(text: str, topics: Collection[str]) -> tuple[str, int]:
     for topic in sorted(topics, key=len, reverse=True):
-        for written in (topic, quoted(topic)):
-            if text.startswith(written) and text[len(written) : len(written) + 1] in ("", ".", "[", "{"):
-                return topic, len(written)
+        if (length := _length_of(topic, text)) is not None:
+            return topic, length
     wanted = re.split(r"[.\[{]", text, maxsplit=1)[0]
-    raise LogError(f"{text!r}: no topic of the log starts this path; {near_matches(wanted, topics)}")
+    raise LogError(
+        f"{text!r}: no topic of the log starts this path; {near_matches(wanted, [*map(topic_text, topics)])}"
+    )
+
+
+def _length_of(topic: str, text: str) -> int | None:
+    """How much of a path is its topic, as it is or in quotes; None where it's another one."""
+    for written in (topic, quoted(topic), _in_quotes(topic)):
+        if text.startswith(written) and text[len(written) : len(written) + 1] in ("", ".", "[", "{"):
+            return len(written)
+    return None
 
 
 def _next_step(text: str, position: int) -> tuple[Step, int]:

@@ -25,7 +25,7 @@ from chladni.io.field_selector import (
 )
 from chladni.io.known_schemas import MAX_LISTED_ELEMENTS, has_signals, is_signal
 from chladni.io.loss import Unread
-from chladni.io.message_path import FieldStep, IndexStep, MessagePath, element_text, near_matches, quoted
+from chladni.io.message_path import FieldStep, IndexStep, MessagePath, element_text, near_matches, quoted, topic_text
 from chladni.io.publishers import at_once
 from chladni.io.topic import Topic
 from chladni.signals.errors import LogError
@@ -71,7 +71,7 @@ class TopicChannels:
     @property
     def publishers(self) -> tuple[str, ...]:
         """Beginnings of the paths of each of several publishers that send at once; empty where there's one."""
-        return tuple(f"{self.topic.name}{_written(frame)}" for frame in self.frames)
+        return tuple(f"{topic_text(self.topic.name)}{_written(frame)}" for frame in self.frames)
 
     def listed(self) -> Iterator[ChannelSource]:
         """Give every channel that is a signal, in the order of the schema."""
@@ -144,7 +144,7 @@ class TopicChannels:
 
     def _columns(self) -> Iterator[ChannelSource]:
         for index, name in enumerate(self.names):
-            yield self._column(index, f"{self.topic.name}.{quoted(name)}")
+            yield self._column(index, f"{topic_text(self.topic.name)}.{quoted(name)}")
 
     def _column(self, index: int, name: str) -> ChannelSource:
         if self.layout is None:
@@ -164,7 +164,7 @@ class TopicChannels:
         if path.rest in self.names:
             # A column's name may hold dots and brackets of its own.
             return self._column(self.names.index(path.rest), path.text)
-        near = near_matches(path.rest, self.names)
+        near = near_matches(path.rest, [*map(quoted, self.names)])
         raise LogError(f"{path.text!r}: {self.topic.name} holds blocks of samples; no column {path.rest!r}, {near}")
 
     # --- one sample a message ---
@@ -245,7 +245,7 @@ class TopicChannels:
                 raise LogError(f"{path.text!r}: {reason}")
 
     def _listed(self, field: str, selector: FieldSelector) -> ChannelSource:
-        return self._leaf_source(selector, field=field, name=f"{self.topic.name}.{field}")
+        return self._leaf_source(selector, field=field, name=f"{topic_text(self.topic.name)}.{field}")
 
     def _of_frame(self, source: ChannelSource, frame: FieldFilter) -> ChannelSource:
         if source.selector is None:
@@ -253,7 +253,7 @@ class TopicChannels:
         return replace(
             source,
             field=f"{_written(frame)}.{source.field}",
-            channel=replace(source.channel, name=f"{self.topic.name}{_written(frame)}.{source.field}"),
+            channel=replace(source.channel, name=f"{topic_text(self.topic.name)}{_written(frame)}.{source.field}"),
             selector=replace(source.selector, message_filters=(frame,)),
         )
 

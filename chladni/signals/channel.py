@@ -6,6 +6,7 @@ from math import isfinite, sqrt
 from typing import Literal, Self
 
 from chladni.signals.errors import EstimateError, SetupError
+from chladni.signals.visible import place_of
 
 Role = Literal["response", "reference"]
 Vector = tuple[float, float, float]
@@ -60,11 +61,11 @@ class Channel:
 
 
 def find_channel(channels: Sequence[Channel], name: str, *, role: str = "channel") -> int:
-    """Row of the named channel; `EstimateError` naming those there are when it's missing."""
-    for row, channel in enumerate(channels):
-        if channel.name == name:
-            return row
-    raise EstimateError(f"no {role} {name!r}; {role}s: {', '.join(channel.name for channel in channels)}")
+    """Row of the channel that is called so or shown so; `EstimateError` naming those there are when it's missing."""
+    names = [channel.name for channel in channels]
+    if (row := place_of(name, names)) is not None:
+        return row
+    raise EstimateError(f"no {role} {name!r}; {role}s: {', '.join(names)}")
 
 
 def unit_direction(direction: str | Iterable[float]) -> Vector:

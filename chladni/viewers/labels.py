@@ -4,6 +4,8 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
+from chladni.signals.visible import visible
+
 LONGEST_NAME = 48
 
 _QUANTITIES = {
@@ -109,7 +111,7 @@ def short_names(names: Iterable[str]) -> dict[str, str]:
     """Give every channel name a label as short as it can be without two channels sharing one.
 
     A label is the last part of the topic and the last field; where that is ambiguous all fields, then the whole
-    name, then the whole name and a number. Characters that can't be printed are shown as U+FFFD.
+    name, then the whole name and a number. Characters that can't be seen are shown as escapes.
 
     Parameters
     ----------
@@ -184,7 +186,7 @@ def _whole(name: str) -> str:
 
 
 def _printable(text: str) -> str:
-    shown = "".join(character if character.isprintable() else "\ufffd" for character in text) or "(no name)"
+    shown = visible(text) or "(no name)"
     if len(shown) <= LONGEST_NAME:
         return shown
     # The end tells channels apart more often than the middle does.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from chladni.signals.channel import Channel
 from chladni.signals.geometry import Geometry
+from chladni.signals.visible import visible
 from chladni.viewers.drawing import Floats
 
 Motion = NDArray[np.complexfloating[Any, Any]]
@@ -24,7 +25,7 @@ class Wireframe:
     Attributes
     ----------
     names
-        Of the points.
+        Of the points, as they are shown.
     rest
         ``[point, axis]`` where they rest, in metres.
     lines
@@ -62,7 +63,7 @@ class Wireframe:
                 measured[place] = True
         places = {name: place for place, name in enumerate(names)}
         return cls(
-            names=names,
+            names=tuple(map(visible, names)),
             rest=np.array([point.position for point in geometry.points], dtype=np.float64),
             lines=tuple(tuple(places[name] for name in line) for line in geometry.lines),
             rows=tuple(rows),

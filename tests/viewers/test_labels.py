@@ -35,7 +35,7 @@ from chladni.viewers.labels import (
         (["/joints.position[elbow.left]"], ["joints.position[elbow.left]"]),
         (["x"], ["x"]),
         ([""], ["(no name)"]),
-        (["/a\n.x"], ["a\ufffd.x"]),
+        (["/a\n.x"], ["a\\n.x"]),
     ],
 )
 def test_labels_are_as_short_as_they_can_be(names: list[str], labels: list[str]) -> None:

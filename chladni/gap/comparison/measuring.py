@@ -19,6 +19,7 @@ from chladni.signals.errors import LogError, ModelError, SetupError
 from chladni.signals.number_range import out_of_range
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import si_factor
+from chladni.signals.visible import place_of
 from chladni.signals.wording import counted
 
 Matrix = NDArray[np.float64]
@@ -149,10 +150,10 @@ def matched_log(
 
 
 def _matched(terminal: Terminal, recording: TimeSeries) -> _Match:
-    rows = {channel.name: row for row, channel in enumerate(recording.channels)}
+    names = [channel.name for channel in recording.channels]
     # The channel that the model names goes first: a log may hold another one by the terminal's name.
-    found = [rows[name] for name in (terminal.channel, terminal.name) if name in rows]
-    return _Match(terminal=terminal, row=found[0] if found else None)
+    found = [place_of(name, names) for name in (terminal.channel, terminal.name) if name is not None]
+    return _Match(terminal=terminal, row=next((row for row in found if row is not None), None))
 
 
 def _require_inputs(inputs: Sequence[_Match], model: str, log: str, *, held: str) -> None:

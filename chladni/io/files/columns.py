@@ -12,6 +12,7 @@ from chladni.io.files.contents import unit_in_si
 from chladni.signals.channel import Channel
 from chladni.signals.errors import SetupError
 from chladni.signals.time_series import NS_PER_S
+from chladni.signals.visible import visible
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -139,7 +140,7 @@ def channels_of(
 
 
 def distinct(names: Sequence[str]) -> list[str]:
-    """Give names of their own to columns that have the same: ``a``, ``a (2)``, ...
+    """Give names of their own to columns that have the same, or are shown the same: ``a``, ``a (2)``, ...
 
     Examples
     --------
@@ -150,9 +151,9 @@ def distinct(names: Sequence[str]) -> list[str]:
     found = []
     for name in names:
         number, own = 1, name
-        while own in taken:
+        while visible(own) in taken:
             number += 1
             own = f"{name} ({number})"
-        taken.add(own)
+        taken.add(visible(own))
         found.append(own)
     return found

@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from decimal import Decimal
 from itertools import islice
 from pathlib import Path
@@ -20,6 +21,7 @@ from chladni.io.files.time_column import UNNAMED, is_time_name
 from chladni.io.files.time_reading import UNIT_OF, TimeOptions, spelled
 from chladni.signals.errors import SetupError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.visible import cell_meant, cell_text
 from chladni.signals.wording import counted
 
 # Some ten MB of text at a time: the table grows, the text of it doesn't.
@@ -39,8 +41,9 @@ def read_csv(
     """Read a table of numbers.
 
     Encoding, delimiter (``;``, tab, ``,`` or blanks), decimal comma, remarks, a line of names and a line of units are
-    found out from the file. A title is ``name``, ``name [unit]`` or ``name (unit)``. Cells that are blank or no
-    finite number are gaps of their channel, times that are left out are gaps of all. Columns of text are left out.
+    found out from the file. A title is ``name``, ``name [unit]`` or ``name (unit)``; an apostrophe that marks text
+    for spreadsheets is none of the name (see `chladni.signals.visible.cell_text`). Cells that are blank or no finite
+    number are gaps of their channel, times that are left out are gaps of all. Columns of text are left out.
 
     The time column is the one called ``time``, ``t``, ``timestamp``, ``Zeit`` or alike, alone or with a unit, or the
     one of dates or times of day; see `chladni.io.files.time_reading` for what its numbers count.
@@ -73,7 +76,8 @@ def read_csv(
         raise SetupError(f"{path}: the decimal sign is . or , not {decimal!r}")
     options = TimeOptions(column=time, unit=time_unit, rate_hz=sample_rate_hz)
     dialect = sniff_csv(path, decimal=decimal)
-    titles = parse_titles(dialect.header or ("",) * dialect.columns)
+    found = parse_titles(dialect.header or ("",) * dialect.columns)
+    titles = [replace(title, name=cell_meant(title.name)) for title in found]
     titled = names if names is not None and len(names) == len(titles) else [title.name for title in titles]
     keep_text = [
         # Of times, whose digits count, and of what is text.
@@ -132,8 +136,9 @@ def write_csv(
 ) -> tuple[str, ...]:
     """Write a table: titles ``name [unit]``, times in seconds from the first sample, every digit of every number.
 
-    The start is in the title of the time column: ``time [s from 1700000000.5]``. A missing value is an empty cell,
-    a sample missing in all channels is left out.
+    The start is in the title of the time column: ``time [s from 1700000000.5]``. A name that a spreadsheet would take
+    for a formula, or that holds what isn't seen, stands behind an apostrophe, with escapes. A missing value is an
+    empty cell, a sample missing in all channels is left out.
 
     Returns
     -------
@@ -161,7 +166,7 @@ def _written_titles(series: TimeSeries) -> Iterator[str]:
     start = Decimal(series.start_time_ns) / NS_PER_S
     yield f"time [s from {start:f}]" if series.start_time_ns else "time [s]"
     for channel in series.channels:
-        yield f"{channel.name} [{channel.unit}]"
+        yield f"{cell_text(channel.name)} [{channel.unit}]"
 
 
 def _quoted(text: str) -> str:

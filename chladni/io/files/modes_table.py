@@ -8,6 +8,7 @@ from pathlib import Path
 from chladni.io.atomic import atomic_path
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
+from chladni.signals.visible import cell_text
 
 _MODE_COLUMNS = (
     "mode",
@@ -36,8 +37,6 @@ _SHAPE_COLUMNS = (
     "imaginary std [1]",
     "amplitude [1]",
 )
-# Read as the start of a formula by spreadsheets: a channel's name comes from a log, which nobody vouches for.
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def write_modes_csv(
@@ -64,7 +63,8 @@ def write_modes_csv(
     Notes
     -----
     RFC 4180, one header line with units, decimal points, 17 significant digits; modes count from 1, as in sentences.
-    What isn't known is an empty field. Text that a spreadsheet would take for a formula is quoted with an apostrophe.
+    What isn't known is an empty field. An apostrophe marks names that a spreadsheet would take for a formula, and
+    those with characters that aren't seen, which are written as escapes.
     Modal masses are in kg for forces in N and translations.
     """
     table = Path(path)
@@ -102,8 +102,8 @@ def _shape_rows(modes: ModeSet) -> Iterable[list[str]]:
             direction = channel.direction or (float("nan"),) * 3
             yield [
                 *start,
-                _text(channel.name),
-                _text(channel.point or ""),
+                cell_text(channel.name),
+                cell_text(channel.point or ""),
                 *(_number(one) for one in direction),
                 _number(component.real),
                 _number(std.real),
@@ -122,7 +122,3 @@ def _write(path: Path, columns: Sequence[str], rows: Iterable[list[str]]) -> Non
 
 def _number(number: float) -> str:
     return f"{float(number):.17g}" if isfinite(number) else ""
-
-
-def _text(text: str) -> str:
-    return f"'{text}" if text.startswith(_FORMULA) else text

@@ -8,6 +8,7 @@ from typing import Any
 from chladni.signals.channel import AXES, Channel, Vector
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.visible import visible
 
 TIME_RESPONSE = 1
 FUNCTION_TYPES = {
@@ -121,7 +122,8 @@ def start_of_header(header: dict[str, Any], second: float = 1.0) -> int:
 def header_of_channel(channel: Channel, series: TimeSeries) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Give the header fields of a record, and sentences on what doesn't fit them."""
     losses = []
-    name = channel.name.encode("ascii", "replace").decode()[:_ID_LENGTH]
+    # On one line: a line feed in a name would begin a record of its own.
+    name = re.sub(r"[^ -~]", "?", visible(channel.name))[:_ID_LENGTH]
     entity, node = _place(channel.point)
     direction = direction_code(channel)
     if name != channel.name:
@@ -132,8 +134,9 @@ def header_of_channel(channel: Channel, series: TimeSeries) -> tuple[dict[str, A
         losses.append(f"{channel.name}: the direction {channel.direction} is along no axis and isn't stored.")
     if channel.overload is not None:
         losses.append(f"{channel.name}: the overload limit isn't stored.")
-    if len(channel.unit) > _LABEL_LENGTH:
-        losses.append(f"{channel.name}: the unit {channel.unit!r} has more than 20 characters and isn't stored.")
+    labelled = len(channel.unit) <= _LABEL_LENGTH and channel.unit.isascii() and channel.unit.isprintable()
+    if not labelled:
+        losses.append(f"{channel.name}: the unit {channel.unit!r} isn't stored; a label holds 20 ASCII characters.")
     header = {
         "id1": name or "NONE",
         "id3": _date(series.start_time_ns),
@@ -148,7 +151,7 @@ def header_of_channel(channel: Channel, series: TimeSeries) -> tuple[dict[str, A
         "abscissa_axis_units_lab": "s",
         "ordinate_spec_data_type": quantity_code(channel),
         "ordinate_axis_lab": "NONE",
-        "ordinate_axis_units_lab": channel.unit if len(channel.unit) <= _LABEL_LENGTH else "NONE",
+        "ordinate_axis_units_lab": channel.unit if labelled else "NONE",
         "orddenom_spec_data_type": 0,
     }
     return header, tuple(losses)

@@ -4,12 +4,12 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from chladni.io.message_path import quoted
+from chladni.io.message_path import quoted, topic_text
 from chladni.signals.errors import SetupError
 
 _TOPIC_AND_REST = re.compile(r"^(?P<topic>/[^.\[{]*[^.\[{/])(?:\.(?P<rest>.+))?$", re.DOTALL)
 # ROS 2 allows lower-case field names only; indices of any word serve JointState, whose elements have names.
-_FIELD_PATH = re.compile(r"^[a-z][a-z0-9_]*(\[\w+\])?(\.[a-z][a-z0-9_]*(\[\d+\])?)*$")
+_FIELD_PATH = re.compile(r"[a-z][a-z0-9_]*(\[\w+\])?(\.[a-z][a-z0-9_]*(\[\d+\])?)*")
 _QUOTED = re.compile(r'^"(?P<inside>(?:[^"\\]|\\.)*)"$', re.DOTALL)
 _OUTSIDE_NAMES = re.compile(r"[^A-Za-z0-9_/]+")
 SCALAR_FIELD = "value"
@@ -66,8 +66,9 @@ def block_places(names: Sequence[str], *, topic: str) -> tuple[FieldOfTopic, ...
 
 def _message_place(name: str) -> FieldOfTopic:
     match = _TOPIC_AND_REST.match(name)
-    if match is not None and match["rest"] is not None and _FIELD_PATH.match(match["rest"]):
-        return FieldOfTopic(topic=match["topic"], field=match["rest"], name=name)
+    if match is not None and match["rest"] is not None and _FIELD_PATH.fullmatch(match["rest"]):
+        topic, field = match["topic"], match["rest"]
+        return FieldOfTopic(topic=topic, field=field, name=f"{topic_text(topic)}.{field}")
     # ROS names hold letters, digits, _ and /; anything else would be refused by the tools that read the log.
     topic = "/" + (_OUTSIDE_NAMES.sub("_", name).strip("_/") or "channel")
     return FieldOfTopic(topic=topic, field=SCALAR_FIELD, name=f"{topic}.{SCALAR_FIELD}")
@@ -80,7 +81,7 @@ def _block_place(name: str, default_topic: str) -> FieldOfTopic:
     in_quotes = _QUOTED.match(column)
     if match is not None and in_quotes is not None:
         column = re.sub(r"\\(.)", r"\1", in_quotes["inside"])
-    return FieldOfTopic(topic=topic, field=column, name=f"{topic}.{quoted(column)}")
+    return FieldOfTopic(topic=topic, field=column, name=f"{topic_text(topic)}.{quoted(column)}")
 
 
 def _without_clash(names: Sequence[str], places: tuple[FieldOfTopic, ...]) -> tuple[FieldOfTopic, ...]:

@@ -14,6 +14,7 @@ from chladni.signals.channel import Channel
 from chladni.signals.errors import ModelError
 from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.visible import place_of
 
 if TYPE_CHECKING:
     from chladni.models.integrator.integrator import Integration
@@ -132,9 +133,9 @@ def _from_series(
     signals = np.zeros((len(compiled.inputs), series.samples))
     driven = set()
     for place, terminal in enumerate(compiled.inputs):
-        found = next((name for name in (terminal.channel, terminal.name) if name in names), None)
-        if found is not None:
-            signals[place] = _sound(series, names.index(found), terminal)
+        rows = [place_of(name, names) for name in (terminal.channel, terminal.name) if name is not None]
+        if (row := next((row for row in rows if row is not None), None)) is not None:
+            signals[place] = _sound(series, row, terminal)
             driven.add(terminal.name)
     if compiled.inputs and not driven:
         wanted = ", ".join(terminal.channel or terminal.name for terminal in compiled.inputs)

@@ -1,6 +1,5 @@
 """A measured log beside the simulation: which channel is what, from when to when, and how well they agree."""
 
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ from chladni.models.core.instrument import Options, Values
 from chladni.models.core.port import Terminal
 from chladni.models.core.reading import InstrumentReading
 from chladni.signals.errors import ChladniError
+from chladni.signals.visible import visible
 from chladni.viewers.bench.board import Board
 from chladni.viewers.bench.desk import Desk
 from chladni.viewers.bench.dropper import Dropper, private_file
@@ -141,12 +141,12 @@ class LogView:
             return False
         # An hour of log is no start; the user may ask for more.
         self.span.value = min(FIRST_SPAN_S, round(log.duration_s, 3))
-        names = [NOT_MEASURED, *(channel.name for channel in log.channels)]
+        names = {visible(name): name for name in (NOT_MEASURED, *(channel.name for channel in log.channels))}
         self.selects = self._selects(terminals, names, assigned)
         self._choices.objects = [*self.selects.values(), self.start, self.span]
         return True
 
-    def _selects(self, terminals: Terminals, names: Sequence[str], assigned: Assignment) -> dict[str, Any]:
+    def _selects(self, terminals: Terminals, names: dict[str, str], assigned: Assignment) -> dict[str, Any]:
         made = {}
         for words, group in zip(("input", "output"), terminals, strict=True):
             for terminal in group:
@@ -154,7 +154,7 @@ class LogView:
                     f"{words} {terminal.name} [{terminal.unit}]",
                     assigned.get(terminal.name, NOT_MEASURED),
                 )
-                made[terminal.name] = choice(label, list(names), chosen, self._changed, width=210, margin=0)
+                made[terminal.name] = choice(label, names, chosen, self._changed, width=210, margin=0)
         return made
 
     def _changed(self, _event: Any) -> None:

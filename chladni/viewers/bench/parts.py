@@ -65,9 +65,15 @@ def switch(label: str, on: bool, turned: Callable[[Any], None]) -> Any:
 
 
 def choice(
-    label: str, words: list[str], chosen: str | None, changed: Callable[[Any], None], *, css: str = "", **layout: Any
+    label: str,
+    words: list[str] | dict[str, str],
+    chosen: str | None,
+    changed: Callable[[Any], None],
+    *,
+    css: str = "",
+    **layout: Any,
 ) -> Any:
-    """Show a list to choose one word of."""
+    """Show a list to choose one word of, or one of the values that words stand for."""
     made = pn.widgets.Select(
         options=words,
         value=chosen,

@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Sequence
-from html import escape
+from html import escape as inert
 from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.models.core.reading import InfluenceTable, Quantity
+from chladni.signals.visible import visible
 from chladni.viewers.labels import printed_unit
 
 DASH = "–"
@@ -19,6 +20,17 @@ _GREEK = {
     "psi": "ψ", "omega": "ω",
 }  # fmt: skip
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def escape(text: str) -> str:
+    r"""Make a text that came from a model or a log visible, and inert in an element or a quoted attribute.
+
+    Examples
+    --------
+    >>> escape("<b>\u202e")
+    '&lt;b&gt;\\u202e'
+    """
+    return inert(visible(text))
 
 
 def number(value: float | None) -> str:

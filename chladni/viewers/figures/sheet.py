@@ -12,6 +12,7 @@ from matplotlib.font_manager import FontProperties, findfont
 from matplotlib.ft2font import FT2Font
 from matplotlib.transforms import ScaledTranslation
 
+from chladni.signals.visible import visible
 from chladni.viewers.style import Colour
 
 # A figure this wide is set across one column of a page at three quarters of its size, type then 6.4 pt.
@@ -90,7 +91,7 @@ def paint(colour: Colour) -> tuple[float, float, float]:
 
 
 def plain(text: str) -> str:
-    r"""Make a text that came from a log safe to print: no mathematics, no missing glyphs, kept in legends.
+    r"""Make a text that came from a log safe to print: visible, no mathematics, no missing glyphs, kept in legends.
 
     Examples
     --------
@@ -101,7 +102,7 @@ def plain(text: str) -> str:
     """
     # matplotlib warns at each missing glyph and draws a box; this is told once, by the mark.
     known = _glyphs()
-    shown = "".join(character if ord(character) in known else "\ufffd" for character in text)
+    shown = "".join(character if ord(character) in known else "\ufffd" for character in visible(text))
     # matplotlib leaves labels that begin with an underscore out of legends.
     return (" " if shown.startswith("_") else "") + shown.replace("$", r"\$")
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from string import Template
 
 from chladni import __version__
+from chladni.signals.visible import visible
 
 # No request leaves the page: pictures are data, styles are inline, and scripts aren't allowed at all.
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; form-action 'none'; base-uri 'none'"
@@ -72,7 +73,7 @@ $body
 
 
 def escaped(text: str) -> str:
-    """Make any text safe inside an element or a quoted attribute; control characters become U+FFFD.
+    """Make any text safe inside an element or a quoted attribute; what can't be seen is shown as an escape.
 
     Examples
     --------
@@ -80,7 +81,7 @@ def escaped(text: str) -> str:
     '&lt;script&gt; &amp; &quot;quotes&quot;'
     """
     # Quotes too, so that the same function serves attributes.
-    return html.escape("".join(character if character.isprintable() else "\ufffd" for character in text))
+    return html.escape(visible(text))
 
 
 def element(name: str, content: str, **attributes: str) -> str:
@@ -91,7 +92,7 @@ def element(name: str, content: str, **attributes: str) -> str:
     >>> element("td", "1", title='"')
     '<td title="&quot;">1</td>'
     """
-    given = "".join(f' {key.rstrip("_")}="{html.escape(value)}"' for key, value in attributes.items())
+    given = "".join(f' {key.rstrip("_")}="{escaped(value)}"' for key, value in attributes.items())
     return f"<{name}{given}>{content}</{name}>"
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from chladni.signals.visible import visible
 from chladni.viewers.drawing import Floats, ticks
 
 GRID_COLOUR = (50, 50, 50)
@@ -65,7 +66,7 @@ class Canvas:
         """Give a view of the rectangle with its numbers, and some units more to the sides and above."""
         return rrb.Spatial2DView(
             origin=origin,
-            name=name,
+            name=visible(name),
             visual_bounds=rrb.VisualBounds2D(
                 x_range=(-left, self.width + right), y_range=(-above, self.height + 2.7 * LETTERS)
             ),
@@ -85,7 +86,7 @@ def draw_labels(
         return
     labels = rr.Points2D(
         places,
-        labels=texts,
+        labels=[visible(text) for text in texts],
         show_labels=True,
         colors=colours or [LABEL_COLOUR] * len(texts),
         radii=rr.Radius.ui_points(0.0),

@@ -3,6 +3,7 @@
 import rerun as rr
 
 from chladni.signals.study import Study
+from chladni.signals.visible import visible
 from chladni.viewers.mode_tables import has_mac, hertz, mode_title
 from chladni.viewers.panels import panels
 from chladni.viewers.rerun.blueprint import ChannelViews, ModesViews, ModeViews, ResponseViews, Views, arrange
@@ -43,7 +44,7 @@ def draw(recording: rr.RecordingStream, study: Study) -> None:
         From rerun, when a value can't be written; nothing is left out with a mere warning.
     """
     style = Style.of(study)
-    recording.send_recording_name(study.title)
+    recording.send_recording_name(visible(study.title))
     if style.origin_ns:
         recording.send_recording_start_time_nanos(style.origin_ns)
     # Drawing a part also makes its view, so that no view can point at an entity that was renamed.

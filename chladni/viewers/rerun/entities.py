@@ -5,6 +5,7 @@ import re
 import rerun as rr
 
 from chladni.signals.channel import Channel
+from chladni.signals.visible import visible
 
 
 def folder(*parts: str) -> str:
@@ -27,4 +28,4 @@ def channel_entity(parent: str, channel: Channel) -> str:
     >>> channel_entity("/waveforms/force", Channel(name="/hammer.force.x"))
     '/waveforms/force/\\/hammer.force.x'
     """
-    return f"{parent}/{rr.escape_entity_path_part(channel.name)}"
+    return f"{parent}/{rr.escape_entity_path_part(visible(channel.name))}"

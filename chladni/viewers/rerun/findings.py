@@ -8,6 +8,7 @@ import rerun.blueprint as rrb
 
 from chladni.signals.peak import Peak
 from chladni.signals.study import Study
+from chladni.signals.visible import visible
 from chladni.viewers.labels import printed_unit, value_with_deviation
 from chladni.viewers.mode_tables import Row, mode_table
 from chladni.viewers.style import Style
@@ -37,9 +38,8 @@ def escaped(text: str) -> str:
     '\\!\\[x\\]\\(http\\:\\/\\/a\\/b.png\\)'
     """
     # A line break would end the table or the list that the text stands in.
-    printable = "".join(character if character.isprintable() else " " for character in text)
     # Every ASCII punctuation mark may be escaped in Markdown, so none needs to be judged.
-    return re.sub(r"([!-,/:-@\[-`{-~])", r"\\\1", printable)
+    return re.sub(r"([!-,/:-@\[-`{-~])", r"\\\1", visible(text))
 
 
 def _page(study: Study, style: Style) -> Iterator[str]:

@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 
 from chladni.gap.records.diagnosis import RestoringForce
 from chladni.io.atomic import atomic_write
+from chladni.signals.visible import visible
 from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.rerun.drawing import new_recording
 from chladni.viewers.rerun.entities import folder
@@ -60,7 +61,7 @@ def write_gap_rrd(
 def draw_gap(recording: rr.RecordingStream, evidence: GapEvidence, sketch: StructureSketch | None) -> None:
     """Write all of a diagnosis and its blueprint into a recording that is connected already."""
     found = evidence.found
-    recording.send_recording_name(f"{found.model}: gap")
+    recording.send_recording_name(f"{visible(found.model)}: gap")
     answer = draw_answer(recording, found)
     pages = [_overview(recording, evidence, answer)]
     if maps := draw_gap_maps(recording, found.signals):
@@ -78,7 +79,7 @@ def _forces(recording: rr.RecordingStream, surfaces: Sequence[RestoringForce]) -
     """A page for each force, with its site where there are several."""
     pages: list[rrb.Container] = []
     for surface in surfaces:
-        name = "Restoring force" if len(surfaces) == 1 else f"Restoring force at {surface.site}"
+        name = "Restoring force" if len(surfaces) == 1 else f"Restoring force at {visible(surface.site)}"
         path = folder(name.lower())
         shown = rrb.Horizontal(*draw_surfaces(recording, surface, path))
         over_time = draw_force_over_time(recording, surface, path)

@@ -6,6 +6,7 @@ import rerun.blueprint as rrb
 
 from chladni.gap.records.diagnosis import GapSignals
 from chladni.signals.time_series import NS_PER_S
+from chladni.signals.visible import visible
 from chladni.viewers.drawing import Floats, thin
 from chladni.viewers.gap_evidence import AFTER_ON_DARK, BEFORE_ON_DARK, MEASURED_ON_DARK
 from chladni.viewers.labels import printed_unit, thinned
@@ -82,7 +83,7 @@ def _line(
 def _view(origin: str, name: str, start_ns: int, end_ns: int) -> rrb.View:
     return rrb.TimeSeriesView(
         origin=origin,
-        name=name,
+        name=visible(name),
         axis_x=time_axis(end_ns, start_ns=start_ns),
         plot_legend=rrb.PlotLegend(visible=True, corner=rrb.Corner2D.LeftTop),
     )

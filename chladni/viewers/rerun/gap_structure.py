@@ -5,6 +5,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from chladni.signals.visible import visible
 from chladni.viewers.drawing import Floats
 from chladni.viewers.engineering import percent
 from chladni.viewers.rerun.entities import folder
@@ -49,9 +50,8 @@ def draw_structure(recording: rr.RecordingStream, sketch: StructureSketch) -> rr
 
 
 def _labels(names: tuple[str, ...], share: Floats) -> list[str]:
-    return [
-        name if np.isnan(one) else f"{name} {percent(float(one))}" for name, one in zip(names, share, strict=True)
-    ]
+    shown = zip(map(visible, names), share, strict=True)
+    return [name if np.isnan(one) else f"{name} {percent(float(one))}" for name, one in shown]
 
 
 def _colours(share: Floats) -> NDArray[np.uint8]:

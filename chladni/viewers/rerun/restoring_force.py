@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from chladni.gap.records.diagnosis import RestoringForce
 from chladni.signals.time_series import NS_PER_S
+from chladni.signals.visible import visible
 from chladni.viewers.drawing import Floats, thin
 from chladni.viewers.engineering import axis_scale, engineering
 from chladni.viewers.gap_evidence import AFTER_ON_DARK, MEASURED_ON_DARK
@@ -92,7 +93,8 @@ def draw_force_over_time(recording: rr.RecordingStream, surface: RestoringForce,
     return rrb.TimeSeriesView(
         origin=f"{path}/time",
         # The viewer labels powers of ten alone where there is little room.
-        name=f"Force lacking at {surface.site} [{printed_unit(unit)}], ±{engineering(reach, None, unit)}{beyond}",
+        name=f"Force lacking at {visible(surface.site)} [{printed_unit(unit)}], "
+        f"±{engineering(reach, None, unit)}{beyond}",
         axis_x=time_axis(end_ns, start_ns=start_ns),
         axis_y=rrb.ScalarAxis(range=force_range(surface)),
         plot_legend=rrb.PlotLegend(visible=True, corner=rrb.Corner2D.LeftTop),

@@ -55,7 +55,7 @@ def test_no_name_becomes_a_formula(tmp_path: Path) -> None:
     wild = Channel(name="=HYPERLINK(1)", point='@,"\n', direction=AXES["+z"])
     modes = replace(mode_set([[1.0]]), channels=(wild,))
     (row,) = rows_of(write_modes_csv(tmp_path / "a.csv", modes)[1])
-    assert (row["channel"], row["point"]) == ("'=HYPERLINK(1)", "'@,\"\n")
+    assert (row["channel"], row["point"]) == ("'=HYPERLINK(1)", "'@,\"\\n")
 
 
 @pytest.mark.parametrize("existing", ["a.csv", "a_shapes.csv"])
