@@ -93,12 +93,16 @@ def _fail(error: Exception, code: int) -> int:
     text = error.format_message() if isinstance(error, typer.TyperException) else str(error)
     # Typer hands on how its own validation calls a wrong choice.
     text = text.replace("Value error, ", "")
-    lines = [visible(line) for line in text.split("\n")]
-    line = " ".join((_mistakes(lines) if isinstance(error, ChladniError) else " ".join(lines)).split())
+    # In a message that chladni wrote only a name can hold a line feed, and no blank of a name is left out.
+    line = _mistakes([*map(visible, error.mistakes)]) if isinstance(error, ChladniError) else _on_one_line(text)
     if code == DEFECT:
         line = f"defect of chladni ({type(error).__name__}): {line}; CHLADNI_TRACEBACK=1 shows where"
     print(f"chladni: {line}", file=sys.stderr)  # noqa: T201  # the one line that a failure prints
     return code
+
+
+def _on_one_line(text: str) -> str:
+    return " ".join(" ".join(map(visible, text.split("\n"))).split())
 
 
 def _mistakes(lines: Sequence[str]) -> str:

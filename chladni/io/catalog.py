@@ -334,7 +334,7 @@ def _setups(catalog: Catalog, setup: Setup, listed: Sequence[ChannelSource]) -> 
         else:
             found[source.topic, source.field] = one
     if mistakes:
-        raise SetupError("\n".join(mistakes))
+        raise SetupError(*mistakes)
     return found
 
 

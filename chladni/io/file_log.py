@@ -295,7 +295,7 @@ def _as_held(path: Path, contents: FileContents, setup: Setup) -> Setup:
     unknown = [one for one, place in zip(setup.channels, places, strict=True) if place is None]
     if unknown:
         raise SetupError(
-            "\n".join(
+            *(
                 f"{one.place}: [[channel]] path: {path.name} has no channel {one.path!r}; "
                 f"{near_matches(one.path, known)}"
                 for one in unknown

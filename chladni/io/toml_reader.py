@@ -65,7 +65,7 @@ class TomlMistakes:
         lines = list(dict.fromkeys(text for _, text in sorted(self._told)))
         more = len(lines) - MAX_MISTAKES
         told = [f"... and {counted(more, 'more mistake')}"] if more > 0 else []
-        return kind("\n".join(lines[:MAX_MISTAKES] + told))
+        return kind(*lines[:MAX_MISTAKES], *told)
 
 
 class TomlDocument:

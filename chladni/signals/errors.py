@@ -13,7 +13,25 @@ A message names the value, the rule and what to do; the command line prints it i
 
 
 class ChladniError(Exception):
-    """Base of every error that chladni raises on purpose."""
+    """Base of every error that chladni raises on purpose.
+
+    Parameters
+    ----------
+    mistakes
+        A message; several where a file has several mistakes, each on a line of its own.
+    """
+
+    def __init__(self, *mistakes: str) -> None:
+        super().__init__(*mistakes)
+
+    @property
+    def mistakes(self) -> tuple[str, ...]:
+        """The messages, which may hold line feeds of names that they quote."""
+        return self.args
+
+    def __str__(self) -> str:
+        """Give all messages, a line each."""
+        return "\n".join(self.args)
 
 
 class LogError(ChladniError):

@@ -3,7 +3,7 @@
 from contextlib import suppress
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from chladni.io.message_path import (
@@ -15,8 +15,10 @@ from chladni.io.message_path import (
     near_matches,
     parse_message_path,
     quoted,
+    topic_text,
 )
 from chladni.signals.errors import LogError
+from chladni.signals.visible import as_meant, visible
 
 TOPICS = ("/imu", "/imu/wrist", "/a.b", "/a", "/log", "/top floor")
 
@@ -114,7 +116,7 @@ def test_a_quoted_name_parses_to_itself(name: str) -> None:
 def test_any_text_is_parsed_or_refused(text: str) -> None:
     # Anything but a LogError would end the test.
     with suppress(LogError):
-        assert parse_message_path(f"/imu{text}", TOPICS).text == f"/imu{text}"
+        assert parse_message_path(f"/imu{text}", TOPICS).text == as_meant(f"/imu{text}")
 
 
 def test_near_matches_of_nothing_and_of_far() -> None:
@@ -125,3 +127,28 @@ def test_near_matches_of_nothing_and_of_far() -> None:
 @given(st.text(min_size=1, max_size=20) | st.sampled_from(["7", " a", "a ", "-1", ":", 'a"b', "²"]))
 def test_the_name_of_an_element_parses_to_itself(name: str) -> None:
     assert steps(f"/imu.x{element_text(name)}") == (FieldStep(name="x"), KeyStep(name=name))
+
+
+@given(topic=st.text(min_size=1), key=st.text(), joint=st.text())
+@example(topic="/a\\x1b", key="\x1b", joint="\\x1b")
+@example(topic="/a\x1b[2J", key="\n", joint="3")
+@example(topic="/a", key="a\\", joint="[x]")
+def test_what_is_shown_of_a_path_is_the_path(topic: str, key: str, joint: str) -> None:
+    path = f"{topic_text(topic)}.{quoted(key)}{element_text(joint)}"
+    for written in (path, visible(path)):
+        parsed = parse_message_path(written, [topic])
+        assert (parsed.text, parsed.topic) == (path, topic)
+        assert parsed.steps == (FieldStep(name=key), KeyStep(name=joint))
+        assert parsed.rest == f"{quoted(key)}{element_text(joint)}"
+
+
+def test_topics_that_look_alike_are_told_apart() -> None:
+    topics = ["/a\x1b", "/a\\x1b"]
+    for topic in topics:
+        assert parse_message_path(visible(f"{topic_text(topic)}.x"), topics).topic == topic
+    assert len({visible(topic_text(topic)) for topic in topics}) == 2
+
+
+def test_advice_shows_what_it_names() -> None:
+    with pytest.raises(LogError, match=r"did you mean /imu\\x1b\[2J\?$"):
+        parse_message_path("/imu.x", ["/imu\x1b[2J"])

@@ -45,7 +45,7 @@ def scheme_from_tables(name: str, tables: Mapping[str, object], *, number: Numbe
     """
     reading = read_scheme(name, tables, number=number)
     if reading.model is None:
-        raise ModelError("\n".join(f"{_place(loc)}: {text}" for loc, text in reading.mistakes))
+        raise ModelError(*(f"{_place(loc)}: {text}" for loc, text in reading.mistakes))
     return reading.model
 
 

@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont
@@ -18,6 +19,9 @@ from chladni.viewers.style import Colour
 # A figure this wide is set across one column of a page at three quarters of its size, type then 6.4 pt.
 WIDTH_IN = 4.6
 LEGEND_COLUMNS = 3
+# Numbers and the name of an axis, and the line with its blanks beside a legend's word.
+BESIDE_AXES_POINTS = 50.0
+BESIDE_WORD_POINTS = 27.0
 BAND_OPACITY = 0.2
 # More bands than this in one plot hide the lines.
 BANDS_OF = 4
@@ -70,18 +74,36 @@ def legend(axes: Axes, *, above_points: float = 0.0) -> None:
     """Put the legend above the axes, where it can't cover data, and above what stands there already."""
     handles, labels = axes.get_legend_handles_labels()
     if handles:
+        # A legend wider than the axes would leave none of them.
+        room = axes.figure.get_figwidth() * 72 - BESIDE_AXES_POINTS
         axes.legend(
             handles,
             labels,
             loc="lower left",
             bbox_to_anchor=(0.0, 1.0),
             bbox_transform=axes.transAxes + ScaledTranslation(0, above_points / 72, axes.figure.dpi_scale_trans),
-            ncols=LEGEND_COLUMNS,
+            ncols=_columns([_width_points(label) for label in labels], room),
             frameon=False,
             borderaxespad=0.2,
             handlelength=1.4,
             columnspacing=1.2,
         )
+
+
+def _columns(widths_points: Sequence[float], room_points: float) -> int:
+    """Give as many columns of a legend as there is room for, with its words from above to below as they are set."""
+    for columns in range(min(LEGEND_COLUMNS, len(widths_points)), 1, -1):
+        parts = np.array_split(np.asarray(widths_points), columns)
+        if sum(float(part.max()) + BESIDE_WORD_POINTS for part in parts) <= room_points:
+            return columns
+    return 1
+
+
+def _width_points(text: str) -> float:
+    font = _font()
+    font.set_size(_LOOK["legend.fontsize"], 72)
+    font.set_text(text)
+    return float(font.get_width_height()[0]) / 64
 
 
 def paint(colour: Colour) -> tuple[float, float, float]:
@@ -109,4 +131,9 @@ def plain(text: str) -> str:
 
 @cache
 def _glyphs() -> frozenset[int]:
-    return frozenset(FT2Font(findfont(FontProperties(family="DejaVu Sans"))).get_charmap())
+    return frozenset(_font().get_charmap())
+
+
+@cache
+def _font() -> FT2Font:
+    return FT2Font(findfont(FontProperties(family="DejaVu Sans")))

@@ -108,7 +108,7 @@ def test_what_a_log_has_lost_is_said_beside_the_comparison_and_beside_a_refusal(
     drop(view, GOOD)
     assert lost in texts(view)
     assert [chart.name for chart in view.board.shown()] == ["log.time"]
-    view.selects["position"].value = view.selects["position"].options[0]
+    view.selects["position"].value = view.selects["position"].values[0]
     assert "no output is measured" in texts(view)
     assert lost in texts(view)
     view.close()

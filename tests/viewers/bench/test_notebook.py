@@ -209,7 +209,7 @@ def test_a_log_named_at_the_start(tmp_path: Path) -> None:
     assert page.log.span.value == 5.0
     page.knobs["mass"].slider.value = 4.0
     assert "4 %" in page.log._scores.object
-    page.log.selects["position"].value = page.log.selects["position"].options[0]
+    page.log.selects["position"].value = page.log.selects["position"].values[0]
     assert "no output is measured" in page.log._words.object
     assert "4 %" in page.log._scores.object
     page.views.value = VIEWS[0]
