@@ -67,7 +67,9 @@ class Output:
             collapse_padding=True,
         )
         for number, column in enumerate(columns):
-            table.add_column(escape(visible(column)), justify="right" if number else "left", overflow="fold")
+            # A heading may be broken into lines; it's a word of ours.
+            heading = "\n".join(map(visible, column.split("\n")))
+            table.add_column(escape(heading), justify="right" if number else "left", overflow="fold")
         for row in rows:
             table.add_row(*(escape(visible(cell)) for cell in row))
         # Not as the table's own title, which would wrap at the table's width.
