@@ -277,6 +277,20 @@ def test_names_that_try_to_be_mathematics_are_printed_as_they_are() -> None:
     assert " _hidden.y" in {text.get_text() for text in figures["psd 1 Acceleration 2/2"].axes[0].get_legend().texts}
 
 
+@pytest.mark.parametrize("name", ["W" * 300, "\x1b[2J" * 60, "$x$" * 100, "of words " * 30, "\u202e" * 90])
+def test_long_names_leave_room_for_the_axes_and_their_ends_are_seen(name: str) -> None:
+    channels = tuple(Channel(name=f"/{name}{end}", unit="m/s^2") for end in ("left", "right"))
+    found = synthetic.density()
+    density = replace(found, values=found.values[1:3], std=found.std[1:3], channels=channels)
+    (figure,) = density_figures(Study(title=name, densities=(density,))).values()
+    # A layout that finds no room warns, and warnings are errors here.
+    rendered(figure, "svg")
+    (axes,) = figure.axes
+    assert axes.get_position().width > 0.5
+    words = [text.get_text() for text in axes.get_legend().texts]
+    assert [word[-4:] for word in words] == ["left", "ight"]
+
+
 def test_a_character_without_a_glyph_is_marked_not_warned_about() -> None:
     assert plain("\U0001f916 robot") == "\ufffd robot"
 

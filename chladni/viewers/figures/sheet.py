@@ -76,6 +76,7 @@ def legend(axes: Axes, *, above_points: float = 0.0) -> None:
     if handles:
         # A legend wider than the axes would leave none of them.
         room = axes.figure.get_figwidth() * 72 - BESIDE_AXES_POINTS
+        labels = [_fitted(label, room - BESIDE_WORD_POINTS) for label in labels]
         axes.legend(
             handles,
             labels,
@@ -97,6 +98,15 @@ def _columns(widths_points: Sequence[float], room_points: float) -> int:
         if sum(float(part.max()) + BESIDE_WORD_POINTS for part in parts) <= room_points:
             return columns
     return 1
+
+
+def _fitted(text: str, room_points: float) -> str:
+    """Leave out the middle of a text that is too wide, since names differ at their ends more often."""
+    width = _width_points(text)
+    if width <= room_points:
+        return text
+    half = max(1, int(len(text) * room_points / width) // 2)
+    return f"{text[: half - 1]}…{text[-half:]}"
 
 
 def _width_points(text: str) -> float:

@@ -93,6 +93,14 @@ def test_a_channel_with_the_terminals_own_name_will_do(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.outputs[1], series.values[1])
 
 
+def test_a_model_names_a_channel_by_what_is_shown_of_it(tmp_path: Path) -> None:
+    named = {name.replace("/wrist", "/wrist\x1b[2J\n"): unit for name, unit in WHOLE.items()}
+    model = model_of(tmp_path, ARM.replace("/wrist", r"/wrist\\x1b[2J\\n"))
+    series = recording(named)
+    found, _ = measurement_of(model, series, log="log.mcap")
+    np.testing.assert_array_equal(found.outputs[1], series.values[0])
+
+
 def test_a_channel_without_unit_is_taken_and_others_are_converted(tmp_path: Path) -> None:
     series = recording({"/hammer.force": "1", "/wrist.accel": "g", "/column.accel": "m/s2"})
     found, _ = measurement_of(model_of(tmp_path), series, log="log.mcap")

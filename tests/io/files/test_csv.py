@@ -1,5 +1,6 @@
 """CSV tables as people write them, real ones, and round trips."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from chladni.io.files.csv import read_csv, write_csv
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.visible import visible
 
 START_NS = 1_700_000_000_123_456_789
 RISING = "time [s],a\n" + "".join(f"{index / 100},2\n" for index in range(60))
@@ -390,3 +392,40 @@ def test_the_start_is_in_the_title(tmp_path: Path) -> None:
     write_csv(series_of(np.zeros((1, 2)), start_time_ns=START_NS), tmp_path / "a.csv")
     title = (tmp_path / "a.csv").read_text().splitlines()[0]
     assert title == 'time [s from 1700000000.123456789],"/a.x, ""0"" [(m/s^2)/N]"'
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "=cmd()",
+        "+1",
+        "-x",
+        "@x",
+        "\tx",
+        "\rx",
+        "a\nb",
+        "a\r\nb",
+        "'=x",
+        "''x",
+        "'plain",
+        "C:\\new",
+        "a\\nb",
+        "\u202ea",
+    ],
+)
+def test_a_name_that_a_spreadsheet_would_run_is_text_and_comes_back(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "a.csv"
+    channels = (Channel(name=name, unit="N"), Channel(name="other", unit="m"))
+    write_csv(TimeSeries(values=np.ones((2, 4)), sample_rate_hz=1.0, channels=channels), path)
+    head, *rows = path.read_bytes().decode().split("\r\n")
+    assert (len(rows), visible(head)) == (5, head)
+    assert not re.search(r'(^|,)"?[=+@\t\r-]', head)
+    assert [channel.name for channel in read_csv(path).series[0].channels] == [name, "other"]
+
+
+def test_columns_that_are_shown_alike_are_told_apart(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time [s],a\u200b,a\\u200b\n0,1,2\n1,3,4\n2,5,6\n", encoding="utf-8")
+    names = [channel.name for channel in read_csv(path).series[0].channels]
+    assert names == ["a\u200b", "a\\u200b (2)"]
+    assert len({visible(name) for name in names}) == 2
