@@ -23,7 +23,7 @@ from chladni.cli.psd import psd
 from chladni.cli.simulate import simulate
 from chladni.cli.view import view
 from chladni.signals.errors import ChladniError
-from chladni.signals.visible import visible
+from chladni.signals.visible import visible, visible_lines
 from chladni.signals.wording import counted
 
 SUCCESS, DEFECT, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
@@ -88,8 +88,7 @@ def _fail(error: Exception, code: int) -> int:
     if os.environ.get("CHLADNI_TRACEBACK"):
         import traceback
 
-        for line in "".join(traceback.format_exception(error)).split("\n"):
-            print(visible(line), file=sys.stderr)  # noqa: T201
+        print(visible_lines("".join(traceback.format_exception(error))), file=sys.stderr)  # noqa: T201
     text = error.format_message() if isinstance(error, typer.TyperException) else str(error)
     # Typer hands on how its own validation calls a wrong choice.
     text = text.replace("Value error, ", "")
@@ -102,7 +101,7 @@ def _fail(error: Exception, code: int) -> int:
 
 
 def _on_one_line(text: str) -> str:
-    return " ".join(" ".join(map(visible, text.split("\n"))).split())
+    return " ".join(visible_lines(text).split())
 
 
 def _mistakes(lines: Sequence[str]) -> str:

@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from chladni.signals.visible import visible, visible_json
+from chladni.signals.visible import visible, visible_json, visible_lines
 
 if TYPE_CHECKING:
     from chladni.signals.study import Study
@@ -68,8 +68,7 @@ class Output:
         )
         for number, column in enumerate(columns):
             # A heading may be broken into lines; it's a word of ours.
-            heading = "\n".join(map(visible, column.split("\n")))
-            table.add_column(escape(heading), justify="right" if number else "left", overflow="fold")
+            table.add_column(escape(visible_lines(column)), justify="right" if number else "left", overflow="fold")
         for row in rows:
             table.add_row(*(escape(visible(cell)) for cell in row))
         # Not as the table's own title, which would wrap at the table's width.

@@ -42,6 +42,17 @@ def visible(text: str) -> str:
     return _MAY_BE_ODD.sub(lambda found: _shown(found[0]), text)
 
 
+def visible_lines(text: str) -> str:
+    r"""Show every character of a text of ours that has several lines, such as a traceback; its lines end as they do.
+
+    Examples
+    --------
+    >>> visible_lines("a\x1b\nb")
+    'a\\x1b\nb'
+    """
+    return "\n".join(map(visible, text.split("\n")))
+
+
 def visible_json(document: str) -> str:
     r"""Write what `visible` shows of a JSON document as JSON does: the same document, harmless on a terminal.
 

@@ -283,3 +283,18 @@ def test_no_name_forges_a_record_of_a_universal_file(tmp_path: Path) -> None:
     write_uff(TimeSeries(values=np.ones((2, 8)), sample_rate_hz=1.0, channels=channels), tmp_path / "a.uff")
     names = channels_of(tmp_path / "a.uff")
     assert names == [visible(forging), "b"]
+
+
+def test_joints_that_are_called_by_numbers_are_read_by_their_names(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with LogMaker(path) as maker:
+        joints = maker.ros2("/j", "sensor_msgs/msg/JointState", JOINT_STATE)
+        for number in range(200):
+            # Joint 1 comes first in every second message.
+            message = joint_state(START_NS + number * 10**7, ["1", "0"][:: 1 if number % 2 else -1], [1.0, 0.0])
+            message["position"] = [float(name) for name in message["name"]]
+            maker.write(joints, message, START_NS + number * 10**7)
+    with open_log(path) as log:
+        for channel in log.channels:
+            assert re.fullmatch(r'/j\.position\["[01]"\]', channel.name)
+            assert (log.read([channel.name]).values == float(channel.name[-3])).all()
