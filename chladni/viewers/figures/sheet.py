@@ -75,7 +75,7 @@ def legend(axes: Axes, *, above_points: float = 0.0) -> None:
     handles, labels = axes.get_legend_handles_labels()
     if handles:
         # A legend wider than the axes would leave none of them.
-        room = axes.figure.get_figwidth() * 72 - BESIDE_AXES_POINTS
+        room = axes.figure.bbox.width / axes.figure.dpi * 72 - BESIDE_AXES_POINTS
         labels = [_fitted(label, room - BESIDE_WORD_POINTS) for label in labels]
         axes.legend(
             handles,
