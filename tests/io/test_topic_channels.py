@@ -173,7 +173,7 @@ def test_a_frame_that_one_message_names_makes_no_second_publisher(tmp_path: Path
         for index in range(300):
             stamp_ns = START_NS + index * STEP_NS
             content = joint_state(stamp_ns, ["a"], np.array([float(index)]))
-            content["header"]["frame_id"] = "basf" if index == odd else "base"
+            content["header"]["frame_id"] = "bass" if index == odd else "base"
             maker.write(channel, content, stamp_ns)
     with open_log(tmp_path / "a.mcap") as log:
         assert [channel.name for channel in log.channels] == ["/js.position[0]"]
