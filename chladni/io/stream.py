@@ -11,9 +11,10 @@ from chladni.io.arrival import Arrivals, numbered
 from chladni.io.batch_messages import BatchLayout, expand
 from chladni.io.channel_source import ChannelSource
 from chladni.io.decoding import Decoded
-from chladni.io.field_selector import FieldFilter, kept_messages, select
+from chladni.io.field_selector import FieldFilter
 from chladni.io.mcap.container import McapContainer
 from chladni.io.mcap.message_batch import MessageBatch
+from chladni.io.selected_numbers import kept_messages, select
 from chladni.io.stamps import LATEST_NS, StampChoice, own_stamps_ns, plausible
 from chladni.io.topic import Topic
 from chladni.signals.channel import Channel

@@ -17,16 +17,14 @@ from chladni.io.field_selector import (
     ElementChoice,
     FieldFilter,
     FieldSelector,
-    element_names,
-    list_places,
     names_beside,
     resolve_fields,
-    select,
 )
 from chladni.io.known_schemas import MAX_LISTED_ELEMENTS, has_signals, is_signal
 from chladni.io.loss import Unread
 from chladni.io.message_path import FieldStep, IndexStep, MessagePath, element_text, near_matches, quoted, topic_text
 from chladni.io.publishers import at_once
+from chladni.io.selected_numbers import element_names, list_places, select
 from chladni.io.topic import Topic
 from chladni.signals.errors import LogError
 

@@ -14,8 +14,9 @@ from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
 from chladni.io.decoding import Decoder, make_decoder
-from chladni.io.field_selector import resolve_fields, select
+from chladni.io.field_selector import resolve_fields
 from chladni.io.message_path import parse_message_path
+from chladni.io.selected_numbers import select
 from chladni.signals.errors import LogError
 from tests.io.decoding.definitions import Oracle, messages
 from tests.io.decoding.encoded import SEPARATOR, CdrWriter, Encoded, batch_of, decoder_of
