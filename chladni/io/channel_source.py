@@ -5,10 +5,10 @@ import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from json import JSONDecodeError
 from math import isfinite
 from typing import Final
 
+from chladni.io.decoding.json_schema import number_in
 from chladni.io.field_selector import FieldSelector
 from chladni.io.known_schemas import is_command, known_unit, likely_role, possible_units
 from chladni.io.topic import Topic
@@ -150,10 +150,7 @@ def _direction(text: str | None) -> Vector | None:
 
 
 def _number(text: str | None) -> float | None:
-    try:
-        number = float(text) if text is not None else None
-    except ValueError:
-        return None
+    number = None if text is None else number_in(text)
     return number if number is not None and isfinite(number) and number > 0 else None
 
 
@@ -162,6 +159,6 @@ def _json(text: str | None) -> object:
         return None
     try:
         found: object = json.loads(text)
-    except (JSONDecodeError, RecursionError):
+    except (ValueError, RecursionError):
         return None
     return found

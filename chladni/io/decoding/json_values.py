@@ -39,14 +39,19 @@ def load_message(content: bytes) -> object:
     """
     text = content.decode("utf-8")
     try:
-        parsed: object = json.loads(text)
+        return _parsed(text)
     except RecursionError as error:
         raise ValueError("nested too deep") from error
+
+
+def _parsed(text: str) -> object:
+    try:
+        found: object = json.loads(text)
     except json.JSONDecodeError:
         raise
     except ValueError:
-        parsed = json.loads(text, parse_int=_int_or_double)
-    return parsed
+        found = json.loads(text, parse_int=_int_or_double)
+    return found
 
 
 def _int_or_double(digits: str) -> float:

@@ -541,3 +541,11 @@ def test_what_is_nested_too_deep_costs_only_itself(way: str, opened: str, closed
         assert [values_of(decoded, "b")[index] for index in sound] == [index + 1.0 for index in sound]
         # What Python can parse is told to be too deep; what it can't tells nothing of itself.
         assert bool(decoder.unread) == (depth == 80)
+
+
+def test_a_long_number_before_what_is_nested_too_deep_costs_only_its_message(way: str) -> None:
+    odd = b'{"b": 1, "n": %s, "deep": %s%s}' % (b"1" * 5000, b"[" * 20_000, b"]" * 20_000)
+    messages = batch_of([odd, b'{"b": 2}', b'{"b": 3}'])
+    decoded = decoder_of(None).informed_by([messages]).columns(messages, ["b"])
+    assert values_of(decoded, "b")[1:] == [2.0, 3.0]
+    assert decoded.bad.tolist() == [way == "one by one", False, False]
