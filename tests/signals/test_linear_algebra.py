@@ -1,4 +1,8 @@
-"""A diagnosis works in one thread of linear algebra, and leaves things as it found them."""
+"""Linear algebra works in one thread where it is asked to, and gives the others back."""
+
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -39,3 +43,18 @@ def test_it_is_a_decorator_as_often_as_it_is_called() -> None:
     with threadpool_limits(limits=2, user_api="blas"):
         assert set(told()) == set(told()) == {1}
         assert 2 in threads()
+
+
+def test_the_library_that_scipy_brings_is_limited_too_though_nobody_has_loaded_it_yet() -> None:
+    script = (
+        "import sys\n"
+        "from threadpoolctl import threadpool_info\n"
+        "from chladni.signals.linear_algebra import in_one_thread\n"
+        "assert 'scipy.linalg' not in sys.modules\n"
+        "with in_one_thread():\n"
+        "    import scipy.linalg\n"
+        "    print(*{pool['num_threads'] for pool in threadpool_info() if pool['user_api'] == 'blas'})\n"
+    )
+    environment = dict(os.environ, OPENBLAS_NUM_THREADS="2")
+    told = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
+    assert told.stdout.split() == ["1"]
