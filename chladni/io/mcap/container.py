@@ -55,6 +55,7 @@ class McapContainer:
         self._registry = registry
         self._end = end
         self._damage = damage
+        self._listed = frozenset(registry.channels) if end.lists_all_channels else None
         self._counts: Mapping[int, int] | None = None
         self._time_range_ns: tuple[int, int] | None = None
         self.path = file.path
@@ -86,7 +87,8 @@ class McapContainer:
         try:
             damage, registry = DamageList(), ChannelRegistry(limits)
             end = read_log_end(file, registry, damage, limits=limits, check_crc=check_crc)
-            if not end.lists_all_channels:
+            # What a whole summary defines holds even where it doesn't list all.
+            if not (end.lists_all_channels or end.crc_checked):
                 registry = ChannelRegistry(limits)
             container = cls(file, limits=limits, check_crc=check_crc, registry=registry, end=end, damage=damage)
             container._take_stock()
@@ -117,6 +119,7 @@ class McapContainer:
             registry=self._registry,
             damage=self._damage,
             selection=selection,
+            listed=self._listed,
             limits=self._limits,
             check_crc=self._check_crc,
         )

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 _STEP_BYTES = 16 * 1024
 _LZ4_INPUT_BYTES = 64 * 1024
 _BELIEVED_BYTES = 16 * 1024 * 1024
-_BELIEVED_RATIO = 256
+#: Nothing that is measured shrinks further than this; lz4 can't shrink anything further.
+BELIEVED_RATIO = 256
 
 
 Compressed = bytes | memoryview
@@ -42,7 +43,7 @@ def decompress(data: Compressed, compression: str, *, size: int) -> Compressed:
     return result
 
 
-def decompress_start(data: Compressed, compression: str, *, size: int) -> bytes:
+def decompress_start(data: Compressed, compression: str, *, size: int) -> Compressed:
     """Decompress as much as there is of a chunk that was cut off.
 
     Raises
@@ -58,7 +59,8 @@ def decompress_start(data: Compressed, compression: str, *, size: int) -> bytes:
         # Checked at each step, so that a bomb is stopped at its first bytes too many.
         if len(result) > size:
             raise DecompressError(f"declares {size} bytes but more were found in it")
-    return bytes(result)
+    # A view, since a copy would hold a large chunk twice.
+    return memoryview(result).toreadonly()
 
 
 def _more_or(found: int, size: int) -> str:
@@ -67,7 +69,7 @@ def _more_or(found: int, size: int) -> str:
 
 def _believable(compressed: int, size: int) -> bool:
     """Tell whether memory for ``size`` bytes may be taken before they are seen."""
-    return size <= max(_BELIEVED_BYTES, _BELIEVED_RATIO * compressed)
+    return size <= max(_BELIEVED_BYTES, BELIEVED_RATIO * compressed)
 
 
 def _plain(data: Compressed, _size: int) -> Compressed:
@@ -112,11 +114,11 @@ def _zstd_steps(data: Compressed) -> Iterator[bytes]:
             raise DecompressError(f"zstd: {error}") from error
 
 
-def _lz4(data: Compressed, size: int) -> bytes:
+def _lz4(data: Compressed, size: int) -> Compressed:
     import lz4.frame
 
-    # With a length to stop at, the library takes that much memory at once.
-    if not _believable(len(data), size):
+    # With a length to stop at, the library takes that much memory at once, and then copies it.
+    if size > _BELIEVED_BYTES:
         return decompress_start(data, "lz4", size=size)
     decompressor = lz4.frame.LZ4FrameDecompressor()
     try:

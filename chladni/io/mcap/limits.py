@@ -24,6 +24,9 @@ class Limits:
         Largest summary section, in bytes. A larger one isn't used: the log is read from its start.
     definition_bytes
         Largest total of all distinct Schema and Channel records, in bytes.
+    expanded_bytes
+        Largest total of all chunks once they are decompressed, in bytes, for a file that is 256 times smaller;
+        a larger file may hold 256 times its size.
 
     Examples
     --------
@@ -32,9 +35,10 @@ class Limits:
     """
 
     record_bytes: int = 256 * MIB
-    chunk_bytes: int = 512 * MIB
+    chunk_bytes: int = 256 * MIB
     summary_bytes: int = 64 * MIB
     definition_bytes: int = 64 * MIB
+    expanded_bytes: int = 1024 * MIB
 
     def excess(self, name: str, value: int) -> str | None:
         """Return the sentence that refuses ``value`` bytes, or None when the limit allows it."""

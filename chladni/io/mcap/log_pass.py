@@ -11,10 +11,11 @@ from chladni.io.mcap.chunk import ChunkRules, OpenedChunk, chunk_content, open_c
 from chladni.io.mcap.damage import DamageList
 from chladni.io.mcap.data_crc import DataCrc
 from chladni.io.mcap.data_section import BareSegment, ChunkSegment, DataSection, Segment
+from chladni.io.mcap.decompress import BELIEVED_RATIO
 from chladni.io.mcap.limits import MIB, Limits
 from chladni.io.mcap.log_file import LogFile
 from chladni.io.mcap.message_batch import MessageBatch
-from chladni.io.mcap.records import MalformedRecordError, record_name
+from chladni.io.mcap.records import ChunkHeader, MalformedRecordError, record_name
 from chladni.io.mcap.selection import Selection
 from chladni.io.mcap.stretch_content import StretchContent, fill_content
 from chladni.io.mcap.summary import LogEnd
@@ -39,6 +40,8 @@ class LogPass:
         Where damage is noted.
     selection
         What is asked for.
+    listed
+        Channels of a summary that lists all; None without one.
     limits, check_crc
         As in `McapContainer.open`.
     """
@@ -51,6 +54,7 @@ class LogPass:
         registry: ChannelRegistry,
         damage: DamageList,
         selection: Selection,
+        listed: frozenset[int] | None,
         limits: Limits,
         check_crc: bool,
     ) -> None:
@@ -59,12 +63,14 @@ class LogPass:
         self._registry = registry
         self._damage = damage
         self._selection = selection
+        self._listed = listed
         self._limits = limits
         self._check_crc = check_crc
         self._crc = DataCrc(file, end)
         self._checksum_seen = False
         self._contradicted: set[int] = set()
         self._skipped_any = False
+        self._expanded = 0
         self.found: Counter[int] = Counter()
         self._lost: Counter[int] = Counter()
         self._first_ns: int | None = None
@@ -127,12 +133,10 @@ class LogPass:
             self.found.update({one.channel_id: len(one.entries) for one in segment.index})
             return None
         header = segment.header
-        # Before a byte of the chunk is read: both sizes are nothing but claims so far.
-        for size in (header.compressed_size, header.uncompressed_size):
-            excess = self._limits.excess("chunk_bytes", size)
-            if excess is not None:
-                refused = OpenedChunk(buffer=None, flaw=f"the chunk {excess}")
-                return partial(chunk_content, segment, refused, self._selection)
+        flaw = self._refused(header)
+        if flaw is not None:
+            refused = OpenedChunk(buffer=None, flaw=flaw)
+            return partial(chunk_content, segment, refused, self._selection)
         rules = ChunkRules(check_crc=self._check_crc, checksum_expected=self._checksum_seen)
         self._checksum_seen |= header.uncompressed_crc != 0
         data: bytes | memoryview | None = segment.data
@@ -140,6 +144,20 @@ class LogPass:
             data = self._file.read(header.data_offset, header.compressed_size)
         opened = pool.submit(open_chunk, header, data, rules)
         return lambda: chunk_content(segment, opened.result(), self._selection)
+
+    def _refused(self, header: ChunkHeader) -> str | None:
+        """Say why a chunk may not be decompressed, before a byte of it is read: its sizes are claims so far."""
+        for size in (header.compressed_size, header.uncompressed_size):
+            excess = self._limits.excess("chunk_bytes", size)
+            if excess is not None:
+                return f"the chunk {excess}"
+        expanded = self._expanded + header.uncompressed_size
+        if expanded > BELIEVED_RATIO * self._file.size:
+            excess = self._limits.excess("expanded_bytes", expanded)
+            if excess is not None:
+                return f"the chunk with those before it {excess}"
+        self._expanded = expanded
+        return None
 
     def _can_skip(self, segment: ChunkSegment) -> bool:
         """Tell whether a chunk surely holds nothing that is asked for.
@@ -177,6 +195,11 @@ class LogPass:
         if unknown:
             what = f"messages of the undefined channel {_listing(unknown)} are left out"
             self._leave_out(content, unknown, what)
+        # Nobody can have asked for them.
+        unlisted = set[int]() if self._listed is None else content.found.keys() - self._listed
+        if unlisted:
+            what = f"messages of channel {_listing(unlisted)}, which the summary doesn't list, are left out"
+            self._leave_out(content, unlisted, f"{what}; 'mcap recover' writes a whole summary")
         # Which of the two definitions these messages follow can't be known; decoded by the wrong one they
         # would be wrong without looking wrong.
         contradicted = content.found.keys() & self._contradicted

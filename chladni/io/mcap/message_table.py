@@ -25,7 +25,7 @@ MESSAGE_HEADER = np.dtype(
     ]
 )
 MESSAGE_HEADER_BYTES = MESSAGE_HEADER.itemsize
-# With more stretches between indexed messages than this, the walk is faster than looking at each.
+# With more stretches between indexed messages than this, one walk over all is faster than looking at each.
 _MOST_STRETCHES = 256
 _NO_STARTS: NDArray[np.int64] = np.empty(0, np.int64)
 
@@ -139,7 +139,9 @@ def _others_between(
     """Return the records other than messages between messages, None when these don't tile the buffer."""
     gaps = np.flatnonzero(ends[:-1] != starts[1:])
     if len(gaps) > _MOST_STRETCHES:
-        return None
+        walked = table_from_walk(buffer, walk_records(buffer, start=0, stop=len(buffer)))
+        tiles = walked.end == len(buffer) and np.array_equal(walked.starts, starts)
+        return walked.others if tiles else None
     stretches = [(0, int(starts[0])), (int(ends[-1]), len(buffer))]
     stretches += zip(ends[gaps].tolist(), starts[gaps + 1].tolist(), strict=True)
     found = [_NO_STARTS]

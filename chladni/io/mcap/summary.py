@@ -1,7 +1,7 @@
 """The end of a log: footer, summary section, DataEnd; used only as far as it is sound."""
 
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +10,11 @@ from chladni.io.mcap.channel_registry import ChannelRegistry
 from chladni.io.mcap.damage import DamageList
 from chladni.io.mcap.limits import Limits
 from chladni.io.mcap.log_file import LogFile
+from chladni.io.mcap.record_walk import walk_records
 from chladni.io.mcap.records import (
     DATA_END_BYTES,
     FOOTER_BYTES,
+    INDEX_ENTRY,
     MAGIC,
     PREFIX_BYTES,
     RECORD_PREFIX,
@@ -22,6 +24,9 @@ from chladni.io.mcap.records import (
 )
 
 _COUNT = np.dtype([("channel_id", "<u2"), ("count", "<u8")])
+# A MessageIndex that lists nothing: channel id and the length of the list.
+_EMPTY_INDEX_BYTES = PREFIX_BYTES + 6
+_LOOK_BYTES = 64 * 1024
 _READ_FROM_START = "the log is read from its start instead"
 
 
@@ -95,7 +100,7 @@ def read_log_end(
     """Read footer and summary; what is unsound is noted as damage and left out.
 
     The registry is filled as far as the summary goes; it has to be started anew when the result
-    doesn't list all channels.
+    neither lists all channels nor is proved by a checksum.
     """
     footer_offset = file.size - len(MAGIC) - FOOTER_BYTES
     footer = file.read(max(footer_offset, 0), FOOTER_BYTES + len(MAGIC))
@@ -169,7 +174,7 @@ def _parse(file: LogFile, start: int, content: bytes, registry: ChannelRegistry,
         chunk_indexes=tuple(indexes),
         statistics=statistics,
         crc_checked=crc_checked,
-        lists_all_channels=_lists_all_channels(registry, statistics, indexes),
+        lists_all_channels=_lists_all_channels(file, end.data_end, registry, statistics, indexes),
     )
 
 
@@ -235,12 +240,61 @@ def _check_layout(indexes: list[ChunkIndex], data_end: int) -> None:
         raise _UnsoundSummaryError("the chunk indexes in the summary point behind the data")
 
 
-def _lists_all_channels(registry: ChannelRegistry, statistics: Statistics | None, indexes: list[ChunkIndex]) -> bool:
+def _lists_all_channels(
+    file: LogFile, data_end: int, registry: ChannelRegistry, statistics: Statistics | None, indexes: list[ChunkIndex]
+) -> bool:
+    """Tell whether no message can be of a channel that the summary doesn't list."""
     # A channel that nobody knows of is a channel that nobody asks for: its messages would vanish.
     known = registry.channels.keys()
     if registry.undefined_schemas() or any(index.channel_ids - known for index in indexes):
         return False
-    if statistics is not None:
-        return statistics.channel_count == len(known) and statistics.message_counts.keys() <= known
-    # Without statistics only a complete message index tells which channels there are.
-    return bool(indexes) and all(index.channel_ids for index in indexes)
+    indexed = bool(indexes) and all(index.channel_ids for index in indexes)
+    if statistics is None:
+        # Then only a complete message index tells which channels there are.
+        return indexed and all(_indexed_messages(index) is not None for index in indexes)
+    counts = statistics.message_counts
+    if not (statistics.channel_count == len(known) and counts.keys() <= known):
+        return False
+    # The counts of channels may be left out, and are wrong where they don't add up.
+    if sum(counts.values()) != statistics.message_count:
+        return False
+    listed = sum(_indexed_messages(index) or 0 for index in indexes) if indexed else None
+    return not _holds_unlisted(file, data_end, indexes, known) and listed in (None, statistics.message_count)
+
+
+def _indexed_messages(index: ChunkIndex) -> int | None:
+    """How many messages the indexes behind a chunk list, by their size; None when it fits no such number."""
+    prefixes = len(index.channel_ids) * _EMPTY_INDEX_BYTES
+    messages, rest = divmod(index.index_length - prefixes, INDEX_ENTRY.itemsize)
+    return None if rest or messages < 0 else messages
+
+
+def _holds_unlisted(file: LogFile, data_end: int, indexes: list[ChunkIndex], known: Set[int]) -> bool:
+    """Tell whether a chunk or a channel that the summary doesn't list lies where it lists no chunk."""
+    position = len(MAGIC)
+    for index in indexes:
+        if _stretch_holds_unlisted(file, position, index.offset, known):
+            return True
+        position = index.offset + index.length + index.index_length
+    return _stretch_holds_unlisted(file, position, data_end, known)
+
+
+def _stretch_holds_unlisted(file: LogFile, position: int, stop: int, known: Set[int]) -> bool:
+    """Look at the records between chunks as far as the first messages; the counts answer for those behind them."""
+    while position < stop:
+        buffer = np.frombuffer(file.read(position, min(_LOOK_BYTES, stop - position)), np.uint8)
+        if len(buffer) < PREFIX_BYTES:
+            return False
+        walk = walk_records(buffer, start=0, stop=len(buffer))
+        # A record longer than what was read is looked at by its first bytes.
+        starts = walk.starts if walk.end else np.zeros(1, np.int64)
+        opcodes = buffer[starts]
+        messages = opcodes == Opcode.MESSAGE
+        named = starts[(messages | (opcodes == Opcode.CHANNEL)) & (starts + PREFIX_BYTES + 2 <= len(buffer))]
+        ids = buffer[named + PREFIX_BYTES].astype(int) | buffer[named + PREFIX_BYTES + 1].astype(int) << 8
+        if (opcodes == Opcode.CHUNK).any() or not known >= set(ids.tolist()):
+            return True
+        if messages.any() or opcodes[0] == 0:
+            return False
+        position += walk.end or PREFIX_BYTES + RECORD_PREFIX.unpack_from(buffer)[1]
+    return False

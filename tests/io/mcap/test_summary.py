@@ -4,6 +4,8 @@ import struct
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from chladni.io.mcap.container import McapContainer
 from tests.io.mcap import log_bytes as lb
@@ -92,14 +94,88 @@ def test_a_summary_that_may_lack_channels_is_completed_from_the_data(tmp_path: P
         assert lb.messages(log) == lb.expected(range(5))
 
 
-def test_a_channel_that_the_summary_conceals_is_told(tmp_path: Path) -> None:
-    hidden = lb.channel(2, "/hidden") + lb.message(7, 2)
-    content = lb.chunk(CONTENT + hidden)
-    index = lb.chunk_index(OFFSET, len(content), [1], 0, len(CONTENT + hidden), len(CONTENT + hidden))
-    path = lb.write(tmp_path, lb.log(DEFINITIONS, content, summary=DEFINITIONS + index))
-    with McapContainer.open(path) as log:
+BOTH = CONTENT + lb.channel(2, "/hidden") + b"".join(lb.message(number, 2) for number in range(5))
+
+
+def hiding_log(index: bytes, told: bytes) -> bytes:
+    """Build a log with a chunk that holds messages of channel 2, too, of which the summary says nothing."""
+    chunk = lb.chunk(BOTH)
+    listed = lb.chunk_index(OFFSET, len(chunk), [1], len(index), len(BOTH), len(BOTH))
+    return lb.log(DEFINITIONS, chunk + index, summary=DEFINITIONS + listed + told)
+
+
+@pytest.mark.parametrize(
+    ("index", "told"),
+    [
+        (lb.index_of(BOTH), b""),  # the size of the indexes doesn't fit one channel
+        (lb.index_of(BOTH), lb.statistics({1: 5})),
+        (b"", b""),
+        (b"", lb.statistics({1: 5})),
+        (b"", lb.statistics({}, channels=0)),
+        (lb.index_of(CONTENT), lb.statistics({1: 5}, channels=2)),
+    ],
+)
+def test_a_channel_that_the_summary_conceals_is_read(tmp_path: Path, index: bytes, told: bytes) -> None:
+    with McapContainer.open(lb.write(tmp_path, hiding_log(index, told))) as log:
+        assert list(log.channels) == [1, 2]
+        assert lb.messages(log, [2]) == lb.expected(range(5), 2)
+        assert sum(one.lost_messages or 0 for one in log.damage) == 0
+
+
+def test_messages_of_a_channel_that_no_number_betrays_are_counted(tmp_path: Path) -> None:
+    content = hiding_log(lb.index_of(CONTENT), lb.statistics({1: 5}))
+    with McapContainer.open(lb.write(tmp_path, content)) as log:
         assert lb.messages(log, [1]) == lb.expected(range(5))
-        assert [one.what for one in log.damage] == ["a channel is defined here that the summary doesn't know"]
+        told = {one.what: one.lost_messages for one in log.damage}
+    assert told == {
+        "the message index contradicts the chunk before it, which is read record by record": 0,
+        "a channel is defined here that the summary doesn't know": 0,
+        "messages of channel 2, which the summary doesn't list, are left out; 'mcap recover' writes a whole summary": 5,
+    }
+
+
+@pytest.mark.parametrize("told", [lb.statistics({}), lb.statistics({1: 5}), lb.statistics({1: 500})])
+@pytest.mark.parametrize("chunked", [False, True])
+@pytest.mark.parametrize("definitions", [b"", DEFINITIONS])
+def test_a_summary_that_lists_no_chunk_hides_none(
+    tmp_path: Path, told: bytes, chunked: bool, definitions: bytes
+) -> None:
+    data = lb.chunk(DEFINITIONS + CONTENT) + lb.index_of(DEFINITIONS + CONTENT) if chunked else DEFINITIONS + CONTENT
+    with McapContainer.open(lb.write(tmp_path, lb.log(data, summary=definitions + told))) as log:
+        assert list(log.channels) == [1]
+        assert lb.messages(log) == lb.expected(range(5))
+
+
+@given(data=st.data())
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_summary_that_omits_whatever_it_likes_hides_nothing(tmp_path: Path, data: st.DataObject) -> None:
+    """Every part of a summary may be missing: what can be read stays the same, or the loss is counted."""
+    chunks = data.draw(st.lists(st.sets(st.integers(1, 5), min_size=1), min_size=1, max_size=5), label="channels")
+    body, indexes, known, counts = lb.header()[:0], b"", set[int](), dict[int, int]()
+    for channels in chunks:
+        fresh = b"".join(lb.channel(one, f"/t{one}") for one in sorted(channels - known))
+        content = (b"" if known else lb.schema()) + fresh + b"".join(lb.message(one, one) for one in sorted(channels))
+        known |= channels
+        counts |= {one: counts.get(one, 0) + 1 for one in channels}
+        behind = lb.index_of(content) if data.draw(st.booleans(), label="message index") else b""
+        told = sorted(channels) if behind else []
+        chunk = lb.chunk(content)
+        if data.draw(st.booleans(), label="chunk index"):
+            offset = lb.data_start() + len(body)
+            indexes += lb.chunk_index(offset, len(chunk), told, len(behind), len(content), len(content))
+        body += chunk + behind
+    listed = data.draw(st.sets(st.sampled_from(sorted(known))), label="listed channels")
+    summary = lb.schema() + b"".join(lb.channel(one, f"/t{one}") for one in sorted(listed)) + indexes
+    summary += data.draw(
+        st.sampled_from(
+            [b"", lb.statistics(counts), lb.statistics({}), lb.statistics({one: counts[one] for one in listed})]
+        ),
+        label="statistics",
+    )
+    with McapContainer.open(lb.write(tmp_path, lb.log(body, summary=summary))) as log:
+        found = lb.messages(log)
+        lost = sum(one.lost_messages or 0 for one in log.damage)
+        assert len(found) + lost == sum(counts.values())
 
 
 def test_a_log_without_data_end_is_read_up_to_the_summary(tmp_path: Path) -> None:
