@@ -1,6 +1,7 @@
 """The main job: a log to everything that can be said and shown of it."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from chladni.apps.sources import Progress, Span, is_small, no_progress
 from chladni.apps.spectra import Averaging, densities, transfer
 from chladni.apps.unit_peaks import unit_peaks
 from chladni.io.log import Log
+from chladni.io.log_reader import MostlyEmptyError
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
@@ -149,7 +151,8 @@ def _response(
 def _shown(log: Log, names: Sequence[str], span: Span) -> _Shown:
     """Read what is drawn over time; of a log too large for memory its beginning, with a word."""
     if is_small(log):
-        return _Shown(series=log.read_groups(names, start_s=span.start_s, end_s=span.end_s))
+        with suppress(MostlyEmptyError):
+            return _Shown(series=log.read_groups(names, start_s=span.start_s, end_s=span.end_s))
     grids = log.grids(names, start_s=span.start_s, end_s=span.end_s)
     a_second = sum(len(grid.names) * grid.sample_rate_hz for grid in grids)
     seconds = MOST_VALUES_DRAWN / a_second

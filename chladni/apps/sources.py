@@ -1,6 +1,7 @@
 """Samples of a log for averaging: whole when they fit in memory, block by block when they don't."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.log import Log
-from chladni.io.log_reader import several_grids
+from chladni.io.log_reader import MostlyEmptyError, several_grids
 from chladni.signals.errors import LogError
 from chladni.signals.resampling import JoinMethod, join_note, join_resampled
 from chladni.signals.time_series import TimeSeries
@@ -107,10 +108,12 @@ def watched_grids(
 ) -> Iterator[Watched]:
     """Give the log's channels, one stream of blocks for each sampling grid."""
     if is_small(log):
-        for series in log.read_groups(channels, start_s=span.start_s, end_s=span.end_s):
-            names = tuple(channel.name for channel in series.channels)
-            yield Watched(names, (series,), duration_s=series.duration_s, progress=progress)
-        return
+        # Long pauses take memory, which blocks do without.
+        with suppress(MostlyEmptyError):
+            for series in log.read_groups(channels, start_s=span.start_s, end_s=span.end_s):
+                names = tuple(channel.name for channel in series.channels)
+                yield Watched(names, (series,), duration_s=series.duration_s, progress=progress)
+            return
     for grid in log.grids(channels, start_s=span.start_s, end_s=span.end_s):
         seconds = max(1.0, VALUES_IN_A_BLOCK / (len(grid.names) * grid.sample_rate_hz))
         blocks = log.blocks(grid.names, seconds=seconds, start_s=span.start_s, end_s=span.end_s)

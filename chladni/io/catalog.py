@@ -2,6 +2,8 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
+from typing import Final
 
 import numpy as np
 
@@ -26,6 +28,9 @@ from chladni.io.stream import Stream
 from chladni.io.topic import Topic, apart, read_arrivals, read_earlier_heads, read_heads, topics_of
 from chladni.io.topic_channels import TopicChannels, topic_channels
 from chladni.signals.errors import LogError, SetupError
+
+#: Channels that a log may list; MCAP numbers its own with 16 bits.
+MOST_LISTED: Final = 1 << 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -171,7 +176,7 @@ def read_catalog(container: McapContainer, *, setup: Setup, request: StampReques
     listed_topics = [name for topic in readable for name in publishers.get(topic, (topic,))]
     readable |= {name: part for found in parts.values() for name, part in found.items()}
     publishers |= {name: one.publishers for name, one in readable.items() if one.publishers}
-    listed = [source for name in listed_topics for source in readable[name].listed()]
+    listed, unlisted = _listed(readable, listed_topics)
     heads = {name: _head(channels.topic) for name, channels in readable.items()}
     choices = _choices(heads, {source.topic for source in listed}, request)
     catalog = Catalog(
@@ -179,7 +184,7 @@ def read_catalog(container: McapContainer, *, setup: Setup, request: StampReques
         topics=readable,
         choices=choices,
         refused=refused,
-        unread=tuple(_unread(container, readable, refused)),
+        unread=(*_unread(container, readable, refused), *unlisted),
         channels=(),
         setups={},
         lags_ns={topic: None if head is None else head.lag_range_ns(choices[topic]) for topic, head in heads.items()},
@@ -190,6 +195,27 @@ def read_catalog(container: McapContainer, *, setup: Setup, request: StampReques
     setups = _setups(catalog, setup, listed)
     channels = tuple(with_setup(source, setups.get((source.topic, source.field))) for source in listed)
     return replace(catalog, channels=channels, setups=setups)
+
+
+def _listed(readable: Mapping[str, TopicChannels], topics: Sequence[str]) -> tuple[list[ChannelSource], list[Unread]]:
+    """List the channels of topics, those with the fewest fields first where they are too many, and tell of others."""
+    room, found = MOST_LISTED, dict[str, list[ChannelSource]]()
+    for name in sorted(topics, key=lambda name: len(readable[name].topic.fields)):
+        sources = list(islice(readable[name].listed(), room + 1))
+        if len(sources) > room:
+            break
+        found[name] = sources
+        room -= len(sources)
+    unlisted = [
+        Unread(
+            topic=name,
+            reason=f"{len(readable[name].topic.fields)} fields are too many for a list of {MOST_LISTED} channels; "
+            "single ones can be read by path",
+        )
+        for name in topics
+        if name not in found
+    ]
+    return [source for name in topics for source in found.get(name, ())], unlisted
 
 
 def _parts(

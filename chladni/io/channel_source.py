@@ -5,6 +5,7 @@ import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from math import isfinite
 from typing import Final
 
@@ -121,7 +122,9 @@ def _si_unit(topic: Topic, *, field: str, leaf: str, unit: str | None) -> tuple[
     return (1.0, UNKNOWN_UNIT) if documented is None else si_factor(documented)
 
 
-def comment_units(schema_text: str) -> dict[str, str]:
+# Asked for each field of a definition.
+@lru_cache(maxsize=8)
+def comment_units(schema_text: str) -> Mapping[str, str]:
     """Units in the comments of a ROS message definition's own fields: ``# [m/s^2]``, or a comment that is one.
 
     Examples

@@ -15,7 +15,7 @@ from chladni.signals.time_series import TimeSeries
 
 #: Blocks that are filled at a time, at most: so many, or as many as this memory holds.
 MOST_BLOCKS: Final = 8
-MOST_BYTES: Final = 1 << 29
+MOST_BYTES: Final = 1 << 28
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -29,9 +29,15 @@ from chladni.signals.errors import LogError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import counted
 
-#: A grid may be this much longer than the samples on it, and this many times as long.
-EMPTY_GRID = 1 << 24
+#: Grids may hold this many values more than there are samples, and this many times as many.
+EMPTY_VALUES = 1 << 24
 SPARSE = 100
+#: ... in memory, where each of them takes as much as a sample.
+SPARSE_IN_MEMORY = 10
+
+
+class MostlyEmptyError(LogError):
+    """Grids would hold many times more values than the log has samples."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,6 +127,8 @@ class LogReader:
         Those clocks, where they have to be known before a window of time can be read; else empty.
     rate_hz
         Sampling rate that the user states, None without.
+    log_start_ns
+        Zero of all times in seconds.
     """
 
     container: McapContainer
@@ -132,6 +140,7 @@ class LogReader:
     clocks: Callable[[Sequence[Stream]], Mapping[Key, StreamClock]]
     known_clocks: Mapping[Key, StreamClock] = field(default_factory=dict)
     rate_hz: float | None = None
+    log_start_ns: int = 0
 
     def pieces(self, *, with_values: bool = True) -> Iterator[tuple[int, Piece]]:
         """What each batch of messages holds of each stream, inside the window, in the order of the file."""
@@ -156,6 +165,7 @@ class LogReader:
         groups = self.groups(self._placements(gatherings))
         if one_clock:
             self._require_one_clock(groups)
+        self._require_filled(groups, SPARSE_IN_MEMORY)
         by_stream = {id(one.stream): one for one in gatherings}
         series = [self._laid_out(group, by_stream) for group in groups]
         return self._some([one for one in series if one is not None])
@@ -245,8 +255,7 @@ class LogReader:
         groups = group_placements([one for one in placements if one.time_base.uniform and one.index.size])
         if not groups:
             raise LogError(self._nothing_uniform(placements))
-        for group in groups:
-            self._require_filled(group)
+        self._require_filled(groups, SPARSE)
         return groups
 
     def one_group(self, groups: Sequence[Group]) -> Group:
@@ -294,17 +303,22 @@ class LogReader:
                 f"{file}: {label} isn't sampled uniformly (by {placement.stream.choice.kind} time): {base.advice}"
             )
 
-    def _require_filled(self, group: Group) -> None:
-        """Refuse a grid that is nearly all gaps: stamps leap, and it would take memory for years of nothing."""
-        first, last = group.extent(self.window.start_ns, self.window.end_ns)
-        samples = sum(placement.time_base.samples for placement in group.placements)
-        if last - first > EMPTY_GRID + SPARSE * samples:
-            label = group.placements[0].stream.label
-            raise LogError(
-                f"{self.container.path.name}: {label}: {samples} samples on a grid of {last - first}: stamps leap, "
-                "or it paused for long: read the parts, each between a start and an end, or take the log's own times "
-                "(--stamp log, in Python stamp='log')"
-            )
+    def _require_filled(self, groups: Sequence[Group], times: int) -> None:
+        """Refuse grids that are nearly all gaps: stamps leap, and they would take memory for years of nothing."""
+        sizes = [_values_on(group, group.extent(self.window.start_ns, self.window.end_ns)) for group in groups]
+        held = sum(placement.values for group in groups for placement in group.placements)
+        if sum(sizes) <= EMPTY_VALUES + times * held:
+            return
+        group = groups[int(np.argmax(sizes))]
+        first = group.placements[0].stream
+        pause = group.longest_pause()
+        cut_s = f"{(group.time_ns(pause.middle) - self.log_start_ns) / NS_PER_S:.6g}"
+        other_clock = "" if first.choice.kind == "log" else ", or take the log's own times (--stamp log)"
+        raise MostlyEmptyError(
+            f"{self.container.path.name}: {first.label}: {pause.later} of {pause.messages} messages lie "
+            f"{pause.samples / group.rate_hz:.6g} s after the others, so {sum(sizes)} values would be laid out for "
+            f"{held} samples: read the part before (--end {cut_s}) or after (--start {cut_s}){other_clock}"
+        )
 
     def _laid_out(self, group: Group, gatherings: dict[int, Gathering]) -> TimeSeries | None:
         first, last = group.extent(self.window.start_ns, self.window.end_ns)
@@ -342,6 +356,10 @@ class LogReader:
             part = slice(starts[member], starts[member] + piece.stamps_ns.size)
             starts[member] = part.stop
             yield PlacedPiece(rows=rows[member], index=placements[member].samples_index(part), values=piece.values)
+
+
+def _values_on(group: Group, extent: tuple[int, int]) -> int:
+    return (extent[1] - extent[0]) * sum(len(placement.stream.sources) for placement in group.placements)
 
 
 def several_grids(file: str, told: Sequence[tuple[Sequence[Channel], float, int]]) -> str:

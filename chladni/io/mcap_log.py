@@ -214,6 +214,7 @@ class McapLog(Log):
             clocks=self._clocks.of,
             known_clocks=known,
             rate_hz=self._rate_hz,
+            log_start_ns=self.start_time_ns,
         )
 
     def _window(self, streams: Sequence[Stream], start_s: float | None, end_s: float | None) -> Window:

@@ -87,6 +87,11 @@ class Placement:
         """Samples left out because an earlier one has their place."""
         return 0 if self.taken is None else int(self.taken.sum())
 
+    @property
+    def values(self) -> int:
+        """How many numbers its channels hold together."""
+        return self.time_base.samples * len(self.stream.sources)
+
     def samples_index(self, part: slice) -> NDArray[np.int64]:
         """Grid index of every sample of some messages, message after message; `NOWHERE` for those left out."""
         index = self.index[part]
@@ -319,6 +324,26 @@ def _taken(
     return taken if taken.any() else None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pause:
+    """A stretch of a grid without samples.
+
+    Attributes
+    ----------
+    samples
+        Its length.
+    middle
+        Grid index in it.
+    later, messages
+        Messages behind it, and in all.
+    """
+
+    samples: int
+    middle: int
+    later: int
+    messages: int
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Group:
     """Streams on one grid.
@@ -347,6 +372,23 @@ class Group:
     def index_from(self, time_ns: int) -> int:
         """First grid point not before a time; one a thousandth of a period before it still counts."""
         return int(np.ceil((time_ns - self.start_ns) / NS_PER_S * self.rate_hz - 1e-3))
+
+    def longest_pause(self) -> "Pause":
+        """Longest stretch of the grid between two messages in which none of its streams has a sample."""
+        starts = np.concatenate([one.index for one in self.placements])
+        counts = [np.ones_like(one.index) if one.counts is None else one.counts for one in self.placements]
+        there = starts > NOWHERE // 2
+        order = np.argsort(starts[there], kind="stable")
+        starts, ends = starts[there][order], (starts + np.concatenate(counts))[there][order]
+        empty = np.append(0, starts[1:] - np.maximum.accumulate(ends)[:-1])
+        behind = int(np.argmax(empty))
+        samples = int(empty[behind])
+        return Pause(
+            samples=samples,
+            middle=int(starts[behind]) - samples // 2,
+            later=starts.size - behind,
+            messages=starts.size,
+        )
 
     def extent(self, start_ns: int | None, end_ns: int | None) -> tuple[int, int]:
         """First grid index and the one after the last, cut to a window of time."""

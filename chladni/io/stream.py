@@ -310,10 +310,11 @@ def read_pieces(
         Of the stream.
     piece : Piece
     """
-    readers = {
-        channel_id: _Readers.of(channel_id, streams)
-        for channel_id in dict.fromkeys(one for stream in streams for one in stream.topic.decoders)
-    }
+    of_channel: dict[int, dict[int, Stream]] = {}
+    for number, stream in enumerate(streams):
+        for channel_id in stream.topic.decoders:
+            of_channel.setdefault(channel_id, {})[number] = stream
+    readers = {channel_id: _Readers.of(channel_id, some) for channel_id, some in of_channel.items()}
     for stretch, batch in numbered(container.batches(readers, start_time_ns=start_ns, end_time_ns=end_ns)):
         reader = readers[batch.channel_id]
         yield from ((index, streams[index].without(len(batch), why)) for index, why in reader.refused.items())
@@ -349,14 +350,13 @@ class _Readers:
     refused: Mapping[int, str]
 
     @classmethod
-    def of(cls, channel_id: int, streams: Sequence[Stream]) -> "_Readers":
-        of_topic = {index: one for index, one in enumerate(streams) if channel_id in one.topic.decoders}
-        known = {info.path for one in of_topic.values() for info in one.topic.decoders[channel_id].fields}
+    def of(cls, channel_id: int, of_topic: Mapping[int, Stream]) -> "_Readers":
+        known = set[str]().union(*(one.topic.known_to(channel_id) for one in of_topic.values()))
         absent = {index: [leaf for leaf in one.leaves() if leaf not in known] for index, one in of_topic.items()}
         able = tuple(index for index, lacks in absent.items() if not lacks)
         return cls(
             streams=able,
-            leaves=tuple(dict.fromkeys(leaf for index in able for leaf in streams[index].leaves())),
+            leaves=tuple(dict.fromkeys(leaf for index in able for leaf in of_topic[index].leaves())),
             refused={
                 index: f"a second schema on the topic has no field {lacks[0]}"
                 for index, lacks in absent.items()

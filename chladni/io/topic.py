@@ -1,7 +1,9 @@
 """A topic of a log: its channels in the file, their decoders, and first messages, which tell what no schema does."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import islice
 from typing import Final
 
@@ -9,7 +11,7 @@ import numpy as np
 
 from chladni.io.arrival import Arrivals, arrival_order, numbered
 from chladni.io.decoding import Decoded, Decoder, FieldInfo, definition_text, make_decoder
-from chladni.io.mcap.channel_registry import McapChannel
+from chladni.io.mcap.channel_registry import McapChannel, McapSchema
 from chladni.io.mcap.container import McapContainer
 from chladni.io.mcap.message_batch import MessageBatch
 from chladni.io.untimed import untimed
@@ -55,14 +57,27 @@ class Topic:
         """Leaves of the messages."""
         return next(iter(self.decoders.values())).fields
 
+    @property
+    def by_path(self) -> Mapping[str, FieldInfo]:
+        """The same by their paths."""
+        return _by_path(next(iter(self.decoders.values())))
+
+    @property
+    def lists_with_text(self) -> frozenset[str]:
+        """Lists of messages that hold a text somewhere."""
+        return _lists_with_text(next(iter(self.decoders.values())))
+
+    def known_to(self, channel_id: int) -> AbstractSet[str]:
+        """Paths of the leaves of one MCAP channel: channels of a topic may differ in their schema."""
+        return _by_path(self.decoders[channel_id]).keys()
+
     def decode(self, batch: MessageBatch, leaves: Sequence[str]) -> Decoded:
         """Decode some leaves of one batch."""
         return self.decoders[batch.channel_id].columns(batch, leaves)
 
     def head_with(self, leaves: Sequence[str]) -> list[MessageBatch]:
-        """Give the first messages whose schema has these leaves: MCAP channels of a topic may differ in it."""
-        known = {channel: {info.path for info in decoder.fields} for channel, decoder in self.decoders.items()}
-        return [batch for batch in self.head if known[batch.channel_id].issuperset(leaves)]
+        """Give the first messages whose schema has these leaves."""
+        return [batch for batch in self.head if self.known_to(batch.channel_id) >= set(leaves)]
 
     def decode_head(self, leaves: Sequence[str]) -> list[Decoded]:
         """Decode some leaves of the first messages that have them."""
@@ -94,6 +109,19 @@ class Topic:
         return replace(self, head=readable, decoders=decoders), reason
 
 
+# Asked for each field; the channels of a topic have few decoders.
+@lru_cache(maxsize=8)
+def _by_path(decoder: Decoder) -> Mapping[str, FieldInfo]:
+    return {info.path: info for info in decoder.fields}
+
+
+@lru_cache(maxsize=8)
+def _lists_with_text(decoder: Decoder) -> frozenset[str]:
+    return frozenset(
+        info.path.partition("[].")[0] for info in decoder.fields if info.kind == "string" and "[]." in info.path
+    )
+
+
 def topics_of(channels: Mapping[int, McapChannel]) -> tuple[dict[str, Topic], dict[str, str]]:
     """Group the channels of a log by topic and make their decoders.
 
@@ -106,25 +134,31 @@ def topics_of(channels: Mapping[int, McapChannel]) -> tuple[dict[str, Topic], di
     """
     topics: dict[str, Topic] = {}
     refused: dict[str, str] = {}
+    # Many channels may share a long schema, which is read once.
+    made: dict[tuple[str, McapSchema | None], Decoder | str] = {}
     for channel in sorted(channels.values(), key=lambda one: one.id):
-        try:
-            decoder = _decoder(channel)
-        except LogError as error:
-            refused[channel.topic] = str(error)
+        key = (channel.message_encoding, channel.schema)
+        decoder = made[key] if key in made else made.setdefault(key, _decoder(channel))
+        if isinstance(decoder, str):
+            refused[channel.topic] = decoder
             continue
         known = topics.get(channel.topic)
         topics[channel.topic] = _new_topic(channel, decoder) if known is None else _joined(known, channel, decoder)
     return topics, refused
 
 
-def _decoder(channel: McapChannel) -> Decoder:
+def _decoder(channel: McapChannel) -> Decoder | str:
+    """Make the decoder of a channel, or say why there's none."""
     schema = channel.schema
-    return make_decoder(
-        message_encoding=channel.message_encoding,
-        schema_name="" if schema is None else schema.name,
-        schema_encoding="" if schema is None else schema.encoding,
-        schema_data=b"" if schema is None else schema.data,
-    )
+    try:
+        return make_decoder(
+            message_encoding=channel.message_encoding,
+            schema_name="" if schema is None else schema.name,
+            schema_encoding="" if schema is None else schema.encoding,
+            schema_data=b"" if schema is None else schema.data,
+        )
+    except LogError as error:
+        return str(error)
 
 
 def _new_topic(channel: McapChannel, decoder: Decoder) -> Topic:

@@ -75,10 +75,11 @@ class TopicChannels:
         """Give every channel that is a signal, in the order of the schema."""
         measured = measured_fields(self.topic.metadata)
         sources = self._columns() if self.layout is not None else self._leaves()
-        wanted = [source for source in sources if measured is None or source.field in measured]
+        wanted = (source for source in sources if measured is None or source.field in measured)
         if not self.frames:
-            return iter(wanted)
-        return (self._of_frame(source, frame) for frame in self.frames for source in wanted)
+            return wanted
+        every = list(wanted)
+        return (self._of_frame(source, frame) for frame in self.frames for source in every)
 
     def resolve(self, path: MessagePath) -> ChannelSource:
         """Find the channel that a path names; its name is the path as it was written.
@@ -179,7 +180,7 @@ class TopicChannels:
         if self._identified_by_text(info):
             # Which element is which differs from message to message: they can be read by filter.
             return
-        names_leaf = names_beside(info, {one.path: one for one in self.topic.fields})
+        names_leaf = names_beside(info, self.topic.by_path)
         lists = self.joints.get(names_leaf, ()) if names_leaf is not None else ()
         if names_leaf is not None and len(lists) > 1 and len(info.dims) == 1 and elements:
             for joint in filter(None, dict.fromkeys(joint for names in lists for joint in names)):
@@ -258,9 +259,7 @@ class TopicChannels:
     def _identified_by_text(self, info: FieldInfo) -> bool:
         """Whether elements are messages with text inside (a frame's name, say) and no fixed number."""
         prefix, mark, _ = info.path.partition("[]")
-        return bool(mark) and any(
-            one.kind == "string" and one.path.startswith(f"{prefix}[].") for one in self.topic.fields
-        )
+        return bool(mark) and prefix in self.topic.lists_with_text
 
     def _leaf_source(self, selector: FieldSelector, *, field: str, name: str) -> ChannelSource:
         leaf = selector.leaf

@@ -271,7 +271,7 @@ def test_stamps_that_leap_for_days_take_no_memory(tmp_path: Path) -> None:
         for index in range(200):
             stamp_ns = START_NS + index * 1_000_000 + (8 * 10**14 if index >= 100 else 0)
             maker.write(channel, imu(stamp_ns, (1, 0, 0)), stamp_ns)
-    with open_log(tmp_path / "a.mcap") as log, pytest.raises(LogError, match="stamps leap"):
+    with open_log(tmp_path / "a.mcap") as log, pytest.raises(LogError, match="lie 800000 s after the others"):
         log.read([AXES[0]])
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from chladni.io.decoding.assemble import gathered, joined, scattered
-from chladni.io.decoding.cdr_forms import ENCAPSULATIONS, HEADER_BYTES, forms_of, ros1_form
+from chladni.io.decoding.cdr_forms import ENCAPSULATIONS, HEADER_BYTES, FormsOf, forms_of, ros1_form
 from chladni.io.decoding.columns import Column, Decoded, Strings, outside_buffer, require_known
 from chladni.io.decoding.cursor import Cursor, uniform
 from chladni.io.decoding.interned import intern_blocks
@@ -105,6 +105,8 @@ class BinaryDecoder:
         self.record = record
         self._encapsulated = encapsulated
         # Until messages tell another.
+        # Channels that share the definition share its layouts, too.
+        self._made = FormsOf(record)
         known = leaves(record)
         self._form = next(forms_of(record, "plain")) if encapsulated else ros1_form(record)
         # Last bit of the number in the header; None until messages tell.
@@ -181,7 +183,7 @@ class BinaryDecoder:
         if number not in ENCAPSULATIONS:
             begin = f"{number >> 8:02x} {number & 0xFF:02x}"
             raise LogError(f"{self.record.name}: messages begin with {begin}, which no header of CDR does")
-        return forms_of(self.record, ENCAPSULATIONS[number])
+        return self._made.of(ENCAPSULATIONS[number])
 
     def columns(self, messages: EncodedMessages, paths: Sequence[str]) -> Decoded:
         """Decode the fields named; see `chladni.io.decoding.columns.Decoder`."""

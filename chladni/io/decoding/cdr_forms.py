@@ -77,6 +77,20 @@ def ros1_form(record: Record) -> Form:
     return _form(None, record, _ROS1)
 
 
+class FormsOf:
+    """The forms of a definition, each made once."""
+
+    def __init__(self, record: Record) -> None:
+        self._record = record
+        self._made: dict[Encapsulation, list[Form]] = {}
+
+    def of(self, encapsulation: Encapsulation) -> Iterator[Form]:
+        """Give what `forms_of` does."""
+        if encapsulation not in self._made:
+            self._made[encapsulation] = list(forms_of(self._record, encapsulation))
+        return iter(self._made[encapsulation])
+
+
 def forms_of(record: Record, encapsulation: Encapsulation) -> Iterator[Form]:
     """Give the forms that messages may have behind a header, the usual one first.
 

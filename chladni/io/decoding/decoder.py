@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from chladni.signals.errors import LogError
@@ -79,6 +80,8 @@ def make_decoder(*, message_encoding: str, schema_name: str, schema_encoding: st
     )
 
 
+# Many channels may share one long definition, of which every copy would take memory.
+@lru_cache(maxsize=8)
 def definition_text(data: bytes) -> str:
     """Give a definition as text.
 

@@ -1,7 +1,8 @@
 """The end of a log: footer, summary section, DataEnd; used only as far as it is sound."""
 
 import zlib
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
 import numpy as np
@@ -269,7 +270,7 @@ def _indexed_messages(index: ChunkIndex) -> int | None:
     return None if rest or messages < 0 else messages
 
 
-def _holds_unlisted(file: LogFile, data_end: int, indexes: list[ChunkIndex], known: Set[int]) -> bool:
+def _holds_unlisted(file: LogFile, data_end: int, indexes: list[ChunkIndex], known: AbstractSet[int]) -> bool:
     """Tell whether a chunk or a channel that the summary doesn't list lies where it lists no chunk."""
     position = len(MAGIC)
     for index in indexes:
@@ -279,7 +280,7 @@ def _holds_unlisted(file: LogFile, data_end: int, indexes: list[ChunkIndex], kno
     return _stretch_holds_unlisted(file, position, data_end, known)
 
 
-def _stretch_holds_unlisted(file: LogFile, position: int, stop: int, known: Set[int]) -> bool:
+def _stretch_holds_unlisted(file: LogFile, position: int, stop: int, known: AbstractSet[int]) -> bool:
     """Look at the records between chunks as far as the first messages; the counts answer for those behind them."""
     while position < stop:
         buffer = np.frombuffer(file.read(position, min(_LOOK_BYTES, stop - position)), np.uint8)

@@ -130,7 +130,8 @@ def test_messages_of_a_channel_that_no_number_betrays_are_counted(tmp_path: Path
     assert told == {
         "the message index contradicts the chunk before it, which is read record by record": 0,
         "a channel is defined here that the summary doesn't know": 0,
-        "messages of channel 2, which the summary doesn't list, are left out; 'mcap recover' writes a whole summary": 5,
+        "messages of channel 2, which the summary doesn't list, are left out; "
+        "'mcap recover' writes a whole summary": 5,
     }
 
 
