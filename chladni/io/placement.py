@@ -356,6 +356,8 @@ class Group:
         Time of grid index 0.
     placements
         With indices on this grid.
+    first, last, messages
+        Grid index of the first sample of all streams and the one after the last, and how many messages they have.
     misalignment
         Largest distance of a stream's samples from the grid of the first, in periods.
     """
@@ -363,7 +365,23 @@ class Group:
     rate_hz: float
     start_ns: int
     placements: tuple[Placement, ...]
+    first: int
+    last: int
+    messages: int
     misalignment: float = 0.0
+
+    @classmethod
+    def of(cls, placement: Placement) -> "Group":
+        """One stream on its grid."""
+        base = placement.time_base
+        return cls(
+            rate_hz=base.rate_hz,
+            start_ns=base.start_ns,
+            placements=(placement,),
+            first=placement.first,
+            last=placement.last,
+            messages=placement.index.size,
+        )
 
     def time_ns(self, index: int) -> int:
         """Time of a grid point."""
@@ -392,8 +410,7 @@ class Group:
 
     def extent(self, start_ns: int | None, end_ns: int | None) -> tuple[int, int]:
         """First grid index and the one after the last, cut to a window of time."""
-        first = min(placement.first for placement in self.placements)
-        last = max(placement.last for placement in self.placements)
+        first, last = self.first, self.last
         if start_ns is not None:
             first = max(first, self.index_from(start_ns))
         if end_ns is not None:
@@ -404,20 +421,22 @@ class Group:
 def group_placements(placements: Sequence[Placement]) -> tuple[Group, ...]:
     """Put streams that share rate and grid together, in the order of their first stream."""
     groups: list[Group] = []
+    members: list[list[Placement]] = []
     for placement in placements:
         for position, group in enumerate(groups):
-            joined = _joined(group, placement)
-            if joined is not None:
-                groups[position] = joined
+            moved = _moved_onto(group, placement)
+            if moved is not None:
+                groups[position], more = moved
+                members[position].append(more)
                 break
         else:
-            base = placement.time_base
-            groups.append(Group(rate_hz=base.rate_hz, start_ns=base.start_ns, placements=(placement,)))
-    return tuple(groups)
+            groups.append(Group.of(placement))
+            members.append([placement])
+    return tuple(replace(group, placements=tuple(some)) for group, some in zip(groups, members, strict=True))
 
 
-def _joined(group: Group, placement: Placement) -> Group | None:
-    """The group with one more stream, or None when its grid is another."""
+def _moved_onto(group: Group, placement: Placement) -> tuple[Group, Placement] | None:
+    """What a group becomes with one more stream beside its first, and the stream on its grid; None on another."""
     ours, theirs = group.placements[0].time_base, placement.time_base
     if group.placements[0].clock != placement.clock:
         return None
@@ -430,13 +449,17 @@ def _joined(group: Group, placement: Placement) -> Group | None:
     if misalignment > max(ALIGNED, min(LOOSELY_ALIGNED, _scatter(ours) + _scatter(theirs))):
         return None
     moved = placement.shifted(offset)
-    samples = sum(one.index.size for one in (*group.placements, moved))
-    together = replace(group, placements=(*group.placements, moved))
-    first, last = together.extent(None, None)
+    together = replace(
+        group,
+        first=min(group.first, moved.first),
+        last=max(group.last, moved.last),
+        messages=group.messages + moved.index.size,
+        misalignment=max(group.misalignment, misalignment),
+    )
     # Two recordings that lie hours apart aren't one measurement; a grid over both would be mostly empty.
-    if last - first > 100 * samples and placement.counts is None:
+    if together.last - together.first > 100 * together.messages and placement.counts is None:
         return None
-    return replace(together, misalignment=max(group.misalignment, misalignment))
+    return together, moved
 
 
 def _common_times(ours: TimeBase, theirs: TimeBase) -> NDArray[np.int64]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from chladni.io.stamps import LATEST_NS, StampChoice, own_stamps_ns, plausible
 from chladni.io.topic import Topic
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import NS_PER_S
+
+#: Fields of messages that are decoded at a time: chunks say how many messages come together, not how wide they are.
+VALUES_AT_ONCE: Final = 1 << 21
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -318,11 +321,11 @@ def read_pieces(
     for stretch, batch in numbered(container.batches(readers, start_time_ns=start_ns, end_time_ns=end_ns)):
         reader = readers[batch.channel_id]
         yield from ((index, streams[index].without(len(batch), why)) for index, why in reader.refused.items())
-        if reader.streams:
-            decoded = streams[reader.streams[0]].topic.decode(batch, reader.leaves)
+        for part in batch.parts(max(1, VALUES_AT_ONCE // max(1, len(reader.leaves)))) if reader.streams else ():
+            decoded = streams[reader.streams[0]].topic.decode(part, reader.leaves)
             counted = _Counted()
             for index in reader.streams:
-                piece = streams[index].piece(batch, decoded, stretch=stretch, with_values=with_values)
+                piece = streams[index].piece(part, decoded, stretch=stretch, with_values=with_values)
                 yield index, counted.once(piece, streams[index])
                 decoded = replace(decoded, reasons={}, told={})
 

@@ -14,7 +14,7 @@ FIRST, COUNT = 5, 30
 
 
 def buffer(dtype: type = np.float64) -> GridBuffer:
-    group = Group(rate_hz=100.0, start_ns=0, placements=())
+    group = Group(rate_hz=100.0, start_ns=0, placements=(), first=0, last=0, messages=0)
     return GridBuffer(group, CHANNELS, FIRST, FIRST + COUNT, np.dtype(dtype))
 
 

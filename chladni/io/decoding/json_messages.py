@@ -15,7 +15,7 @@ from chladni.io.decoding.json_arrow import read_by_arrow
 from chladni.io.decoding.json_schema import Settled, is_unicode, parse_json_schema
 from chladni.io.decoding.json_stream import Span
 from chladni.io.decoding.json_values import Extractor, load_message
-from chladni.io.decoding.schema import MAX_NESTING, leaves
+from chladni.io.decoding.schema import MAX_NESTING, Primitive, leaves
 from chladni.signals.errors import LogError
 
 if TYPE_CHECKING:
@@ -167,20 +167,67 @@ class _Block:
 
     def _one_by_one(self, contents: Sequence[bytes]) -> None:
         bad = np.zeros(len(contents), np.bool_)
-        rows: list[list[Row]] = []
-        extract = Extractor(self.leaves, self.told)
+        rows = _Rows(self.leaves, self.told)
         for index, content in enumerate(contents):
             try:
-                rows.append(extract(load_message(content)))
+                rows.add(load_message(content))
             except ValueError as error:
                 bad[index] = True
                 self.reasons["not JSON" if isinstance(error, _SYNTAX) else str(error)] += 1
-        self._add([found_of(leaf, [row[i] for row in rows]) for i, leaf in enumerate(self.leaves)], bad)
+        self._add(rows.found(), bad)
 
     def _add(self, found: Sequence[Found], bad: NDArray[np.bool_]) -> None:
         for column, one in zip(self.found, found, strict=True):
             column.append(one)
         self.bad.append(bad)
+
+
+class _Rows:
+    """Values of leaves in one message after another; numbers that a message doesn't hold take no work."""
+
+    def __init__(self, chosen: Sequence[Leaf], told: Counter[str]) -> None:
+        self._leaves, self._told = chosen, told
+        self._rows: list[list[Row]] = [[] for _ in chosen]
+        self._places: list[list[int]] = [[] for _ in chosen]
+        self._sound = 0
+        self._always = [place for place, leaf in enumerate(chosen) if not _may_lack(leaf)]
+        self._by_key: dict[str, list[int]] = {}
+        for place, leaf in enumerate(chosen):
+            if _may_lack(leaf):
+                self._by_key.setdefault(leaf.names[0], []).append(place)
+        self._keys: tuple[str, ...] | None = None
+        self._present: list[int] = []
+        self._extract = Extractor((), told)
+
+    def add(self, message: object) -> None:
+        """Take in a message; `ValueError` says why it can't be used."""
+        keys = tuple(message) if isinstance(message, dict) else ()
+        if keys != self._keys:
+            # Message after message mostly has the same.
+            self._keys = keys
+            self._present = [*self._always, *(place for key in keys for place in self._by_key.get(key, ()))]
+            self._extract = Extractor([self._leaves[place] for place in self._present], self._told)
+        for place, row in zip(self._present, self._extract(message), strict=True):
+            self._rows[place].append(row)
+            self._places[place].append(self._sound)
+        self._sound += 1
+
+    def found(self) -> list[Found]:
+        """Give the values of each leaf in all messages that could be used."""
+        return [self._spread(place, found_of(leaf, self._rows[place])) for place, leaf in enumerate(self._leaves)]
+
+    def _spread(self, place: int, found: Found) -> Found:
+        places = self._places[place]
+        if len(places) == self._sound or isinstance(found.values, Strings):
+            return found
+        values = np.full(self._sound, np.nan)
+        values[places] = found.values
+        return Found(values=values)
+
+
+def _may_lack(leaf: Leaf) -> bool:
+    """Whether a message without the leaf has one NaN for it."""
+    return leaf.info.kind == "number" and not any(leaf.lists) and isinstance(leaf.type, Primitive)
 
 
 def _span(messages: EncodedMessages, index: NDArray[np.intp]) -> Span:

@@ -1,6 +1,7 @@
 """Still encoded messages of one channel, as columns."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,3 +39,19 @@ class MessageBatch:
 
     def __len__(self) -> int:
         return len(self.offsets)
+
+    def parts(self, size: int) -> Iterator["MessageBatch"]:
+        """Give the batch in parts of so many messages."""
+        if len(self) <= size:
+            yield self
+            return
+        for first in range(0, len(self), size):
+            part = slice(first, first + size)
+            yield replace(
+                self,
+                offsets=self.offsets[part],
+                lengths=self.lengths[part],
+                log_time_ns=self.log_time_ns[part],
+                publish_time_ns=self.publish_time_ns[part],
+                sequence=self.sequence[part],
+            )
