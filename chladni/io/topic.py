@@ -11,7 +11,7 @@ import numpy as np
 
 from chladni.io.arrival import Arrivals, arrival_order, numbered
 from chladni.io.decoding import Decoded, Decoder, FieldInfo, definition_text, make_decoder
-from chladni.io.mcap.channel_registry import McapChannel, McapSchema
+from chladni.io.mcap.channel_registry import McapChannel
 from chladni.io.mcap.container import McapContainer
 from chladni.io.mcap.message_batch import MessageBatch
 from chladni.io.untimed import untimed
@@ -135,10 +135,10 @@ def topics_of(channels: Mapping[int, McapChannel]) -> tuple[dict[str, Topic], di
     topics: dict[str, Topic] = {}
     refused: dict[str, str] = {}
     # Many channels may share a long schema, which is read once.
-    made: dict[tuple[str, McapSchema | None], Decoder | str] = {}
+    made: dict[_Format, Decoder | str] = {}
     for channel in sorted(channels.values(), key=lambda one: one.id):
-        key = (channel.message_encoding, channel.schema)
-        decoder = made[key] if key in made else made.setdefault(key, _decoder(channel))
+        key = _format_of(channel)
+        decoder = made[key] if key in made else made.setdefault(key, _decoder(*key))
         if isinstance(decoder, str):
             refused[channel.topic] = decoder
             continue
@@ -147,15 +147,25 @@ def topics_of(channels: Mapping[int, McapChannel]) -> tuple[dict[str, Topic], di
     return topics, refused
 
 
-def _decoder(channel: McapChannel) -> Decoder | str:
-    """Make the decoder of a channel, or say why there's none."""
+_Format = tuple[str, str, str, bytes]
+"""Message encoding, and name, encoding and text of the schema."""
+
+
+def _format_of(channel: McapChannel) -> _Format:
     schema = channel.schema
+    if schema is None:
+        return channel.message_encoding, "", "", b""
+    return channel.message_encoding, schema.name, schema.encoding, schema.data
+
+
+def _decoder(message_encoding: str, schema_name: str, schema_encoding: str, schema_data: bytes) -> Decoder | str:
+    """Make a decoder, or say why there's none."""
     try:
         return make_decoder(
-            message_encoding=channel.message_encoding,
-            schema_name="" if schema is None else schema.name,
-            schema_encoding="" if schema is None else schema.encoding,
-            schema_data=b"" if schema is None else schema.data,
+            message_encoding=message_encoding,
+            schema_name=schema_name,
+            schema_encoding=schema_encoding,
+            schema_data=schema_data,
         )
     except LogError as error:
         return str(error)
