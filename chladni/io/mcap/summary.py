@@ -297,5 +297,5 @@ def _stretch_holds_unlisted(file: LogFile, position: int, stop: int, known: Abst
             return True
         if messages.any() or opcodes[0] == 0:
             return False
-        position += walk.end or PREFIX_BYTES + RECORD_PREFIX.unpack_from(buffer)[1]
+        position += walk.end or PREFIX_BYTES + RECORD_PREFIX.unpack_from(buffer.data)[1]
     return False
