@@ -40,6 +40,8 @@ _STRETCH_BYTES = 4 * MIB
 _FIRST_STRETCH_BYTES = 64 * 1024
 _READ_ALONG_BYTES = 16 * MIB
 _ZERO_BLOCK_BYTES = MIB
+# Of a MessageIndex: channel id, and length of the list.
+_INDEX_FIELDS_BYTES = 6
 # Records that end a stretch: each is looked at by itself, an attachment not read at all.
 _SINGLE = frozenset([Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER, Opcode.ATTACHMENT])
 _READ_BARE = frozenset([Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL])
@@ -193,8 +195,7 @@ class DataSection:
             # Left over from the chunk before, which had no room for so many messages.
             what, lost = "a message index with more entries than its chunk can hold messages", 0
         else:
-            fields_bytes = PREFIX_BYTES + 6
-            lost = max(end - position - fields_bytes, 0) // INDEX_ENTRY.itemsize
+            lost = max(end - position - PREFIX_BYTES - _INDEX_FIELDS_BYTES, 0) // INDEX_ENTRY.itemsize
             what = "a message index without a chunk before it"
         self._damage.add(what, offset=position, record="MessageIndex", lost_messages=lost)
         return end
@@ -301,7 +302,8 @@ class DataSection:
                 found.append(parse_message_index(content))
             except MalformedRecordError as problem:
                 self._damage.add(str(problem), offset=position, record="MessageIndex", lost_messages=0)
-            room -= len(content)
+            # An index that lists nothing takes no room.
+            room -= max(0, len(content) - _INDEX_FIELDS_BYTES)
             position += PREFIX_BYTES + len(content)
         # Two for one channel can't both be right, and the counts of lost messages rely on them.
         if len({one.channel_id for one in found}) < len(found):
@@ -316,7 +318,7 @@ class DataSection:
             return None
         opcode, length = RECORD_PREFIX.unpack(prefix)
         end = position + PREFIX_BYTES + length
-        if opcode != Opcode.MESSAGE_INDEX or end > self._bound(position) or length > room + 6:
+        if opcode != Opcode.MESSAGE_INDEX or end > self._bound(position) or length > room + _INDEX_FIELDS_BYTES:
             return None
         content = self._window.read(position + PREFIX_BYTES, length)
         return content if len(content) == length else None

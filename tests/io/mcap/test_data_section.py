@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from mcap.writer import CompressionType, IndexType
 
 from chladni.io.mcap.container import McapContainer
@@ -264,6 +266,31 @@ def test_more_messages_than_the_statistics_count_are_told_too(tmp_path: Path) ->
         assert log.damage[0].lost_messages == 0
 
 
+@given(
+    order=st.lists(st.integers(1, 6), min_size=1, max_size=60),
+    sizes=st.lists(st.integers(0, 40), min_size=6, max_size=6),
+    chunk_size=st.integers(1, 300),
+    empty=st.booleans(),
+)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_whole_log_in_chunks_of_any_size_is_sound(
+    tmp_path: Path, order: list[int], sizes: list[int], chunk_size: int, empty: bool
+) -> None:
+    """Few messages a chunk, and indexes of channels that it doesn't hold, as some writers give them."""
+    definitions = lb.schema() + b"".join(lb.channel(number, f"/t{number}") for number in range(1, 7))
+    data, content, expected = b"", b"", []
+    for place, number in enumerate(order):
+        content += lb.message(place, number, size=sizes[number - 1])
+        expected += lb.expected([place], number, sizes[number - 1])
+        if len(content) >= chunk_size or place == len(order) - 1:
+            spare = [lb.message_index(other, []) for other in range(10, 14)] if empty else []
+            data += lb.chunk(content) + lb.index_of(content) + b"".join(spare)
+            content = b""
+    with McapContainer.open(lb.write(tmp_path, lb.log(definitions, data, summary=b""))) as log:
+        assert sorted(lb.messages(log)) == sorted(expected)
+        assert log.damage == ()
+
+
 def patched(content: bytes, offset: int, new: bytes) -> bytes:
     return content[:offset] + new + content[offset + len(new) :]
 
@@ -329,8 +356,8 @@ def test_records_inside_a_chunk_that_make_no_sense_end_it(tmp_path: Path) -> Non
 
 
 def test_the_checksum_over_all_data_is_checked(tmp_path: Path) -> None:
-    for settings in ({"use_chunking": False}, {"enable_crcs": False}):
-        content = lb.sample_log(enable_data_crcs=True, compression=CompressionType.NONE, **settings)
+    for options in ({"use_chunking": False}, {"enable_crcs": False}):
+        content = lb.sample_log(enable_data_crcs=True, compression=CompressionType.NONE, **options)
         at = content.index(lb.payload(77, 40))
         for position, told in ((None, False), (at, True), (20, True)):
             changed = content if position is None else patched(content, position, b"\xee")
