@@ -196,6 +196,9 @@ class Decoded:
 class Decoder(Protocol):
     """Turns messages of one schema to columns."""
 
+    def __hash__(self) -> int:
+        """Each is one of its own."""
+
     @property
     def fields(self) -> tuple[FieldInfo, ...]:
         """Leaves of the message in the order of the schema; empty while only messages could tell."""
