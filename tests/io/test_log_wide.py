@@ -57,7 +57,7 @@ def test_a_schema_that_channels_share_is_kept_once(tmp_path: Path) -> None:
             for channel in channels:
                 content = b"\0\1\0\0" + struct.pack("<d", place)
                 writer.add_message(channel, START_NS + place * PERIOD_NS, content, START_NS + place * PERIOD_NS)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]  # mcap leaves it unannotated
     tracemalloc.start()
     with open_log(tmp_path / "a.mcap") as log:
         info = log.info()
@@ -75,7 +75,7 @@ def test_the_narrowest_topics_are_listed_and_the_others_told(
     monkeypatch.setattr(catalog, "MOST_LISTED", most)
     fields = {"/wide": 18, "/imu": 3, "/one": 1, "/mid": 9}
     write_wide(tmp_path / "a.mcap", fields)
-    room, listed = most, set()
+    room, listed = most, set[str]()
     for name in sorted(fields, key=lambda name: fields[name]):
         if fields[name] <= room:
             room, listed = room - fields[name], listed | {name}
