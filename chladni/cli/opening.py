@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from chladni.signals.text_reading import real_number
+
 if TYPE_CHECKING:
     from chladni.io.log import Log
 
@@ -151,6 +153,6 @@ def _value(text: str) -> str | float | bool:
     if text.lower() in ("true", "false"):
         return text.lower() == "true"
     try:
-        return float(text)
+        return real_number(text)
     except ValueError:
         return text

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from chladni.signals.errors import SetupError
+from chladni.signals.text_reading import real_number
 
 if TYPE_CHECKING:
     from chladni.models.core.model import Effect, Model
@@ -89,7 +90,7 @@ def _number(text: str, unit: str | None, where: str) -> float:
     from chladni.signals.units import parse_quantity
 
     try:
-        return float(text)
+        return real_number(text)
     except ValueError:
         try:
             value, found = parse_quantity(text)

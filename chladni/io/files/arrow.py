@@ -16,6 +16,7 @@ from chladni.io.files.series_fields import SERIES_FORMAT, restated, series_field
 from chladni.io.files.table import Part, series_of_parts
 from chladni.io.files.time_reading import TimeOptions
 from chladni.signals.errors import LogError
+from chladni.signals.text_reading import real_number
 from chladni.signals.time_series import TimeSeries
 
 if TYPE_CHECKING:
@@ -273,7 +274,7 @@ def _units_by_name(metadata: Mapping[str, str]) -> dict[str, str]:
 def _stated_rate_hz(metadata: Mapping[str, str]) -> float | None:
     for name, text in metadata.items():
         try:
-            rate_hz = rate_of_scalar(name, float(text))
+            rate_hz = rate_of_scalar(name, real_number(text))
         except ValueError:
             continue
         if rate_hz is not None:

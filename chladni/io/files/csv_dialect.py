@@ -11,14 +11,15 @@ from chladni.io.files.columns import is_unit
 from chladni.io.files.time_reading import UNIT_OF, spelled
 from chladni.io.files.time_text import is_time_text
 from chladni.signals.errors import LogError
+from chladni.signals.text_reading import lines_of
 
 # Enough for most heads; the larger one for tables of thousands of columns, and for long remarks.
 _HEAD_BYTES: Final = (2**16, 2**22)
 NUMBER: Final = r"(?i)^[+-]?(\d+([.,]\d*)?|[.,]\d+)([ed][+-]?\d+)?$|^[+-]?(nan|inf|infinity)$"
 """A number with either decimal sign, as a regular expression; Fortran writes 1.0D+00."""
-_NUMBER: Final = re.compile(NUMBER)
+_NUMBER: Final = re.compile(NUMBER, re.ASCII)
 # Three digits behind a comma or point, and no zero before it, may as well be thousands.
-_GROUPED: Final = re.compile(r"^[+-]?[1-9]\d{0,2}[.,]\d{3}$")
+_GROUPED: Final = re.compile(r"^[+-]?[1-9]\d{0,2}[.,]\d{3}$", re.ASCII)
 _DELIMITERS: Final = (";", "\t", ",", " ")
 LONE: Final = "\n"
 """In place of a delimiter: there's one column."""
@@ -170,8 +171,7 @@ def _head(path: Path, size: int) -> tuple[str, list[str]]:
             head[: head.rfind(b"\n") + 1].decode(encoding)
     except UnicodeDecodeError:
         encoding, text = "cp1252", head.decode("cp1252", errors="replace")
-    # As files are read: what str.splitlines takes for ends of lines besides may stand within one.
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = lines_of(text)
     return encoding, lines if whole or len(lines) == 1 else lines[:-1]
 
 

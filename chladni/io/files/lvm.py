@@ -6,8 +6,7 @@ they are followed: the count of samples is often wrong, and so is the step where
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from decimal import Decimal, InvalidOperation
-from io import StringIO
+from decimal import Decimal
 from pathlib import Path
 from typing import Final
 
@@ -23,6 +22,7 @@ from chladni.io.files.time_reading import NO_TIMES, NS_OF, UNIT_OF, TimeOptions,
 from chladni.io.files.time_text import read_time_text
 from chladni.signals.clock_verdict import round_rate
 from chladni.signals.errors import LogError, SetupError
+from chladni.signals.text_reading import lines_of, real_number
 from chladni.signals.time_series import NS_PER_S
 
 _MAGIC: Final = "LabVIEW Measurement"
@@ -142,8 +142,7 @@ def _lines(path: Path) -> tuple[list[str], str]:
         text, encoding = raw.decode("utf-8-sig"), "utf-8-sig"
     except UnicodeDecodeError:
         text, encoding = raw.decode("cp1252", errors="replace"), "cp1252"
-    # As files are read: what str.splitlines takes for ends of lines besides may stand within one.
-    return list(StringIO(text, newline=None)), encoding
+    return [f"{line}\n" for line in lines_of(text)], encoding
 
 
 def _tables(path: Path, lines: Sequence[str], encoding: str) -> list[_Table]:
@@ -287,10 +286,12 @@ def _axis_unit(label: str) -> str:
 
 def _decimal(text: str) -> Decimal | None:
     try:
-        number = Decimal(text.replace(",", "."))
-    except InvalidOperation:
+        plain = text.strip().replace(",", ".")
+        # No clock steps by less than a double tells from 0, or by decades.
+        believable = 1e-300 < abs(real_number(plain) or 1.0) < 1e9
+    except ValueError:
         return None
-    return number if number.is_finite() and abs(number) < 10**9 else None
+    return Decimal(plain) if believable else None
 
 
 def _decimals(number: Decimal) -> int:

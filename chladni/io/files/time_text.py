@@ -31,7 +31,8 @@ _BASIC = (
 )
 # A time of day; dates with or without one; ISO 8601's basic form; minutes with a fraction, as in spreadsheets.
 _PATTERNS = tuple(
-    re.compile(pattern)
+    # As Arrow, which reads the columns, has it: digits are those of ASCII.
+    re.compile(pattern, re.ASCII)
     for pattern in (
         rf"^{_CLOCK}{_ZONE}$",
         *(rf"^{date}(?:(?:[Tt]|,?\s+|-){_CLOCK}{_ZONE})?$" for date in _DATES),

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from chladni.io.files.uff_values import fortran_number, layout_of
 from chladni.signals.errors import LogError
+from chladni.signals.text_reading import whole_number
 
 _DELIMITER = re.compile(rb"^ {4}-1[ \t]*\r?$", re.MULTILINE)
 # Binary values may end anywhere, and the delimiter follows without a line break, or behind one.
@@ -59,7 +60,7 @@ class TextBlock:
         """Read `count` integers of a line in columns of ten; `LogError` when they aren't there."""
         texts = _fields(self.line(index), _INTEGER_WIDTH, count)
         try:
-            numbers = [int(text) for text in texts]
+            numbers = [whole_number(text) for text in texts]
         except ValueError:
             numbers = []
         if len(numbers) != count or any(abs(number) >= _LARGEST_INTEGER for number in numbers):
@@ -238,7 +239,7 @@ def _next_line(content: bytes, position: int) -> int:
 
 def _integer(field: bytes) -> int:
     try:
-        return int(field)
+        return whole_number(field.decode("latin-1"))
     except ValueError:
         return 0
 

@@ -19,6 +19,7 @@ from chladni.io.atomic import atomic_path
 from chladni.io.files.uff_records import UniversalFile
 from chladni.io.files.uff_values import Layout, Values, binary_values, fortran_number, layout_of, text_values
 from chladni.signals.errors import LogError
+from chladni.signals.text_reading import whole_number
 
 Dataset = dict[str, Any]
 
@@ -166,7 +167,7 @@ def _units(lines: list[str]) -> Dataset:
     words = " ".join(lines[2:]).split()
     try:
         length, force = fortran_number(words[0]), fortran_number(words[1])
-        code = int((lines[1] if len(lines) > 1 else "")[:10])
+        code = whole_number((lines[1] if len(lines) > 1 else "")[:10])
     except (ValueError, IndexError):
         raise LogError("its lines aren't a units code and factors of length and force") from None
     if not all(isfinite(one) and _LEAST_FACTOR < one < 1 / _LEAST_FACTOR for one in (length, force)):
@@ -203,7 +204,7 @@ def _integer(text: str, name: str, *, blank: bool) -> int:
     if not text and blank:
         return 0
     try:
-        return int(text)
+        return whole_number(text)
     except ValueError:
         raise LogError(f"found {text[:20]!r} where an integer is due ({name})") from None
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.errors import LogError
+from chladni.signals.text_reading import real_number
 
 Numbers = NDArray[np.float64]
 
@@ -94,11 +95,11 @@ def fortran_number(text: str) -> float:
     (15.0, -2.5e-101)
     """
     try:
-        return float(text)
+        return real_number(text)
     except ValueError:
         plain = text.strip().upper().replace("D", "E")
         sign = max(plain.rfind("+"), plain.rfind("-"))
-        return float(f"{plain[:sign]}E{plain[sign:]}" if sign > 0 and "E" not in plain else plain)
+        return real_number(f"{plain[:sign]}E{plain[sign:]}" if sign > 0 and "E" not in plain else plain)
 
 
 # --- text --------------------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from chladni.models.core.instrument import Option
 from chladni.models.core.parameter import Parameters
 from chladni.models.files.quantity import number
 from chladni.signals.errors import ModelError
+from chladni.signals.text_reading import lines_of, real_number
 
 FORMAT = "chladni.variants/1"
 MAX_BYTES = 1 << 20
@@ -167,7 +168,7 @@ class _Rows:
         self._options = {option.name: option for option in options}
 
     def from_csv(self, text: str) -> Iterator[Variant]:
-        lines = reader(text.splitlines(), strict=True)
+        lines = reader(lines_of(text), strict=True)
         titles: list[tuple[str, str]] | None = None
         count = 0
         try:
@@ -265,7 +266,7 @@ def _si(found: object, written: str, wanted: str) -> float:
         raise ModelError(f"found {found!r}; must be a number, or text with a unit")
     if isinstance(found, str):
         try:
-            found = float(found)
+            found = real_number(found)
         except ValueError:
             return number(found, wanted)
     return number(f"{found!r} {written}" if written else found, wanted)

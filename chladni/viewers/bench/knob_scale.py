@@ -7,6 +7,7 @@ from typing import Self
 
 from chladni.models.core.parameter import Parameter
 from chladni.signals.errors import ModelError, SetupError
+from chladni.signals.text_reading import real_number
 from chladni.signals.units import parse_quantity, si_factor
 from chladni.viewers.labels import printed_unit
 
@@ -113,7 +114,7 @@ class KnobScale:
     def _number(self, text: str) -> float:
         try:
             # Plain numbers first: "65" means 65 of what is shown, though it would also be a quantity without unit.
-            number = float(text)
+            number = real_number(text)
         except ValueError:
             value, unit = parse_quantity(text)
             expected = si_factor(self.parameter.unit)[1]

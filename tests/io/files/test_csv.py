@@ -261,13 +261,6 @@ def test_a_table_that_is_padded_and_whose_head_is_repeated(tmp_path: Path) -> No
     assert contents.notes == (f"{tmp_path / 'a.csv'}: 2 lines without numbers left out, the first is line 25.",)
 
 
-@pytest.mark.parametrize("mark", ["\f", "\v", "\x1c", "\u2028", "\x85"])
-def test_marks_that_only_look_like_ends_of_lines(tmp_path: Path, mark: str) -> None:
-    rows = "".join(f"{index / 100},{index}\n" for index in range(60))
-    series = only(file_of(tmp_path, f"# measured{mark}by me\ntime [s],a{mark}b\n{rows}"))
-    np.testing.assert_array_equal(series.values, [np.arange(60)])
-
-
 def test_rows_that_are_cut_are_gaps(tmp_path: Path) -> None:
     rows = [f"{index},1\n" for index in range(60)]
     rows[30] = "3\n"
@@ -429,3 +422,30 @@ def test_columns_that_are_shown_alike_are_told_apart(tmp_path: Path) -> None:
     names = [channel.name for channel in read_csv(path).series[0].channels]
     assert names == ["a\u200b", "a\\u200b (2)"]
     assert len({visible(name) for name in names}) == 2
+
+
+SEPARATORS = "\v\f\x1c\x1d\x1e\x1f\x85\u2028\u2029"
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    remark=st.lists(st.text(st.sampled_from(f'ab #"{SEPARATORS}'), max_size=6), max_size=4),
+    mark=st.sampled_from(SEPARATORS),
+)
+def test_no_mark_above_the_data_costs_a_row(
+    tmp_path_factory: pytest.TempPathFactory, remark: list[str], mark: str
+) -> None:
+    head = "".join(f"# {line}\n" for line in remark)
+    text = f"{head}time [s],a{mark}b [N],remark\n" + "".join(f"{n / 8},{n + 0.5},x{mark}y\n" for n in range(40))
+    contents = read_csv(file_of(tmp_path_factory.mktemp("csv"), text.encode()))
+    (series,) = contents.series
+    np.testing.assert_array_equal(series.values, [np.arange(40) + 0.5])
+    assert contents.unread[0][0] == "remark"
+
+
+@pytest.mark.parametrize("cell", ["1_0", "١٠", "１０", "0x10", "1e1_0"])
+def test_what_is_no_number_elsewhere_is_none_here(tmp_path: Path, cell: str) -> None:
+    rows = "".join(f"{n},{n}\n" for n in range(20))
+    contents = read_csv(file_of(tmp_path, f"a,b\n{rows}{cell},3\n"), sample_rate_hz=1.0, time="none")
+    assert np.isnan(contents.series[0].values[0, -1])
+    assert f"first {cell!r} in line 22" in contents.notes[0]
