@@ -1,7 +1,6 @@
 """Where a model comes from: a file, or an instrument's name; and a log that drives it."""
 
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 
 from chladni.apps.findings import reading_sentences
@@ -15,6 +14,7 @@ from chladni.models.instruments.of_model import instrument_of
 from chladni.signals.errors import ModelError
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.visible import visible
+from chladni.signals.wording import near_words
 
 
 def named_instrument(text: str) -> Instrument:
@@ -26,7 +26,7 @@ def _of_file(text: str) -> Model:
     path = Path(text)
     if path.suffix or path.exists():
         return load_model(path)
-    near = get_close_matches(text, INSTRUMENTS, n=1)
+    near = near_words(text, INSTRUMENTS)
     told = f"did you mean {near[0]}?" if near else f"instruments: {', '.join(INSTRUMENTS)}"
     raise ModelError(f"{text}: no such file, and no instrument of this name; {told}")
 

@@ -110,6 +110,9 @@ def _mistakes(lines: Sequence[str]) -> str:
     if place := re.match(r".+?:(?=\d+: )", lines[0] if lines else ""):
         # All have the same long path in front.
         told[1:] = [line.replace(place[0], "line ", 1) for line in told[1:]]
-    if len(lines) > MOST_MISTAKES:
-        told.append(f"and {counted(len(lines) - MOST_MISTAKES, 'more mistake')}")
+    if more := lines[MOST_MISTAKES:]:
+        # The last line counts those that have none of their own.
+        further = re.fullmatch(r"\.\.\. and (at least )?(\d+) more mistakes?", more[-1])
+        count = len(more) + (int(further[2]) - 1 if further else 0)
+        told.append(f"and {further[1] or '' if further else ''}{counted(count, 'more mistake')}")
     return "; ".join(told)

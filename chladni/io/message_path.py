@@ -3,11 +3,11 @@
 import re
 from collections.abc import Collection
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Literal
 
 from chladni.signals.errors import LogError
 from chladni.signals.visible import as_meant, visible
+from chladni.signals.wording import near_words
 
 Operator = Literal["==", "!=", "<", "<=", ">", ">="]
 FilterValue = str | float | bool
@@ -173,7 +173,7 @@ def near_matches(word: str, known: Collection[str], *, count: int = 3) -> str:
     >>> near_matches("/imu.linear_accel.x", ["/imu.linear_acceleration.x", "/odom.x"])
     'did you mean /imu.linear_acceleration.x?'
     """
-    near = get_close_matches(word, dict.fromkeys(known), n=count, cutoff=0.6)
+    near = near_words(word, dict.fromkeys(known), count=count, cutoff=0.6)
     if near:
         return f"did you mean {' or '.join(map(visible, near))}?"
     first = sorted(known)[:8]

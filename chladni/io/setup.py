@@ -1,6 +1,6 @@
 """Setup file: where the sensors sit, what they measure, and how unusual messages are to be read."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -14,6 +14,7 @@ from chladni.signals.geometry import Geometry, Point
 from chladni.signals.unit_labels import quantity_of_name, read_label
 from chladni.signals.unit_text import in_unit
 from chladni.signals.units import parse_quantity, quantity_by, quotient, si_factor
+from chladni.signals.wording import shown
 
 if TYPE_CHECKING:
     from chladni.io.setup_file import BatchTable, ChannelTable
@@ -201,7 +202,7 @@ def batch_layout(table: "BatchTable") -> BatchLayout:
 
 def _check_references(content: dict[str, Any], mistakes: "TomlMistakes") -> None:
     """Names that must be unique, and names that must be defined."""
-    points = [str(point.get("name")) for _, point in tables(content, "point")]
+    points = dict.fromkeys(str(point.get("name")) for _, point in tables(content, "point"))
     for table, key in (("point", "name"), ("channel", "path"), ("batch", "topic")):
         _check_unique(content, table, key, mistakes)
     for index, line in tables(content, "line"):
@@ -220,9 +221,10 @@ def _check_unique(content: dict[str, Any], table: str, key: str, mistakes: "Toml
     for index, one in tables(content, table):
         name = one.get(key)
         if isinstance(name, str) and name in seen:
-            mistakes.add((table, index, key), f"found {name!r} a second time; one table [[{table}]] for each {key}")
+            told = f"found {shown(name)} a second time; one table [[{table}]] for each {key}"
+            mistakes.add((table, index, key), told)
         seen.add(str(name))
 
 
-def _no_point(name: str, points: list[str]) -> str:
-    return f"found {name!r}, which is no point; {near_matches(name, points)}"
+def _no_point(name: str, points: Collection[str]) -> str:
+    return f"found {shown(name)}, which is no point; {near_matches(name, points)}"

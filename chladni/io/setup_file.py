@@ -1,81 +1,68 @@
 """The setup file as pydantic models; imported only when one is read, since pydantic takes a quarter of a second."""
 
 from collections.abc import Callable
-from typing import Annotated, Literal, Self, TypeVar
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 
 from chladni.signals.channel import unit_direction
 from chladni.signals.errors import SetupError
 from chladni.signals.unit_labels import read_label, require_label
 from chladni.signals.units import parse_quantity, quantity_by, si_factor
 
+if TYPE_CHECKING:
+    from chladni.io.toml_reader import TomlMistakes
+
 T = TypeVar("T")
 
 
-def _checked(value: T, check: Callable[[T], object]) -> T:
-    try:
-        check(value)
-    except SetupError as error:
-        raise ValueError(str(error)) from None
-    return value
+def _checked(check: Callable[[T], object]) -> AfterValidator:
+    """Make a validator of a check; where more is wrong already than is told, nothing is looked at any more."""
+
+    def validated(value: T, info: ValidationInfo) -> T:
+        mistakes: TomlMistakes = info.context
+        # A label that nobody knows is compared with all that are, which takes a millisecond.
+        if mistakes.may_refuse():
+            try:
+                check(value)
+            except SetupError as error:
+                mistakes.refuse()
+                raise ValueError(str(error)) from None
+        return value
+
+    return AfterValidator(validated)
 
 
-def _label(text: str) -> str:
-    # What the log says of the channel may settle which of several meanings it has.
-    return _checked(text, require_label)
-
-
-def _unit(text: str) -> str:
-    return _checked(text, read_label)
-
-
-def _positive(text: str) -> None:
+def _quantity(text: str) -> None:
     if parse_quantity(text)[0] <= 0:
         raise SetupError("must be greater than zero")
-
-
-def _quantity(text: str) -> str:
-    _checked(text, _positive)
     # As labels are read: mV/lb is that of a force or of a mass, and has to say which.
-    _checked(text, lambda quantity: quantity_by(quantity, read_label))
-    return text
+    quantity_by(text, read_label)
 
 
-def _direction(value: "str | Vector3") -> "str | Vector3":
-    return _checked(value, unit_direction)
+def _time_unit(text: str) -> None:
+    if si_factor(text)[1] != "s":
+        raise SetupError("must be a unit of time, such as us")
 
 
-def _time_unit(text: str) -> str:
-    if _checked(text, si_factor) is not None and si_factor(text)[1] != "s":
-        raise ValueError("must be a unit of time, such as us")
-    return text
+def _rate_unit(text: str) -> None:
+    if si_factor(text)[1] != "Hz":
+        raise SetupError("must be a unit of frequency, such as kHz")
 
 
-def _rate_unit(text: str) -> str:
-    if _checked(text, si_factor) is not None and si_factor(text)[1] != "Hz":
-        raise ValueError("must be a unit of frequency, such as kHz")
-    return text
-
-
-def _number_with(value: str | float, si_unit: str) -> str | float:
-    """A number, a quantity such as ``"125 us"``, or the path of a field, which begins with no digit."""
+def _number_with(value: str | float, si_unit: str) -> None:
+    """Take a number, a quantity such as ``"125 us"``, or the path of a field, which begins with no digit."""
     if isinstance(value, float):
-        if value <= 0:
-            raise ValueError("must be greater than zero")
+        number, unit = value, si_unit
     elif value[:1].isdigit():
-        _checked(value, _positive)
-        if parse_quantity(value)[1] != si_unit:
-            raise ValueError(f"must be in {si_unit} or a multiple of it")
-    return value
-
-
-def _rate(value: str | float) -> str | float:
-    return _number_with(value, "Hz")
-
-
-def _period(value: str | float) -> str | float:
-    return _number_with(value, "s")
+        number, unit = parse_quantity(value)
+    else:
+        return
+    if number <= 0:
+        raise SetupError("must be greater than zero")
+    if unit != si_unit:
+        raise SetupError(f"must be in {si_unit} or a multiple of it")
 
 
 # Strict: TOML has types of its own, so "1" is no number; whole numbers count as numbers all the same.
@@ -83,9 +70,10 @@ Number = Annotated[float, Field(strict=True)]
 Vector3 = tuple[Number, Number, Number]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Path = Annotated[str, Field(min_length=1, max_length=1000)]
-Label = Annotated[str, AfterValidator(_label)]
-Unit = Annotated[str, AfterValidator(_unit)]
-Quantity = Annotated[str, AfterValidator(_quantity)]
+# What the log says of the channel may settle which of several meanings a label has.
+Label = Annotated[str, _checked(require_label)]
+Unit = Annotated[str, _checked(read_label)]
+Quantity = Annotated[str, _checked(_quantity)]
 
 
 class _Table(BaseModel):
@@ -104,7 +92,7 @@ class ChannelTable(_Table):
 
     path: Path
     point: Name | None = None
-    direction: Annotated[str | Vector3, AfterValidator(_direction)] | None = None
+    direction: Annotated[str | Vector3, _checked(unit_direction)] | None = None
     unit: Label | None = None
     sensitivity: Quantity | None = None
     range: Quantity | None = None
@@ -122,10 +110,10 @@ class BatchTable(_Table):
 
     topic: Path
     samples: Annotated[str | list[str], Field(min_length=1)]
-    rate: Annotated[str | Number, AfterValidator(_rate)] | None = None
-    rate_unit: Annotated[str, AfterValidator(_rate_unit)] = "Hz"
-    dt: Annotated[str | Number, AfterValidator(_period)] | None = None
-    dt_unit: Annotated[str, AfterValidator(_time_unit)] = "s"
+    rate: Annotated[str | Number, _checked(partial(_number_with, si_unit="Hz"))] | None = None
+    rate_unit: Annotated[str, _checked(_rate_unit)] = "Hz"
+    dt: Annotated[str | Number, _checked(partial(_number_with, si_unit="s"))] | None = None
+    dt_unit: Annotated[str, _checked(_time_unit)] = "s"
     stamp: Literal["first", "last"] = "first"
     names: Annotated[str | list[Name], Field(min_length=1)] | None = None
     layout: Literal["channel", "sample"] = "channel"

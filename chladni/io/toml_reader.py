@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 import tomllib
-from difflib import get_close_matches
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from chladni.signals.wording import counted
+from chladni.io.regular_file import read_text
+from chladni.io.toml_lines import Place, places_of
+from chladni.signals.wording import MOST_SHOWN, counted, near_words, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -27,8 +29,13 @@ MAX_BYTES: Final = 1 << 20
 MAX_MISTAKES: Final = 50
 """Mistakes that are told; one wrong habit can repeat in every table."""
 
-# Lines inside of one table's values that begin like a header, before its lines are looked for the long way.
-_MOST_FALSE_HEADERS = 20
+# Deep enough for any setup or model; messages and checks go as deep as what they are about.
+_MAX_DEPTH: Final = 32
+_TOO_DEEP: Final = "nested too deeply for a file of this kind"
+_MANY_DIGITS: Final = re.compile(r"[0-9_]{4300}")
+_NO_INTEGER: Final = (
+    "a whole number has 64 bits, and must be finite, and within double precision; write one with a decimal point"
+)
 
 _LINE_IN_MESSAGE = re.compile(r"\s*\(at (?:line (\d+), column \d+|end of document)\)$")
 _RULES: dict[str, str] = {
@@ -45,27 +52,64 @@ _RULES: dict[str, str] = {
 }
 
 
+class _EnoughMistakes(Exception):  # noqa: N818  # no error: the search for mistakes ends
+    """As many mistakes as are told have been found."""
+
+
 class TomlMistakes:
-    """Collects mistakes found in one file, and turns them into one error."""
+    """Collects mistakes found in one file, and turns them into one error.
+
+    What they cost is bounded: the search ends with the first mistake beyond those that are told.
+    """
 
     def __init__(self, document: TomlDocument) -> None:
         self._document = document
-        self._told: list[tuple[int, str]] = []
+        self._told: list[tuple[int, Callable[[], str]]] = []
+        self._ended = False
+        self._refused = 0
 
     def add(self, loc: Loc, text: str) -> None:
         """Note a mistake at a place such as ``("channel", 2, "unit")``."""
+        self.require_search()
+        self.add_later(loc, lambda: text)
+
+    def add_later(self, loc: Loc, text: Callable[[], str]) -> None:
+        """Note a mistake whose text is made only when it's told."""
         line = self._document.line_of(loc)
-        self._told.append((line, f"{self._document.name}:{line}: {_place(loc)}{text}"))
+        self._told.append((line, lambda: f"{self._document.name}:{line}: {_place(loc)}{text()}"))
+
+    def require_search(self) -> None:
+        """End the search when more mistakes are known than are told."""
+        if self._ended or len(self._told) > MAX_MISTAKES:
+            self._ended = True
+            raise _EnoughMistakes
+
+    def end_search(self) -> None:
+        """Leave the rest of the file, which is of no sane size."""
+        self._ended = True
+
+    def may_refuse(self) -> bool:
+        """Whether a validator still has to look: not when it has refused more than is told."""
+        self._ended = self._ended or self._refused > MAX_MISTAKES
+        return not self._ended
+
+    def refuse(self) -> None:
+        """Count what a validator refuses, which is told when all are done."""
+        self._refused += 1
 
     def __bool__(self) -> bool:
         return bool(self._told)
 
     def error(self, kind: type[ChladniError]) -> ChladniError:
         """Give one error with a line for each mistake, in the order of the file."""
-        lines = list(dict.fromkeys(text for _, text in sorted(self._told)))
-        more = len(lines) - MAX_MISTAKES
-        told = [f"... and {counted(more, 'more mistake')}"] if more > 0 else []
-        return kind(*lines[:MAX_MISTAKES], *told)
+        told: dict[str, None] = {}
+        found = sorted(self._told, key=lambda one: one[0])
+        while found and len(told) < MAX_MISTAKES:
+            told[found.pop(0)[1]()] = None
+        # One slip may be found twice, by the table's model and by what refers to it.
+        more = len({text() for _, text in found} - told.keys()) if len(found) < MAX_MISTAKES else len(found)
+        least = "at least " if self._ended else ""
+        return kind(*told, *([f"... and {least}{counted(more, 'more mistake')}"] if more else []))
 
 
 class TomlDocument:
@@ -81,20 +125,28 @@ class TomlDocument:
     Raises
     ------
     ChladniError
-        Of the kind given, when the text is no TOML; the message names the line.
+        Of the kind given, when the text is no TOML, a whole number has more than the 64 bits of TOML's, or tables lie
+        deeper in each other than any that are read; the message names the line.
     """
 
     def __init__(self, text: str, *, name: str, kind: type[ChladniError]) -> None:
         self.name = name
-        self._lines = text.replace("\r\n", "\n").split("\n")
-        self._kind = kind
-        self._tables: dict[Loc, tuple[int, int]] | None = None
+        self._text = text.replace("\r\n", "\n")
+        self._places: Place | None = None
         try:
             self.content: dict[str, Any] = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
-            raise kind(_syntax_message(str(error), name, self._lines)) from None
+            raise kind(_syntax_message(str(error), name, self._text.split("\n"))) from None
         except RecursionError:
-            raise kind(f"{name}:1: tables or lists are nested too deeply for a file of this kind") from None
+            raise kind(f"{name}:1: tables or lists are {_TOO_DEEP}") from None
+        except ValueError:
+            # The only one that is left to Python: more digits than it makes a number of.
+            line = next((n for n, one in enumerate(self._text.split("\n"), 1) if _MANY_DIGITS.search(one)), 1)
+            raise kind(f"{name}:{line}: found a number of thousands of digits; {_NO_INTEGER}") from None
+        found = _impossible(self.content)
+        if found is not None:
+            loc, rule = found
+            raise kind(f"{self.place(loc)}: {_place(loc)}{rule}")
 
     def place(self, loc: Loc) -> str:
         """``file:line`` of a value or table."""
@@ -102,54 +154,9 @@ class TomlDocument:
 
     def line_of(self, loc: Loc) -> int:
         """Line, from 1, in which the value at `loc` starts; for a missing value the line of its table."""
-        while loc and not _holds(self.content, loc):
-            loc = loc[:-1]
-        if not loc:
-            return 1
-        if self._tables is None:
-            self._tables = _table_lines(self._lines, self.content)
-        span = self._tables.get(loc[:2])
-        if span is None:
-            return self._bisected(loc)
-        # A file may have thousands of mistakes: each is looked for in the few lines of its own table.
-        table = TomlDocument("\n".join(self._lines[span[0] : span[1]]), name=self.name, kind=self._kind)
-        return span[0] + table._bisected((loc[0], 0, *loc[2:]))
-
-    def _bisected(self, loc: Loc) -> int:
-        """Line of a value that is there.
-
-        The prefixes of a file that end at a whole line are TOML themselves (unless the cut is inside a value), and
-        a value stands in the first prefix that has it.
-        """
-        low, high = 0, len(self._lines)
-        while high - low > 1:
-            middle = (low + high) // 2
-            cut, content = self._prefix(middle, low)
-            if cut > low and _holds(content, loc):
-                high = cut
-            else:
-                # Nothing between `cut` and `middle` parses: a value goes over several lines.
-                low = middle
-        return self._first_line(loc, high)
-
-    def _prefix(self, lines: int, at_least: int) -> tuple[int, dict[str, Any]]:
-        """Longest prefix of at most `lines` and more than `at_least` lines that parses."""
-        while lines > at_least:
-            try:
-                return lines, tomllib.loads("\n".join(self._lines[:lines]))
-            except tomllib.TOMLDecodeError:
-                lines -= 1
-        return at_least, {}
-
-    def _first_line(self, loc: Loc, last: int) -> int:
-        """A value that ends in line `last` starts behind the longest shorter prefix that parses."""
-        start, _ = self._prefix(last - 1, 0)
-        key = str(next(part for part in reversed(loc) if isinstance(part, str)))
-        for line in range(start + 1, last + 1):
-            text = self._lines[line - 1].strip()
-            if key in text and not text.startswith("#"):
-                return line
-        return last
+        if self._places is None:
+            self._places = places_of(self._text)
+        return self._places.line_of(loc)
 
 
 def read_toml(
@@ -185,14 +192,18 @@ def read_toml(
     ChladniError
         Of the kind given, one line for each mistake: ``file:line: table key: found, rule``.
     """
-    document = TomlDocument(_text(path, kind), name=str(path), kind=kind)
+    document = TomlDocument(read_text(path, MAX_BYTES, kind), name=str(path), kind=kind)
     mistakes = TomlMistakes(document)
     content = _validated(document.content, model, mistakes)
     if content is None and not document.content:
         # Rather than a list of all that it should hold.
         raise kind(f"{path}: is empty, or holds comments alone; write the file, or name another")
-    if check is not None:
-        check(document.content, mistakes)
+    try:
+        if check is not None:
+            mistakes.require_search()
+            check(document.content, mistakes)
+    except _EnoughMistakes:
+        raise mistakes.error(kind) from None
     if content is None or mistakes:
         raise mistakes.error(kind)
     return content, document
@@ -211,27 +222,14 @@ def _validated(content: dict[str, Any], model: type[ModelT], mistakes: TomlMista
     from pydantic import ValidationError
 
     try:
-        return model.model_validate(content)
+        return model.model_validate(content, context=mistakes)
     except ValidationError as error:
         for one in error.errors(include_url=False):
             loc = tuple(part for part in one["loc"] if isinstance(part, int) or not part.startswith("function-"))
-            mistakes.add(loc, _mistake(one["type"], one["msg"], one["input"], loc, model))
+            if one["type"] == "too_long":
+                mistakes.end_search()
+            mistakes.add_later(loc, partial(_mistake, one["type"], one["msg"], one["input"], loc, model))
         return None
-
-
-def _text(path: Path, kind: type[ChladniError]) -> str:
-    try:
-        with path.open("rb") as file:
-            raw = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise kind(f"{path}: can't be read: {error.strerror or error}") from None
-    if len(raw) > MAX_BYTES:
-        raise kind(f"{path}: is larger than {MAX_BYTES} bytes, the most that a file of this kind may have")
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise kind(f"{path}:{line}: byte {raw[error.start]:#04x} isn't UTF-8; save the file as UTF-8") from None
 
 
 def _syntax_message(message: str, name: str, lines: list[str]) -> str:
@@ -240,7 +238,7 @@ def _syntax_message(message: str, name: str, lines: list[str]) -> str:
     what = _LINE_IN_MESSAGE.sub("", message)
     # Python says what it expected, not what it met: the line itself names the key.
     met = lines[line - 1].strip()
-    return f"{name}:{line}: not TOML: {what[:1].lower()}{what[1:]}{f', in {_shown(met)}' if met else ''}"
+    return f"{name}:{line}: not TOML: {what[:1].lower()}{what[1:]}{f', in {shown(met)}' if met else ''}"
 
 
 def _mistake(kind: str, message: str, found: object, loc: Loc, model: type[BaseModel]) -> str:
@@ -248,18 +246,15 @@ def _mistake(kind: str, message: str, found: object, loc: Loc, model: type[BaseM
         return "is missing, and is needed"
     if kind == "extra_forbidden":
         known = _known_keys(model, loc[:-1])
-        near = get_close_matches(str(loc[-1]), known, n=1)
+        near = near_words(str(loc[-1]), known)
         advice = f"did you mean {near[0]}?" if near else f"known keys: {', '.join(known)}"
         return f"unknown key; {advice}"
+    if kind == "too_long":
+        return message.replace("List should have", "must have").replace(" after validation", "")
     if kind == "value_error" and isinstance(found, dict):
         return message.removeprefix("Value error, ")
     rule = _RULES.get(kind, message.removeprefix("Value error, ").replace("Input should", "must", 1))
-    return f"found {_shown(found)}; {rule}"
-
-
-def _shown(found: object) -> str:
-    text = repr(found)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return f"found {shown(found)}; {rule}"
 
 
 def _known_keys(model: type[BaseModel], loc: Sequence[str | int]) -> list[str]:
@@ -282,51 +277,18 @@ def _model_in(annotation: Any) -> Any:
     return next((model for model in map(_model_in, inner) if model is not None), None)
 
 
-def _table_lines(lines: list[str], content: dict[str, Any]) -> dict[Loc, tuple[int, int]]:
-    """Lines ``[first, last)`` of the tables ``[[name]]``, by name and index.
-
-    Lines that look like a header may stand inside of text or of a list over several lines, and a table may go on
-    under ``[name.key]``. So only names are taken whose tables, each read by itself, are those of the whole file.
-    """
-    headers = [line for line, text in enumerate(lines) if text.lstrip().startswith("[")]
-    spans: dict[Loc, tuple[int, int]] = {}
-    counts: dict[str, int] = {}
-    place = 0
-    while place < len(headers):
-        start, place, read = headers[place], *_one_table(lines, headers, place)
-        for name, table in read.items():
-            index = counts.get(name, 0)
-            counts[name] = index + 1
-            listed = content.get(name)
-            # By their text, because nan is not equal to itself.
-            if isinstance(listed, list) and repr([table]) == repr(listed[index : index + 1]):
-                spans[name, index] = (start, headers[place] if place < len(headers) else len(lines))
-    return {loc: span for loc, span in spans.items() if counts[str(loc[0])] == len(content[str(loc[0])])}
-
-
-def _one_table(lines: list[str], headers: list[int], place: int) -> tuple[int, dict[str, Any]]:
-    """Read the table ``[[name]]`` below a header; give the place of the next header, and the table by its name."""
-    for following in range(place + 1, min(place + 1 + _MOST_FALSE_HEADERS, len(headers)) + 1):
-        last = headers[following] if following < len(headers) else len(lines)
-        try:
-            read = tomllib.loads("\n".join(lines[headers[place] : last]))
-        except tomllib.TOMLDecodeError:
-            # What looked like the next header stands inside of a value.
-            continue
-        return following, {name: listed[0] for name, listed in read.items() if isinstance(listed, list)}
-    return place + 1, {}
-
-
-def _holds(content: Any, loc: Loc) -> bool:
-    for part in loc:
-        match content, part:
-            case dict(), str() if part in content:
-                content = content[part]
-            case list(), int() if part < len(content):
-                content = content[part]
-            case _:
-                return False
-    return True
+def _impossible(content: dict[str, Any]) -> tuple[Loc, str] | None:
+    """Where a value lies too deep, or is a whole number that TOML doesn't have; and what is wrong with it."""
+    waiting: list[tuple[Loc, Any]] = [((), content)]
+    while waiting:
+        loc, found = waiting.pop()
+        if isinstance(found, int) and not -(2**63) <= found < 2**63:
+            return loc, f"found a whole number of {found.bit_length()} bits; {_NO_INTEGER}"
+        entries = found.items() if isinstance(found, dict) else enumerate(found) if isinstance(found, list) else ()
+        if entries and len(loc) >= _MAX_DEPTH:
+            return loc, f"is {_TOO_DEEP}"
+        waiting += [((*loc, key), inner) for key, inner in entries]
+    return None
 
 
 def _place(loc: Loc) -> str:
@@ -338,5 +300,6 @@ def _place(loc: Loc) -> str:
         if isinstance(part, int):
             parts.append(str(part + 1))
         else:
-            parts.append(f"[[{part}]]" if isinstance(following, int) and len(parts) == 0 else part)
+            short = part if len(part) <= MOST_SHOWN else f"{part[:MOST_SHOWN]}..."
+            parts.append(f"[[{short}]]" if isinstance(following, int) and len(parts) == 0 else short)
     return f"{' '.join(parts)}: "

@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite, sqrt
+from math import frexp, inf, isfinite, ldexp, sqrt
 from typing import Literal, Self
 
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.visible import place_of
+from chladni.signals.wording import shown
 
 Role = Literal["response", "reference"]
 Vector = tuple[float, float, float]
@@ -80,10 +81,16 @@ def unit_direction(direction: str | Iterable[float]) -> Vector:
     """
     if isinstance(direction, str):
         if direction not in AXES:
-            raise SetupError(f"direction {direction!r} is none of {', '.join(AXES)}; or give a vector")
+            raise SetupError(f"direction {shown(direction)} is none of {', '.join(AXES)}; or give a vector")
         return AXES[direction]
-    components = tuple(float(component) for component in direction)
-    length = sqrt(sum(component**2 for component in components))
-    if len(components) != 3 or not isfinite(length) or length == 0:
-        raise SetupError(f"direction {components} must be three finite numbers, not all zero")
-    return (components[0] / length, components[1] / length, components[2] / length)
+    try:
+        components = [float(component) for component in direction]
+    except OverflowError:
+        components = [inf]
+    largest = max(map(abs, components), default=0.0)
+    if len(components) != 3 or not all(map(isfinite, components)) or largest == 0:
+        raise SetupError(f"direction {shown(components)} must be three finite numbers, not all zero")
+    # Squares of large numbers overflow, and those of small ones vanish; a power of two takes no digit.
+    x, y, z = (ldexp(component, -frexp(largest)[1]) for component in components)
+    length = sqrt(x**2 + y**2 + z**2)
+    return (x / length, y / length, z / length)

@@ -182,7 +182,7 @@ dt = 3
     expected = [
         "4: [[point]] 1 position 3: found inf; must be finite, not inf or nan",
         "7: [[point]] 2 name: found 'wrist' a second time; one table [[point]] for each name",
-        "8: [[point]] 2 position 2: found 'a'; must be a number",
+        "10: [[point]] 2 position 2: found 'a'; must be a number",
         "14: [[channel]] 1 point: found 'wris', which is no point; did you mean wrist?",
         "15: [[channel]] 1 directio: unknown key; did you mean direction?",
         "16: [[channel]] 1 direction: found '+q'",

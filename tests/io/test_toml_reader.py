@@ -1,14 +1,20 @@
 """Lines of TOML values, and files that are no TOML."""
 
+import os
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 from unittest import mock
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import BaseModel, ConfigDict
 
-from chladni.io.toml_reader import MAX_BYTES, MAX_MISTAKES, TomlDocument, read_toml, tables
+from chladni.io.toml_lines import Place, places_of
+from chladni.io.toml_reader import MAX_BYTES, MAX_MISTAKES, TomlDocument, TomlMistakes, read_toml, tables
 from chladni.signals.errors import ModelError
+from chladni.signals.wording import near_words
 
 
 class Part(BaseModel):
@@ -57,7 +63,7 @@ a.b.c = 3
         (("part", 1, "mass"), 6),
         (("part", 1, "place", "y"), 7),
         (("part", 1, "note"), 8),
-        (("part", 1, "list", 1), 11),
+        (("part", 1, "list", 1), 14),
         (("part", 1, "missing"), 4),
         (("tolerance",), 16),
         (("tolerance", "part.mass"), 17),
@@ -114,7 +120,7 @@ x = [
     ("loc", "line"),
     [
         (("part", 0, "mass"), 7),
-        (("part", 0, "grid", 1), 12),
+        (("part", 0, "grid", 1), 14),
         (("part", 0, "place", "x"), 17),
         (("part", 1), 18),
         (("part", 1, "mass"), 19),
@@ -135,13 +141,109 @@ def test_a_list_with_many_lines_in_brackets_is_no_heap_of_tables() -> None:
     assert document(text).line_of(("part", 0, "grid")) == 3
 
 
-def test_a_thousand_mistakes_take_no_longer_than_their_tables() -> None:
-    # Every look-up parses a few lines, not the file: counted, since time depends on the machine.
-    text = "".join(f"[[part]]\nmass = {n}.0\n" for n in range(1000))
-    whole = document(text)
-    with mock.patch("chladni.io.toml_reader.tomllib.loads", wraps=tomllib.loads) as loads:
-        assert [whole.line_of(("part", n, "mass")) for n in range(1000)] == list(range(2, 2001, 2))
-    assert max(len(call.args[0]) for call in loads.call_args_list) < 60
+PIECES = [
+    "{key} = 1",
+    "{key} = 1979-05-27 07:32:00 # = [x]",
+    '{key} = """\n[[a]]\nb = \\""" c\n"""""',
+    "{key} = '''\n[a]\nb = 2''''",
+    '{key} = "[a] # \\" b = 3"',
+    "{key} = [ # one\n  1,\n  [2, 1979-05-27 07:32:00], # two\n  {{ b = 4, c.d = [5] }},\n]",
+    "{key} = {{ b = {{ }}, 'c d' = \"x\" }}",
+    '{key}.b."c.d" = 6',
+    '"{key} x" = [ ]',
+    "[{key}]",
+    "[ {key} . b ]",
+    "[[{key}]]",
+    "[[{key}.b]]",
+    "# [[{key}]]",
+    "",
+]
+
+
+def keys_of(content: object) -> object:
+    """Keys and indices of all that lies in a value, without the values."""
+    if isinstance(content, dict):
+        return {key: keys_of(inner) for key, inner in content.items()}
+    return {place: keys_of(inner) for place, inner in enumerate(content)} if isinstance(content, list) else {}
+
+
+def places_in(place: Place) -> object:
+    return {key: places_in(inner) for key, inner in place.inner.items()}
+
+
+@given(pieces=st.lists(st.tuples(st.sampled_from(PIECES), st.sampled_from("abc")), max_size=12))
+def test_every_value_of_any_file_has_its_line(pieces: list[tuple[str, str]]) -> None:
+    valid: list[str] = []
+    for piece, key in pieces:
+        # What doesn't fit to the lines above it is left out.
+        with suppress(tomllib.TOMLDecodeError):
+            tomllib.loads("\n".join([*valid, piece.format(key=key)]))
+            valid.append(piece.format(key=key))
+    text = "\n".join(valid)
+    content = tomllib.loads(text)
+    places = places_of(text)
+    assert places_in(places) == keys_of(content)
+    # A key first stands in the first line with which the file has it.
+    lines = text.split("\n")
+    for key in content:
+        assert key.split()[0] in lines[places.line_of((key,)) - 1]
+
+
+def test_what_many_mistakes_cost_is_bounded(tmp_path: Path) -> None:
+    looked = 0
+
+    def check(content: dict[str, object], mistakes: TomlMistakes) -> None:
+        nonlocal looked
+        for place, _ in tables(content, "part"):
+            looked += 1
+            mistakes.add(("part", place), "is wrong")
+
+    path = tmp_path / "m.toml"
+    path.write_text("[[part]]\nmass = 1\n" * 20_000)
+    with pytest.raises(ModelError, match=r"\.\.\. and at least 1 more mistake$"):
+        read_toml(path, Model, kind=ModelError, check=check)
+    assert looked == MAX_MISTAKES + 2
+    path.write_text("".join(f"key{n} = 1\n" for n in range(20_000)))
+    with (
+        mock.patch("chladni.io.toml_reader.near_words", wraps=near_words) as near,
+        pytest.raises(ModelError, match="at least 19950 more mistakes"),
+    ):
+        read_toml(path, Model, kind=ModelError, check=check)
+    assert near.call_count == MAX_MISTAKES
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (f"a = 1\nb = {'9' * 5000}", "m.toml:2: found a number of thousands of digits; a whole number has 64 bits"),
+        (f"a = 1\nb = [1, 0x{'f' * 5000}]", "m.toml:2: [[b]] 2: found a whole number of 20000 bits; a whole number"),
+        ("b = 9223372036854775808", "m.toml:1: b: found a whole number of 64 bits"),
+        (f"c = 1\n{'.'.join('ab' * 3000)} = 1", "is nested too deeply for a file of this kind"),
+        (f"a = {'[' * 40}{']' * 40}", "is nested too deeply for a file of this kind"),
+        (f"{'x' * 100_000} = 1", "unknown key; known keys: part, tolerance"),
+    ],
+)
+def test_numbers_and_tables_that_no_file_has(tmp_path: Path, text: str, told: str) -> None:
+    found = read(tmp_path, text)
+    assert told in found
+    assert len(found) < 400
+
+
+def test_the_least_and_greatest_whole_numbers_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text("[tolerance]\na = -9223372036854775808\nb = 9223372036854775807")
+    assert read_toml(path, Model, kind=ModelError)[0].tolerance == {"a": -(2.0**63), "b": 2.0**63}
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_refused_without_waiting(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "m.toml")
+    with pytest.raises(ModelError, match=r"m\.toml: is a named pipe; files alone are read"):
+        read_toml(tmp_path / "m.toml", Model, kind=ModelError)
+    with pytest.raises(ModelError, match="is a folder"):
+        read_toml(tmp_path, Model, kind=ModelError)
+    with pytest.raises(ModelError, match="is a device"):
+        read_toml(Path("/dev/zero"), Model, kind=ModelError)
 
 
 def read(tmp_path: Path, content: str | bytes) -> str:

@@ -33,9 +33,9 @@ def test_whole_numbers_come_back(number: int) -> None:
 
 @pytest.mark.parametrize("text", ["1_0", "1_000.5", "١٢", "１２", "1e1_0", "1\u00a0", "", "-", "0x1f", "one"])
 def test_what_is_no_number_in_a_file(text: str) -> None:
-    with pytest.raises(ValueError, match="number|convert|literal"):
+    with pytest.raises(ValueError, match=r"number|convert|literal"):
         real_number(text)
-    with pytest.raises(ValueError, match="number|literal"):
+    with pytest.raises(ValueError, match=r"number|literal"):
         whole_number(text)
 
 

@@ -335,3 +335,15 @@ def test_assert_close_sees_every_difference() -> None:
         assert_close(masked[0], masked[1], rtol=1.0)
     with pytest.raises(AssertionError):
         assert_close(masked[0], series(), rtol=1.0)
+
+
+@pytest.mark.parametrize("scale", [1e308, 1.0, 1e-300, 5e-324])
+def test_directions_of_any_length(scale: float) -> None:
+    assert unit_direction([scale, 0.0, -scale]) == pytest.approx((0.5**0.5, 0.0, -(0.5**0.5)), rel=1e-15)
+
+
+@pytest.mark.parametrize("direction", [[1e308, float("inf"), 0.0], [0, 0, 0], [10**400, 0, 0], [1, 2], "x" * 100_000])
+def test_what_is_no_direction_is_told_briefly(direction: list[float] | str) -> None:
+    with pytest.raises(SetupError, match="direction") as caught:
+        unit_direction(direction)
+    assert len(str(caught.value)) < 200

@@ -3,12 +3,12 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from math import inf, isfinite
 from typing import Literal, Self
 
 from chladni.signals.errors import ModelError
 from chladni.signals.number_range import LARGEST_OF_MODEL, SMALLEST_OF_MODEL
+from chladni.signals.wording import near_words
 
 Role = Literal["construction", "function"]
 
@@ -145,7 +145,7 @@ class Parameters(Mapping[str, Parameter]):
         """Give the named parameter; `ModelError` that names the nearest one when it's missing."""
         if name in self:
             return self[name]
-        near = get_close_matches(name, list(self), n=1)
+        near = near_words(name, list(self))
         advice = f"did you mean {near[0]}?" if near else f"parameters: {', '.join(self)}"
         raise ModelError(f"no parameter {name!r}; {advice}")
 

@@ -2,9 +2,9 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
 
 from chladni.models.core.port import PortKind
+from chladni.signals.wording import near_words
 
 # A catalogue is shown whole, a model's sites need not be.
 MOST_NAMES = 30
@@ -33,7 +33,7 @@ def nearest(name: str, known: Iterable[str], what: str) -> str:
     'effects: coulomb_friction, stribeck_friction, delay'
     """
     names = list(dict.fromkeys(known))
-    near = get_close_matches(name, names, n=1) or _with_a_word_like(name, names)
+    near = near_words(name, names) or _with_a_word_like(name, names)
     if near:
         return f"did you mean {' or '.join(near)}?"
     more = ", ..." if len(names) > MOST_NAMES else ""
@@ -44,7 +44,7 @@ def _with_a_word_like(name: str, names: Sequence[str]) -> list[str]:
     """Names that hold the word nearest to `name`: ``friction`` alone is far from ``coulomb_friction`` as a whole."""
     words = {one: re.split(r"[_.]", one) for one in names}
     every = list(dict.fromkeys(word for parts in words.values() for word in parts))
-    near = get_close_matches(name, every, n=1, cutoff=LIKE_A_WORD)
+    near = near_words(name, every, cutoff=LIKE_A_WORD)
     holders = [one for one, parts in words.items() if near and near[0] in parts]
     # A word that many share, such as a body's in the names of its parameters, tells nothing.
     return holders if len(holders) <= MOST_LIKE else []

@@ -1,7 +1,6 @@
 """All kinds of elements by the word that files use."""
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 from types import MappingProxyType
 
 from chladni.models.elements.basic import BASIC
@@ -11,6 +10,7 @@ from chladni.models.elements.element import Element, ElementKind
 from chladni.models.elements.mechanical import MECHANICAL
 from chladni.models.elements.regulators import REGULATORS
 from chladni.signals.errors import ModelError
+from chladni.signals.wording import near_words
 
 #: Every kind of element by name, in the order in which people learn them.
 ELEMENTS: Mapping[str, ElementKind] = MappingProxyType(
@@ -22,7 +22,7 @@ def element_kind(name: str) -> ElementKind:
     """Give the named kind; `ModelError` that names the nearest one when there's none."""
     if name in ELEMENTS:
         return ELEMENTS[name]
-    near = get_close_matches(name, ELEMENTS, n=1)
+    near = near_words(name, ELEMENTS)
     raise ModelError(
         f"no element {name!r:.60}; " + (f"did you mean {near[0]}?" if near else f"kinds: {', '.join(ELEMENTS)}")
     )

@@ -8,6 +8,7 @@ from chladni.models.files.quantity import dimension
 from chladni.models.structures.controller import Controller, Law, controller_units, gains_of
 from chladni.signals.errors import SetupError
 from chladni.signals.units import parse_quantity
+from chladni.signals.wording import shown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +72,7 @@ def _gain(file: FileReading, loc: Loc, found: object) -> _WithUnit | None:
     """Any unit will do: it says in what the controller's own command is measured."""
     value = file.number(loc, found, None)
     if value == 0:
-        file.mistakes.add(loc, f"found {found!r}; a gain of zero drives nothing")
+        file.mistakes.add(loc, f"found {shown(found)}; a gain of zero drives nothing")
     if not value:
         return None
     return _WithUnit(value, parse_quantity(found)[1] if isinstance(found, str) else None)
@@ -89,7 +90,7 @@ def _limit(
         unit = ends.driven
     value = file.number(loc, found, unit)
     if value is not None and value <= 0:
-        file.mistakes.add(loc, f"found {found!r}; must be above zero")
+        file.mistakes.add(loc, f"found {shown(found)}; must be above zero")
         return None
     return None if value is None else _WithUnit(value, None if unit == command else unit)
 

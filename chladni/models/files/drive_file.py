@@ -15,6 +15,7 @@ from chladni.models.files.site_units import SiteUnits, compiled_site_units
 from chladni.models.files.tolerances import with_tolerances
 from chladni.models.structures.wiring import name_mistakes
 from chladni.signals.errors import ModelError
+from chladni.signals.wording import shown
 
 
 def read_drive(path: Path) -> DriveModel:
@@ -57,8 +58,8 @@ class _DriveReading:
         if model is None or self._mistakes:
             return []
         model = replace(model, parameters=with_tolerances(model.parameters, *tolerances))
-        for count in range(len(effects)):
-            self._file.tried(("effect", count), model.with_effects(effects[: count + 1]).compile)
+        found = model
+        self._file.refused_with("effect", len(effects), lambda count: found.with_effects(effects[:count]).compile())
         return [model.with_effects(effects)]
 
     def _kind(self) -> DriveKind | None:
@@ -89,7 +90,7 @@ class _DriveReading:
                 wish = nearest(signal, known, f"{part}s")
                 self._mistakes.add((part, place, "signal"), f"no {part} {signal!r:.60}; {wish}")
             elif signal in [one.signal for one in chosen]:
-                self._mistakes.add((part, place, "signal"), f"{signal!r} is chosen a second time; once is enough")
+                self._mistakes.add((part, place, "signal"), f"{shown(signal)} is chosen twice; once is enough")
             else:
                 name, channel = self._file.text(table, "name") or "", self._file.text(table, "channel")
                 chosen.append(ChosenSignal(signal=signal, name=name, channel=channel))

@@ -12,6 +12,7 @@ from chladni.models.effects.wording import nearest
 from chladni.models.files.quantity import is_finite, number
 from chladni.models.files.site_units import SiteUnits
 from chladni.signals.errors import ModelError
+from chladni.signals.wording import shown
 
 T = TypeVar("T")
 Content = dict[str, Any]
@@ -48,7 +49,7 @@ class FileReading:
             return None
         value = self.tried(loc, lambda: number(found, unit))
         if value is not None and at_least is not None and value < at_least:
-            self.mistakes.add(loc, f"found {found!r}; must be {at_least:g} or more")
+            self.mistakes.add(loc, f"found {shown(found)}; must be {at_least:g} or more")
             return None
         return value
 
@@ -80,6 +81,24 @@ class FileReading:
             self.mistakes.add(loc, str(error))
             return None
 
+    def refused_with(self, table: str, count: int, made: Callable[[int], object]) -> bool:
+        """Whether `made` refuses `count` tables; the mistake is told at one without which it takes those before.
+
+        A compilation of a large model takes seconds, so that table is found by halving.
+        """
+        low, high, told = 0, count + 1, ""
+        middle = count
+        while middle > low:
+            try:
+                made(middle)
+                low = middle
+            except ModelError as error:
+                high, told = middle, str(error)
+            middle = (low + high) // 2
+        if told:
+            self.mistakes.add((table, high - 1), told)
+        return bool(told)
+
     def effects(self, sites: Mapping[str, SiteUnits | None]) -> list[Effect]:
         """Effects of the file; `sites` by name, None where a mistake hides which units they have."""
         found = [self._effect(place, table, sites) for place, table in self.tables("effect")]
@@ -106,7 +125,7 @@ class FileReading:
     def _names_parameter(self, loc: Loc, key: str, parameters: Parameters | None) -> bool:
         if parameters is None or key in parameters:
             return parameters is not None
-        self.mistakes.add(loc, f"no parameter {key!r}; {nearest(key, list(parameters), 'parameters')}")
+        self.mistakes.add(loc, f"no parameter {shown(key)}; {nearest(key, list(parameters), 'parameters')}")
         return False
 
     def _effect(self, place: int, table: Content, sites: Mapping[str, SiteUnits | None]) -> Effect | None:

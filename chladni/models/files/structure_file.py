@@ -17,6 +17,7 @@ from chladni.models.structures.structure_model import StructureModel
 from chladni.models.structures.structure_output import StructureOutput, measure_unit
 from chladni.models.structures.wiring import Wiring, joint_mistakes, name_mistakes, wiring_mistakes
 from chladni.signals.errors import ModelError
+from chladni.signals.wording import shown
 
 _PARTS: Final = ("body", "joint", "input", "output", "controller")
 _INPUT_KINDS: Final = ("force", "base_acceleration", "displacement", "disturbance")
@@ -172,7 +173,7 @@ class _StructureReading:
             self._mistakes.add((part, place, "joint"), f"{name!r:.60} is no joint; {wish}")
             return None
         if given == ["at"] and name in joints:
-            self._mistakes.add((part, place, "at"), f'{name!r} is a joint; write joint = "{name}"')
+            self._mistakes.add((part, place, "at"), f'{shown(name)} is a joint; write joint = "{name}"')
             return None
         return name
 
@@ -256,16 +257,17 @@ class _StructureReading:
 
     def _note_equations(self, model: StructureModel) -> None:
         """Note what only the equations show: a loop without solution, an effect that doesn't fit its site."""
-        # One more at a time, so that the mistake is told at the table that brings it in.
-        for count in range(len(model.controllers)):
-            closed = {one.name for one in model.controllers[: count + 1]}
+
+        def with_controllers(count: int) -> object:
+            closed = {one.name for one in model.controllers[:count]}
             inputs = tuple(one for one in model.inputs if one.kind != "disturbance" or one.at in closed)
-            part = replace(model, controllers=model.controllers[: count + 1], inputs=inputs, effects=())
-            if self._file.tried(("controller", count), part.compile) is None:
-                return
-        for count in range(len(model.effects)):
-            if self._file.tried(("effect", count), model.with_effects(model.effects[: count + 1]).compile) is None:
-                return
+            return replace(model, controllers=model.controllers[:count], inputs=inputs, effects=()).compile()
+
+        if self._file.refused_with("controller", len(model.controllers), with_controllers):
+            return
+        self._file.refused_with(
+            "effect", len(model.effects), lambda count: model.with_effects(model.effects[:count]).compile()
+        )
 
 
 def _made(records: Sequence[Any]) -> tuple[Any, ...]:

@@ -1,20 +1,21 @@
 """Files of variants: rows of parameters, one row a variant, which may grow while they are watched."""
 
 import time
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from csv import Error as CsvError
 from csv import reader
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 
+from chladni.io.regular_file import read_text
+from chladni.io.toml_reader import TomlDocument
 from chladni.models.analysis.variants import Variant
 from chladni.models.core.instrument import Option
 from chladni.models.core.parameter import Parameters
 from chladni.models.files.quantity import number
 from chladni.signals.errors import ModelError
 from chladni.signals.text_reading import lines_of, real_number
+from chladni.signals.wording import near_words, shown
 
 FORMAT = "chladni.variants/1"
 MAX_BYTES = 1 << 20
@@ -61,7 +62,7 @@ def read_variants(path: Path | str, parameters: Parameters, options: Sequence[Op
         One line with file, line and column for what is wrong; the nearest name for an unknown one.
     """
     path = Path(path)
-    return _parsed(path, _text(path), parameters, options)
+    return _parsed(path, read_text(path, MAX_BYTES, ModelError), parameters, options)
 
 
 class VariantsWatch:
@@ -93,7 +94,7 @@ class VariantsWatch:
     def poll(self) -> VariantsState:
         """Look at the file, and give what holds now."""
         try:
-            text = _text(self._path)
+            text = read_text(self._path, MAX_BYTES, ModelError)
         except ModelError as error:
             self._state = VariantsState(variants=self._state.variants, mistake=str(error))
             self._seen, self._settled = None, False
@@ -135,28 +136,13 @@ def watch_variants(
         time.sleep(poll_s)
 
 
-def _text(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            raw = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise ModelError(f"{path}: can't be read: {error.strerror or error}") from None
-    if len(raw) > MAX_BYTES:
-        raise ModelError(f"{path}: is larger than {MAX_BYTES} bytes, the most that a file of variants may have")
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise ModelError(f"{path}:{line}: byte {raw[error.start]:#04x} isn't UTF-8; save the file as UTF-8") from None
-
-
 def _parsed(path: Path, text: str, parameters: Parameters, options: Sequence[Option]) -> tuple[Variant, ...]:
     rows = _Rows(path, parameters, options)
     found = tuple(rows.from_toml(text) if path.suffix.lower() == ".toml" else rows.from_csv(text))
     names = [variant.name for variant in found]
     for name in names:
         if names.count(name) > 1:
-            raise ModelError(f"{path}: {names.count(name)} variants are called {name!r}; give each its own name")
+            raise ModelError(f"{path}: {names.count(name)} variants are called {shown(name)}; give each its own name")
     return found
 
 
@@ -184,12 +170,9 @@ class _Rows:
             raise ModelError(f"{self._path}:{lines.line_num}: not CSV: {error}") from None
 
     def from_toml(self, text: str) -> Iterator[Variant]:
-        try:
-            content = tomllib.loads(text)
-        except (tomllib.TOMLDecodeError, RecursionError) as error:
-            raise ModelError(f"{self._path}: not TOML: {error}") from None
+        content = TomlDocument(text, name=str(self._path), kind=ModelError).content
         if content.get("format") != FORMAT:
-            raise ModelError(f'{self._path}: format is {content.get("format")!r}; write format = "{FORMAT}"')
+            raise ModelError(f'{self._path}: format is {shown(content.get("format"))}; write format = "{FORMAT}"')
         extra = [key for key in content if key not in ("format", "variant")]
         tables = content.get("variant", [])
         if extra or not isinstance(tables, list):
@@ -249,21 +232,21 @@ class _Rows:
     def _word(self, key: str, found: object, where: str) -> str:
         choices = self._options[key].choices
         if found not in choices:
-            raise ModelError(f"{where}: column {key}: found {found!r}; must be one of {', '.join(choices)}")
+            raise ModelError(f"{where}: column {key}: found {shown(found)}; must be one of {', '.join(choices)}")
         return str(found)
 
     def _require_known(self, name: str, where: str) -> None:
         known = [NAME, *self._parameters, *self._options]
         if name not in known:
-            near = get_close_matches(name, known, n=1)
+            near = near_words(name, known)
             advice = f"did you mean {near[0]}?" if near else f"columns: {', '.join(known)}"
-            raise ModelError(f"{where}: no parameter is called {name!r}; {advice}")
+            raise ModelError(f"{where}: no parameter is called {shown(name)}; {advice}")
 
 
 def _si(found: object, written: str, wanted: str) -> float:
     """Give a cell in SI: a bare number is in the unit `written` after its title, or in SI without one."""
     if isinstance(found, bool) or not isinstance(found, (int, float, str)):
-        raise ModelError(f"found {found!r}; must be a number, or text with a unit")
+        raise ModelError(f"found {shown(found)}; must be a number, or text with a unit")
     if isinstance(found, str):
         try:
             found = real_number(found)

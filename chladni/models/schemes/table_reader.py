@@ -15,6 +15,7 @@ from chladni.models.schemes.scheme_output import SchemeOutput
 from chladni.models.schemes.wiring import MAX_BLOCKS, nearest
 from chladni.signals.errors import ModelError, SetupError
 from chladni.signals.units import parse_quantity, si_factor
+from chladni.signals.wording import shown
 
 T = TypeVar("T")
 #: Place of a value: ``("block", 2, "parameters", "gain")``, tables counted from 0.
@@ -170,7 +171,7 @@ class TableReader:
         for kind, names in named:
             for place, name in enumerate(names):
                 if name in taken:
-                    self._tell((kind, place, "name"), f"the name {name!r} is taken; names are unique")
+                    self._tell((kind, place, "name"), f"the name {shown(name)} is taken; names are unique")
                 taken.add(name)
 
     def number(self, loc: Loc, value: object, unit: str | None) -> float | None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from chladni.models.schemes.block import Block, require_name
 from chladni.models.schemes.scheme_output import SchemeOutput
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
+from chladni.signals.wording import near_words
 
 #: Most blocks of a scheme: matrices grow with the square of the number.
 MAX_BLOCKS = 1000
@@ -83,7 +83,7 @@ def _source_names(blocks: Sequence[Block], inputs: Sequence[Terminal]) -> list[s
 def nearest(name: str, known: Iterable[str]) -> str:
     """Advice for a name that is unknown."""
     known = list(known)
-    near = get_close_matches(name, known, n=1)
+    near = near_words(name, known)
     return f"did you mean {near[0]}?" if near else f"there are: {', '.join(known[:20])}"
 
 

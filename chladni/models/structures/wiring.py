@@ -3,12 +3,12 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import NamedTuple
 
 from chladni.models.structures.structure import GROUND, Motion
 from chladni.models.structures.structure_input import StructureInput
 from chladni.models.structures.structure_output import StructureOutput
+from chladni.signals.wording import near_words
 
 NAME_RULE = "names begin with a letter and go on with letters, digits, _ and -, up to 100"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
@@ -207,7 +207,7 @@ def _article(word: str) -> str:
 
 def _nothing(name: str, what: str, known: Mapping[str, object] | Sequence[str]) -> str:
     names = list(known)
-    near = get_close_matches(name, names, n=1)
+    near = near_words(name, names)
     # A structure may have a thousand bodies; a message holds twenty.
     listed = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
     advice = f"did you mean {near[0]!r}?" if near else f"there are: {listed or 'none'}"

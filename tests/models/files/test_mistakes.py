@@ -133,7 +133,7 @@ DRIVE_MISTAKES = [
     ('signal = "velocity"', '@signal = "speed"', "[[output]] 1 signal: no output 'speed'; outputs: displacement"),
     ('signal = "velocity"', '@sgnal = "velocity"', "[[output]] 1 sgnal: unknown key; did you mean signal?"),
     ('name = "v"', '@name = "flow"', "[[output]] 1 name: the name 'flow' is taken by an input"),
-    ('name = "v"', 'name = "v"\n[[output]]\n@signal = "velocity"', "'velocity' is chosen a second time"),
+    ('name = "v"', 'name = "v"\n[[output]]\n@signal = "velocity"', "'velocity' is chosen twice"),
     ('"50 cm/s"', '"50 cm"', "[[effect]] 1 parameters limit: found '50 cm', which is in m; must be a number in m/s"),
     ('site = "v"', '@site = "w"', "[[effect]] 1 site: no site 'w'; sites: "),
     ('site = "v"', 'site = "flow"', "limit: found '50 cm/s', which is in m/s"),
@@ -232,6 +232,18 @@ def test_a_thousand_parts_are_enough(tmp_path: Path) -> None:
     text = f'format = "chladni.model/1"\nname = "many"\nkind = "structure"\n{bodies}'
     assert "body: " in (line := told(tmp_path, text)[0])
     assert "at most 1000 items" in line
+
+
+@pytest.mark.parametrize("wrong", [0, 3, 6])
+def test_of_many_effects_the_one_that_does_not_fit_is_told(tmp_path: Path, wrong: int) -> None:
+    head = STRUCTURE[: STRUCTURE.index("[[effect]]")]
+    sites = ["elbow" if place != wrong else "wrist" for place in range(7)]
+    effects = "".join(
+        f'[[effect]]\neffect = "coulomb_friction"\nsite = "{site}"\nparameters = {{ force = 1.0 }}\n'
+        for site in sites
+    )
+    (line,) = told(tmp_path, head + effects)
+    assert f"[[effect]] {wrong + 1}: coulomb_friction acts at a joint" in line
 
 
 def test_a_structure_without_bodies_is_refused(tmp_path: Path) -> None:

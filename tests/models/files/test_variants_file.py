@@ -1,6 +1,7 @@
 """Files of variants: what is read, what is refused in one line, and how a file that grows is watched."""
 
 import itertools
+import os
 from pathlib import Path
 
 import pytest
@@ -59,6 +60,8 @@ def test_a_toml_table_is_a_variant(tmp_path: Path) -> None:
     ("text", "said"),
     [
         ("aktive_area\n1\n", ":1: no parameter is called 'aktive_area'; did you mean active_area?"),
+        ("reduced_mass\n1_0\n", ":2: column reduced_mass: unit '_'"),
+        ("reduced_mass\n\n1\x0c2\n", ":3: column reduced_mass:"),
         ("q\n1\n", ":1: no parameter is called 'q'; columns: name, active_area, reduced_mass, loop"),
         ("reduced_mass,reduced_mass\n1,2\n", ":1: column reduced_mass stands there 2 times"),
         ("reduced_mass\n1\nheavy\n", ":3: column reduced_mass:"),
@@ -79,7 +82,9 @@ def test_a_wrong_csv_is_refused_in_one_line(tmp_path: Path, text: str, said: str
     ("text", "said"),
     [
         ("[[variant]]\n", 'write format = "chladni.variants/1"'),
-        ("= 3", "not TOML"),
+        ("= 3", ":1: not TOML"),
+        (f"a = {'9' * 5000}", ":1: found a number of thousands of digits"),
+        (f"a.{'b.' * 5000}c = 1", "nested too deeply"),
         ('format = "chladni.variants/1"\nvariants = 3\n', "found variants; each variant is a [[variant]] table"),
         ('format = "chladni.variants/1"\nvariant = [1]\n', "[[variant]] 1: must be a table"),
         ('format = "chladni.variants/1"\n[[variant]]\nreduced_mas = 1\n', "did you mean reduced_mass?"),
@@ -170,3 +175,11 @@ def test_watching_tells_each_state_once(tmp_path: Path) -> None:
     states = list(watch_variants(path, PARAMETERS, poll_s=0.0, go_on=go_on))
 
     assert [len(state.variants) for state in states] == [1, 2]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_refused_and_watched_without_waiting(tmp_path: Path) -> None:
+    path = tmp_path / "rows.csv"
+    os.mkfifo(path)
+    assert "is a named pipe" in refused(path)
+    assert "is a named pipe" in VariantsWatch(path, PARAMETERS).poll().mistake
