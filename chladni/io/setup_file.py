@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeVar, cast
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 
@@ -21,7 +21,7 @@ def _checked(check: Callable[[T], object]) -> AfterValidator:
     """Make a validator of a check; where more is wrong already than is told, nothing is looked at any more."""
 
     def validated(value: T, info: ValidationInfo) -> T:
-        mistakes: TomlMistakes = info.context
+        mistakes = cast("TomlMistakes", info.context)
         # A label that nobody knows is compared with all that are, which takes a millisecond.
         if mistakes.may_refuse():
             try:

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import re
 import tomllib
-from functools import partial
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final
 
 from chladni.io.regular_file import read_text
 from chladni.io.toml_lines import Place, places_of
-from chladni.signals.wording import MOST_SHOWN, counted, near_words, shown
+from chladni.io.validation import ModelT, place_words, validated
+from chladni.signals.wording import counted, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable
     from pathlib import Path
 
-    from pydantic import BaseModel
-
+    from chladni.io.validation import Loc
     from chladni.signals.errors import ChladniError
-
-    Loc = tuple[str | int, ...]
-
-ModelT = TypeVar("ModelT", bound="BaseModel")
 
 MAX_BYTES: Final = 1 << 20
 """Largest file that is read; a setup of a thousand sensors takes a tenth."""
@@ -38,18 +33,6 @@ _NO_INTEGER: Final = (
 )
 
 _LINE_IN_MESSAGE = re.compile(r"\s*\(at (?:line (\d+), column \d+|end of document)\)$")
-_RULES: dict[str, str] = {
-    "string_type": "must be text in quotes",
-    "float_type": "must be a number",
-    "float_parsing": "must be a number",
-    "int_type": "must be a whole number",
-    "bool_type": "must be true or false",
-    "list_type": "must be a list in brackets",
-    "tuple_type": "must be a list in brackets",
-    "dict_type": "must be a table",
-    "model_type": "must be a table",
-    "finite_number": "must be finite, not inf or nan",
-}
 
 
 class _EnoughMistakes(Exception):  # noqa: N818  # no error: the search for mistakes ends
@@ -76,7 +59,7 @@ class TomlMistakes:
     def add_later(self, loc: Loc, text: Callable[[], str]) -> None:
         """Note a mistake whose text is made only when it's told."""
         line = self._document.line_of(loc)
-        self._told.append((line, lambda: f"{self._document.name}:{line}: {_place(loc)}{text()}"))
+        self._told.append((line, lambda: f"{self._document.name}:{line}: {place_words(loc)}{text()}"))
 
     def require_search(self) -> None:
         """End the search when more mistakes are known than are told."""
@@ -146,7 +129,7 @@ class TomlDocument:
         found = _impossible(self.content)
         if found is not None:
             loc, rule = found
-            raise kind(f"{self.place(loc)}: {_place(loc)}{rule}")
+            raise kind(f"{self.place(loc)}: {place_words(loc)}{rule}")
 
     def place(self, loc: Loc) -> str:
         """``file:line`` of a value or table."""
@@ -219,17 +202,12 @@ def tables(content: dict[str, Any], name: str) -> list[tuple[int, dict[str, Any]
 
 def _validated(content: dict[str, Any], model: type[ModelT], mistakes: TomlMistakes) -> ModelT | None:
     """Validate content against a model; None when `mistakes` were added."""
-    from pydantic import ValidationError
-
-    try:
-        return model.model_validate(content, context=mistakes)
-    except ValidationError as error:
-        for one in error.errors(include_url=False):
-            loc = tuple(part for part in one["loc"] if isinstance(part, int) or not part.startswith("function-"))
-            if one["type"] == "too_long":
-                mistakes.end_search()
-            mistakes.add_later(loc, partial(_mistake, one["type"], one["msg"], one["input"], loc, model))
-        return None
+    read, found = validated(content, model, context=mistakes)
+    for one in found:
+        if one.too_long:
+            mistakes.end_search()
+        mistakes.add_later(one.loc, one.text)
+    return read
 
 
 def _syntax_message(message: str, name: str, lines: list[str]) -> str:
@@ -239,42 +217,6 @@ def _syntax_message(message: str, name: str, lines: list[str]) -> str:
     # Python says what it expected, not what it met: the line itself names the key.
     met = lines[line - 1].strip()
     return f"{name}:{line}: not TOML: {what[:1].lower()}{what[1:]}{f', in {shown(met)}' if met else ''}"
-
-
-def _mistake(kind: str, message: str, found: object, loc: Loc, model: type[BaseModel]) -> str:
-    if kind == "missing":
-        return "is missing, and is needed"
-    if kind == "extra_forbidden":
-        known = _known_keys(model, loc[:-1])
-        near = near_words(str(loc[-1]), known)
-        advice = f"did you mean {near[0]}?" if near else f"known keys: {', '.join(known)}"
-        return f"unknown key; {advice}"
-    if kind == "too_long":
-        return message.replace("List should have", "must have").replace(" after validation", "")
-    if kind == "value_error" and isinstance(found, dict):
-        return message.removeprefix("Value error, ")
-    rule = _RULES.get(kind, message.removeprefix("Value error, ").replace("Input should", "must", 1))
-    return f"found {shown(found)}; {rule}"
-
-
-def _known_keys(model: type[BaseModel], loc: Sequence[str | int]) -> list[str]:
-    """Keys that the table at `loc` may have."""
-    current: Any = model
-    for part in loc:
-        if isinstance(part, str):
-            field = current.model_fields.get(part)
-            current = None if field is None else _model_in(field.annotation)
-        if current is None:
-            return []
-    return [field.alias or name for name, field in current.model_fields.items()]
-
-
-def _model_in(annotation: Any) -> Any:
-    """Model inside an annotation such as ``list[Point]``, or None."""
-    if hasattr(annotation, "model_fields"):
-        return annotation
-    inner: Iterable[Any] = getattr(annotation, "__args__", ())
-    return next((model for model in map(_model_in, inner) if model is not None), None)
 
 
 def _impossible(content: dict[str, Any]) -> tuple[Loc, str] | None:
@@ -289,17 +231,3 @@ def _impossible(content: dict[str, Any]) -> tuple[Loc, str] | None:
             return loc, f"is {_TOO_DEEP}"
         waiting += [((*loc, key), inner) for key, inner in entries]
     return None
-
-
-def _place(loc: Loc) -> str:
-    """``("channel", 2, "unit")`` as people count: ``[[channel]] 3 unit: ``."""
-    if not loc:
-        return ""
-    parts = []
-    for part, following in zip(loc, (*loc[1:], None), strict=True):
-        if isinstance(part, int):
-            parts.append(str(part + 1))
-        else:
-            short = part if len(part) <= MOST_SHOWN else f"{part[:MOST_SHOWN]}..."
-            parts.append(f"[[{short}]]" if isinstance(following, int) and len(parts) == 0 else short)
-    return f"{' '.join(parts)}: "

@@ -205,7 +205,7 @@ def test_what_many_mistakes_cost_is_bounded(tmp_path: Path) -> None:
     assert looked == MAX_MISTAKES + 2
     path.write_text("".join(f"key{n} = 1\n" for n in range(20_000)))
     with (
-        mock.patch("chladni.io.toml_reader.near_words", wraps=near_words) as near,
+        mock.patch("chladni.io.validation.near_words", wraps=near_words) as near,
         pytest.raises(ModelError, match="at least 19950 more mistakes"),
     ):
         read_toml(path, Model, kind=ModelError, check=check)

@@ -3,12 +3,15 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from chladni.gap.blind.documents import SealedCase, Truth, read_as
 from chladni.gap.blind.seal import CASE_FORMAT, SEALED_FILES, TRUTH_FORMAT, checksum, seal_of
-from chladni.gap.blind.vocabulary import WORDS
+from chladni.io.regular_file import read_text
 from chladni.signals.errors import SetupError
+from chladni.signals.wording import shown
 
 #: Largest JSON that is read, bytes.
 _MOST_BYTES = 16 * 1024 * 1024
@@ -57,12 +60,10 @@ def _folder(path: Path) -> CaseFolder:
     for file in (model, log):
         if not file.is_file():
             raise SetupError(f"{file}: isn't there; a case is a model and a log")
-    seal, words = content.get("seal"), content.get("leave_out", [])
-    if not isinstance(seal, str) or len(seal) != 64:
-        raise SetupError(f"{path}: seal must be 64 hexadecimal digits; seal the case again")
-    if not isinstance(words, list) or not all(word in WORDS for word in words):
-        raise SetupError(f"{path}: leave_out {words!r:.80} must be a list of effects of the vocabulary")
-    return CaseFolder(name=path.parent.name, model=model, log=log, seal=seal, leave_out=frozenset(words))
+    case = read_as(SealedCase, content, str(path), "seal the case again")
+    return CaseFolder(
+        name=path.parent.name, model=model, log=log, seal=case.seal, leave_out=frozenset(case.leave_out)
+    )
 
 
 def truth_of_case(directory: Path, case: CaseFolder) -> Mapping[str, Any]:
@@ -82,17 +83,14 @@ def truth_of_case(directory: Path, case: CaseFolder) -> Mapping[str, Any]:
             f"{path}: doesn't fit the seal of {case.name}: truth or seal were changed after the case was made; "
             "it can't be scored"
         )
-    for key, kind in (("kind", str), ("effects", list)):
-        if not isinstance(truth.get(key), kind):
-            raise SetupError(f"{path}: {key} is missing or no {kind.__name__}")
-    _require_sealed(case, truth.get("files"))
+    read = read_as(Truth, truth, str(path), "seal a whole truth")
+    if read.files is not None:
+        _require_sealed(case, read.files)
     return truth
 
 
-def _require_sealed(case: CaseFolder, checksums: object) -> None:
+def _require_sealed(case: CaseFolder, checksums: Mapping[str, str]) -> None:
     """Refuse a model or a log that was changed; a truth sealed by an earlier version doesn't know them."""
-    if not isinstance(checksums, dict):
-        return
     for file in (case.model, case.log):
         if checksums.get(file.name) != checksum(file):
             raise SetupError(
@@ -101,27 +99,31 @@ def _require_sealed(case: CaseFolder, checksums: object) -> None:
             )
 
 
-def read_json(path: Path, word: str) -> dict[str, Any]:
-    """Read one JSON object of a format.
+def read_json(path: Path, *words: str) -> dict[str, Any]:
+    """Read one JSON object of a format, or of one of several.
 
     Raises
     ------
     SetupError
-        When the file isn't there, is too large, is no such JSON or holds NaN.
+        When the file isn't there, is too large, is no such JSON, or holds what isn't finite.
     """
+    text = read_text(path, _MOST_BYTES, SetupError)
     try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise SetupError(f"{path}: is larger than {_MOST_BYTES} bytes, which no such file is")
-        content = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refused)
-    except OSError as error:
-        raise SetupError(f"{path}: can't be read: {error.strerror or error}") from error
+        content = json.loads(text, parse_constant=_refused, parse_float=_finite)
+        # Seals are of this text; half a surrogate pair, or lists too deep for it, have none.
+        json.dumps(content, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
         raise SetupError(f"{path}: isn't JSON: {error}") from error
-    if not isinstance(content, dict) or content.get("format") != word:
+    if not isinstance(content, dict) or content.get("format") not in words:
         found = content.get("format") if isinstance(content, dict) else type(content).__name__
-        raise SetupError(f"{path}: format is {found!r:.60}; must be {word!r}")
+        raise SetupError(f"{path}: format is {shown(found)}; must be {' or '.join(map(repr, words))}")
     return content
 
 
+def _finite(text: str) -> float:
+    number = float(text)
+    return number if isfinite(number) else _refused(text[:20])
+
+
 def _refused(word: str) -> float:
-    raise ValueError(f"{word} is no number")
+    raise ValueError(f"{word} is no finite number")

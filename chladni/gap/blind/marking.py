@@ -1,14 +1,13 @@
 """Marks one answer against the truth."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from chladni.gap.blind import documents
+from chladni.gap.blind.documents import RESULT_FORMAT, Result, Truth, read_as
 from chladni.gap.blind.vocabulary import FAMILY_OF, OUTSIDE
-from chladni.signals.errors import SetupError
 
-RESULT_FORMAT = "chladni.gap/1"
-VERDICTS = ("none", "parameters", "effect", "unknown")
 #: What a case counts as whose diagnosis failed; it's never right.
 FAILED = "failed"
 
@@ -120,53 +119,53 @@ def mark(name: str, truth: Mapping[str, Any], result: Mapping[str, Any]) -> Mark
     Raises
     ------
     SetupError
-        When the answer breaks its format.
+        When truth or answer break their format, with the key.
     """
-    sound = result.get("format") == RESULT_FORMAT
-    verdict = str(result.get("verdict")) if sound else FAILED
-    if sound and verdict not in VERDICTS:
-        raise SetupError(f"{name}: verdict {verdict!r:.40} is none of {', '.join(VERDICTS)}")
-    gap = result.get("gap") or {}
-    closed, ideal = gap.get("closed"), truth.get("ideal") or 1.0
-    try:
-        causes = tuple(_cause(one) for one in result.get("causes") or () if one.get("effect") != "parameter")
-        naive, alternatives = _naive(result), _alternatives(result)
-    except (KeyError, TypeError, AttributeError) as error:
-        raise SetupError(f"{name}: causes or ranking of its result break the format: {error}") from error
+    return _marked(name, truth_read(truth, name), result_read(result, name))
+
+
+def truth_read(content: Mapping[str, Any], where: str) -> Truth:
+    """Give a truth as what a score goes by; `SetupError` when it breaks its format."""
+    return read_as(Truth, content, where, "seal a whole truth")
+
+
+def result_read(content: Mapping[str, Any], where: str) -> Result | None:
+    """Give an answer as what a score goes by, None of a failed diagnosis; `SetupError` when it breaks its format."""
+    if content.get("format") != RESULT_FORMAT:
+        return None
+    return read_as(Result, content, where, "remove this result, and run the case again")
+
+
+def _marked(name: str, truth: Truth, result: Result | None) -> Mark:
+    answer = result or Result(verdict="unknown")
+    named = answer.causes or ()
+    closed = answer.gap.closed if answer.gap else None
     return Mark(
         name=name,
-        kind=str(truth["kind"]),
-        coloured=bool(truth.get("coloured", False)),
-        hidden=tuple((str(one["effect"]), str(one["site"])) for one in truth["effects"]),
-        off=next(iter(truth.get("off") or {}), ""),
-        verdict=verdict,
-        causes=causes,
-        naive=naive,
-        ratio=truth.get("ratio"),
-        ratio_tuned=truth.get("ratio_tuned"),
-        closed=None if closed is None else float(closed) / float(ideal),
-        alternatives=alternatives,
+        kind=truth.kind,
+        coloured=truth.coloured,
+        hidden=tuple((one.effect, one.site) for one in truth.effects),
+        off=next(iter(truth.off or {}), ""),
+        verdict=answer.verdict if result else FAILED,
+        causes=tuple(_cause(one) for one in named if one.effect != "parameter"),
+        naive=_naive(answer),
+        ratio=truth.ratio,
+        ratio_tuned=truth.ratio_tuned,
+        closed=None if closed is None else closed / (truth.ideal or 1.0),
+        alternatives=tuple(one.effect for one in (named[0].alternatives or () if named else ())),
     )
 
 
-def _cause(one: Mapping[str, Any]) -> Cause:
-    group: Sequence[str] = one.get("group") or ()
-    return Cause(effect=str(one["effect"]), site=str(one["site"]), group=tuple(str(site) for site in group),
-                 probability=float(one.get("probability") or 0.0))  # fmt: skip
+def _cause(one: documents.Cause) -> Cause:
+    return Cause(effect=one.effect, site=one.site, group=tuple(one.group or ()), probability=one.probability or 0.0)
 
 
-def _alternatives(result: Mapping[str, Any]) -> tuple[str, ...]:
-    named = list(result.get("causes") or ())
-    return tuple(str(one["effect"]) for one in (named[0].get("alternatives") or () if named else ()))
-
-
-def _naive(result: Mapping[str, Any]) -> tuple[str, str] | None:
+def _naive(result: Result) -> tuple[str, str] | None:
     """Largest drop in RMS: said by the result, or the smallest gap of its ranking."""
-    told = result.get("naive")
-    if told:
-        return str(told["effect"]), str(told["site"])
-    ranked = [one for one in result.get("ranking") or () if one.get("gap") is not None]
-    if not ranked:
+    if result.naive is not None:
+        return result.naive.effect, result.naive.site
+    ranked = [(one.gap, place) for place, one in enumerate(result.ranking or ()) if one.gap is not None]
+    if not ranked or result.ranking is None:
         return None
-    least = min(ranked, key=lambda one: float(one["gap"]))
-    return str(least["effect"]), str(least["site"])
+    least = result.ranking[min(ranked)[1]]
+    return least.effect, least.site

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from chladni.gap.blind.case_folder import case_folders, read_json, truth_of_case
+from chladni.gap.blind.documents import RESULT_FORMAT
 from chladni.gap.blind.intervals import Share, calibration_error, reliability, share_of
-from chladni.gap.blind.marking import FAILED, RESULT_FORMAT, Mark, mark
+from chladni.gap.blind.marking import FAILED, Mark, mark, result_read
 from chladni.gap.blind.run import FAILURE_FORMAT
 from chladni.gap.blind.seal import write_json
 from chladni.gap.blind.vocabulary import FAMILY_OF
@@ -52,10 +53,10 @@ def score_cases(directory: Path) -> dict[str, Any]:
 
 
 def _result(path: Path) -> dict[str, Any]:
-    try:
-        return read_json(path, RESULT_FORMAT)
-    except SetupError:
-        return read_json(path, FAILURE_FORMAT)
+    content = read_json(path, RESULT_FORMAT, FAILURE_FORMAT)
+    # Here, where the file can be named.
+    result_read(content, str(path))
+    return content
 
 
 def scored(marks: Sequence[Mark]) -> dict[str, Any]:

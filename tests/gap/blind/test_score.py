@@ -1,11 +1,17 @@
 """Marks and figures on answers made up for the purpose."""
 
+import json
+from copy import deepcopy
+from functools import reduce
+
 import pytest
 
+from chladni.gap.blind.case_folder import read_json
 from chladni.gap.blind.intervals import Share, calibration_error, reliability
 from chladni.gap.blind.marking import mark
-from chladni.gap.blind.score import scored
+from chladni.gap.blind.score import score_cases, scored
 from chladni.gap.blind.score_table import HEADER, confusion_rows, detection_rows, markdown, missed_rows, score_rows
+from chladni.gap.blind.seal import seal_case
 from chladni.signals.errors import SetupError
 
 
@@ -201,9 +207,9 @@ def test_numbers_of_few_cases_meet_and_miss_nothing(count, median, tenth, calibr
 @pytest.mark.parametrize(
     ("result", "told"),
     [
-        ({"verdict": "perhaps"}, "verdict 'perhaps'"),
-        ({"verdict": "effect", "causes": [{"site": "m"}]}, "break the format"),
-        ({"verdict": "effect", "causes": [3]}, "break the format"),
+        ({"verdict": "perhaps"}, "x: verdict: found 'perhaps'; must be 'none'"),
+        ({"verdict": "effect", "causes": [{"site": "m"}]}, r"x: causes\[0\]\.effect: is missing"),
+        ({"verdict": "effect", "causes": [3]}, r"x: causes\[0\]: found 3; must be a table"),
     ],
 )
 def test_an_answer_that_breaks_its_format_is_told(result, told):
@@ -225,3 +231,115 @@ def test_tables_say_what_must_be_met():
     header, confusion = confusion_rows(score["confusion"])
     assert markdown(header, confusion).splitlines()[2] == "| delay | 9 | 1 |"
     assert len(detection_rows(score)[1]) == 4
+
+
+TRUTH = {"format": "chladni.blind-truth/1", "kind": "effect", "effects": [{"effect": "delay", "site": "m"}],
+         "off": {"k": 5.0}, "ratio": 9.0, "ratio_tuned": None, "ideal": 1.0, "coloured": False}  # fmt: skip
+RESULT = {
+    "format": "chladni.gap/1", "verdict": "effect",
+    "causes": [{"effect": "delay", "site": "m", "group": ["m"], "probability": 0.9,
+                "alternatives": [{"effect": "lag", "site": "m"}]}],
+    "ranking": [{"effect": "delay", "site": "m", "gap": 0.1}], "naive": {"effect": "lag", "site": "m"},
+    "gap": {"closed": 0.9},
+}  # fmt: skip
+WRONG = [
+    None,
+    True,
+    0,
+    -1,
+    3.5,
+    10**400,
+    1e308,
+    "",
+    "delay",
+    "\ud800",
+    "x" * 5000,
+    [],
+    [1.5],
+    {},
+    {"a": 1},
+    [[]],
+    [{}],
+]
+
+
+def places_in(content, path=()):
+    """Place of every value, at any depth."""
+    keys = range(len(content)) if isinstance(content, list) else content if isinstance(content, dict) else ()
+    return [place for key in keys for place in [(*path, key), *places_in(content[key], (*path, key))]]
+
+
+def changed(content, place, value):
+    """Content with another value at a place; without it where the value is `...`."""
+    again = deepcopy(content)
+    *parents, key = place
+    inner = reduce(lambda outer, one: outer[one], parents, again)
+    if value is ...:
+        del inner[key]
+    else:
+        inner[key] = value
+    return again
+
+
+@pytest.mark.parametrize("whole", [TRUTH, RESULT], ids=["truth", "result"])
+def test_any_value_at_any_key_is_marked_or_told_by_its_key(whole):
+    told = {}
+    for place in places_in(whole):
+        for value in [*WRONG, ...]:
+            wrong = changed(whole, place, value)
+            try:
+                one = mark("x", wrong if whole is TRUTH else TRUTH, wrong if whole is RESULT else RESULT)
+            except SetupError as error:
+                told[place, str(value)] = str(error)
+            else:
+                json.dumps(scored([one]), allow_nan=False)
+    assert len(told) > 100
+    for (place, _), text in told.items():
+        assert text.startswith("x: ")
+        assert str(place[0]) in text
+        assert len(text) < 600
+
+
+CAUSE = {"effect": "delay", "site": "m"}
+
+
+@pytest.mark.parametrize(("key", "value", "named"), [
+    ("causes", [CAUSE | {"probability": "0.9"}], r"causes\[0\]\.probability: found '0\.9'; must be a number"),
+    ("causes", [CAUSE | {"probability": 1.5}], r"causes\[0\]\.probability: found 1\.5; must be less"),
+    ("ranking", [CAUSE | {"gap": -1.0}], r"ranking\[0\]\.gap: found -1\.0; must be greater"),
+    ("gap", [], r"gap: found \[\]; must be a table"),
+    ("gap", {"closed": [1]}, r"gap\.closed: found \[1\]; must be a number"),
+    ("naive", {"effect": "lag"}, r"naive\.site: is missing"),
+])  # fmt: skip
+def test_a_result_on_disk_is_refused_with_its_file_and_key(tmp_path, key, value, named):
+    for name in ("one", "two"):
+        folder = tmp_path / "cases" / name
+        folder.mkdir(parents=True)
+        (folder / "model.toml").write_text("")
+        (folder / "log.mcap").write_bytes(b"")
+        seal_case(tmp_path, name, {"kind": "effect", "effects": TRUTH["effects"]})
+        (tmp_path / "results").mkdir(exist_ok=True)
+        (tmp_path / "results" / f"{name}.json").write_text(
+            json.dumps(RESULT | ({key: value} if name == "two" else {}))
+        )
+    with pytest.raises(
+        SetupError, match=rf"results/two\.json: {named}.*; remove this result, and run the case again"
+    ):
+        score_cases(tmp_path)
+    (tmp_path / "results" / "two.json").unlink()
+    assert score_cases(tmp_path)["missing"] == ["two"]
+
+
+@pytest.mark.parametrize(
+    "text", ['{"x": 1e999}', '{"x": NaN}', '{"x": "\\ud800"}', "[" * 990, "1" * 5000, "{", "\x00", "3"]
+)
+def test_what_is_no_json_is_told_with_its_file(tmp_path, text):
+    path = tmp_path / "a.json"
+    path.write_text(text)
+    with pytest.raises(SetupError, match=r"a\.json: (isn't JSON|format is)"):
+        read_json(path, "chladni.gap/1")
+
+
+def test_a_truth_that_hides_nothing_though_its_kind_does_is_refused():
+    with pytest.raises(SetupError, match="x: kind is two, and effects holds none"):
+        mark("x", {"kind": "two", "effects": []}, RESULT)
