@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from chladni.io.files.formats import MCAP, WRITTEN_SUFFIXES, call_with_options, writer_of
 from chladni.io.log import Log, open_log
 from chladni.io.loss import Unread
+from chladni.io.regular_file import require_regular
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
 
@@ -119,8 +120,9 @@ def _require_paths(source: Path, target: Path, *, overwrite: bool) -> None:
     written = (MCAP, *WRITTEN_SUFFIXES)
     if target.suffix.lower() not in written:
         raise SetupError(f"{target}: the suffix {target.suffix!r} isn't written; supported are {', '.join(written)}")
-    if not source.is_file():
+    if not source.exists():
         raise LogError(f"{source}: no such file")
+    require_regular(source, LogError)
     # Said before the question of overwriting, whose answer would destroy the source.
     if target.exists() and target.samefile(source):
         raise SetupError(f"{target}: is the source itself; name another target")

@@ -1,7 +1,7 @@
 """Tables of Apache Arrow: Parquet, Feather and Arrow files, by pyarrow."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.atomic import atomic_path
+from chladni.io.files.arrow_tables import arrow_table, is_text
+from chladni.io.files.bounds import Budget, TooLargeError
 from chladni.io.files.columns import Column, distinct, parse_titles
-from chladni.io.files.contents import MAX_BYTES, NOTHING, FileContents, joined, one_line, one_series
+from chladni.io.files.contents import FileContents, joined, one_line, one_series
 from chladni.io.files.named_arrays import rate_of_scalar
 from chladni.io.files.series_fields import SERIES_FORMAT, restated, series_fields, series_of_fields
 from chladni.io.files.table import Part, series_of_parts
@@ -34,7 +36,7 @@ def read_arrow(
     time: str | None = None,
     time_unit: str | None = None,
     units: Mapping[str, str] | None = None,
-    max_bytes: int = MAX_BYTES,
+    max_bytes: int | None = None,
 ) -> FileContents:
     """Read a Parquet, Feather or Arrow file: a column for each channel, and one of times.
 
@@ -52,7 +54,7 @@ def read_arrow(
     units
         Unit by column name, instead of those in the file.
     max_bytes
-        Most memory that the columns may take.
+        Most memory that the columns may take, by default as `chladni.io.files.bounds` has it.
 
     Raises
     ------
@@ -64,14 +66,17 @@ def read_arrow(
     import pyarrow as pa
 
     path = Path(path)
+    budget = Budget.of_file(path, max_bytes)
     try:
-        table, told = _table(path, max_bytes)
+        table, told = arrow_table(path, budget)
         table.validate(full=True)
         metadata = _texts(table.schema.metadata)
         if metadata.get("format") == SERIES_FORMAT:
             own = _own(table, metadata.get("series", ""), str(path))
             return joined([told, FileContents(series=restated([own], units, where=str(path)))])
-        columns, unread = _columns(table, metadata)
+        columns, unread = _columns(table, metadata, budget)
+    except TooLargeError as error:
+        raise LogError(f"{path}: {error}") from error
     # Names and texts are decoded when they're looked at.
     except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError) as error:
         raise LogError(f"{path}: this Arrow file can't be read: {one_line(error)}") from error
@@ -121,80 +126,6 @@ def write_arrow(
     return ()
 
 
-def _table(path: Path, max_bytes: int) -> tuple["pa.Table", FileContents]:
-    """Read the whole table, and tell what it lacks; its size is checked before memory is taken for it."""
-    import pyarrow as pa
-    from pyarrow import ipc, parquet
-
-    with path.open("rb") as file:
-        head = file.read(8)
-    if head.startswith(b"PAR1"):
-        with parquet.ParquetFile(path) as source:
-            rows, columns = source.metadata.num_rows, source.metadata.num_columns
-            # A packed column of equal numbers announces any count of rows in a few bytes.
-            _require_bounded(path, rows * columns * 8, max_bytes)
-            return _parquet(source)
-    with pa.OSFile(str(path)) as source:
-        if head.startswith(b"ARROW1"):
-            try:
-                reader = ipc.open_file(source)
-            except pa.ArrowInvalid:
-                # The end is missing, where the places of the batches stand; up to there it is a stream.
-                source.seek(8)
-            else:
-                return _joined(
-                    path, reader.schema, map(reader.get_batch, range(reader.num_record_batches)), max_bytes
-                )
-        stream = ipc.open_stream(source)
-        return _joined(path, stream.schema, iter(stream), max_bytes, closed=not head.startswith(b"ARROW1"))
-
-
-def _parquet(source: Any) -> tuple["pa.Table", FileContents]:
-    """Read all columns, one by one where one of them is damaged."""
-    import pyarrow as pa
-
-    try:
-        return source.read(), NOTHING
-    except (pa.ArrowException, OSError):
-        good, unread = [], []
-        for name in source.schema_arrow.names:
-            try:
-                source.read(columns=[name])
-                good.append(name)
-            except (pa.ArrowException, OSError) as error:
-                unread.append((name, f"damaged ({one_line(error)})"))
-        return source.read(columns=good), FileContents(series=(), unread=tuple(unread))
-
-
-def _joined(
-    path: Path, schema: "pa.Schema", batches: Iterator["pa.RecordBatch"], max_bytes: int, *, closed: bool = True
-) -> tuple["pa.Table", FileContents]:
-    """Put batches together as far as they go."""
-    import pyarrow as pa
-
-    read: list[pa.RecordBatch] = []
-    notes = [] if closed else [f"{path}: was never closed; {{}} rows are read."]
-    try:
-        for batch in batches:
-            # Offsets of text are taken from the file as they are: a wrong one would end the process.
-            batch.validate(full=True)
-            _require_bounded(path, sum(part.nbytes for part in read) + batch.nbytes, max_bytes)
-            read.append(batch)
-    except (pa.ArrowException, OSError) as error:
-        if not read:
-            raise
-        notes = [f"{path}: is cut short or damaged: {{}} rows are read ({one_line(error)})."]
-    table = pa.Table.from_batches(read, schema=schema)
-    return table, FileContents(series=(), notes=tuple(note.format(table.num_rows) for note in notes))
-
-
-def _require_bounded(path: Path, size: int, max_bytes: int) -> None:
-    if size > max_bytes:
-        raise LogError(
-            f"{path}: its columns take {size} bytes, {max_bytes} are allowed; raise max_bytes to read them"
-        )
-
-
 def _texts(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
     return {key.decode(errors="replace"): text.decode(errors="replace") for key, text in (metadata or {}).items()}
 
@@ -209,11 +140,13 @@ def _own(table: "pa.Table", text: str, where: str) -> TimeSeries:
         if not all(good.all() for good in valid):
             fields["valid"] = np.stack(valid, axis=1)
         return series_of_fields(fields, where=where)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, RecursionError) as error:
         raise LogError(f"{where}: the description of its series is damaged: {error}") from error
 
 
-def _columns(table: "pa.Table", metadata: Mapping[str, str]) -> tuple[list[Column], tuple[tuple[str, str], ...]]:
+def _columns(
+    table: "pa.Table", metadata: Mapping[str, str], budget: Budget
+) -> tuple[list[Column], tuple[tuple[str, str], ...]]:
     """Give the columns of numbers, times and text, and why others are none."""
     import pyarrow as pa
 
@@ -225,7 +158,7 @@ def _columns(table: "pa.Table", metadata: Mapping[str, str]) -> tuple[list[Colum
         unit = next((text for key, text in _texts(field.metadata).items() if key in _UNIT_KEYS), None)
         said = unit or by_name.get(field.name) or title.unit
         try:
-            numbers, text = _content(content)
+            numbers, text = _content(content, budget)
         except pa.ArrowException as error:
             unread.append((name, one_line(error)))
             continue
@@ -233,16 +166,18 @@ def _columns(table: "pa.Table", metadata: Mapping[str, str]) -> tuple[list[Colum
     return columns, tuple(unread)
 
 
-def _content(column: "pa.ChunkedArray") -> tuple[NDArray[Any] | None, "pa.Array | None"]:
+def _content(column: "pa.ChunkedArray", budget: Budget) -> tuple[NDArray[Any] | None, "pa.Array | None"]:
     """Give the numbers or the text of a column; an Arrow error for what is neither."""
     import pyarrow as pa
     import pyarrow.types as kinds
 
     kind = column.type
     if kinds.is_dictionary(kind):
+        if is_text(kind.value_type):
+            budget.take(_text_bytes(column))
         column = column.cast(kind.value_type)
         kind = column.type
-    if kinds.is_string(kind) or kinds.is_large_string(kind) or kinds.is_null(kind):
+    if is_text(kind) or kinds.is_null(kind):
         text = column.cast(pa.string()).fill_null("").combine_chunks()
         text.validate(full=True)
         return None, text
@@ -261,10 +196,18 @@ def _content(column: "pa.ChunkedArray") -> tuple[NDArray[Any] | None, "pa.Array 
     return np.asarray(numbers), None
 
 
+def _text_bytes(column: "pa.ChunkedArray") -> int:
+    """Bytes of a column of texts that stand once each, written out for every row."""
+    import pyarrow.compute as pc
+
+    lengths = [pc.binary_length(part.dictionary).take(part.indices) for part in column.chunks]
+    return 8 * len(column) + sum(int(pc.sum(part).as_py() or 0) for part in lengths)
+
+
 def _units_by_name(metadata: Mapping[str, str]) -> dict[str, str]:
     try:
         units = json.loads(metadata.get("units", "{}"))
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     if not isinstance(units, dict):
         return {}

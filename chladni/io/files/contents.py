@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from chladni.signals.mode_set import ModeSet
     from chladni.signals.time_base import TimeBase
 
-MAX_BYTES = 8 * 2**30
-"""Most memory that the arrays of one file may take unless the caller allows more."""
 # As for the topics of a log, see `chladni.io.placement`: points of one grid are never farther apart than this share
 # of a period, and a grid isn't this many times as long as the samples on it.
 _ALIGNED, _SPARSE = 0.01, 100
@@ -87,11 +85,9 @@ def unit_in_si(name: str, label: str) -> tuple[float, str]:
     return read_label(label, quantity=quantity_of_name(name))
 
 
-def _channel_in_si(values: NDArray[np.floating[Any]], channel: Channel) -> tuple[NDArray[np.floating[Any]], str]:
+def _unit_of_channel(channel: Channel) -> tuple[float, str]:
     try:
-        factor, unit = unit_in_si(channel.name, channel.unit)
-        # Values already in SI are given back untouched, to the bit.
-        return (values if factor == 1.0 else values * factor), unit
+        return unit_in_si(channel.name, channel.unit)
     except SetupError as error:
         raise SetupError(f"channel {channel.name!r}: {error}; or state its unit yourself") from error
 
@@ -102,20 +98,27 @@ def unit_of(name: str, found: str | None, units: Mapping[str, str] | None) -> st
 
 
 def series_of_rows(
-    rows: Sequence[NDArray[np.floating[Any]]],
+    rows: Sequence[NDArray[Any]],
     channels: Sequence[Channel],
     *,
     sample_rate_hz: float,
     start_time_ns: int = 0,
 ) -> TimeSeries:
     """Stack rows whose units are any into one series in SI; samples that are no finite numbers count as missing."""
-    converted = [_channel_in_si(row, channel) for row, channel in zip(rows, channels, strict=True)]
-    values = np.stack([row for row, _ in converted])
+    units = [_unit_of_channel(channel) for channel in channels]
+    # Row by row into place: of large files there is no third copy. Integers become double, which has 53 bits of them.
+    single = all(row.dtype == np.float32 for row in rows)
+    values = np.empty((len(rows), len(rows[0])), np.float32 if single else np.float64)
+    for place, (row, (factor, _)) in enumerate(zip(rows, units, strict=True)):
+        values[place] = row
+        # Values already in SI stay untouched, to the bit.
+        if factor != 1.0:
+            values[place] *= factor
     return TimeSeries(
         values=values,
         sample_rate_hz=sample_rate_hz,
         start_time_ns=start_time_ns,
-        channels=tuple(replace(channel, unit=unit) for channel, (_, unit) in zip(channels, converted, strict=True)),
+        channels=tuple(replace(channel, unit=unit) for channel, (_, unit) in zip(channels, units, strict=True)),
         valid=finite_mask(values),
     )
 

@@ -15,6 +15,7 @@ The contract of a reader, which every command relies on::
 A writer is ``writer(series, path, *, overwrite, **options) -> losses``.
 """
 
+import os
 import re
 from collections.abc import Callable
 from inspect import signature
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from chladni.io.files.contents import FileContents
+from chladni.io.regular_file import require_regular
 from chladni.signals.errors import LogError, SetupError
 
 Reader = Callable[..., FileContents]
@@ -131,9 +133,13 @@ def read_file(path: Path | str, *, kind: str | None = None, **options: Any) -> F
         When the suffix isn't known, an option isn't, or an option is missing.
     """
     reader = reader_of(f"a{kind}" if kind else path)
-    if not Path(path).is_file():
+    if not os.path.exists(path):  # noqa: PTH110  # the method raises for names that no file has
         raise LogError(f"{path}: no such file")
-    contents: FileContents = call_with_options(reader, Path(path), options)
+    require_regular(Path(path), LogError)
+    try:
+        contents: FileContents = call_with_options(reader, Path(path), options)
+    except MemoryError as error:
+        raise LogError(f"{path}: takes more memory than there is; save it in parts, and read these") from error
     return contents
 
 

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from chladni.io.files.bounds import read_whole
 from chladni.io.files.columns import Column, distinct, parse_titles
 from chladni.io.files.contents import FileContents, with_notes
 from chladni.io.files.csv import read_csv
@@ -137,7 +138,7 @@ class _Table:
 
 
 def _lines(path: Path) -> tuple[list[str], str]:
-    raw = path.read_bytes()
+    raw = read_whole(path)
     try:
         text, encoding = raw.decode("utf-8-sig"), "utf-8-sig"
     except UnicodeDecodeError:

@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 
 from chladni.io.atomic import atomic_path
-from chladni.io.files.contents import MAX_BYTES, FileContents
+from chladni.io.files.bounds import Budget, read_whole
+from chladni.io.files.contents import FileContents
 from chladni.io.files.mat_elements import HEADER_BYTES, Unreadable, read_mat_elements
 from chladni.io.files.mat_hdf5 import read_mat_hdf5
 from chladni.io.files.named_arrays import series_of_arrays
 from chladni.io.files.series_fields import SERIES_FORMAT, restated, series_fields, series_of_fields
 from chladni.io.files.time_reading import TimeOptions
+from chladni.io.regular_file import open_regular
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
 
@@ -26,7 +28,7 @@ def read_mat(
     time: str | None = None,
     time_unit: str | None = None,
     units: Mapping[str, str] | None = None,
-    max_bytes: int = MAX_BYTES,
+    max_bytes: int | None = None,
 ) -> FileContents:
     """Read our own layout (`chladni.io.files.series_fields`), or any variables with a rate or a time vector.
 
@@ -44,7 +46,7 @@ def read_mat(
     units
         Unit by channel name, instead of that in the file.
     max_bytes
-        Most memory that the variables may take, unpacked.
+        Most memory that the variables may take, unpacked; by default as `chladni.io.files.bounds` has it.
 
     Raises
     ------
@@ -54,13 +56,14 @@ def read_mat(
         When nothing says the sample rate, or a unit is unknown.
     """
     path = Path(path)
-    with path.open("rb") as file:
+    most = Budget.of_file(path, max_bytes).most
+    with open_regular(path, LogError) as file:
         header = file.read(HEADER_BYTES)
     try:
         if header.startswith((b"MATLAB 7.3", b"\x89HDF")):
-            variables = read_mat_hdf5(path, max_bytes=max_bytes)
+            variables = read_mat_hdf5(path, max_bytes=most)
         else:
-            variables = read_mat_elements(_raw(path, header, max_bytes), max_bytes=max_bytes)
+            variables = read_mat_elements(read_whole(path), max_bytes=most)
     except LogError as error:
         raise LogError(f"{path}: this mat file can't be read: {error}") from error
     flat, unread = _flat(variables)
@@ -138,16 +141,8 @@ def _flat(content: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[tuple[str, 
             unread.append((name, "complex numbers, which are no samples"))
         elif isinstance(value, np.ndarray) and value.ndim > 2:
             unread.append((name, f"an array of {value.ndim} axes"))
+        elif isinstance(value, Mapping | list):
+            unread.append((name, f"structs and cells more than {_MAX_DEPTH} deep in each other"))
         else:
             flat[name] = value
     return flat, tuple(unread)
-
-
-def _raw(path: Path, header: bytes, max_bytes: int) -> bytes:
-    if len(header) < HEADER_BYTES or header[126:128] not in (b"IM", b"MI"):
-        raise LogError("it is no mat file of versions 5 to 7.3")
-    # The file itself is held in memory beside its arrays.
-    size = path.stat().st_size
-    if size > max_bytes:
-        raise LogError(f"it has {size} bytes, {max_bytes} are allowed; raise max_bytes to read it")
-    return path.read_bytes()

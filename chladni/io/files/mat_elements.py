@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.files.bounds import Budget, TooLargeError
 from chladni.signals.errors import LogError
 
 HEADER_BYTES = 128
@@ -28,6 +29,11 @@ _OTHERS = {3: "an object of MATLAB", 5: "a sparse matrix", 16: "a function"}
 _COMPLEX = 0x0800
 # Deep enough for any struct a person made; Python's own stack ends at a thousand.
 _MAX_DEPTH = 16
+# As many as NumPy has had in every version.
+_MOST_AXES = 32
+MAX_OBJECTS = 100_000
+"""Members of structs and cells that are read: more than any file a person made."""
+_AT_ONCE = 2**20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,10 +41,6 @@ class Unreadable:
     """In place of a content that isn't read."""
 
     reason: str
-
-
-class _TooLargeError(LogError):
-    """The variables unpack to more than is allowed."""
 
 
 def read_mat_elements(raw: bytes, *, max_bytes: int) -> dict[str, Any]:
@@ -49,7 +51,7 @@ def read_mat_elements(raw: bytes, *, max_bytes: int) -> dict[str, Any]:
     raw
         The whole file.
     max_bytes
-        Most bytes that compressed variables may unpack to, together.
+        Most bytes that the variables may take, together.
 
     Returns
     -------
@@ -62,9 +64,11 @@ def read_mat_elements(raw: bytes, *, max_bytes: int) -> dict[str, Any]:
     LogError
         When nothing can be read, or the variables unpack to more than `max_bytes`.
     """
+    if raw[126:128] not in (b"IM", b"MI"):
+        raise LogError("it is no mat file of versions 5 to 7.3")
     order = "<" if raw[126:128] == b"IM" else ">"
     variables: dict[str, Any] = {}
-    place, left = HEADER_BYTES, max_bytes
+    place, limits = HEADER_BYTES, _Limits(memory=Budget(most=max_bytes))
     while place + 8 <= len(raw):
         kind, length = struct.unpack_from(f"{order}II", raw, place)
         body = memoryview(raw)[place + 8 : place + 8 + length]
@@ -73,13 +77,11 @@ def read_mat_elements(raw: bytes, *, max_bytes: int) -> dict[str, Any]:
         try:
             _require_whole(body, length)
             if kind == _COMPRESSED:
-                unpacked = _unpacked(body, left)
-                left -= len(unpacked)
-                kind, body, _ = _element(memoryview(unpacked), 0, order)
+                kind, body, _ = _element(_unpacked(body, order, limits.memory), 0, order)
             if kind == _MATRIX and len(body):
-                name, content = _Matrix(body=body, order=order).read()
+                name, content = _Matrix(body=body, order=order, limits=limits).read()
                 variables[name] = content
-        except _TooLargeError:
+        except TooLargeError:
             raise
         except LogError as error:
             variables[f"variable {len(variables) + 1}"] = Unreadable(reason=str(error))
@@ -95,18 +97,29 @@ def _require_whole(body: memoryview, length: int) -> None:
         raise LogError(f"a variable claims {length} bytes, {len(body)} are there; it's cut short")
 
 
-def _unpacked(packed: memoryview, allowed: int) -> bytes:
+def _unpacked(packed: memoryview, order: str, memory: Budget) -> memoryview:
+    """Unpack the one element of a compressed variable, whose tag says its length, into memory of that length."""
     unpacker = zlib.decompressobj()
     try:
-        # One byte more than allowed is enough to know, and bounds what a bomb can take.
-        content = unpacker.decompress(packed, allowed + 1)
+        tag = unpacker.decompress(packed, 8)
+        if len(tag) < 8:
+            raise LogError("a compressed variable is damaged (it ends too early)")
+        length = 8 + struct.unpack(f"{order}II", tag)[1]
+        memory.take(length)
+        content = bytearray(length)
+        content[:8], filled = tag, 8
+        # What lies behind the element is read for the checksum at the end, and left.
+        while not unpacker.eof and filled < length + _AT_ONCE:
+            part = unpacker.decompress(unpacker.unconsumed_tail, _AT_ONCE)
+            if not part:
+                break
+            content[filled : filled + len(part)] = part[: max(length - filled, 0)]
+            filled += len(part)
     except zlib.error as error:
         raise LogError(f"a compressed variable is damaged ({error})") from error
-    if len(content) > allowed:
-        raise _TooLargeError("the variables unpack to more bytes than allowed; raise max_bytes to read them")
-    if not unpacker.eof:
+    if filled < length or not unpacker.eof:
         raise LogError("a compressed variable is damaged (it ends too early)")
-    return content
+    return memoryview(content).toreadonly()
 
 
 def _element(raw: memoryview, place: int, order: str) -> tuple[int, memoryview, int]:
@@ -126,11 +139,26 @@ def _element(raw: memoryview, place: int, order: str) -> tuple[int, memoryview, 
 
 
 @dataclass(slots=True, kw_only=True)
+class _Limits:
+    """What the variables of a file may take together."""
+
+    memory: Budget
+    members: int = 0
+
+    def take_members(self, count: int) -> None:
+        """Count members of cells and structs; each is an object, tens of times as large as an empty one's tag."""
+        self.members += count
+        if self.members > MAX_OBJECTS:
+            raise LogError(f"its cells and structs have more than {MAX_OBJECTS} members")
+
+
+@dataclass(slots=True, kw_only=True)
 class _Matrix:
     """Reads one array element; `place` walks over its parts."""
 
     body: memoryview
     order: str
+    limits: "_Limits"
     depth: int = 0
     place: int = 0
 
@@ -139,8 +167,8 @@ class _Matrix:
         if len(flags) and flags[0] & 0xFF == _OPAQUE:
             return self._opaque()
         shape = tuple(int(length) for length in self._numbers(_INT32))
-        if len(flags) != 2 or len(shape) < 2 or min(shape) < 0:
-            raise LogError(f"an array has {len(flags)} flags and the shape {shape}")
+        if len(flags) != 2 or not 2 <= len(shape) <= _MOST_AXES or min(shape) < 0:
+            raise LogError(f"an array has {len(flags)} flags and the shape {shape[:_MOST_AXES]}")
         kind, name, self.place = _element(self.body, self.place, self.order)
         if kind not in _TEXT:
             raise LogError(f"the name of an array has the type {kind}")
@@ -180,6 +208,8 @@ class _Matrix:
         array = self._part(code, shape)
         if not is_complex:
             return array
+        # The imaginary part, that times j, and the sum.
+        self.limits.memory.take(5 * array.nbytes)
         whole: NDArray[Any] = array + 1j * self._part(code, shape)
         return whole
 
@@ -188,8 +218,10 @@ class _Matrix:
         numbers = self._numbers()
         if len(numbers) != prod(shape):
             raise LogError(f"an array of shape {shape} holds {len(numbers)} numbers")
+        if numbers.dtype != np.dtype(code):
+            self.limits.memory.take(len(numbers) * np.dtype(code).itemsize)
         with np.errstate(invalid="ignore", over="ignore"):
-            return numbers.astype(code).reshape(shape, order="F").squeeze()
+            return numbers.astype(code, copy=False).reshape(shape, order="F").squeeze()
 
     def _text(self) -> str:
         kind, content, self.place = _element(self.body, self.place, self.order)
@@ -206,11 +238,15 @@ class _Matrix:
         # Each member takes a tag of 8 bytes at least; a count that can't be is refused before the loop.
         if count * 8 > len(self.body) - self.place:
             raise LogError(f"a cell or struct announces {count} members, more than the file holds")
+        self.limits.take_members(count)
         for _ in range(count):
             kind, body, self.place = _element(self.body, self.place, self.order)
             if kind != _MATRIX:
                 raise LogError(f"a member of a cell or struct has the type {kind}, which is no array")
-            yield _Matrix(body=body, order=self.order, depth=self.depth + 1).read() if len(body) else ("", None)
+            yield self._member(body) if len(body) else ("", None)
+
+    def _member(self, body: memoryview) -> tuple[str, Any]:
+        return _Matrix(body=body, order=self.order, limits=self.limits, depth=self.depth + 1).read()
 
     def _struct(self, count: int) -> Any:
         lengths = self._numbers(_INT32)

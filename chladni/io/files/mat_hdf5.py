@@ -5,19 +5,19 @@ is taken for it.
 """
 
 from dataclasses import dataclass
+from math import prod
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from chladni.io.files.bounds import Budget
 from chladni.io.files.contents import one_line
-from chladni.io.files.mat_elements import Unreadable
+from chladni.io.files.mat_elements import MAX_OBJECTS, Unreadable
 from chladni.signals.errors import LogError
 
 _MAX_DEPTH: Final = 8
-# More objects than any file a person made; one that links to itself would never end.
-_MAX_OBJECTS: Final = 100_000
-# deflate packs no better than 1032:1; what claims to is filled with zeros that nobody wrote.
+# deflate packs no better than 1032:1; what claims to was never written.
 _BEST_PACKING: Final = 1032
 _SMALL_BYTES: Final = 65_536
 _OPAQUE: Final = ("string", "datetime", "duration", "table", "timetable", "categorical")
@@ -54,8 +54,7 @@ class _Reader:
     def __init__(self, h5py: Any, file: Any, max_bytes: int) -> None:
         self._h5py = h5py
         self._file = file
-        self._max_bytes = max_bytes
-        self._bytes = 0
+        self._memory = Budget(most=max_bytes)
         self._objects = 0
         self._groups = {self._address(file)}
 
@@ -81,7 +80,7 @@ class _Reader:
 
     def _member(self, member: Any, depth: int) -> Any:
         self._objects += 1
-        if depth >= _MAX_DEPTH or self._objects > _MAX_OBJECTS:
+        if depth >= _MAX_DEPTH or self._objects > MAX_OBJECTS:
             return Unreadable(reason="structs and cells too deep, or too many of them")
         kind = _text(member.attrs.get("MATLAB_class", b""))
         if "MATLAB_object_decode" in member.attrs or kind in _OPAQUE:
@@ -96,6 +95,8 @@ class _Reader:
             return "" if kind == "char" else np.empty((0, 0))
         self._require_bounded(member)
         if member.dtype == self._h5py.ref_dtype:
+            if member.size > MAX_OBJECTS - self._objects:
+                return Unreadable(reason="a cell of too many members")
             parts = [self._member(self._file[place], depth + 1) for place in member[()].ravel()]
             return parts if kind == "cell" else _OfEach(parts=parts)
         return _array(member, kind)
@@ -110,9 +111,9 @@ class _Reader:
         packing = _BEST_PACKING if member.chunks else 1
         if member.nbytes > packing * held + _SMALL_BYTES:
             raise ValueError(f"it announces {member.nbytes} bytes and holds {held}")
-        self._bytes += int(member.nbytes)
-        if self._bytes > self._max_bytes:
-            raise LogError(f"its variables take more than {self._max_bytes} bytes; raise max_bytes to read them")
+        # A chunk is unpacked whole, however little of it the numbers take.
+        chunk = prod(member.chunks or ()) * member.dtype.itemsize
+        self._memory.take(max(int(member.nbytes), chunk))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,8 +124,8 @@ class _OfEach:
 
 
 def _array(member: Any, kind: str) -> Any:
-    if kind == "char":
-        return "".join(map(chr, member[()].ravel().tolist()))
+    if kind == "char" and member.dtype.kind in "iu":
+        return member[()].astype("<u2").tobytes().decode("utf-16-le", errors="replace")
     if member.dtype.names == ("real", "imag"):
         return Unreadable(reason="complex numbers, which are no samples")
     if member.dtype.kind not in "fiub":

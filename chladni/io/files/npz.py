@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.atomic import atomic_write
-from chladni.io.files.contents import MAX_BYTES, FileContents
+from chladni.io.files.bounds import Budget, TooLargeError
+from chladni.io.files.contents import FileContents, one_line
 from chladni.io.files.named_arrays import series_of_arrays
 from chladni.io.files.series_fields import SERIES_FORMAT, restated, series_fields, series_of_fields
 from chladni.io.files.time_reading import TimeOptions
@@ -20,6 +21,9 @@ from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
 
 _MAX_HEADER = 10_000
+# Vectors and matrices are signals; of our own layout also texts.
+_MOST_AXES = 2
+_READ_KINDS = "fiubmMUS"
 # What zipfile and NumPy raise for archives whose bytes are wrong: a flag that claims encryption is a RuntimeError, an
 # offset that points nowhere an OSError.
 _DAMAGED = (
@@ -44,7 +48,7 @@ def read_npz(
     time: str | None = None,
     time_unit: str | None = None,
     units: Mapping[str, str] | None = None,
-    max_bytes: int = MAX_BYTES,
+    max_bytes: int | None = None,
 ) -> FileContents:
     """Read our own layout (`chladni.io.files.series_fields`), or any arrays with a rate or a time vector.
 
@@ -59,7 +63,8 @@ def read_npz(
     units
         Unit by channel name, instead of that in the file.
     max_bytes
-        Most memory that the arrays may take together; their headers are checked before anything is unpacked.
+        Most memory that the arrays may take together, by default as `chladni.io.files.bounds` has it; their headers
+        are checked before anything is unpacked.
 
     Raises
     ------
@@ -71,14 +76,14 @@ def read_npz(
     path = Path(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            _require_bounded(path, archive, max_bytes)
+            wanted, unread = _wanted(path, archive, Budget.of_file(path, max_bytes))
         with np.load(path, allow_pickle=False) as arrays:
-            content = {name: arrays[name] for name in arrays.files}
+            content = {name: arrays[name] for name in wanted}
     except _DAMAGED as error:
-        raise LogError(f"{path}: this npz file can't be read: {error}") from error
+        raise LogError(f"{path}: this npz file can't be read: {one_line(error)}") from error
     if str(content.get("format", "")) != SERIES_FORMAT:
         options = TimeOptions(column=time, unit=time_unit, rate_hz=sample_rate_hz)
-        return series_of_arrays(content, options, where=str(path), units=units)
+        return series_of_arrays(content, options, where=str(path), units=units, unread=unread)
     groups = _groups(content)
     series = [series_of_fields(fields, where=f"{path}, {name}") for name, fields in groups.items()]
     return FileContents(series=restated(series, units, where=str(path)))
@@ -91,7 +96,7 @@ def read_npy(
     time: str | None = None,
     time_unit: str | None = None,
     units: Mapping[str, str] | None = None,
-    max_bytes: int = MAX_BYTES,
+    max_bytes: int | None = None,
 ) -> FileContents:
     """Read one array: a vector, a matrix with a column or row for each channel, or a structured array.
 
@@ -117,10 +122,11 @@ def read_npy(
     try:
         with path.open("rb") as file:
             shape, dtype = _header(file)
-            _require_held(str(path), shape, dtype, path.stat().st_size - file.tell(), max_bytes)
+            size = _size_held(str(path), shape, dtype, path.stat().st_size - file.tell())
+            _take(str(path), Budget.of_file(path, max_bytes), size)
         array = np.load(path, allow_pickle=False)
     except _DAMAGED as error:
-        raise LogError(f"{path}: this npy file can't be read: {error}") from error
+        raise LogError(f"{path}: this npy file can't be read: {one_line(error)}") from error
     fields = {name: array[name] for name in dtype.names} if dtype.names else {path.stem: array}
     options = TimeOptions(column=time, unit=time_unit, rate_hz=sample_rate_hz)
     return series_of_arrays(fields, options, where=str(path), units=units)
@@ -164,30 +170,44 @@ def _groups(content: Mapping[str, NDArray[Any]]) -> dict[str, dict[str, NDArray[
     return groups
 
 
-def _require_bounded(path: Path, archive: zipfile.ZipFile, max_bytes: int) -> None:
-    """Add up what the array headers announce, without unpacking the arrays."""
-    total = 0
+def _wanted(path: Path, archive: zipfile.ZipFile, budget: Budget) -> tuple[list[str], tuple[tuple[str, str], ...]]:
+    """Give the names of the arrays that may be signals, and why others aren't read; nothing is unpacked.
+
+    Raises
+    ------
+    LogError
+        When an array holds objects, or less than it announces, or all together take more than is allowed.
+    """
+    wanted, unread = [], []
     for entry in archive.infolist():
+        name, where = entry.filename.removesuffix(".npy"), f"{path}: {entry.filename}"
         with archive.open(entry) as file:
             shape, dtype = _header(file)
-        _require_held(f"{path}: {entry.filename}", shape, dtype, entry.file_size, max_bytes)
-        total += entry.file_size
-    if total > max_bytes:
-        raise LogError(
-            f"{path}: its arrays take {total} bytes, {max_bytes} are allowed; raise max_bytes to read them"
-        )
+        size = _size_held(where, shape, dtype, entry.file_size)
+        if len(shape) > _MOST_AXES or dtype.kind not in _READ_KINDS:
+            unread.append((name, f"{dtype} {shape}, which are no samples"))
+            continue
+        _take(where, budget, size)
+        wanted.append(name)
+    return wanted, tuple(unread)
 
 
-def _require_held(where: str, shape: tuple[int, ...], dtype: np.dtype[Any], held: int, max_bytes: int) -> None:
-    """Check an array's header against the bytes that are there: NumPy would allocate what it announces."""
+def _size_held(where: str, shape: tuple[int, ...], dtype: np.dtype[Any], held: int) -> int:
+    """Give the bytes that an array takes; NumPy would allocate what its header announces, whatever is there."""
     if dtype.hasobject:
         raise LogError(f"{where} holds Python objects, which are never loaded; store numbers")
     # Python integers: a product of lengths from a file may well overflow 64 bits.
     size = dtype.itemsize * int(np.prod([int(length) for length in shape], dtype=object))
-    if size > held:
+    if min(shape, default=0) < 0 or size > held:
         raise LogError(f"{where} announces {size} bytes and holds {held}")
-    if size > max_bytes:
-        raise LogError(f"{where} takes {size} bytes, {max_bytes} are allowed; raise max_bytes to read it")
+    return size
+
+
+def _take(where: str, budget: Budget, size: int) -> None:
+    try:
+        budget.take(size)
+    except TooLargeError as error:
+        raise LogError(f"{where}: {error}") from error
 
 
 def _header(file: Any) -> tuple[tuple[int, ...], np.dtype[Any]]:

@@ -163,11 +163,11 @@ def series_of_rows_at(
     if not signals:
         raise LogError(f"{where}: holds a time column and nothing else" if times else f"{where}: holds no numbers")
     channels, notes = channels_of(signals, units, where=where)
-    rows: Rows = [_floating(column.numbers) for column in signals if column.numbers is not None]
+    rows = [column.numbers for column in signals if column.numbers is not None]
     if times is None:
         series = series_of_rows(rows, channels, sample_rate_hz=_rate_hz(columns, options, where))
         return FileContents(series=(series,), notes=notes, unread=unread, time_bases=(None,))
-    placed = _placed(rows, channels, times, options, where)
+    placed = _placed([_floating(row) for row in rows], channels, times, options, where)
     return replace(placed, notes=notes + placed.notes, unread=unread)
 
 

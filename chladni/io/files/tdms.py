@@ -11,11 +11,13 @@ from typing import Any, Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.files.bounds import Budget, TooLargeError
 from chladni.io.files.columns import Column
-from chladni.io.files.contents import MAX_BYTES, FileContents, one_line, with_notes
+from chladni.io.files.contents import FileContents, one_line, with_notes
 from chladni.io.files.table import Part, series_of_parts
 from chladni.io.files.time_column import is_time_name
 from chladni.io.files.time_reading import NO_TIMES, NS_OF, UNIT_OF, TimeOptions, spelled
+from chladni.io.regular_file import open_regular
 from chladni.signals.clock_verdict import round_rate
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import NS_PER_S
@@ -34,7 +36,7 @@ def read_tdms(
     time: str | None = None,
     time_unit: str | None = None,
     units: Mapping[str, str] | None = None,
-    max_bytes: int = MAX_BYTES,
+    max_bytes: int | None = None,
 ) -> FileContents:
     """Read a TDMS file: channels with their ``unit_string``, waveforms with ``wf_increment`` and ``wf_start_time``.
 
@@ -52,7 +54,7 @@ def read_tdms(
     units
         Unit by channel name, instead of those in the file.
     max_bytes
-        Most memory that the channels may take.
+        Most memory that the channels may take, by default as `chladni.io.files.bounds` has it.
 
     Raises
     ------
@@ -68,9 +70,10 @@ def read_tdms(
         raise LogError(
             f"{path}: TDMS files are read by nptdms, which this installation lacks; pip install 'chladni[io]'"
         ) from error
+    budget = Budget.of_file(path, max_bytes)
     # An index beside the file may be one of another file: what is open has none.
-    with _said() as said, path.open("rb") as raw:
-        channels, unread = _channels(path, _answer(path, lambda: TdmsFile.open(raw)), max_bytes)
+    with _said() as said, open_regular(path, LogError) as raw:
+        channels, unread = _channels(path, _answer(path, lambda: TdmsFile.open(raw)), budget)
     options = TimeOptions(column=time, unit=time_unit, rate_hz=sample_rate_hz)
     contents = _contents(path, channels, unread, options, units)
     return with_notes(contents, [f"{path}: {text}." for text in dict.fromkeys(map(one_line, said))][:_MOST_SAID])
@@ -117,9 +120,9 @@ def _answer(where: object, call: Callable[[], _Answer]) -> _Answer:
         raise LogError(f"{where}: this TDMS file can't be read: {one_line(error)}") from error
 
 
-def _channels(path: Path, file: Any, max_bytes: int) -> tuple[list[_Channel], tuple[tuple[str, str], ...]]:
+def _channels(path: Path, file: Any, budget: Budget) -> tuple[list[_Channel], tuple[tuple[str, str], ...]]:
     """Read the channels of numbers, and say why others aren't; sizes are checked before memory is taken for them."""
-    size, taken = path.stat().st_size, 0
+    size = path.stat().st_size
     found = _answer(
         path, lambda: [(group.name, one, len(one), one.dtype) for group in file.groups() for one in group.channels()]
     )
@@ -127,13 +130,12 @@ def _channels(path: Path, file: Any, max_bytes: int) -> tuple[list[_Channel], tu
     channels, unread = [], []
     for group, channel, length, dtype in found:
         name = channel.name if names.count(channel.name) == 1 else f"{group}/{channel.name}"
-        taken += 8 * length
-        if length > size or taken > max_bytes:
-            raise LogError(
-                f"{path}: {name!r} announces {length} numbers, the file has {size} bytes and {max_bytes} are "
-                "allowed; raise max_bytes if it's sound"
-            )
+        # The samples of digital lines have a bit each, none has less.
+        if length > 8 * size:
+            raise LogError(f"{path}: {name!r} announces {length} numbers, the file has {size} bytes")
         reason = _why_unread(dtype, length, channel.properties)
+        if not reason:
+            _take(path, budget, 8 * length)
         try:
             numbers = np.empty(0) if reason else _answer(path, partial(_values, channel))
         except LogError as error:
@@ -146,6 +148,13 @@ def _channels(path: Path, file: Any, max_bytes: int) -> tuple[list[_Channel], tu
         column = Column(name=name, numbers=numbers, unit=said)
         channels.append(_Channel(column=column, group=group, rate_hz=rate_hz, start_ns=start_ns))
     return channels, tuple(unread)
+
+
+def _take(path: Path, budget: Budget, size: int) -> None:
+    try:
+        budget.take(size)
+    except TooLargeError as error:
+        raise LogError(f"{path}: {error}") from error
 
 
 def _values(channel: Any) -> NDArray[Any]:

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 
+from chladni.io.files.bounds import read_whole
 from chladni.io.files.uff_values import fortran_number, layout_of
+from chladni.io.regular_file import require_regular
 from chladni.signals.errors import LogError
 from chladni.signals.text_reading import whole_number
 
@@ -136,9 +138,10 @@ def open_uff(path: Path) -> UniversalFile:
     LogError
         When there is no file, or no dataset in it.
     """
-    if not path.is_file():
+    if not path.exists():
         raise LogError(f"{path}: no such file")
-    content = path.read_bytes()
+    require_regular(path, LogError)
+    content = read_whole(path)
     spans = tuple(_spans(content))
     if not spans:
         raise LogError(

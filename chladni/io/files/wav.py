@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.atomic import atomic_write
+from chladni.io.files.bounds import Budget, TooLargeError, memory_bytes
 from chladni.io.files.contents import FileContents, one_series, require_no_gaps, series_of_rows, unit_of
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
@@ -64,12 +65,15 @@ def read_wav(
     from chladni.signals.units import parse_quantity
 
     path = Path(path)
-    with path.open("rb") as file:
-        encoding, frames, notes, unread = _sound(path, file)
+    try:
+        with path.open("rb") as file:
+            encoding, frames, notes, unread = _sound(path, file)
+    except TooLargeError as error:
+        raise LogError(f"{path}: {error}") from error
     scale, scale_unit = parse_quantity(full_scale)
     values = _fractions(frames).T
     if scale != 1.0:
-        values = values * scale
+        values *= scale
     titles = _names(path, len(values), names)
     for name in units or {}:
         if name not in titles:
@@ -260,6 +264,7 @@ def _extent(
 def _frames(file: IO[bytes], start: int, length: int, encoding: _Encoding) -> NDArray[Any]:
     """Read whole frames, ``[frame, channel]``, integers of three bytes widened to four."""
     frames = length // (encoding.channels * encoding.width)
+    Budget(most=memory_bytes()).take(8 * frames * encoding.channels)
     file.seek(start)
     raw = np.fromfile(file, dtype=np.uint8, count=frames * encoding.channels * encoding.width)
     if encoding.width == 3:
