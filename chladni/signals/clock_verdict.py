@@ -1,7 +1,7 @@
 """What a time base is worth: a word for it, a sentence of advice, and the rate it may be rounded to."""
 
 from dataclasses import replace
-from math import floor, isfinite, log10, pi
+from math import floor, inf, isfinite, log10, pi
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -129,6 +129,8 @@ def round_rate(rate_hz: float, std_hz: float) -> float | None:
 def _round_number(value: float, std: float) -> float | None:
     # Two sigma, and never less than the rounding of the division that gave the value.
     within = max(2 * std, 4e-16 * value)
+    if not 0 < value < inf:
+        return None
     for digits in range(8):
         decimals = digits - floor(log10(value))
         if 10.0**-decimals < 100 * within:

@@ -71,7 +71,8 @@ def _parquet(path: Path, budget: Budget) -> tuple["pa.Table", FileContents]:
         if not _is_flat(field.type)
     ]
     # Of a text that stands in many rows the file has one copy, and so has memory.
-    with parquet.ParquetFile(path, read_dictionary=[field.name for field in flat if is_text(field.type)]) as source:
+    texts = [field.name for field in flat if is_text(field.type)]
+    with parquet.ParquetFile(path, read_dictionary=texts, page_checksum_verification=True) as source:
         # A packed column of equal numbers announces any count of rows in a few bytes.
         budget.take(source.metadata.num_rows * 8 * len(flat))
         names = [field.name for field in flat]

@@ -110,7 +110,9 @@ def series_of_rows(
     single = all(row.dtype == np.float32 for row in rows)
     values = np.empty((len(rows), len(rows[0])), np.float32 if single else np.float64)
     for place, (row, (factor, _)) in enumerate(zip(rows, units, strict=True)):
-        values[place] = row
+        # A damaged row may hold what no processor casts without a word; it counts as missing.
+        with np.errstate(invalid="ignore", over="ignore"):
+            values[place] = row
         # Values already in SI stay untouched, to the bit.
         if factor != 1.0:
             values[place] *= factor

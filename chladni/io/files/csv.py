@@ -92,6 +92,9 @@ def read_csv(
             line += len(lines)
     columns, notes = _columns(path, titles, dialect.units, reader.columns, names)
     contents = series_of_parts([Part(columns=columns)], options, where=str(path), units=units)
+    if above := dialect.rows_above:
+        told = f"{counted(len(above), 'line')} of numbers above the titles left out, the first is line {above[0]}"
+        notes.append(f"{path}: {told}.")
     return with_notes(contents, (*reader.notes(), *notes))
 
 

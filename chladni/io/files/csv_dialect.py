@@ -50,6 +50,8 @@ class CsvDialect:
         For each column, whether most of its cells in the head are numbers.
     blank_ends
         Columns at the end that are blank in the head: delimiters behind the last cell, which lines may lack.
+    rows_above
+        Numbers of the lines above the titles that hold as many numbers as a row.
     """
 
     encoding: str
@@ -60,6 +62,7 @@ class CsvDialect:
     first_data_line: int
     numeric: tuple[bool, ...]
     blank_ends: int = 0
+    rows_above: tuple[int, ...] = ()
 
     @property
     def columns(self) -> int:
@@ -117,14 +120,16 @@ def sniff_csv(path: Path, *, decimal: str | None = None) -> CsvDialect:
         (run for run in runs if 2 * len(run.lines) >= longest), key=lambda run: (run.numeric, run.delimiter != LONE)
     )
     first = _first_row(lines, rows)
-    header, units = _titles(path, lines[:first], rows)
+    header, units, titled = _titles(path, lines[:first], rows)
     return CsvDialect(
         encoding=encoding,
         delimiter=rows.delimiter,
         decimal_commas=_decimal_commas(path, rows, decimal),
         header=header,
         units=units,
-        first_data_line=first,
+        # What stands between the titles and the first line that looks like a row is one that doesn't.
+        first_data_line=titled or first,
+        rows_above=_rows_above(lines[:titled], rows),
         numeric=tuple(
             2 * sum(is_number(cell) for cell in cells) > len(cells) for cells in zip(*rows.lines, strict=True)
         ),
@@ -225,6 +230,15 @@ def _first_row(lines: Sequence[str], rows: _Rows) -> int:
     return alike[0]
 
 
+def _rows_above(lines: Sequence[str], rows: _Rows) -> tuple[int, ...]:
+    pattern = [_kind(cell) for cell in rows.lines[0]]
+    return tuple(
+        number
+        for number, line in enumerate(lines, start=1)
+        if len(pattern) > 1 and [_kind(cell) for cell in split_cells(line, rows.delimiter)] == pattern
+    )
+
+
 def _titled(lines: Sequence[str], rows: _Rows) -> bool:
     """Whether any of the lines names all columns."""
     return any(_names_all(_fitted(split_cells(line.lstrip("# "), rows.delimiter), rows), rows) for line in lines)
@@ -236,27 +250,29 @@ def _names_all(cells: Sequence[str], rows: _Rows) -> bool:
     )
 
 
-def _titles(path: Path, lines: Sequence[str], rows: _Rows) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Find the names, and the units where the line below holds them."""
+def _titles(path: Path, lines: Sequence[str], rows: _Rows) -> tuple[tuple[str, ...], tuple[str, ...], int]:
+    """Find the names, the units where the line below holds them, and how many lines end with them."""
     columns = len(rows.lines[0])
     # np.savetxt puts # before the titles; some writers end only the rows, others only the titles, with a delimiter.
     # Spreadsheets write the delimiter itself into the first line.
     lines = ["" if line.startswith("sep=") else line for line in lines]
     titles = [_fitted(split_cells(line.lstrip("# "), rows.delimiter), rows) for line in lines]
-    found = [cells for cells in titles if any(cells)]
+    found = [(cells, place) for place, cells in enumerate(titles, start=1) if any(cells)]
     if not found:
         if any(line.strip() and not line.startswith("#") for line in lines):
             raise LogError(
                 f"{path}: line {len(lines) + 1} has {columns} columns, but none of the lines above it has as many "
                 "names; give each column a name, or take the lines out"
             )
-        return (), ()
+        return (), (), 0
     units: list[str] = []
-    if len(found) > 1 and _are_units(found[-1]):
-        units = found.pop()
+    end = 0
+    if len(found) > 1 and _are_units(found[-1][0]):
+        units, end = found.pop()
     # Remarks above the titles may have as many cells; the titles are the nearest line that names all columns.
-    full = [cells for cells in found if _names_all(cells, rows)]
-    return tuple((full or found)[-1]), tuple(units)
+    full = [one for one in found if _names_all(one[0], rows)]
+    header, place = (full or found)[-1]
+    return tuple(header), tuple(units), max(place, end)
 
 
 def _fitted(cells: list[str], rows: _Rows) -> list[str]:

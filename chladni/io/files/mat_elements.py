@@ -33,7 +33,7 @@ _MAX_DEPTH = 16
 _MOST_AXES = 32
 MAX_OBJECTS = 100_000
 """Members of structs and cells that are read: more than any file a person made."""
-_AT_ONCE = 2**20
+_AT_ONCE = 2**18
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,10 +81,17 @@ def read_mat_elements(raw: bytes, *, max_bytes: int) -> dict[str, Any]:
             if kind == _MATRIX and len(body):
                 name, content = _Matrix(body=body, order=order, limits=limits).read()
                 variables[name] = content
+            elif kind != _MATRIX and any(body):
+                variables[f"element {len(variables) + 1}"] = Unreadable(
+                    reason=f"of the type {kind}, which is no array"
+                )
         except TooLargeError:
             raise
         except LogError as error:
             variables[f"variable {len(variables) + 1}"] = Unreadable(reason=str(error))
+    if any(raw[place:]):
+        reason = "they belong to no variable; where bytes were added, the numbers behind them are wrong"
+        variables[f"{len(raw) - place} bytes at the end"] = Unreadable(reason=reason)
     read = [content for content in variables.values() if not isinstance(content, Unreadable)]
     damaged = [content.reason for content in variables.values() if isinstance(content, Unreadable)]
     if damaged and not read:
@@ -101,7 +108,7 @@ def _unpacked(packed: memoryview, order: str, memory: Budget) -> memoryview:
     """Unpack the one element of a compressed variable, whose tag says its length, into memory of that length."""
     unpacker = zlib.decompressobj()
     try:
-        tag = unpacker.decompress(packed, 8)
+        tag = unpacker.decompress(packed[:_AT_ONCE], 8)
         if len(tag) < 8:
             raise LogError("a compressed variable is damaged (it ends too early)")
         length = 8 + struct.unpack(f"{order}II", tag)[1]
@@ -109,17 +116,26 @@ def _unpacked(packed: memoryview, order: str, memory: Budget) -> memoryview:
         content = bytearray(length)
         content[:8], filled = tag, 8
         # What lies behind the element is read for the checksum at the end, and left.
-        while not unpacker.eof and filled < length + _AT_ONCE:
-            part = unpacker.decompress(unpacker.unconsumed_tail, _AT_ONCE)
-            if not part:
-                break
+        for part in _parts_of(unpacker, packed):
             content[filled : filled + len(part)] = part[: max(length - filled, 0)]
             filled += len(part)
+            if filled > length + _AT_ONCE:
+                break
     except zlib.error as error:
         raise LogError(f"a compressed variable is damaged ({error})") from error
     if filled < length or not unpacker.eof:
         raise LogError("a compressed variable is damaged (it ends too early)")
     return memoryview(content).toreadonly()
+
+
+def _parts_of(unpacker: Any, packed: memoryview) -> Iterator[bytes]:
+    """Unpack piece by piece: what isn't used of a piece is copied each time."""
+    waiting = unpacker.unconsumed_tail
+    for first in range(_AT_ONCE, len(packed) + _AT_ONCE, _AT_ONCE):
+        while waiting and not unpacker.eof:
+            yield unpacker.decompress(waiting, _AT_ONCE)
+            waiting = unpacker.unconsumed_tail
+        waiting = packed[first : first + _AT_ONCE]
 
 
 def _element(raw: memoryview, place: int, order: str) -> tuple[int, memoryview, int]:
@@ -177,7 +193,10 @@ class _Matrix:
     def _content(self, flags: int, shape: tuple[int, ...]) -> Any:
         kind = flags & 0xFF
         if kind in _NUMERIC:
-            return self._array(_NUMERIC[kind], shape, is_complex=bool(flags & _COMPLEX))
+            array = self._array(_NUMERIC[kind], shape, is_complex=bool(flags & _COMPLEX))
+            if any(self.body[self.place :]):
+                raise LogError("an array has bytes behind its numbers; where they were added, others are wrong")
+            return array
         if kind == _CHAR:
             return self._text()
         if kind == _CELL:
@@ -218,6 +237,9 @@ class _Matrix:
         numbers = self._numbers()
         if len(numbers) != prod(shape):
             raise LogError(f"an array of shape {shape} holds {len(numbers)} numbers")
+        if not len(numbers):
+            # Of empty arrays the other lengths may be any.
+            return np.empty((0, 0), code)
         if numbers.dtype != np.dtype(code):
             self.limits.memory.take(len(numbers) * np.dtype(code).itemsize)
         with np.errstate(invalid="ignore", over="ignore"):

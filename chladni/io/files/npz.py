@@ -122,14 +122,17 @@ def read_npy(
     try:
         with path.open("rb") as file:
             shape, dtype = _header(file)
-            size = _size_held(str(path), shape, dtype, path.stat().st_size - file.tell())
+            held = path.stat().st_size - file.tell()
+            size = _size_held(str(path), shape, dtype, held)
             _take(str(path), Budget.of_file(path, max_bytes), size)
         array = np.load(path, allow_pickle=False)
     except _DAMAGED as error:
         raise LogError(f"{path}: this npy file can't be read: {one_line(error)}") from error
     fields = {name: array[name] for name in dtype.names} if dtype.names else {path.stem: array}
     options = TimeOptions(column=time, unit=time_unit, rate_hz=sample_rate_hz)
-    return series_of_arrays(fields, options, where=str(path), units=units)
+    behind = (f"{held - size} bytes at the end", "they lie behind the numbers that the header announces")
+    unread = (behind,) if held > size else ()
+    return series_of_arrays(fields, options, where=str(path), units=units, unread=unread)
 
 
 def write_npz(

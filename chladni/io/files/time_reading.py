@@ -276,7 +276,8 @@ def _stamps_ns(
     column: Column, numbers: NDArray[Any], known: NDArray[np.bool_], reading: _Reading, where: str
 ) -> NDArray[np.int64]:
     ns = NS_OF[reading.unit]
-    kept = numbers[known]
+    # In single precision, or less, a count of nanoseconds overflows.
+    kept = numbers[known] if numbers.dtype.kind in "iu" else numbers[known].astype(np.float64)
     largest = float(np.abs(kept.astype(np.float64) - reading.zero).max(initial=0.0)) * ns + abs(column.start_ns)
     if not largest < 2**62:
         raise LogError(

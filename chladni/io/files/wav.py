@@ -256,7 +256,8 @@ def _extent(
         told = f"{path}: is cut short: it announces {chunk.length} bytes of samples, {there} are there and read."
         return there, (told,), ()
     behind = container.size - chunk.start - chunk.length
-    if behind < 8 or container.ends_in_chunks(chunk.next):
+    # Behind an odd length stands a byte that counts for nothing, and which some writers leave out.
+    if container.size <= chunk.next or container.ends_in_chunks(chunk.next):
         return chunk.length, (), ()
     return chunk.length, (), ((f"{behind} bytes at the end", "they lie behind the samples that the file announces"),)
 
