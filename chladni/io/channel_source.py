@@ -3,9 +3,8 @@
 import json
 import re
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import isfinite
 from typing import Final
 
@@ -49,6 +48,8 @@ class ChannelSource:
         Where the number stands in a message; None for a column of a batch message.
     column
         Index of the column of a batch message, or None.
+    unread_unit
+        What the log calls the unit, where that is none that can be read.
     """
 
     topic: str
@@ -57,9 +58,10 @@ class ChannelSource:
     factor: float
     selector: FieldSelector | None = None
     column: int | None = None
+    unread_unit: str = ""
 
 
-def channel_of(topic: Topic, *, name: str, field: str, leaf: str, unit: str | None) -> tuple[Channel, float]:
+def channel_of(topic: Topic, *, name: str, field: str, leaf: str, unit: str | None) -> tuple[Channel, float, str]:
     """Describe a channel by what the log says of it.
 
     Parameters
@@ -81,8 +83,10 @@ def channel_of(topic: Topic, *, name: str, field: str, leaf: str, unit: str | No
         In SI.
     factor
         From the unit of the log to SI.
+    unread_unit
+        As of `ChannelSource`.
     """
-    factor, si_unit = _si_unit(topic, field=field, leaf=leaf, unit=unit)
+    factor, si_unit, unread = _si_unit(topic, field=field, leaf=leaf, unit=unit)
     said = topic.metadata
     overload = _number(said.get(f"chladni.overload.{field}"))
     role = said.get(f"chladni.role.{field}")
@@ -96,7 +100,7 @@ def channel_of(topic: Topic, *, name: str, field: str, leaf: str, unit: str | No
         units_possible=possible_units(topic.schema_name, leaf) if si_unit == UNKNOWN_UNIT else (),
         held=is_command(topic.schema_name),
     )
-    return channel, factor
+    return channel, factor, unread
 
 
 def measured_fields(metadata: Mapping[str, str]) -> frozenset[str] | None:
@@ -107,19 +111,24 @@ def measured_fields(metadata: Mapping[str, str]) -> frozenset[str] | None:
     return frozenset(listed)
 
 
-def _si_unit(topic: Topic, *, field: str, leaf: str, unit: str | None) -> tuple[float, str]:
-    """First unit that is one: of the metadata, the message, the schema's comment, the type's documentation."""
+def _si_unit(topic: Topic, *, field: str, leaf: str, unit: str | None) -> tuple[float, str, str]:
+    """First unit that is one, of the metadata, the message, the schema's comment, the type's documentation.
+
+    With it the first label that is none.
+    """
     ours, documented = topic.metadata.get(f"chladni.unit.{field}"), known_unit(topic.schema_name, leaf)
-    labels = (topic.metadata.get("unit"), unit, comment_units(topic.schema_text).get(leaf))
-    # A log may call its unit what it likes; what isn't understood counts as unknown, never as an error.
-    if ours:
-        with suppress(SetupError):
-            return si_factor(ours)
-    for label in labels:
-        if label:
-            with suppress(SetupError):
-                return read_label(label, quantity=documented or quantity_of_name(field))
-    return (1.0, UNKNOWN_UNIT) if documented is None else si_factor(documented)
+    in_comment, quantity = comment_units(topic.schema_text).get(leaf), documented or quantity_of_name(field)
+    of_quantity, unread = partial(read_label, quantity=quantity), ""
+    labels = ((topic.metadata.get("unit"), of_quantity), (unit, of_quantity), (in_comment, of_quantity))
+    # A log may call its unit what it likes; what isn't understood is told, and never an error.
+    for label, read in ((ours, si_factor), *labels):
+        try:
+            if label:
+                return *read(label), unread
+        except SetupError:
+            # What stands in brackets in a comment may be anything.
+            unread = unread or ("" if label is in_comment else str(label))
+    return (1.0, UNKNOWN_UNIT, unread) if documented is None else (*si_factor(documented), unread)
 
 
 # Asked for each field of a definition.

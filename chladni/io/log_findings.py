@@ -11,7 +11,7 @@ from chladni.io.sample_monitor import SampleMonitor
 from chladni.signals.channel import Channel
 from chladni.signals.sensor_quality import SensorFault, moments
 from chladni.signals.time_base import TimeBase
-from chladni.signals.wording import counted
+from chladni.signals.wording import counted, shown
 
 MOST_LOSSES_TOLD = 3
 
@@ -178,7 +178,14 @@ def _constant(dead: Sequence[SensorFault]) -> Iterator[tuple[str, str]]:
 def _content_findings(content: Catalog) -> Iterator[str]:
     # Text beside signals is no trouble; where there is nothing else it is what the log holds.
     yield from unread_sentences(one for one in content.unread if not (one.complete and content.channels))
-    yield from unit_findings([source.channel for source in content.channels])
+    labelled: dict[str, list[str]] = {}
+    for source in content.channels:
+        if source.unread_unit:
+            labelled.setdefault(source.unread_unit, []).append(source.channel.name)
+    if labelled:
+        told = some_of([f"{shown(label)} of {some_of(names)}" for label, names in labelled.items()])
+        yield f"units that can't be read: {told}; a setup file can give them"
+    yield from unit_findings([source.channel for source in content.channels if not source.unread_unit])
 
 
 def unit_findings(channels: Sequence[Channel]) -> Iterator[str]:

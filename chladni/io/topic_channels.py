@@ -151,8 +151,10 @@ class TopicChannels:
         leaf = self.layout.samples[index if len(self.layout.samples) > 1 else 0]
         unit = self.units[index] if len(self.units) == len(self.names) else self.layout.unit
         field = self.names[index]
-        channel, factor = channel_of(self.topic, name=name, field=field, leaf=leaf, unit=unit)
-        return ChannelSource(topic=self.topic.name, field=field, channel=channel, factor=factor, column=index)
+        channel, factor, unread = channel_of(self.topic, name=name, field=field, leaf=leaf, unit=unit)
+        return ChannelSource(
+            topic=self.topic.name, field=field, channel=channel, factor=factor, column=index, unread_unit=unread
+        )
 
     def _column_source(self, path: MessagePath) -> ChannelSource:
         match path.steps:
@@ -265,10 +267,12 @@ class TopicChannels:
         leaf = selector.leaf
         # A log's writer knows fields, and no filter on whose they are.
         known_as = field.partition("}.")[2] if field.startswith("{") else field
-        channel, factor = channel_of(self.topic, name=name, field=known_as, leaf=leaf.path, unit=None)
+        channel, factor, unread = channel_of(self.topic, name=name, field=known_as, leaf=leaf.path, unit=None)
         if leaf.kind in ("time", "duration"):
             factor = 1e-9
-        return ChannelSource(topic=self.topic.name, field=field, channel=channel, factor=factor, selector=selector)
+        return ChannelSource(
+            topic=self.topic.name, field=field, channel=channel, factor=factor, selector=selector, unread_unit=unread
+        )
 
     def _spelling(self, path: MessagePath, selector: FieldSelector) -> str:
         """Field in the spelling of the list: by index where a name always stands in the same place."""

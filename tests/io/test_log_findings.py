@@ -105,3 +105,18 @@ def test_samples_of_batch_messages_have_times_of_their_own(tmp_path: Path) -> No
     with open_log(tmp_path / "a.mcap") as log:
         (told,) = [found for found in log.info().findings if "cut off" in found]
     assert told.startswith("/daq.b: is cut off at 16 m/s^2 in 1333 samples between 0.4 and 0.6664 s;")
+
+
+@pytest.mark.parametrize(
+    ("label", "told"), [("furlongs/fortnight", True), ("rust", True), ("mm", False), ("", False)]
+)
+def test_a_unit_that_no_one_can_read_is_told_with_its_text(tmp_path: Path, label: str, told: bool) -> None:
+    with LogMaker(tmp_path / "a.mcap") as maker:
+        channel = maker.ros2("/a", "std_msgs/Float64", "float64 data", {"unit": label})
+        for index in range(50):
+            maker.write(channel, {"data": float(index % 7)}, START_NS + index * 10**7)
+    with open_log(tmp_path / "a.mcap") as log:
+        found = log.info().findings
+    assert (f"units that can't be read: {label!r} of /a.data; a setup file can give them" in found) == told
+    # What is told as unreadable isn't told as none.
+    assert ("the log gives no unit for /a.data; a setup file can" in found) == (not label)

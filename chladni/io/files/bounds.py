@@ -45,7 +45,7 @@ class Budget:
     taken: int = 0
 
     @classmethod
-    def of_file(cls, path: Path, max_bytes: float | None = None) -> "Budget":
+    def of_file(cls, path: Path, max_bytes: object = None) -> "Budget":
         """Give the budget of a file: what the caller allows, else what it can hold that was measured.
 
         Raises

@@ -133,7 +133,8 @@ def channels_of(
         except SetupError as error:
             if column.name in (units or {}):
                 raise SetupError(f"{where}: channel {column.name!r}: {error}") from error
-            notes.append(f"{where}: channel {column.name!r} is without unit: {error}; or state its unit yourself.")
+            told = f"its unit can't be read, and its numbers are taken without one: {error}"
+            notes.append(f"{where}: channel {column.name!r}: {told}; or state its unit yourself.")
             unit = "1"
         channels.append(Channel(name=column.name, unit=unit))
     return channels, tuple(notes)

@@ -20,11 +20,12 @@ import re
 from collections.abc import Callable
 from inspect import signature
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, get_args
 
 from chladni.io.files.contents import FileContents
 from chladni.io.regular_file import require_regular
 from chladni.signals.errors import LogError, SetupError
+from chladni.signals.wording import shown
 
 Reader = Callable[..., FileContents]
 Writer = Callable[..., tuple[str, ...]]
@@ -150,7 +151,16 @@ def call_with_options(function: Callable[..., Any], first: object, options: dict
     for name in options:
         if name not in signature(function).parameters:
             raise SetupError(f"{function.__name__} has no option {name!r}; it has {', '.join(known)}")
+        _require_kind(name, options[name], signature(function).parameters[name].annotation)
     return function(first, **options)
+
+
+def _require_kind(name: str, value: object, annotation: object) -> None:
+    """Refuse text for a number, or a number for text: options come as people wrote them."""
+    kinds = get_args(annotation) or (annotation,)
+    for kind, found, told in ((float, int | float, "a number"), (int, int | float, "a number"), (str, str, "text")):
+        if kind in kinds and (isinstance(value, bool) or not isinstance(value, found)) and value is not None:
+            raise SetupError(f"option {name} is {shown(value)}; must be {told}")
 
 
 def reader_of(path: Path | str) -> Reader:

@@ -1,12 +1,13 @@
 """LabVIEW's TDMS files, by nptdms, which comes with the extra ``[io]``."""
 
+import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from logging import LogRecord
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, BinaryIO, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,9 @@ from chladni.signals.time_series import NS_PER_S
 _UNITS: Final = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
 
 _MOST_SAID: Final = 3
+# Up to the length of a segment; its offset of raw data follows.
+_LEAD_IN: Final = struct.Struct("<12xQ")
+_NEVER_CLOSED: Final = 2**64 - 1
 _Answer = TypeVar("_Answer")
 
 
@@ -74,9 +78,30 @@ def read_tdms(
     # An index beside the file may be one of another file: what is open has none.
     with _said() as said, open_regular(path, LogError) as raw:
         channels, unread = _channels(path, _answer(path, lambda: TdmsFile.open(raw)), budget)
+        unread += _behind_segments(raw, path.stat().st_size)
     options = TimeOptions(column=time, unit=time_unit, rate_hz=sample_rate_hz)
     contents = _contents(path, channels, unread, options, units)
     return with_notes(contents, [f"{path}: {text}." for text in dict.fromkeys(map(one_line, said))][:_MOST_SAID])
+
+
+def _behind_segments(file: BinaryIO, size: int) -> tuple[tuple[str, str], ...]:
+    """Tell of bytes that no whole segment announces, which nptdms passes over.
+
+    Each segment begins with its tag, flags, version, and its length; one that was never closed has a length of ones.
+    After National Instruments' "TDMS File Format Internal Structure".
+    """
+    place = 0
+    while place < size:
+        file.seek(place)
+        head = file.read(_LEAD_IN.size)
+        if len(head) < _LEAD_IN.size or not head.startswith(b"TDSm"):
+            reason = (
+                "no whole segment; where bytes were added or lost, the numbers before them may be wrong or missing"
+            )
+            return ((f"{size - place} bytes at the end", reason),)
+        (length,) = _LEAD_IN.unpack(head)
+        place = size if length == _NEVER_CLOSED else place + _LEAD_IN.size + 8 + length
+    return ()
 
 
 @contextmanager

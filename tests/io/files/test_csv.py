@@ -337,7 +337,10 @@ def test_an_unknown_unit_costs_only_the_unit(tmp_path: Path) -> None:
     (series,) = contents.series
     np.testing.assert_allclose(series.values, [[9.80665, 3 * 9.80665], [2, 4]])
     assert [channel.unit for channel in series.channels] == ["m/s^2", "1"]
-    assert "channel 'b' is without unit: unit 'furlongs': not known" in contents.notes[0]
+    assert (
+        "channel 'b': its unit can't be read, and its numbers are taken without one: unit 'furlongs': not known"
+        in contents.notes[0]
+    )
 
 
 def series_of(values: np.ndarray, valid: np.ndarray | None = None, **fields: object) -> TimeSeries:
@@ -449,3 +452,12 @@ def test_what_is_no_number_elsewhere_is_none_here(tmp_path: Path, cell: str) -> 
     contents = read_csv(file_of(tmp_path, f"a,b\n{rows}{cell},3\n"), sample_rate_hz=1.0, time="none")
     assert np.isnan(contents.series[0].values[0, -1])
     assert f"first {cell!r} in line 22" in contents.notes[0]
+
+
+def test_numbers_above_the_first_row_are_never_passed_over(tmp_path: Path) -> None:
+    rows = [f"{n / 100},{n}\n" for n in range(60)]
+    with pytest.raises(LogError, match="line 3 has 4 cells where the table has 2 columns"):
+        read_csv(file_of(tmp_path, f"time [s],a\n{rows[0]}0.01,1,2,3\n{''.join(rows[1:])}"))
+    contents = read_csv(file_of(tmp_path, f"{''.join(rows[:15])}time [s],a\n{''.join(rows[15:])}"))
+    np.testing.assert_array_equal(contents.series[0].values, [np.arange(15, 60)])
+    assert "15 lines of numbers above the titles left out, the first is line 1." in contents.notes[-1]

@@ -1,5 +1,6 @@
 """The registry of data files keeps its contract for every kind."""
 
+import os
 from inspect import Parameter, signature
 from pathlib import Path
 
@@ -52,3 +53,26 @@ def test_other_kinds_and_options_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("a\n1\n")
     with pytest.raises(SetupError, match="read_csv has no option 'colour'; it has sample_rate_hz, time"):
         read_file(tmp_path / "a.csv", colour=1)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "told"),
+    [
+        ("sample_rate_hz", "fast", "must be a num"),
+        ("time", 3.0, "must be text"),
+        ("decimal", True, "must be text"),
+    ],
+)
+def test_an_option_of_another_kind_is_refused(tmp_path: Path, option: str, value: object, told: str) -> None:
+    (tmp_path / "a.csv").write_text("a,b\n1,2\n3,4\n")
+    with pytest.raises(SetupError, match=f"option {option} is .*; {told}"):
+        read_file(tmp_path / "a.csv", **{option: value})
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+@pytest.mark.parametrize("suffix", FILE_SUFFIXES)
+def test_no_kind_of_file_waits_for_a_pipe(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    os.mkfifo(path)
+    with pytest.raises(LogError, match=rf"a\{suffix}: is a named pipe; files alone are read"):
+        read_file(path)

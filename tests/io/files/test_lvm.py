@@ -146,7 +146,10 @@ def test_what_is_no_signal_costs_nothing_else(tmp_path: Path) -> None:
     contents = read_lvm(lvm(tmp_path / "a.lvm", rows))
     assert [channel.name for channel in contents.series[0].channels] == ["acc"]
     assert contents.unread == (("Kraft", "against Frequency, not time"), ("Comment", "text"))
-    assert any("'acc' is without unit: unit 'EUs'" in note for note in contents.notes)
+    assert any(
+        "'acc': its unit can't be read, and its numbers are taken without one: unit 'EUs'" in note
+        for note in contents.notes
+    )
 
 
 def test_a_comma_between_cells(tmp_path: Path) -> None:

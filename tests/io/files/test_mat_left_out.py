@@ -206,7 +206,9 @@ def test_version_73_leaves_out_what_only_matlab_reads(tmp_path: Path) -> None:
 
 def test_version_73_is_bounded(tmp_path: Path) -> None:
     hdf5(tmp_path / "a.mat", {"fs": 200.0, "x": np.zeros(100_000)})
-    with pytest.raises(LogError, match="takes 800008 bytes in memory or more, 100000 are allowed; .*raise max_bytes"):
+    with pytest.raises(
+        LogError, match=r"takes 800008 bytes in memory or more, 100000 are allowed; .*raise max_bytes"
+    ):
         read_mat(tmp_path / "a.mat", max_bytes=100_000)
     assert read_mat(tmp_path / "a.mat", max_bytes=1_000_000).series[0].samples == 100_000
 

@@ -84,7 +84,10 @@ def test_what_is_no_signal_costs_nothing_else(tmp_path: Path) -> None:
     assert reasons["spectrum"] == "against an axis in 'hz', not time"
     assert reasons["complex"] == "complex128 numbers"
     assert reasons["nothing"] == "empty"
-    assert "'unit' is without unit: unit 'furlongs': not known" in contents.notes[0]
+    assert (
+        "'unit': its unit can't be read, and its numbers are taken without one: unit 'furlongs': not known"
+        in contents.notes[0]
+    )
 
 
 def test_one_name_in_several_groups(tmp_path: Path) -> None:
@@ -163,3 +166,11 @@ def test_wrong_bytes_never_crash(tmp_path: Path) -> None:
         except ChladniError:
             refused += 1
     assert refused > 20
+
+
+@pytest.mark.parametrize("behind", [b"\x00" * 9, b"TDSm"])
+def test_bytes_behind_the_last_segment_are_told(tmp_path: Path, behind: bytes) -> None:
+    path = written(tmp_path / "a.tdms", ("daq", "x", SIGNAL, waveform()))
+    assert read_tdms(path).unread == ()
+    path.write_bytes(path.read_bytes() + behind)
+    assert f"{len(behind)} bytes at the end" in dict(read_tdms(path).unread)
