@@ -96,7 +96,7 @@ def _behind_segments(file: BinaryIO, size: int) -> tuple[tuple[str, str], ...]:
         head = file.read(_LEAD_IN.size)
         if len(head) < _LEAD_IN.size or not head.startswith(b"TDSm"):
             reason = (
-                "no whole segment; where bytes were added or lost, the numbers before them may be wrong or missing"
+                "no whole segment; where bytes were added or lost, numbers before them may be wrong or missing"
             )
             return ((f"{size - place} bytes at the end", reason),)
         (length,) = _LEAD_IN.unpack(head)
