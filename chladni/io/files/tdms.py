@@ -95,9 +95,7 @@ def _behind_segments(file: BinaryIO, size: int) -> tuple[tuple[str, str], ...]:
         file.seek(place)
         head = file.read(_LEAD_IN.size)
         if len(head) < _LEAD_IN.size or not head.startswith(b"TDSm"):
-            reason = (
-                "no whole segment; where bytes were added or lost, numbers before them may be wrong or missing"
-            )
+            reason = "no whole segment; where bytes were added or lost, numbers before them may be wrong or missing"
             return ((f"{size - place} bytes at the end", reason),)
         (length,) = _LEAD_IN.unpack(head)
         place = size if length == _NEVER_CLOSED else place + _LEAD_IN.size + 8 + length
