@@ -59,8 +59,8 @@ def near_words(word: str, known: Iterable[str], *, count: int = 1, cutoff: float
 
     Examples
     --------
-    >>> near_words("dampin", ["mass", "damping"])
-    ['damping']
+    >>> near_words("wirst", ["mass", "wrist"])
+    ['wrist']
     """
     if len(word) > _LONGEST_WORD:
         return []

@@ -113,9 +113,9 @@ def series_of_rows(
         # A damaged row may hold what no processor casts without a word; it counts as missing.
         with np.errstate(invalid="ignore", over="ignore"):
             values[place] = row
-        # Values already in SI stay untouched, to the bit.
-        if factor != 1.0:
-            values[place] *= factor
+            # Values already in SI stay untouched, to the bit.
+            if factor != 1.0:
+                values[place] *= factor
     return TimeSeries(
         values=values,
         sample_rate_hz=sample_rate_hz,

@@ -20,6 +20,7 @@ import re
 from collections.abc import Callable
 from inspect import signature
 from pathlib import Path
+from types import NoneType
 from typing import Any, Final, TypeVar, get_args
 
 from chladni.io.files.contents import FileContents
@@ -157,10 +158,12 @@ def call_with_options(function: Callable[..., Any], first: object, options: dict
 
 def _require_kind(name: str, value: object, annotation: object) -> None:
     """Refuse text for a number, or a number for text: options come as people wrote them."""
-    kinds = get_args(annotation) or (annotation,)
-    for kind, found, told in ((float, int | float, "a number"), (int, int | float, "a number"), (str, str, "text")):
-        if kind in kinds and (isinstance(value, bool) or not isinstance(value, found)) and value is not None:
-            raise SetupError(f"option {name} is {shown(value)}; must be {told}")
+    kinds = set(get_args(annotation) or (annotation,)) - {NoneType}
+    if value is None or kinds not in ({str}, {float}, {int}):
+        return
+    found, told = (str, "text") if kinds == {str} else (int | float, "a number")
+    if isinstance(value, bool) or not isinstance(value, found):
+        raise SetupError(f"option {name} is {shown(value)}; must be {told}")
 
 
 def reader_of(path: Path | str) -> Reader:
