@@ -43,7 +43,7 @@ def topic(metadata: Mapping[str, str]) -> Topic:
 def test_metadata_that_means_nothing_is_passed_over(said: str) -> None:
     named: dict[str, Any] = {"name": "/a.x", "field": "x", "leaf": "x", "unit": None}
     assert measured_fields({"chladni.fields": said}) is None
-    channel, factor = channel_of(topic({"chladni.direction.x": said}), **named)
+    channel, factor, _ = channel_of(topic({"chladni.direction.x": said}), **named)
     assert (channel.direction, channel.overload, factor) == (None, None, 1.0)
 
 
@@ -52,5 +52,5 @@ def test_metadata_that_means_nothing_is_passed_over(said: str) -> None:
 )
 def test_an_overload_in_the_metadata_is_a_positive_number(said: str, overload: float | None) -> None:
     metadata = {"chladni.overload.x": said, "chladni.fields": json.dumps(["x"])}
-    channel, _ = channel_of(topic(metadata), name="/a.x", field="x", leaf="x", unit=None)
+    channel, _, _ = channel_of(topic(metadata), name="/a.x", field="x", leaf="x", unit=None)
     assert channel.overload == overload
