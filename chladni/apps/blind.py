@@ -5,11 +5,14 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing.resource_tracker import ensure_running
 from pathlib import Path
 from typing import Any
 
 from chladni.apps.diagnose import diagnosis_json
+from chladni.apps.stopping import begin_worker
 from chladni.gap.blind.composition import composition_of
 from chladni.gap.blind.make import make_cases
 from chladni.gap.blind.run import RunReport, run_cases
@@ -76,12 +79,15 @@ def score_campaign(directory: Path) -> Mapping[str, Any]:
 
 @contextmanager
 def workers(jobs: int | None) -> Iterator[Executor | None]:
-    """Give processes to work with; None for one, which is this process. Ctrl-C ends them in the midst of their work.
+    """Give processes to work with; None for one, which is this process.
+
+    Ctrl-C and a signal that ends this process end them in the midst of their work; so does its death by any other
+    cause, within seconds.
 
     Raises
     ------
     SetupError
-        When `jobs` is below one.
+        When `jobs` is below one, or a process was ended from outside.
     """
     count = (os.cpu_count() or 1) if jobs is None else jobs
     if count < 1:
@@ -89,22 +95,42 @@ def workers(jobs: int | None) -> Iterator[Executor | None]:
     if count == 1:
         yield None
         return
+    _track_semaphores()
     others = frozenset(multiprocessing.active_children())
     # A forked child of a process with threads may wait for a lock that nobody holds any more.
-    pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"), initializer=_begin_worker)
+    pool = ProcessPoolExecutor(
+        count,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=begin_worker,
+        initargs=(keep_memory,),
+    )
     try:
         yield pool
-    except KeyboardInterrupt:
+    except (BrokenProcessPool, KeyboardInterrupt, SystemExit) as error:
         # A case under way may take a minute, and is done again when the campaign goes on: its file isn't there.
         for process in frozenset(multiprocessing.active_children()) - others:
             process.terminate()
-        raise
+        if not isinstance(error, BrokenProcessPool):
+            raise
+        raise SetupError(
+            "a process was ended from outside, as happens where memory is short; what is done stays: run it again to "
+            "go on, with fewer processes (--jobs)"
+        ) from error
     finally:
         # After a mistake nobody wants the cases that haven't begun.
         pool.shutdown(cancel_futures=True)
 
 
-def _begin_worker() -> None:
-    keep_memory()
-    # A terminal interrupts the whole group: each process would give its case up, begin the next, and say so.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _track_semaphores() -> None:
+    """Start the process that Python has beside its workers, deaf to SIGHUP as it is to SIGINT and SIGTERM.
+
+    A terminal that closes ends the whole group; without that process the pool can't be taken down in peace.
+    """
+    if not hasattr(signal, "SIGHUP"):
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGHUP,))
+    try:
+        # What is blocked stays so in the processes that are started.
+        ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

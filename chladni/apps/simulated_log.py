@@ -5,14 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import floor, inf, log10, pi
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any
 
 import numpy as np
 
 from chladni.apps.excitation_words import Run, excitation
 from chladni.apps.measured_charts import scores
-from chladni.io.atomic import atomic_write
+from chladni.io.atomic import atomic_write, require_place
 from chladni.io.mcap.topic_names import message_places
 from chladni.io.mcap.writer import WrittenLog, write_mcap
 from chladni.models.core.compiled_model import CompiledModel
@@ -21,7 +20,7 @@ from chladni.models.core.reading import Quantity
 from chladni.models.core.simulation import Simulation
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.simulate import simulate
-from chladni.signals.errors import LogError, SetupError
+from chladni.signals.errors import SetupError
 from chladni.signals.number_range import LARGEST, rms
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.visible import visible_json
@@ -148,7 +147,7 @@ def write_simulated_log(log: SimulatedLog, path: Path) -> tuple[WrittenLog, Path
     log, truth
         What was written, and the path of the truth.
     """
-    require_place(path)
+    require_log_place(path)
     text = visible_json(json.dumps(log.truth, indent=1, allow_nan=False, ensure_ascii=False))
     written = write_mcap(log.recorded, path, metadata={METADATA_NAME: {"format": TRUTH_FORMAT, "truth": text}})
     beside = path.with_suffix(".truth.json")
@@ -157,7 +156,7 @@ def write_simulated_log(log: SimulatedLog, path: Path) -> tuple[WrittenLog, Path
     return written, beside
 
 
-def require_place(path: Path) -> None:
+def require_log_place(path: Path) -> None:
     """Refuse a path at which no log can be written, before anything is simulated.
 
     Raises
@@ -165,16 +164,11 @@ def require_place(path: Path) -> None:
     SetupError
         When the name doesn't end with ``.mcap``.
     LogError
-        When the path is a folder, or its folder isn't there or can't be written to.
+        See `chladni.io.atomic.require_place`.
     """
     if path.suffix != ".mcap":
         raise SetupError(f"{path}: a simulated log is written as MCAP; give a name that ends with .mcap")
-    if path.is_dir():
-        raise LogError(f"{path}: is a folder; name a file in it")
-    try:
-        TemporaryFile(dir=path.parent).close()
-    except OSError as error:
-        raise LogError(f"{path}: can't be written to {path.parent}: {error.strerror or error}") from error
+    require_place(path)
 
 
 def default_run(compiled: CompiledModel, *, seconds: float | None = None, rate_hz: float | None = None) -> Run:

@@ -49,7 +49,7 @@ def make(
     """Make cases: random machines with hidden effects, and their sealed truths; what is there stays."""
     from chladni.apps.blind import make_campaign
 
-    require_places(reads=(), writes={"--json": json})
+    require_places(reads=(), writes={"--json": json}, folders={"DIR": directory})
     to = Output(json)
     with to.progress("making cases") as show:
         made = make_campaign(directory, count=count, seed=seed, kinds=kind or (), jobs=jobs, progress=show)
@@ -72,7 +72,7 @@ def run(
     from chladni.apps.blind import run_campaign
     from chladni.gap.kept_memory import keep_memory
 
-    require_places(reads=(), writes={"--json": json})
+    require_places(reads=(), writes={"--json": json}, folders={"DIR": directory})
     to = Output(json)
     # With one job this process is the worker.
     keep_memory()

@@ -4,11 +4,14 @@ import os
 import re
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
+from signal import Signals
 from typing import Annotated
 
 import typer
 
 from chladni import __version__
+from chladni.apps.stopping import LISTENER, Stopped
 from chladni.cli.bench import bench
 from chladni.cli.blind import blind
 from chladni.cli.compare import compare
@@ -22,7 +25,7 @@ from chladni.cli.modes import modes
 from chladni.cli.psd import psd
 from chladni.cli.simulate import simulate
 from chladni.cli.view import view
-from chladni.signals.errors import ChladniError
+from chladni.signals.errors import ChladniError, LogError
 from chladni.signals.visible import visible, visible_lines
 from chladni.signals.wording import counted
 
@@ -60,31 +63,53 @@ def _options(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and give its exit code.
 
-    0 success; 2 unusable input; 130 interrupted; 1 a defect of chladni. Each of the others is one line on standard
-    error; with ``CHLADNI_TRACEBACK=1`` in the environment the traceback follows.
+    0 success; 2 unusable input, or output that can't be written; 130, 143, 129 ended by Ctrl-C, SIGTERM, SIGHUP; 1 a
+    defect of chladni. Each but the first is one line on standard error; with ``CHLADNI_TRACEBACK=1`` in the
+    environment the traceback follows.
     """
     try:
         code = app(args=arguments, prog_name="chladni", standalone_mode=False)
     except (ChladniError, typer.TyperException) as error:
         return _fail(error, UNUSABLE)
+    except Stopped as stopped:
+        return _stopped(f"ended by {stopped.name}", 128 + stopped.number)
     except SystemExit:
         # Typer's way of saying that the reader of our output has gone, as with `| head`: nothing is wrong.
         return SUCCESS
     except (KeyboardInterrupt, typer.Abort):
-        return _interrupted()
+        return _stopped("interrupted", INTERRUPTED)
+    except OSError as error:
+        return _fail(_told(error), UNUSABLE)
     except Exception as error:  # noqa: BLE001  # the last line of defence: a defect is told in one line
         return _fail(error, DEFECT)
     # Typer makes an exit code of Ctrl-C in a command.
-    return _interrupted() if code == INTERRUPTED else code if isinstance(code, int) else SUCCESS
+    if code == INTERRUPTED:
+        return _stopped("interrupted", INTERRUPTED)
+    return code if isinstance(code, int) else SUCCESS
 
 
-def _interrupted() -> int:
+def _stopped(how: str, code: int) -> int:
     # True because files are written atomically: each appears when it's whole.
-    print("chladni: interrupted; every file is whole, or as it was before", file=sys.stderr)  # noqa: T201
-    return INTERRUPTED
+    _say(f"chladni: {how}; every file is whole, or as it was before")
+    return code
+
+
+def _say(line: str) -> None:
+    # Where standard error can't be written to, the exit code says it alone.
+    with suppress(OSError):
+        print(line, file=sys.stderr)  # noqa: T201  # the one line that a failure prints
+
+
+def _told(error: OSError) -> ChladniError:
+    """What the operating system refuses is no mistake of ours: a full disk, a lack of rights, too many open files."""
+    about = f"{error.filename}: " if error.filename is not None else ""
+    return LogError(f"{about}the operating system refuses: {error.strerror or error}")
 
 
 def _fail(error: Exception, code: int) -> int:
+    if LISTENER.heard is not None:
+        # A library made an error of its own of what the signal raised.
+        return _stopped(f"ended by {Signals(LISTENER.heard).name}", 128 + LISTENER.heard)
     if os.environ.get("CHLADNI_TRACEBACK"):
         import traceback
 
@@ -96,7 +121,7 @@ def _fail(error: Exception, code: int) -> int:
     line = _mistakes([*map(visible, error.mistakes)]) if isinstance(error, ChladniError) else _on_one_line(text)
     if code == DEFECT:
         line = f"defect of chladni ({type(error).__name__}): {line}; CHLADNI_TRACEBACK=1 shows where"
-    print(f"chladni: {line}", file=sys.stderr)  # noqa: T201  # the one line that a failure prints
+    _say(f"chladni: {line}")
     return code
 
 

@@ -14,12 +14,15 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from chladni.io.atomic import Place, atomic_write
+from chladni.signals.errors import LogError
 from chladni.signals.visible import visible, visible_json, visible_lines
 
 if TYPE_CHECKING:
     from chladni.signals.study import Study
 
 PROGRESS_AFTER_S = 1.0
+STANDARD_OUTPUT = 1
 
 
 class Progress(Protocol):
@@ -37,11 +40,32 @@ class _Console(Console):
         # What Python flushes at its end must go somewhere.
         os.dup2(os.open(os.devnull, os.O_WRONLY), self.file.fileno())
 
+    def print(self, *objects: Any, **options: Any) -> None:
+        with writing("standard error" if self.stderr else "standard output"):
+            super().print(*objects, **options)
+
+
+@contextmanager
+def writing(stream: str) -> Iterator[None]:
+    """Make a `LogError` of what the operating system says of a stream; that its reader has gone is no mistake."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise LogError(
+            f"{stream}: can't be written: {error.strerror or error}; send it to where there is room"
+        ) from error
+
 
 class Output:
     """Tables go to standard output, unless JSON was asked for there: then to standard error."""
 
     def __init__(self, json_target: str | None = None) -> None:
+        if json_target is not None and Place.of(json_target).descriptor == STANDARD_OUTPUT:
+            json_target = "-"
+        if json_target == "-" and sys.stdout is None:
+            raise LogError("standard output is closed: it can't take the document of --json -; name a file")
         self.json_target = json_target
         self.console = _Console(stderr=json_target == "-", highlight=False, soft_wrap=False)
         if not self.console.is_terminal:
@@ -95,14 +119,17 @@ class Output:
         """Write `content` where ``--json`` said; nothing when it wasn't given."""
         if self.json_target is None:
             return
-        text = visible_json(json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)) + "\n"
-        if self.json_target == "-":
-            sys.stdout.write(text)
+        document = visible_json(json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)) + "\n"
+        # UTF-8, whatever the terminal's encoding.
+        encoded = document.encode()
+        if self.json_target != "-":
+            with atomic_write(self.json_target) as file:
+                file.write(encoded)
             return
-        from chladni.io.atomic import atomic_write
-
-        with atomic_write(Path(self.json_target)) as file:
-            file.write(text.encode())
+        with writing("standard output"):
+            sys.stdout.flush()
+            sys.stdout.buffer.write(encoded)
+            sys.stdout.flush()
 
     @contextmanager
     def progress(self, title: str) -> Iterator[Progress]:

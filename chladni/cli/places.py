@@ -1,10 +1,12 @@
 """Where a command may write: asked before anything is computed, for all commands alike."""
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from itertools import combinations
 from pathlib import Path
 
+from chladni.io.atomic import Place, require_place
 from chladni.signals.errors import LogError, SetupError
 
 # Viewers, browsers and drawing go by the suffix; text for programs may have any name, a pipe's too.
@@ -50,11 +52,11 @@ def require_places(
     files = {option: Path(path) for option, path in writes.items() if path is not None and str(path) != "-"}
     for option, path in files.items():
         _require_suffix(option, path)
-        _require_folder_of(option, path)
+    places = {option: require_place(path) for option, path in files.items()}
     for option, folder in (folders or {}).items():
         if folder is not None:
             _require_folder(option, folder)
-    _require_apart(files, {path.resolve() for path in reads if path is not None})
+    _require_apart(places, [place for path in reads if path is not None for place in _read_place(path)])
 
 
 def _require_suffix(option: str, path: Path) -> None:
@@ -63,30 +65,29 @@ def _require_suffix(option: str, path: Path) -> None:
         raise SetupError(f"{path}: {option} writes {_listed(known)}; give such a name")
 
 
-def _require_folder_of(option: str, path: Path) -> None:
-    # A link is followed when the file is written, too.
-    folder = path.resolve().parent
-    if not folder.is_dir():
-        raise LogError(f"{path}: there is no folder {path.parent}; make it, or name another")
-    if path.is_dir():
-        raise LogError(f"{path}: is a folder; {option} takes a file, name one in it")
-    if not os.access(folder, os.W_OK):
-        raise LogError(f"{path}: the folder {path.parent} can't be written to; name another")
-
-
 def _require_folder(option: str, folder: Path) -> None:
-    there = next(one for one in (folder, *folder.resolve().parents) if one.exists())
-    if not there.is_dir():
-        raise LogError(f"{folder}: {there} is a file; {option} takes a folder, name another")
+    there = next(one for one in (folder, *folder.parents) if os.path.lexists(one))
+    # Also tells that the current folder was removed.
+    if not Place.of(there).is_folder:
+        raise LogError(f"{folder}: {there} is no folder; {option} takes a folder, name another")
 
 
-def _require_apart(files: Mapping[str, Path], reads: set[Path]) -> None:
-    for option, path in files.items():
-        if path.resolve() in reads:
-            raise SetupError(f"{path}: is read by this command, and {option} would replace it; name another file")
-    for (one, path), (other, second) in combinations(files.items(), 2):
-        if path.resolve() == second.resolve():
-            raise SetupError(f"{path}: {one} and {other} name the same file; give each its own")
+def _read_place(path: Path) -> Iterator[Place]:
+    # What can't be read is told by its reader.
+    with suppress(LogError):
+        yield Place.of(path)
+
+
+def _require_apart(places: Mapping[str, Place], reads: Iterable[Place]) -> None:
+    read = list(reads)
+    for option, place in places.items():
+        if any(place.is_same(one) for one in read):
+            raise SetupError(
+                f"{place.path}: is read by this command, and {option} would replace it; name another file"
+            )
+    for (one, place), (other, second) in combinations(places.items(), 2):
+        if place.is_same(second):
+            raise SetupError(f"{place.path}: {one} and {other} name the same file; give each its own")
 
 
 def _listed(suffixes: tuple[str, ...]) -> str:

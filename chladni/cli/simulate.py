@@ -92,11 +92,11 @@ def simulate(
 ) -> None:
     """Simulate a model and write a log, with its truth beside it and in its metadata."""
     from chladni.apps.model_sources import named_instrument, recording_for
-    from chladni.apps.simulated_log import Drive, require_place, simulate_log, write_simulated_log
+    from chladni.apps.simulated_log import Drive, require_log_place, simulate_log, write_simulated_log
 
     to = Output(json)
     # A simulation may take minutes: it shouldn't be lost to a misspelt folder.
-    require_place(out)
+    require_log_place(out)
     require_places(
         reads=[Path(model), log, opener.setup],
         writes={"--out": out, "the truth of --out": out.with_suffix(".truth.json"), "--json": json},

@@ -6,6 +6,7 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from chladni.io.atomic import Place, require_place
 from chladni.io.files.formats import MCAP, WRITTEN_SUFFIXES, call_with_options, writer_of
 from chladni.io.log import Log, open_log
 from chladni.io.loss import Unread
@@ -124,10 +125,9 @@ def _require_paths(source: Path, target: Path, *, overwrite: bool) -> None:
         raise LogError(f"{source}: no such file")
     require_regular(source, LogError)
     # Said before the question of overwriting, whose answer would destroy the source.
-    if target.exists() and target.samefile(source):
+    if Place.of(target).is_same(Place.of(source)):
         raise SetupError(f"{target}: is the source itself; name another target")
-    if target.exists() and not overwrite:
-        raise LogError(f"{target}: exists already; ask for overwriting (--overwrite) or name another file")
+    require_place(target, overwrite=overwrite)
 
 
 def _read(

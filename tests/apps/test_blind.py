@@ -1,11 +1,14 @@
 """Processes that work on a campaign."""
 
 import time
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import pytest
 
 from chladni.apps.blind import workers
+from chladni.apps.stopping import Stopped
+from chladni.signals.errors import SetupError
 
 # Longer than it takes to be told to stop, short enough to wait for when nobody tells.
 CASE_S = 5.0
@@ -26,9 +29,12 @@ def _work_until(error: BaseException, begun: Path, done: Path) -> None:
         raise error
 
 
-def test_ctrl_c_does_not_wait_for_the_cases_under_way(tmp_path: Path) -> None:
-    with pytest.raises(KeyboardInterrupt):
-        _work_until(KeyboardInterrupt(), tmp_path / "begun", tmp_path / "done")
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), Stopped(15), BrokenProcessPool()])
+def test_who_is_ended_does_not_wait_for_the_cases_under_way(tmp_path: Path, error: BaseException) -> None:
+    # A process that was ended from outside, as where memory is short, is told with what to do.
+    told = SetupError if isinstance(error, BrokenProcessPool) else type(error)
+    with pytest.raises(told):
+        _work_until(error, tmp_path / "begun", tmp_path / "done")
     assert not (tmp_path / "done").exists()
 
 

@@ -38,12 +38,12 @@ def test_two_outputs_are_two_files(tmp_path: Path) -> None:
 
 def test_folders_and_files_are_not_confused(log: Path, tmp_path: Path) -> None:
     (tmp_path / "page.html").mkdir()
-    with pytest.raises(LogError, match=r"page\.html: is a folder; --html takes a file"):
+    with pytest.raises(LogError, match=r"page\.html: is a folder; name a file in it"):
         require_places(reads=(), writes={"--html": tmp_path / "page.html"})
     with pytest.raises(LogError, match="there is no folder"):
         require_places(reads=(), writes={"--json": str(tmp_path / "none" / "x.json")})
     for folder in (log, log / "figures" / "all"):
-        with pytest.raises(LogError, match=r"arm\.mcap is a file; --figures takes a folder"):
+        with pytest.raises(LogError, match=r"arm\.mcap is no folder; --figures takes a folder"):
             require_places(reads=(), writes={}, folders={"--figures": folder})
 
 

@@ -151,7 +151,7 @@ def test_units_at_a_schemes_block_are_taken_as_they_come(run: Run, tmp_path: Pat
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("log.csv", "ends with .mcap"), ("none/log.mcap", "No such file or directory"), ("folder.mcap", "is a folder")],
+    [("log.csv", "ends with .mcap"), ("none/log.mcap", "there is no folder"), ("folder.mcap", "is a folder")],
 )
 def test_a_place_that_cant_hold_the_log_is_told_before_the_simulation(
     run: Run, model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: str

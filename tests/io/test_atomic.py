@@ -33,11 +33,11 @@ def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path, error: type[Ba
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("a.bin", b"old")]
 
 
-def test_the_temporary_path_keeps_the_suffix_and_folder(tmp_path: Path) -> None:
-    with atomic_path(tmp_path / "plot.svg") as temporary:
-        assert temporary.suffix == ".svg"
-        assert temporary.parent == tmp_path.resolve()
-        temporary.write_text("<svg/>")
+def test_what_is_under_way_lies_beside_the_file_and_is_not_taken_for_one(tmp_path: Path) -> None:
+    with atomic_path(tmp_path / "plot.svg") as part:
+        assert (part.parent, part.suffix) == (tmp_path.resolve(), ".part")
+        part.write_text("<svg/>")
+        assert not list(tmp_path.glob("*.svg"))
     assert (tmp_path / "plot.svg").read_text() == "<svg/>"
 
 
@@ -80,7 +80,7 @@ def test_a_file_that_appears_meanwhile_is_kept_unless_told(tmp_path: Path) -> No
 
 
 def test_a_missing_folder_is_named(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="none doesn't exist"), atomic_write(tmp_path / "none" / "a"):
+    with pytest.raises(LogError, match=r"there is no folder .*none; make it"), atomic_write(tmp_path / "none" / "a"):
         pass
 
 

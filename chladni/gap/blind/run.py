@@ -12,7 +12,7 @@ from typing import Protocol
 from chladni.gap.blind.case_folder import CaseFolder, case_folders
 from chladni.gap.blind.seal import write_json
 from chladni.io.folder import made_folder
-from chladni.signals.errors import ChladniError
+from chladni.signals.errors import ChladniError, LogError
 
 FAILURE_FORMAT = "chladni.blind-failure/1"
 Progress = Callable[[float], None]
@@ -104,5 +104,9 @@ def _diagnosed(results: Path, diagnose: Diagnose, seed: int, case: CaseFolder) -
 
 
 def _note_time(path: Path, name: str, seconds: float) -> None:
-    with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps({"case": name, "seconds": round(seconds, 3)}) + "\n")
+    try:
+        # One call, so that no line is cut in two by whatever ends this process.
+        with path.open("ab", buffering=0) as file:
+            file.write((json.dumps({"case": name, "seconds": round(seconds, 3)}) + "\n").encode())
+    except OSError as error:
+        raise LogError(f"{path}: can't be written: {error.strerror or error}; run it again to go on") from error

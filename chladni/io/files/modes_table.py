@@ -114,7 +114,7 @@ def _shape_rows(modes: ModeSet) -> Iterable[list[str]]:
 
 
 def _write(path: Path, columns: Sequence[str], rows: Iterable[list[str]]) -> None:
-    with path.open("x", newline="", encoding="utf-8") as file:
+    with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows(rows)

@@ -4,22 +4,25 @@ They are read here, because the size of binary values, their number format, and 
 from the header; pyuff, which takes every line of -1 for the end of a dataset, writes them.
 """
 
-import tempfile
+import os
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from math import isfinite, nan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chladni.io.atomic import atomic_path
+from chladni.io.atomic import atomic_path, scratch_path
 from chladni.io.files.uff_records import UniversalFile
 from chladni.io.files.uff_values import Layout, Values, binary_values, fortran_number, layout_of, text_values
 from chladni.signals.errors import LogError
 from chladni.signals.text_reading import whole_number
+
+if TYPE_CHECKING:
+    import pyuff
 
 Dataset = dict[str, Any]
 
@@ -275,12 +278,22 @@ def append_datasets(path: Path, datasets: list[Dataset]) -> None:
     """Write datasets behind what `path` holds, if there is anything."""
     import pyuff
 
-    with tempfile.TemporaryDirectory() as folder, path.open("ab") as whole, warnings.catch_warnings():
+    # Beside the file: its disk is the one that must have room, whatever TMPDIR says.
+    with scratch_path(path) as one, path.open("ab") as whole, warnings.catch_warnings():
         # Pyuff leaves closing its second handle to the interpreter, which does it before the call returns.
         warnings.simplefilter("ignore", ResourceWarning)
         # Pyuff reads a file again before each dataset that it adds: thousands of them go through small files.
-        part = Path(folder) / "part.uff"
         for dataset in datasets:
-            pyuff.UFF(str(part)).write_sets(dataset, mode="add")
-            whole.write(part.read_bytes())
-            part.unlink()
+            os.truncate(one, 0)
+            _write_one(pyuff.UFF(str(one)), dataset)
+            whole.write(one.read_bytes())
+
+
+def _write_one(file: "pyuff.UFF", dataset: Dataset) -> None:
+    try:
+        file.write_sets(dataset, mode="add")
+    except Exception as error:
+        # Pyuff hides what the operating system says, and signals, behind an error of no kind.
+        if isinstance(error.__context__, (OSError, KeyboardInterrupt, SystemExit)):
+            raise error.__context__ from None
+        raise

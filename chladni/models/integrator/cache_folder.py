@@ -38,8 +38,8 @@ def _private_folder() -> Path | None:
     """Make or reuse a folder under the temporary one that only this user can enter; None when that can't be had."""
     if not hasattr(os, "getuid"):
         return None
-    folder = Path(tempfile.gettempdir()) / f"chladni-numba-{os.getuid()}"
     try:
+        folder = Path(tempfile.gettempdir()) / f"chladni-numba-{os.getuid()}"
         folder.mkdir(mode=0o700, exist_ok=True)
         found = folder.lstat()
     except OSError:

@@ -19,11 +19,28 @@ LOOPBACK = "127.0.0.1"
 PATIENCE_S = 30.0
 POLL_S = 0.05
 
+# Ends the program when told to (SIGTERM), or when the other end of its input is closed, as any death of ours does.
+_GUARD = """
+import os, signal, subprocess, sys, threading
+program = subprocess.Popen(sys.argv[1:], stdin=subprocess.DEVNULL)
+def end(*_):
+    program.terminate()
+    threading.Timer(3.0, program.kill).start()
+def wait_for_parent():
+    sys.stdin.buffer.read()
+    end()
+signal.signal(signal.SIGTERM, end)
+threading.Thread(target=wait_for_parent, daemon=True).start()
+code = program.wait()
+# Not by way of the interpreter's end, which waits for timers.
+os._exit(code if code >= 0 else 128 - code)
+"""
+
 
 def start(
     options: Sequence[str], *, ports: Sequence[int], detached: bool, settle_s: float = 0.0
 ) -> "subprocess.Popen[bytes]":
-    """Start rerun bound to loopback and wait until it listens on all `ports`.
+    """Start rerun bound to loopback and wait until it listens on all `ports`; only a `detached` one outlives us.
 
     Python's own servers (``rr.serve_grpc`` and its kin) bind every interface and can't be told otherwise, and so
     does ``rr.spawn``; only the program takes an address. With `settle_s` it must also live that long after it
@@ -36,9 +53,11 @@ def start(
     """
     with tempfile.TemporaryFile() as said:
         command = [_executable(), "--bind", LOOPBACK, "--hide-welcome-screen", *options]
+        if not detached:
+            command = [sys.executable, "-I", "-S", "-c", _GUARD, *command]
         process = subprocess.Popen(  # noqa: S603  # the program and all options are ours
             command,
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.DEVNULL if detached else subprocess.PIPE,
             stdout=said,
             stderr=said,
             start_new_session=detached,
@@ -62,6 +81,8 @@ def stop(process: "subprocess.Popen[bytes]") -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
+    if process.stdin is not None:
+        process.stdin.close()
 
 
 def send(study: Study, port: int) -> None:
