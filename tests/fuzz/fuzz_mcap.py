@@ -1,4 +1,4 @@
-"""Feeds damaged MCAP logs to the container reader: ``python tests/fuzz/fuzz_mcap.py --inputs 20000 --seed 1``.
+"""Damaged MCAP logs, for the container reader: ``python tests/fuzz/fuzz_mcap.py --inputs 20000 --seed 1``.
 
 Small logs of every kind (zstd, lz4, plain; chunked or not; with and without index, summary, checksums)
 are flipped, cut, spliced, zeroed, repeated and given absurd lengths. Allowed outcomes are a `LogError`,
@@ -11,34 +11,27 @@ or messages and damage after these rules:
    end, within its memory.
 4. Messages that are missing, or there twice, are not passed over in silence (logs of kind 3 excepted,
    unless their statistics count messages).
-5. Every input is read within a time limit and the process stays below a memory limit.
-
-Exits with 1 after the first input that breaks a rule, and keeps that input.
 """
 
-import argparse
-import faulthandler
 import io
 import random
-import resource
-import shutil
 import struct
 import sys
-import tempfile
-import time
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
+from damage import BYTES, Damage, flip, overwrite, splice, zero
+from harness import REFUSED, TOLD, WHOLE, BrokenRuleError, Case, Format, generator, main
 from mcap.writer import CompressionType, IndexType, Writer
+from samples import log_command, read_log
 
 from chladni.io.mcap.container import McapContainer
 from chladni.signals.errors import LogError
 
-SECONDS_AN_INPUT = 20
-MEMORY_BYTES = 3 << 30
 START_NS = 1_700_000_000_000_000_000
 UNCHECKED = "the checksum could not be checked"
 
@@ -84,8 +77,10 @@ def write_seed(name: str, rng: random.Random, protection: str, **settings: objec
     )
 
 
-def seeds(rng: random.Random) -> list[Seed]:
+@cache
+def seeds() -> list[Seed]:
     """Write one log of each kind."""
+    rng = generator("mcap")
     bare = {
         "index_types": IndexType.NONE,
         "use_statistics": False,
@@ -127,7 +122,7 @@ def seeds(rng: random.Random) -> list[Seed]:
     return found
 
 
-# ---------------------------------------------------------------- mutations
+# ---------------------------------------------------------------- damage
 
 
 def record_starts(content: bytes | bytearray) -> list[int]:
@@ -137,50 +132,6 @@ def record_starts(content: bytes | bytearray) -> list[int]:
         found.append(position)
         position += 9 + struct.unpack_from("<Q", content, position + 1)[0]
     return found
-
-
-def flip(content: bytearray, rng: random.Random) -> None:
-    for _ in range(rng.choice((1, 1, 2, 8))):
-        content[rng.randrange(len(content))] ^= 1 << rng.randrange(8)
-
-
-def overwrite(content: bytearray, rng: random.Random) -> None:
-    start, size = stretch(content, rng)
-    content[start : start + size] = rng.randbytes(size)
-
-
-def cut(content: bytearray, rng: random.Random) -> None:
-    del content[rng.randrange(len(content)) :]
-
-
-def drop(content: bytearray, rng: random.Random) -> None:
-    start, size = stretch(content, rng)
-    del content[start : start + size]
-
-
-def zero(content: bytearray, rng: random.Random) -> None:
-    start, size = stretch(content, rng)
-    content[start : start + size] = bytes(size)
-
-
-def zero_tail(content: bytearray, rng: random.Random) -> None:
-    start = rng.randrange(len(content))
-    content[start:] = bytes(len(content) - start)
-
-
-def repeat(content: bytearray, rng: random.Random) -> None:
-    start, size = stretch(content, rng)
-    content[start:start] = content[start : start + size]
-
-
-def splice(content: bytearray, rng: random.Random) -> None:
-    start, size = stretch(content, rng)
-    at = rng.randrange(len(content))
-    content[at : at + size] = content[start : start + size]
-
-
-def append(content: bytearray, rng: random.Random) -> None:
-    content += rng.choice((bytes(rng.randrange(1, 5000)), rng.randbytes(rng.randrange(1, 50))))
 
 
 def huge_length(content: bytearray, rng: random.Random) -> None:
@@ -193,14 +144,7 @@ def opcode(content: bytearray, rng: random.Random) -> None:
     content[rng.choice(record_starts(content))] = rng.choice((0, *range(1, 17), 0x80, 0xFF))
 
 
-def stretch(content: bytearray, rng: random.Random) -> tuple[int, int]:
-    start = rng.randrange(len(content))
-    return start, min(rng.choice((1, 4, 9, 60, 700, 5000)), len(content) - start)
-
-
-MUTATIONS: tuple[Callable[[bytearray, random.Random], None], ...] = (
-    flip, flip, overwrite, cut, drop, zero, zero_tail, repeat, splice, append, huge_length, huge_length, opcode,
-)  # fmt: skip
+MUTATIONS: tuple[Damage, ...] = (*BYTES, huge_length, huge_length, opcode)
 
 
 def mutate(seed: Seed, rng: random.Random) -> tuple[bytes, list[str]]:
@@ -250,100 +194,64 @@ def messages_of(log: McapContainer, channel_ids: set[int]) -> Iterator[Message]:
             yield batch.channel_id, log_time, data[offset : offset + length]
 
 
-def read_all(path: Path, rng: random.Random) -> Outcome | None:
-    """Read a log, sometimes with a second read of one channel; None for a `LogError`."""
-    try:
-        with McapContainer.open(path) as log:
-            messages = Counter(messages_of(log, set(log.channels)))
-            if rng.random() < 0.2 and log.channels:
-                one = rng.choice(sorted(log.channels))
-                alone = Counter(messages_of(log, {one}))
-                expected = Counter({key: count for key, count in messages.items() if key[0] == one})
-                if alone != expected and not log.damage:
-                    raise AssertionError(f"channel {one} alone differs from the same channel among all")
-            return Outcome(messages=messages, damage=tuple(damage.what for damage in log.damage))
-    except LogError as error:
-        if "\n" in str(error) or str(path) not in str(error):
-            raise AssertionError(f"not one line that names the file: {error}") from error
-        return None
+def read_all(path: Path, rng: random.Random) -> Outcome:
+    """Read a log, sometimes with a second read of one channel."""
+    with McapContainer.open(path) as log:
+        messages = Counter(messages_of(log, set(log.channels)))
+        if rng.random() < 0.2 and log.channels:
+            one = rng.choice(sorted(log.channels))
+            alone = Counter(messages_of(log, {one}))
+            expected = Counter({key: count for key, count in messages.items() if key[0] == one})
+            if alone != expected and not log.damage:
+                raise BrokenRuleError("one channel alone", f"{one} differs from the same channel among all")
+        return Outcome(messages=messages, damage=tuple(damage.what for damage in log.damage))
 
 
-def broken_rule(seed: Seed, outcome: Outcome, mutations: list[str]) -> str | None:
+def broken_rule(seed: Seed, outcome: Outcome, mutations: list[str]) -> tuple[str, str] | None:
     """Return which rule the outcome breaks, None when it breaks none."""
     wrong = [message for message in outcome.messages if message not in seed.messages]
     excused = any(UNCHECKED in what for what in outcome.damage) and mutations != ["cut"]
     if wrong and seed.protection == "chunks" and not excused:
-        return f"a wrong message under a chunk's checksum: {wrong[0]}"
+        return "a wrong message under a chunk's checksum", str(wrong[0])
     if wrong and seed.protection == "data" and not outcome.damage:
-        return f"a wrong message without a word: {wrong[0]}"
+        return "a wrong message without a word", str(wrong[0])
     unprotected = seed.protection == "none"
     differs = outcome.messages != seed.messages
     if unprotected:
         differs = seed.has_statistics and outcome.messages.total() < seed.messages.total()
     if differs and not outcome.damage:
-        return f"{outcome.messages.total()} messages instead of {seed.messages.total()} without a word"
+        return "messages lost without a word", f"{outcome.messages.total()} instead of {seed.messages.total()}"
     return None
 
 
-def run(inputs: int, seed_number: int, keep: Path) -> int:
-    """Run the harness and return the exit code."""
-    rng = random.Random(seed_number)  # noqa: S311 - damage needs no cryptography
-    pool = seeds(rng)
-    plain = [seed for seed in pool if seed.name.startswith("none") and seed.protection == "chunks"]
-    tally: Counter[str] = Counter()
-    slowest = 0.0
-    started = time.monotonic()
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "input.mcap"
-        for number in range(inputs):
-            forged = number % 20 == 19
-            seed = rng.choice(plain if forged else pool)
-            content, mutations = (forge if forged else mutate)(seed, rng)
-            path.write_bytes(content)
-            faulthandler.dump_traceback_later(SECONDS_AN_INPUT, exit=True)
-            began = time.monotonic()
-            try:
-                outcome = read_all(path, rng)
-                problem = None if outcome is None or forged else broken_rule(seed, outcome, mutations)
-            except (Exception, MemoryError) as error:  # noqa: BLE001 - any crash at all is the finding
-                outcome, problem = None, f"{type(error).__name__}: {error}"
-            faulthandler.cancel_dump_traceback_later()
-            slowest = max(slowest, time.monotonic() - began)
-            if problem is not None:
-                kept = keep / f"fuzz-{seed_number}-{number}.mcap"
-                shutil.copy(path, kept)
-                how = f"input {number} ({seed.name}: {', '.join(mutations)})"
-                sys.stdout.write(f"{how}, kept as {kept}: {problem}\n")
-                return 1
-            tally[_kind(seed, outcome)] += 1
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    seconds = time.monotonic() - started
-    kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(tally.items()))
-    sys.stdout.write(
-        f"{inputs} inputs, seed {seed_number}, {seconds:.0f} s, slowest {slowest * 1e3:.0f} ms, "
-        f"peak {peak:.0f} MiB: no crash, no hang, no silent wrong sample; {kinds}\n"
-    )
-    return 0
+def make(rng: random.Random) -> Case:
+    """Damage a log, or the inside of one of its chunks."""
+    forged = rng.random() < 0.05
+    plain = [seed for seed in seeds() if seed.name.startswith("none") and seed.protection == "chunks"]
+    seed = rng.choice(plain if forged else seeds())
+    content, mutations = (forge if forged else mutate)(seed, rng)
+    how = f"{seed.name}: {', '.join(mutations)}"
+    return Case(files={"a.mcap": content}, how=how, truth=(seed, mutations, rng.getrandbits(32)))
 
 
-def _kind(seed: Seed, outcome: Outcome | None) -> str:
-    if outcome is None:
-        return "refused"
-    if not outcome.damage:
-        return "without damage"
-    return "damaged, all messages" if outcome.messages == seed.messages else "damaged, some messages"
+def read(path: Path, case: Case) -> str:
+    """Read a log by its container, and now and then as the commands do."""
+    seed, mutations, number = case.truth
+    rng = generator(number)
+    try:
+        outcome = read_all(path, rng)
+    except LogError as error:
+        if "\n" in str(error) or str(path) not in str(error):
+            raise BrokenRuleError("not one line that names the file", str(error)) from error
+        return REFUSED
+    if mutations != ["forge"] and (problem := broken_rule(seed, outcome, mutations)):
+        raise BrokenRuleError(*problem)
+    if rng.random() < 0.2:
+        read_log(path, {})
+    return TOLD if outcome.damage else WHOLE
 
 
-def main() -> int:
-    """Parse the command line."""
-    parser = argparse.ArgumentParser(description="Fuzz the MCAP container reader.")
-    parser.add_argument("--inputs", type=int, default=2000)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--keep", type=Path, default=Path(tempfile.gettempdir()))
-    arguments = parser.parse_args()
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    return run(arguments.inputs, arguments.seed, arguments.keep)
-
+FORMAT = Format(name="mcap", make=make, read=read, command=log_command)
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(["mcap"]))
