@@ -7,7 +7,7 @@ import sys
 
 from harness import main
 
-FORMATS = ("mcap", "messages", "csv", "lvm", "uff", "wav", "mat", "npz", "arrow", "tdms", "toml", "blind")
+FORMATS = ("mcap", "messages", "valid", "csv", "lvm", "uff", "wav", "mat", "npz", "arrow", "tdms", "toml", "blind")
 
 if __name__ == "__main__":
     sys.exit(main(FORMATS))

@@ -82,6 +82,12 @@ def huge_number(content: bytearray, rng: random.Random) -> None:
     content[at : at + size] = (value & (256**size - 1)).to_bytes(size, rng.choice(("little", "big")))
 
 
+def zeros(size: int, packer: Any) -> bytes:
+    """Pack many zeros, by a compressor of zlib or zstandard, without having them."""
+    block = bytes(1 << 20)
+    return b"".join([*(packer.compress(block) for _ in range(size >> 20)), packer.flush()])
+
+
 BYTES: tuple[Damage, ...] = (
     flip, flip, flip, overwrite, cut, drop, zero, zero_tail, repeat, splice, append, huge_number,
 )  # fmt: skip
@@ -91,7 +97,7 @@ def odd_text(content: bytearray, rng: random.Random) -> None:
     """Put odd text in the place of a word, or beside it."""
     start = rng.randrange(len(content))
     end = start
-    while end < len(content) and content[end] not in b" ,;\t\r\n=[]{}\"":
+    while end < len(content) and content[end] not in b' ,;\t\r\n=[]{}"':
         end += 1
     content[start if rng.random() < 0.7 else end : end] = rng.choice(ODD_TEXTS).encode()
 

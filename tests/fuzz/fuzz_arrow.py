@@ -1,10 +1,12 @@
 """Damaged and odd Parquet, Feather and Arrow files: ``python tests/fuzz/fuzz_arrow.py --inputs 20000 --seed 1``.
 
-Parquet's pages may have checksums, Arrow's batches have none. Damage among the numbers of the latter changes no others.
+Parquet's pages may have checksums: a wrong number of such a page is never read. Nothing else has any; damage among
+plain numbers changes no others.
 """
 
 import random
 import sys
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -34,20 +36,38 @@ def content_of(table: pa.Table, kind: str, **options: Any) -> bytes:
 def sounds() -> tuple[Sound, ...]:
     """Write one file of each kind."""
     rng = np.random.default_rng(1)
-    first, second, times = rng.normal(size=(ROWS, 1)), rng.normal(size=(ROWS, 1)), np.arange(ROWS)[:, np.newaxis] / 100
+    first, second, times = (
+        rng.normal(size=(ROWS, 1)),
+        rng.normal(size=(ROWS, 1)),
+        np.arange(ROWS)[:, np.newaxis] / 100,
+    )
     table = pa.table({"time [s]": times[:, 0], "ax [N]": first[:, 0], "ay [N]": second[:, 0]})
     truth = Truth(channels={"ax": first[:, 0], "ay": second[:, 0]}, start_ns=0)
     arrays = [times, first, second]
     found = []
-    for how, options in (("packed", {}), ("checked", {"write_page_checksum": True}), ("old", {"version": "1.0"})):
-        found.append(sound_file(how, "a.parquet", content_of(table, "parquet", **options), truth))
+    for how, options in (("packed", {}), ("old", {"version": "1.0"})):
+        found.append(sound_file(how, "a.parquet", content_of(table, "parquet", **options), truth, vague_outside=True))
     for compression in ("lz4", "zstd"):
         content = content_of(table, "feather", compression=compression)
-        found.append(sound_file(compression, "a.feather", content, truth))
+        found.append(sound_file(compression, "a.feather", content, truth, vague_outside=True))
     for kind, options in (("feather", {"compression": "uncompressed"}), ("stream", {})):
         content = content_of(table, kind, **options)
-        found.append(sound_file(f"plain {kind}", "a.arrow", content, truth, unprotected=arrays))
-    return tuple(found)
+        plain = sound_file(f"plain {kind}", "a.arrow", content, truth, unprotected=arrays, vague_outside=True)
+        found.append(plain)
+    return (*found, checked(table, truth))
+
+
+def checked(table: pa.Table, truth: Truth) -> Sound:
+    """Write Parquet with checksums: of pages, not of what describes them."""
+    content = content_of(table, "parquet", write_page_checksum=True, use_dictionary=False)
+    group = parquet.ParquetFile(pa.BufferReader(content)).metadata.row_group(0)
+    columns = [group.column(number) for number in range(3)]
+    ends = [column.data_page_offset + column.total_compressed_size for column in columns]
+    numbers = [len(table) * 8 // 2 for _ in columns]
+    starts = [end - size for end, size in zip(ends, numbers, strict=True)]
+    edges = [0, *(edge for pair in zip(starts, ends, strict=True) for edge in pair), len(content)]
+    sound = sound_file("checked", "a.parquet", content, truth)
+    return replace(sound, vague=tuple(zip(edges[::2], edges[1::2], strict=True)))
 
 
 def odd(rng: random.Random) -> Case:

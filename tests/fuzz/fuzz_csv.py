@@ -9,13 +9,11 @@ import random
 import sys
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from damage import BYTES, ODD_TEXTS, TEXTS, damaged
 from harness import Case, Format, main
-from samples import START_NS, Truth, check_log, proven
+from samples import START_NS, Truth, log_command, proven, read_case
 
 ROWS = 60
 
@@ -70,8 +68,6 @@ def table(
 @cache
 def tables() -> tuple[Table, ...]:
     """Write one table of each kind."""
-    odd = [text for text in ODD_TEXTS if text.strip() and len(text) < 100 and "\r" not in text and "\0" not in text]
-    comments = tuple(f"# made {text} by" for text in odd if text not in "'\"")
     return (
         table("comma", ",", ".", "s"),
         table("semicolon", ";", ",", "s", end="\r\n"),
@@ -81,29 +77,36 @@ def tables() -> tuple[Table, ...]:
         table("rate", ",", ".", "none"),
         table("wide", ",", ".", "s", count=40),
         table("preamble", ",", ".", "s", head=("Instrument: A", "Serial: 7", "")),
-        *(table(f"odd{number}", ",", ".", "s", head=(one,)) for number, one in enumerate(comments)),
     )
 
 
 def make(rng: random.Random) -> Case:
-    """Damage a table, mostly in its rows."""
-    sound = rng.choice(tables()[:8]) if rng.random() < 0.8 else rng.choice(tables())
+    """Damage a table, mostly in its rows, or put an odd line above it."""
+    sound = rng.choice(tables())
+    what = rng.random()
     head = "".join(line + sound.end for line in sound.head).encode()
-    rows = sound.content[len(head) :]
-    if rng.random() < 0.75:
-        spoilt, how = damaged(rows, rng, TEXTS if rng.random() < 0.7 else BYTES)
-        content = head + spoilt
+    if what < 0.1:
+        # Whatever a remark holds, it's one line.
+        odd = rng.choice(ODD_TEXTS).replace("\r", " ")
+        remark = f"{rng.choice(('# made', '; made', 'made', '%'))} {odd} by{sound.end}".encode()
+        return Case(
+            files={"a.csv": remark + sound.content}, how=f"{sound.name}: remark {odd[:40]!r}", truth=sound.truth
+        )
+    if what < 0.7:
+        rows, how = damaged(sound.content[len(head) :], rng, TEXTS if rng.random() < 0.7 else BYTES)
+        content = head + rows
     else:
         content, how = damaged(sound.content, rng, TEXTS)
-    return Case(files={"input.csv": content}, how=f"{sound.name}: {how}", truth=expected(sound, head, content))
+    return Case(files={"a.csv": content}, how=f"{sound.name}: {how}", truth=expected(sound, head, content))
 
 
 def expected(sound: Table, head: bytes, content: bytes) -> Truth:
     """Give what may be read of a damaged table."""
-    if not content.startswith(head):
-        return replace(sound.truth, channels=None)
-    lines = content[len(head) :].split(sound.end.encode())
     recorded = {row.encode(): number for number, row in enumerate(sound.rows)}
+    if not content.startswith(head):
+        lines = content.split(sound.end.encode())
+        return replace(sound.truth, channels=None, least=len({line for line in lines if line in recorded}))
+    lines = content[len(head) :].split(sound.end.encode())
     whole = [recorded[line] for line in lines if line in recorded]
     intact = np.zeros(ROWS, np.bool_)
     intact[whole] = True
@@ -125,18 +128,7 @@ def _by_place(sound: Table, lines: list[bytes], recorded: dict[bytes, int]) -> T
     return replace(sound.truth, channels=channels, foreign=int(np.count_nonzero(known < 0)))
 
 
-def read(path: Path, case: Case) -> str:
-    """Read a table and hold it against the truth."""
-    return check_log(path, case.truth)
-
-
-def command(path: Path, rng: random.Random) -> list[str]:
-    """Any command that takes a table."""
-    words: list[list[Any]] = [["info", path], ["psd", path], ["convert", path, path.with_name("out.mcap")]]
-    return [str(word) for word in rng.choice(words)]
-
-
-FORMAT = Format(name="csv", make=make, read=read, command=command)
+FORMAT = Format(name="csv", make=make, read=read_case, command=log_command)
 
 if __name__ == "__main__":
     sys.exit(main(["csv"]))

@@ -16,7 +16,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from damage import ODD_TEXTS
+from damage import ODD_TEXTS, zeros
 from harness import Case, Format, main
 from samples import Sound, Truth, damaged_case, log_command, odd_case, read_case, sound_file
 from scipy.io import savemat
@@ -35,7 +35,9 @@ def mat73(**arrays: Any) -> bytes:
         path = Path(folder) / "a.mat"
         with h5py.File(path, "w", userblock_size=512) as file:
             for name, array in arrays.items():
-                one = file.create_dataset(name, data=np.atleast_2d(array).T, fletcher32=np.size(array) > 1, chunks=True)
+                one = file.create_dataset(
+                    name, data=np.atleast_2d(array).T, fletcher32=np.size(array) > 1, chunks=True
+                )
                 one.attrs["MATLAB_class"] = np.bytes_("double")
         content = path.read_bytes()
     return b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + content[128:]
@@ -87,10 +89,20 @@ def matrix(rng: random.Random, depth: int = 0) -> bytes:
     return tag(14, head + tag(rng.choice((1, 2, 7, 9, 9, 12, 13, 20)), rng.randbytes(rng.choice((0, 8, 80, 240)))))
 
 
+@cache
+def bomb() -> bytes:
+    """Write an element of 640 MB in 3 MB."""
+    size = 640 << 20
+    head = tag(6, struct.pack("<II", 6, 0)) + tag(5, struct.pack("<ii", size // 8, 1)) + tag(1, b"x")
+    head = struct.pack("<II", 14, len(head) + 8 + size) + head + struct.pack("<II", 9, size)
+    packer = zlib.compressobj(1)
+    return tag(15, packer.compress(head) + zeros(size, packer))
+
+
 def odd(rng: random.Random) -> Case:
     """Write elements that contradict themselves, cells of unlike members, deep nesting, and much in little."""
     header = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
-    what = rng.choice(("elements", "elements", "elements", "cells", "deep", "bomb"))
+    what = rng.choices(("elements", "cells", "deep", "bomb"), (60, 20, 20, 1))[0]
     if what == "elements":
         parts = [matrix(rng) for _ in range(rng.randrange(1, 4))]
         content = header + b"".join(tag(15, zlib.compress(one)) if rng.random() < 0.4 else one for one in parts)
@@ -102,12 +114,12 @@ def odd(rng: random.Random) -> Case:
     elif what == "deep":
         inner = tag(6, struct.pack("<II", 6, 0)) + tag(5, struct.pack("<ii", 1, 1)) + tag(1, b"x") + tag(9, bytes(8))
         for _ in range(rng.choice((3, 50, 500, 3000))):
-            inner = tag(6, struct.pack("<II", 1, 0)) + tag(5, struct.pack("<ii", 1, 1)) + tag(1, b"x") + tag(14, inner)
+            inner = (
+                tag(6, struct.pack("<II", 1, 0)) + tag(5, struct.pack("<ii", 1, 1)) + tag(1, b"x") + tag(14, inner)
+            )
         content = header + tag(14, inner)
     else:
-        size = rng.choice((10**6, 3 * 10**7))
-        head = tag(6, struct.pack("<II", 6, 0)) + tag(5, struct.pack("<ii", size // 8, 1)) + tag(1, b"x")
-        content = header + tag(15, zlib.compress(tag(14, head + tag(9, bytes(size))), 1))
+        content = header + bomb()
     return odd_case("a.mat", content, what)
 
 

@@ -24,7 +24,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from damage import BYTES, Damage, flip, overwrite, splice, zero
+import zstandard
+from damage import BYTES, Damage, flip, overwrite, splice, zero, zeros
 from harness import REFUSED, TOLD, WHOLE, BrokenRuleError, Case, Format, generator, main
 from mcap.writer import CompressionType, IndexType, Writer
 from samples import log_command, read_log
@@ -174,6 +175,17 @@ def forge(seed: Seed, rng: random.Random) -> tuple[bytes, list[str]]:
     return bytes(content), ["forge"]
 
 
+@cache
+def bomb(megabytes: int, announced: int) -> bytes:
+    """Write a log of one chunk that holds many zeros, and announces so many bytes."""
+    packed = zeros(megabytes << 20, zstandard.ZstdCompressor().compressobj())
+    chunk = (
+        struct.pack("<QQQII", START_NS, START_NS, announced, 0, 4) + b"zstd" + struct.pack("<Q", len(packed)) + packed
+    )
+    header = b"\x01" + struct.pack("<QII", 8, 0, 0)
+    return b"\x89MCAP0\r\n" + header + b"\x06" + struct.pack("<Q", len(chunk)) + chunk
+
+
 # ---------------------------------------------------------------- the rules
 
 
@@ -226,6 +238,11 @@ def broken_rule(seed: Seed, outcome: Outcome, mutations: list[str]) -> tuple[str
 
 def make(rng: random.Random) -> Case:
     """Damage a log, or the inside of one of its chunks."""
+    if rng.random() < 0.002:
+        megabytes = rng.choice((300, 600, 1000))
+        announced = rng.choice((megabytes << 20, 1000, 1 << 40))
+        how = f"{megabytes} MB of zeros, {announced} announced"
+        return Case(files={"a.mcap": bomb(megabytes, announced)}, how=how, truth=(None, ["forge"], 0))
     forged = rng.random() < 0.05
     plain = [seed for seed in seeds() if seed.name.startswith("none") and seed.protection == "chunks"]
     seed = rng.choice(plain if forged else seeds())

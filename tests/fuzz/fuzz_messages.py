@@ -22,13 +22,12 @@ from typing import Any
 import numpy as np
 from damage import BYTES, ODD_TEXTS, TEXTS, Damage, cut, damaged, huge_number, odd_json
 from google.protobuf import descriptor_pb2, timestamp_pb2
-from harness import Case, Format, main
+from harness import BrokenRuleError, Case, Format, main
 from mcap.writer import CompressionType, Writer
 from mcap_ros2._dynamic import serialize_dynamic
-from samples import START_NS, Truth, check_log, log_command, odd_case, proven
+from samples import START_NS, Truth, check_log, log_command, proven
 
 from chladni.signals.errors import ChladniError
-from harness import BrokenRuleError
 from tests.make_logs import JOINT_STATE, SAMPLE_BLOCK
 
 COUNT = 50
@@ -88,9 +87,7 @@ def kinds_of(rng: np.random.Generator) -> list[Kind]:
     flat = {".x": x, ".y": y.astype(float), ".part.small": small.astype(float)}
     flat |= {f".v[{column}]": v[:, column] for column in range(3)}
     flat |= {f".part.many[{column}]": many[:, column] for column in range(2)}
-    stamped = [
-        {"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}, "frame_id": "abc"} for stamp in stamps
-    ]
+    stamped = [{"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}, "frame_id": "abc"} for stamp in stamps]
     messages = [
         {"header": head, "x": x[i], "y": float(y[i]), "v": v[i].tolist(),
          "part": {"small": int(small[i]), "many": many[i].tolist()}}
@@ -98,7 +95,10 @@ def kinds_of(rng: np.random.Generator) -> list[Kind]:
     ]  # fmt: skip
     encode = serialize_dynamic("demo/msg/Flat", ROS2)["demo/msg/Flat"]
     cdr = tuple(map(encode, messages))
-    binary, text = (BYTES + (huge_number, huge_number, cut), TEXTS), (TEXTS + (odd_json,) * 6, TEXTS + (odd_json,) * 6)
+    binary, text = (
+        (BYTES + (huge_number, huge_number, cut), TEXTS),
+        (TEXTS + (odd_json,) * 6, TEXTS + (odd_json,) * 6),
+    )
     ros1 = tuple(
         struct.pack("<IIII3sdf3dhI2d", i, stamp // 10**9, stamp % 10**9, 3, b"abc", x[i], y[i], *v[i], small[i], 2, *many[i])
         for i, stamp in enumerate(stamps)
@@ -225,7 +225,10 @@ def make(rng: random.Random) -> Case:
         spoilt, how = odd_kind(rng)
         known = replace(known, channels=None)
     truth = replace(
-        known, intact=np.repeat(intact, first.per_message), foreign=int((~intact).sum()) * 2 * first.per_message, sure=sound
+        known,
+        intact=np.repeat(intact, first.per_message),
+        foreign=int((~intact).sum()) * 2 * first.per_message,
+        sure=sound,
     )
     topic = "/s" if rng.random() < 0.9 else f"/s{rng.choice(ODD_TEXTS)[:99]}"
     truth = truth if topic == "/s" else replace(truth, channels=None)
@@ -234,17 +237,33 @@ def make(rng: random.Random) -> Case:
 
 
 SIZES = ("", "[]", "[3]", "[²]", "[-1]", "[0]", "[99999999999]", "[<=3]", "[]" * 3, "[3", "[ 3 ]", "[1e3]", "[0x3]")
-TYPES = ("float64", "string", "wstring", "Self", "demo/Part", "byte", "time", "duration", "string<=5", "int128", "bool")
+TYPES = (
+    "float64",
+    "string",
+    "wstring",
+    "Self",
+    "demo/Part",
+    "byte",
+    "time",
+    "duration",
+    "string<=5",
+    "int128",
+    "bool",
+)
 
 
 def odd_kind(rng: random.Random) -> tuple[Kind, str]:
     """Write a definition that nobody writes, and messages that don't care for it."""
     what = rng.choice(("ros2msg", "ros1msg", "ros2idl", "jsonschema", "json", "json", "protobuf", "none"))
+    if rng.random() < 0.02:
+        return spread(rng)
     names = [rng.choice(("a", "b", "header", "stamp", "name", "x" * 300, *ODD_TEXTS)) for _ in range(6)]
     if what in ("ros2msg", "ros1msg"):
         lines = [f"{rng.choice(TYPES)}{rng.choice(SIZES)} {name} {rng.choice(('', '=5', '# [g]'))}" for name in names]
-        lines += ["=" * 80, "MSG: demo/Self", "Self[] again", "=" * 80, "MSG: demo/Part", "Part next"][: rng.randrange(7)]
-        text = "\n".join(lines * rng.choice((1, 1, 1, 200)))
+        lines += ["=" * 80, "MSG: demo/Self", "Self[] again", "=" * 80, "MSG: demo/Part", "Part next"][
+            : rng.randrange(7)
+        ]
+        text = "\n".join(lines * rng.choice((1, 1, 1, 1, 100)))
     elif what == "ros2idl":
         sizes = ("", "[3]", "[²]", "[9999999999]", "[N]", "[-1]", "[2]" * 50, "[99999]" * 200, "[")
         kinds = ("double", "sequence<double>", "S", "string<²>", "sequence<" * 60 + "double" + ">" * 60, "map<a,b>")
@@ -264,14 +283,42 @@ def odd_kind(rng: random.Random) -> tuple[Kind, str]:
         payloads = [one if rng.random() < 0.9 else odd_value(rng).encode("utf-8", "surrogatepass") for _ in range(9)]
     else:
         payloads = [b"\0\1\0\0" + rng.randbytes(rng.choice((0, 8, 48))) for _ in range(COUNT)]
-    kind = Kind(name=f"odd {what}", encoding=encoding, schema=schema, payloads=tuple(payloads), channels={}, damages=((), ()))
+    kind = Kind(
+        name=f"odd {what}", encoding=encoding, schema=schema, payloads=tuple(payloads), channels={}, damages=((), ())
+    )
     return kind, f"{data[:60]!r}"
+
+
+def spread(rng: random.Random) -> tuple[Kind, str]:
+    """Write many fields, few messages, and hours between two of them: a grid over all has billions of places."""
+    fields, hours = rng.choice((3, 60, 300)), rng.choice((0.1, 4.4, 900.0))
+    numbers = {f"x{number}": 1.5 for number in range(fields)}
+    stamps = [START_NS + number * STEP_NS for number in range(COUNT - 2)]
+    stamps += [START_NS + round(hours * 3600e9) + number * STEP_NS for number in range(2)]
+    heads = [{"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}} for stamp in stamps]
+    payloads = tuple(json.dumps({"header": head, **numbers}).encode() for head in heads)
+    kind = Kind(name="spread", encoding="json", schema=None, payloads=payloads, channels={}, damages=((), ()))
+    return kind, f"{fields} fields, {hours} h apart"
 
 
 def odd_value(rng: random.Random, depth: int = 0) -> str:
     """Write JSON that is valid, or nearly so."""
     if depth > 3 or rng.random() < 0.5:
-        tokens = ("1", "-0.0", "1e999", "NaN", "null", "true", '"1.5"', '"\\ud800"', "9" * 5000, "[" * 3000, "1E+2", "{}", "[]")
+        tokens = (
+            "1",
+            "-0.0",
+            "1e999",
+            "NaN",
+            "null",
+            "true",
+            '"1.5"',
+            '"\\ud800"',
+            "9" * 5000,
+            "[" * 3000,
+            "1E+2",
+            "{}",
+            "[]",
+        )
         return rng.choice(tokens)
     if rng.random() < 0.3:
         return "[" + ",".join(odd_value(rng, depth + 1) for _ in range(rng.choice((0, 1, 3, 70)))) + "]"

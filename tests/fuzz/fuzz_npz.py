@@ -40,9 +40,7 @@ def sounds() -> tuple[Sound, ...]:
     timed = Truth(channels=columns, start_ns=0)
     rated = Truth(channels=columns, start_ns=0, options={"sample_rate_hz": 100.0})
     fields = np.array([tuple(row) for row in values], dtype=[("x", "f8"), ("y", "f4"), ("z", ">f8")])
-    by_field = Truth(
-        channels={name: fields[name].astype(float) for name in "xyz"}, start_ns=0, options=rated.options
-    )
+    by_field = Truth(channels={name: fields[name].astype(float) for name in "xyz"}, start_ns=0, options=rated.options)
     singles = values.astype(np.float32)
     found = []
     for compressed in (False, True):
@@ -65,21 +63,44 @@ def sounds() -> tuple[Sound, ...]:
     return tuple(found)
 
 
+@cache
+def bomb() -> bytes:
+    """Write an archive of 640 MB in 600 kB."""
+    stream = io.BytesIO()
+    header = lone(np.zeros(0))
+    with (
+        zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as file,
+        file.open("x.npy", "w") as member,
+    ):
+        member.write(header.replace(b"(0,),  ", b"(80000000,),".ljust(15))[: len(header)])
+        for _ in range(640):
+            member.write(bytes(10**6))
+    return stream.getvalue()
+
+
 def odd(rng: random.Random) -> Case:
-    """Write a header that promises much, or an archive of odd members."""
+    """Write a header that promises much, an archive of odd members, or one of very many zeros."""
+    if rng.random() < 0.01:
+        return odd_case("bomb.npz", bomb(), "bomb", sample_rate_hz=100.0)
     if rng.random() < 0.5:
         shape = rng.choice(
             ("(99999999999999,)", "(-1,)", "(0, 3)", "(3, 0)", "()", "(2,)*9", "(1e9,)", "(" + "1," * 70 + ")", "(5")
         )
-        kind = rng.choice(("<f8", "|O", "<M8[ns]", "<c16", "<U9", "|V8", "<f2", "<f16", "?", "[('a','<f8')]", "<m8[D]"))
+        kind = rng.choice(
+            ("<f8", "|O", "<M8[ns]", "<c16", "<U9", "|V8", "<f2", "<f16", "?", "[('a','<f8')]", "<m8[D]")
+        )
         header = f"{{'descr': '{kind}', 'fortran_order': {rng.choice(('True', 'False', '1', 'None'))}, 'shape': {shape}, }}"
         raw = header.encode() + b"\n"
         content = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(raw)) + raw + rng.randbytes(rng.choice((0, 80, 800)))
         return odd_case("odd.npy", content, f"header {header[:60]}", sample_rate_hz=100.0)
     stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", rng.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2))) as file:
+    with zipfile.ZipFile(
+        stream, "w", rng.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2))
+    ) as file:
         for _ in range(rng.randrange(1, 5)):
-            name = rng.choice((*(f"a{text}" for text in ODD_TEXTS), "../../up", "/root", "C:\\x", "a/b", "fs", "t", "acc"))[:300]
+            name = rng.choice(
+                (*(f"a{text}" for text in ODD_TEXTS), "../../up", "/root", "C:\\x", "a/b", "fs", "t", "acc")
+            )[:300]
             size = rng.choice((0, 1, 5, 300))
             odd_array = rng.choice(
                 (np.zeros(size), np.full(size, np.nan), np.arange(size), np.zeros((size, 2), np.complex128),

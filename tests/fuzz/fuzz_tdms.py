@@ -13,7 +13,7 @@ import numpy as np
 from damage import ODD_TEXTS
 from harness import Case, Format, main
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
-from samples import Sound, Truth, damaged_case, log_command, odd_case, read_case, sound_file
+from samples import Sound, Truth, block_of, damaged_case, log_command, odd_case, read_case, sound_file
 
 ROWS = 50
 
@@ -38,11 +38,12 @@ def sounds() -> tuple[Sound, ...]:
     wave = {"wf_increment": 0.01, "wf_start_offset": 0.0, "unit_string": "N"}
     names = {"a": first[:, 0], "b": second[:, 0]}
     vague = [np.float64(0.01).tobytes(), b"unit_string", b"wf_increment", b"wf_start_offset", b"'g'/'a'", b"'g'/'b'"]
-    one = tdms(names, wave)
+    one, two = tdms(names, wave), tdms(names, wave, segments=2)
     return (
         sound_file("waveforms", "a.tdms", one, truth, unprotected=[first, second], vague=vague),
-        sound_file("segments", "a.tdms", tdms(names, wave, segments=2), truth, vague=vague,
-                   unprotected=[part for one in (first, second) for part in np.split(one, 2)]),
+        sound_file("segments", "a.tdms", two, truth, vague=vague,
+                   blocks=[block_of(part, two, first=ROWS // 2 * number)
+                           for one in (first, second) for number, part in enumerate(np.split(one, 2))]),
         sound_file("times", "a.tdms", tdms({"time [s]": times[:, 0], **names}, {"unit_string": "s"}), truth,
                    unprotected=[first, second, times], vague=vague),
     )  # fmt: skip
@@ -51,7 +52,13 @@ def sounds() -> tuple[Sound, ...]:
 def odd(rng: random.Random) -> Case:
     """Write channels of odd names, types and properties."""
     size = rng.choice((0, 1, 5, 50))
-    kinds = (np.zeros(size), np.arange(size), np.arange(size).astype("M8[us]"), np.array(["x"] * size), np.ones(size, bool))
+    kinds = (
+        np.zeros(size),
+        np.arange(size),
+        np.arange(size).astype("M8[us]"),
+        np.array(["x"] * size),
+        np.ones(size, bool),
+    )
     values: tuple[Any, ...] = (0.0, -1.0, 1e-300, 1e300, float("nan"), float("inf"), 3, "text", True, *ODD_TEXTS[:30])
     objects = []
     for _ in range(rng.randrange(5)):

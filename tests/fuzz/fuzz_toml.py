@@ -189,15 +189,33 @@ ODD_VALUES = (
     '"' + "9" * 5000 + ' kg"', "[" * 2000 + "]" * 2000, "{a=" * 500 + "1" + "}" * 500, '"""\n[[joint]]\n"""', "[1e308, 1e308, 1e308]",
     "[" + "1, " * 3000 + "]", "9223372036854775808", "-0.0", '"a~b"', '"1 m/s^99999999"', '"1 kg^2^2"', '"1 [kg]"', "0b1", "1e308",
 )  # fmt: skip
-NO_NUMBERS = ("1_0", "0x10", "１２", "1,5", "1e", "--1", "²", "1 0", "nan", "inf", "", "1e5e5", "0b1", "٣", "½", "1.5.5", "+")
+NO_NUMBERS = (
+    "1_0",
+    "0x10",
+    "１２",
+    "1,5",
+    "1e",
+    "--1",
+    "²",
+    "1 0",
+    "nan",
+    "inf",
+    "",
+    "1e5e5",
+    "0b1",
+    "٣",
+    "½",
+    "1.5.5",
+    "+",
+)
 """Put in quotes before the unit of a mass, they're no mass."""
-UNKNOWN = ('unknwon = 1\n', '"\\u001b[31m" = 1\n', '"" = 1\n', 'a.b.c = 1\n', "__class__ = 1\n", "NAME = 1\n")
+UNKNOWN = ("unknwon = 1\n", '"\\u001b[31m" = 1\n', '"" = 1\n', "a.b.c = 1\n", "__class__ = 1\n", "NAME = 1\n")
 
 
 def odd(text: str, rng: random.Random) -> tuple[str, str, bool]:
     """Change a file as no editor would; give it, how, and whether it has to be refused."""
     lines = text.splitlines(keepends=True)
-    what = rng.choice(("value", "value", "value", "key", "table", "dots", "many", "number", "names"))
+    what = rng.choice(("value", "value", "value", "key", "table", "dots", "many", "keys", "number", "names"))
     valued = [at for at, line in enumerate(lines) if "=" in line]
     at = rng.choice(valued or [0])
     key = lines[at].partition("=")[0]
@@ -210,7 +228,10 @@ def odd(text: str, rng: random.Random) -> tuple[str, str, bool]:
         return "".join(lines), f"unknown {lines[at].strip()}", True
     if what == "table":
         at = rng.randrange(len(lines) + 1)
-        lines.insert(at, rng.choice(("[[body]]\n", "[joint]\n", "[a.b]\n", "[tolerance]\n", "[[joint.x]]\n", "[[odd]]\n" * 3000)))
+        lines.insert(
+            at,
+            rng.choice(("[[body]]\n", "[joint]\n", "[a.b]\n", "[tolerance]\n", "[[joint.x]]\n", "[[odd]]\n" * 3000)),
+        )
         return "".join(lines), f"table {lines[at][:20].strip()}", False
     if what == "dots":
         lines.insert(at, ".".join("a" * rng.choice((2, 100, 5000))) + " = 1\n")
@@ -218,12 +239,19 @@ def odd(text: str, rng: random.Random) -> tuple[str, str, bool]:
     if what == "many":
         block = rng.choice(text.split("\n\n")) + "\n"
         return text + "\n" + block * rng.choice((2, 50, 1000)), f"many {block[:20].strip()}", False
+    if what == "keys":
+        lines.insert(at, "".join(f"unknown{number} = 1\n" for number in range(rng.choice((60, 1000, 20_000)))))
+        return "".join(lines), "many unknown keys", True
     if what == "names":
         lines[at] = f'{key}= "{rng.choice(ODD_TEXTS)[:300]}"\n'
         return "".join(lines), f"{lines[at][:40]!r}", False
     no_number = rng.choice(NO_NUMBERS)
     changed = text.replace('mass = "2.5 kg"', f'mass = "{no_number} kg"').replace('"60 cm^2"', f'"{no_number} cm^2"')
-    changed = changed.replace('"100 mV/g"', f'"{no_number} mV/g"').replace('"9.9 s"', f'"{no_number} s"').replace(",60,", f',"{no_number}",')
+    changed = (
+        changed.replace('"100 mV/g"', f'"{no_number} mV/g"')
+        .replace('"9.9 s"', f'"{no_number} s"')
+        .replace(",60,", f',"{no_number}",')
+    )
     return changed, f"no number {no_number!r}", changed != text and bool(no_number)
 
 

@@ -17,7 +17,7 @@ from damage import BYTES, ODD_TEXTS, TEXTS, damaged
 from harness import Case, Format, main
 from samples import Block, Sound, Truth, damaged_case, log_command, odd_case, proven, read_case
 
-from tests.io.files.uff_makers import function_set, ibm, response_set, units_set, vax_f
+from tests.io.files.uff_makers import function_set, ibm, response_set, vax_f
 
 ROWS = 60
 ODD_FIELDS: dict[str, tuple[Any, ...]] = {
@@ -100,9 +100,14 @@ def odd(rng: random.Random) -> Case:
     for _ in range(rng.randrange(1, 6)):
         if rng.random() < 0.4:
             fields = {key: rng.choice(ODD_FIELDS[key]) for key in rng.sample(list(ODD_FIELDS), rng.choice((1, 2, 4)))}
-            fields = {key: one[:60].replace("\n", " ") if isinstance(one, str) and key != "exponent" else one for key, one in fields.items()}
+            fields = {
+                key: one[:60].replace("\n", " ") if isinstance(one, str) and key != "exponent" else one
+                for key, one in fields.items()
+            }
             maker = rng.choice((function_set, response_set, partial(function_set, raw=rng.randbytes(240))))
-            parts.append(maker(np.exp(1j * np.arange(ROWS)) if maker is response_set else np.arange(float(ROWS)), **fields))
+            parts.append(
+                maker(np.exp(1j * np.arange(ROWS)) if maker is response_set else np.arange(float(ROWS)), **fields)
+            )
             hows.append(str(fields)[:80])
         else:
             content, how = damaged(rng.choice(modal()), rng, TEXTS)
@@ -116,7 +121,9 @@ def make(rng: random.Random) -> Case:
     if rng.random() < 0.4:
         return odd(rng)
     sound = rng.choice(sounds())
-    return damaged_case(sound, rng, TEXTS if sound.how in ("text", "doubles", "units") and rng.random() < 0.6 else BYTES)
+    return damaged_case(
+        sound, rng, TEXTS if sound.how in ("text", "doubles", "units") and rng.random() < 0.6 else BYTES
+    )
 
 
 FORMAT = Format(name="uff", make=make, read=read_case, command=log_command)

@@ -419,4 +419,6 @@ def report(found: Sequence[tuple[str, Tally]], seed: int, keep: Path) -> str:
 
 if __name__ == "__main__":
     # The formats know this module by its name, and its classes with it.
-    importlib.import_module("harness").work(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4]), Path(sys.argv[5]))
+    importlib.import_module("harness").work(
+        sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4]), Path(sys.argv[5])
+    )

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from damage import BYTES, Damage, damaged
-from harness import TOLD, WHOLE, BrokenRuleError, Case, unprintable
+from harness import TOLD, WHOLE, BrokenRuleError, Case
 
 import chladni
 
@@ -36,6 +36,8 @@ class Truth:
         Sentences that are said of the sound file.
     options
         With which it is opened.
+    least
+        How many samples are read, unless something is said, where nothing else is known.
     sure
         What is read whatever is said: of parts of the file that weren't damaged.
     """
@@ -47,6 +49,7 @@ class Truth:
     foreign: int = 0
     usual: frozenset[str] = _NOTHING
     options: Mapping[str, Any] = field(default_factory=dict)
+    least: int = 0
     sure: "Truth | None" = None
 
 
@@ -103,6 +106,9 @@ def check_log(path: Path, truth: Truth) -> str:
             _check_channel(name, recorded, reading, truth.sure)
     if reading.said - truth.usual:
         return TOLD
+    most = max((len(values) for _, values in reading.samples.values()), default=0)
+    if most < truth.least:
+        raise BrokenRuleError("a lost row", f"{most} of {truth.least} are read")
     for name, recorded in (truth.channels or {}).items():
         _check_channel(name, recorded, reading, truth)
     return WHOLE
@@ -120,7 +126,9 @@ def _check_channel(name: str, recorded: np.ndarray[Any, Any], reading: Reading, 
     wrong = len(values) - int(np.count_nonzero(right))
     if wrong > truth.foreign:
         at = int(np.argmin(right)) if not right.all() else 0
-        raise BrokenRuleError("a wrong sample", f"{wrong} of {name}, {truth.foreign} were damaged; {at}: {values[:3]}")
+        raise BrokenRuleError(
+            "a wrong sample", f"{wrong} of {name}, {truth.foreign} were damaged; {at}: {values[:3]}"
+        )
     there = np.zeros(len(recorded), np.bool_)
     there[index[right]] = True
     due = np.isfinite(recorded) if truth.intact is None else np.isfinite(recorded) & truth.intact
@@ -129,18 +137,11 @@ def _check_channel(name: str, recorded: np.ndarray[Any, Any], reading: Reading, 
         raise BrokenRuleError("a lost sample", f"{np.count_nonzero(lost)} of {name}, first row {np.argmax(lost)}")
 
 
-def require_printable(said: frozenset[str]) -> None:
-    """Names of a file come before people; what a terminal obeys is shown, not sent."""
-    for one in said:
-        if odd := unprintable(one):
-            raise BrokenRuleError("unprintable", f"{odd!r} in {one!r:.200}")
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
     """Where numbers of the rows lie in a file: row after row of so many items, or column after column.
 
-    An item may be a line of several samples.
+    An item may be a line of several samples. The first row may be a later one of the file's.
     """
 
     start: int
@@ -149,13 +150,20 @@ class Block:
     columns: int
     by_column: bool = False
     samples: int = 1
+    first: int = 0
+
+    @property
+    def stop(self) -> int:
+        """Where it ends."""
+        return self.start + self.item * self.rows * self.columns
 
     def touched(self, places: np.ndarray[Any, Any]) -> tuple[np.ndarray[Any, Any], int]:
         """Give the rows that damaged bytes belong to, and how many items that are."""
-        inside = places[(places >= self.start) & (places < self.start + self.item * self.rows * self.columns)]
+        inside = places[(places >= self.start) & (places < self.stop)]
         items = np.unique((inside - self.start) // self.item)
         rows = items % self.rows if self.by_column else items // self.columns
-        return (rows[:, np.newaxis] * self.samples + np.arange(self.samples)).ravel(), len(items) * self.samples
+        samples = (rows[:, np.newaxis] * self.samples + np.arange(self.samples)).ravel()
+        return samples + self.first, len(items) * self.samples
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -201,6 +209,18 @@ class Sound:
         return replace(self.truth, intact=intact, foreign=foreign)
 
 
+def block_of(array: np.ndarray[Any, Any], content: bytes, *, first: int = 0) -> Block:
+    """Find an array ``[row, column]`` in a file, row after row or column after column."""
+    found = {order: content.find(array.tobytes(order)) for order in ("C", "F")}
+    order = max(found, key=lambda one: found[one] >= 0)
+    if found[order] < 0:
+        raise AssertionError("the array isn't in the file as it is")
+    rows, columns = array.shape[0], array[0].size
+    return Block(
+        start=found[order], item=array.itemsize, rows=rows, columns=columns, by_column=order == "F", first=first
+    )
+
+
 def sound_file(
     how: str,
     name: str,
@@ -208,24 +228,29 @@ def sound_file(
     truth: Truth,
     *,
     unprotected: Sequence[np.ndarray[Any, Any]] = (),
+    blocks: Sequence[Block] = (),
     vague: Sequence[bytes] = (),
+    vague_outside: bool = False,
 ) -> Sound:
-    """Note a sound file, after a look whether it's read rightly, with arrays ``[row, column]`` as they lie in it."""
-    blocks = []
-    for array in unprotected:
-        for order in ("C", "F"):
-            start = content.find(array.tobytes(order))
-            if start >= 0:
-                rows, columns = array.shape[0], array[0].size
-                blocks.append(
-                    Block(start=start, item=array.itemsize, rows=rows, columns=columns, by_column=order == "F")
-                )
-                break
-        else:
-            raise AssertionError(f"{how}: an array isn't in the file as it is")
+    """Note a sound file, after a look whether it's read rightly.
+
+    Parameters
+    ----------
+    unprotected, blocks
+        Arrays ``[row, column]`` as they lie in it, and blocks.
+    vague
+        Bytes whose damage makes another sound file.
+    vague_outside
+        Whether all but the blocks is such.
+    """
+    own = (*blocks, *(block_of(array, content) for array in unprotected))
     parts = [(place, place + len(part)) for part in vague for place in _places(content, part)]
-    proof = proven(name, content, truth)
-    return Sound(how=how, name=name, content=content, truth=proof, blocks=tuple(blocks), vague=tuple(parts))
+    if vague_outside:
+        edges = [0, *(edge for one in sorted(own, key=lambda one: one.start) for edge in (one.start, one.stop))]
+        parts += zip(edges[::2], [*edges[1::2], len(content)], strict=True)
+    return Sound(
+        how=how, name=name, content=content, truth=proven(name, content, truth), blocks=own, vague=tuple(parts)
+    )
 
 
 def _places(content: bytes, part: bytes) -> Iterator[int]:
@@ -238,7 +263,9 @@ def _places(content: bytes, part: bytes) -> Iterator[int]:
 def damaged_case(sound: Sound, rng: random.Random, kinds: Sequence[Damage] = BYTES) -> Case:
     """Damage a sound file."""
     content, how = damaged(sound.content, rng, kinds)
-    return Case(files={sound.name: content}, how=f"{sound.how}: {how}", truth=sound.judged(content, once=" " not in how))
+    return Case(
+        files={sound.name: content}, how=f"{sound.how}: {how}", truth=sound.judged(content, once=" " not in how)
+    )
 
 
 def odd_case(name: str, content: bytes, how: str, **options: Any) -> Case:
