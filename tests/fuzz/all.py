@@ -1,4 +1,4 @@
-"""Feeds damaged and odd files of every kind to what reads them: ``python tests/fuzz/all.py --inputs 100000 --seed 7``.
+"""Feeds damaged and odd files of every kind to their readers: ``python tests/fuzz/all.py --inputs 100000 --seed 7``.
 
 See `harness` for what an input must not do, and each program for the rule of its format.
 """

@@ -1,8 +1,8 @@
 """Damaged and odd tables of text: ``python tests/fuzz/fuzz_csv.py --inputs 20000 --seed 1``.
 
-The rule is by line. A line of the damaged file that stands so in the sound one is a row that was recorded: its numbers
-are read at its time. A sample that no such row holds needs a foreign line to come from. Where the lines above the rows
-were damaged too, names and units may be others; still as many rows are read as there are.
+The rule is by line. A line of the damaged file that stands so in the sound one is a row that was recorded: its
+numbers are read at its time. A sample that no such row holds needs a foreign line to come from. Where the lines above
+the rows were damaged too, names and units may be others; still as many rows are read as there are.
 """
 
 import random

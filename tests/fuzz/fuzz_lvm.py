@@ -17,14 +17,28 @@ from samples import Truth, log_command, odd_case, proven, read_case
 START_NS = int(np.datetime64("2024-01-01", "ns").astype(np.int64))
 
 
-def head_of(columns: str, extra: str = "") -> tuple[str, ...]:
-    return (
-        "LabVIEW Measurement\t", "Writer_Version\t2", "Reader_Version\t2", "Separator\tTab", "Decimal_Separator\t.",
-        f"Multi_Headings\t{'No' if columns != 'Multi' else 'Yes'}", f"X_Columns\t{columns}", "Time_Pref\tAbsolute",
-        "Date\t2024/01/01", "Time\t00:00:00.0", "***End_of_Header***\t", "\t", "Channels\t2\t\t", f"Samples\t{ROWS}\t{ROWS}",
-        "Date\t2024/01/01\t2024/01/01", "Time\t00:00:00\t00:00:00", "Y_Unit_Label\tN\tV", "X_Dimension\tTime\tTime",
-        "X0\t0.0\t0.0", "Delta_X\t0.010000\t0.010000", *filter(None, [extra]), "***End_of_Header***\t\t\t", "X_Value\ta\tb\tComment",
-    )  # fmt: skip
+HEAD = f"""LabVIEW Measurement\t
+Writer_Version\t2
+Reader_Version\t2
+Separator\tTab
+Decimal_Separator\t.
+Multi_Headings\tNo
+X_Columns\tCOLUMNS
+Time_Pref\tAbsolute
+Date\t2024/01/01
+Time\t00:00:00.0
+***End_of_Header***\t
+\t
+Channels\t2\t\t
+Samples\t{ROWS}\t{ROWS}
+Date\t2024/01/01\t2024/01/01
+Time\t00:00:00\t00:00:00
+Y_Unit_Label\tN\tV
+X_Dimension\tTime\tTime
+X0\t0.0\t0.0
+Delta_X\t0.010000\t0.010000
+***End_of_Header***\t\t\t
+X_Value\ta\tb\tComment"""
 
 
 @cache
@@ -36,7 +50,13 @@ def tables() -> tuple[Table, ...]:
     for columns in ("One", "No"):
         times = [f"{row / 100:.6f}" if columns == "One" else "" for row in range(ROWS)]
         rows = tuple(f"{times[row]}\t{values[row, 0]:.6f}\t{values[row, 1]:.6f}" for row in range(ROWS))
-        made = Table(name=f"X {columns}", head=head_of(columns), rows=rows, end="\n", truth=truth)
+        made = Table(
+            name=f"X {columns}",
+            head=tuple(HEAD.replace("COLUMNS", columns).split("\n")),
+            rows=rows,
+            end="\n",
+            truth=truth,
+        )
         found.append(replace(made, truth=proven("a.lvm", made.content, truth)))
     return tuple(found)
 

@@ -1,7 +1,7 @@
 """Damaged and odd messages in sound MCAP logs: ``python tests/fuzz/fuzz_messages.py --inputs 20000 --seed 1``.
 
-ROS 2 (CDR, by message text and by IDL), ROS 1, JSON with and without schema, protobuf. A log holds one topic of two of
-these kinds. Of the first some messages are damaged before they're stored, as a faulty program would, or its definition.
+ROS 2 (CDR, by message text and by IDL), ROS 1, JSON with and without schema, protobuf. A log holds a topic each of
+two kinds. Of the first some messages, or the definition, are damaged before they're stored, as by a faulty program.
 The rules:
 
 1. The second topic is read to the last sample, whatever became of the first.
@@ -44,7 +44,9 @@ IDL = """module std_msgs { module msg { struct Header { builtin_interfaces::msg:
 module builtin_interfaces { module msg { struct Time { int32 sec; uint32 nanosec; }; }; };
 module demo { module msg {
   struct Part { short small; sequence<double> many; };
-  struct Flat { std_msgs::msg::Header header; @unit(value="N") double x; float y; double v[3]; demo::msg::Part part; };
+  struct Flat {
+    std_msgs::msg::Header header; @unit(value="N") double x; float y; double v[3]; demo::msg::Part part;
+  };
 }; };
 """
 
@@ -95,14 +97,13 @@ def kinds_of(rng: np.random.Generator) -> list[Kind]:
     ]  # fmt: skip
     encode = serialize_dynamic("demo/msg/Flat", ROS2)["demo/msg/Flat"]
     cdr = tuple(map(encode, messages))
-    binary, text = (
-        (BYTES + (huge_number, huge_number, cut), TEXTS),
-        (TEXTS + (odd_json,) * 6, TEXTS + (odd_json,) * 6),
-    )
+    in_json = (*TEXTS, *[odd_json] * 6)
+    binary, text = ((*BYTES, huge_number, huge_number, cut), TEXTS), (in_json, in_json)
     ros1 = tuple(
-        struct.pack("<IIII3sdf3dhI2d", i, stamp // 10**9, stamp % 10**9, 3, b"abc", x[i], y[i], *v[i], small[i], 2, *many[i])
+        struct.pack("<IIII3s", i, stamp // 10**9, stamp % 10**9, 3, b"abc")
+        + struct.pack("<df3dhI2d", x[i], y[i], *v[i], small[i], 2, *many[i])
         for i, stamp in enumerate(stamps)
-    )  # fmt: skip
+    )
     schema = {"type": "object", "properties": {"header": {"type": "object"}, "x": {"type": "number"}}}
     raw = tuple(json.dumps(message).encode() for message in messages)
     joints = {f".position[{i}]": many[:, i] for i in range(2)}
@@ -237,19 +238,7 @@ def make(rng: random.Random) -> Case:
 
 
 SIZES = ("", "[]", "[3]", "[²]", "[-1]", "[0]", "[99999999999]", "[<=3]", "[]" * 3, "[3", "[ 3 ]", "[1e3]", "[0x3]")
-TYPES = (
-    "float64",
-    "string",
-    "wstring",
-    "Self",
-    "demo/Part",
-    "byte",
-    "time",
-    "duration",
-    "string<=5",
-    "int128",
-    "bool",
-)
+TYPES = ("float64", "string", "wstring", "Self", "demo/Part", "byte", "time", "duration", "string<=5", "int128")
 
 
 def odd_kind(rng: random.Random) -> tuple[Kind, str]:
@@ -301,25 +290,15 @@ def spread(rng: random.Random) -> tuple[Kind, str]:
     return kind, f"{fields} fields, {hours} h apart"
 
 
+TOKENS = (
+    "1", "-0.0", "1e999", "NaN", "null", "true", '"1.5"', '"\\ud800"', "9" * 5000, "[" * 3000, "1E+2", "{}", "[]",
+)  # fmt: skip
+
+
 def odd_value(rng: random.Random, depth: int = 0) -> str:
     """Write JSON that is valid, or nearly so."""
     if depth > 3 or rng.random() < 0.5:
-        tokens = (
-            "1",
-            "-0.0",
-            "1e999",
-            "NaN",
-            "null",
-            "true",
-            '"1.5"',
-            '"\\ud800"',
-            "9" * 5000,
-            "[" * 3000,
-            "1E+2",
-            "{}",
-            "[]",
-        )
-        return rng.choice(tokens)
+        return rng.choice(TOKENS)
     if rng.random() < 0.3:
         return "[" + ",".join(odd_value(rng, depth + 1) for _ in range(rng.choice((0, 1, 3, 70)))) + "]"
     keys = ('"a"', '"\\ud800"', '"\\u001b[31m"', '"stamp"', '"type"', '"properties"', '"$ref"', '"a.b"', '""', '"a"')
@@ -334,9 +313,12 @@ def proto_odd(rng: random.Random) -> bytes:
         message = file.message_type.add(name=name)
         for number in range(rng.choice((0, 2, 9))):
             message.field.add(
-                name=rng.choice(("a", "x" * 300, "\x1b[31m", "stamp", "é")), number=rng.choice((0, -1, 1, 2, number, 2**29)),
-                type=rng.randrange(1, 19), type_name=rng.choice((".demo.S", ".demo.T", "S", "", "?")), label=rng.randrange(1, 4),
-            )  # fmt: skip
+                name=rng.choice(("a", "x" * 300, "\x1b[31m", "stamp", "é")),
+                number=rng.choice((0, -1, 1, 2, number, 2**29)),
+                type=rng.randrange(1, 19),
+                type_name=rng.choice((".demo.S", ".demo.T", "S", "", "?")),
+                label=rng.randrange(1, 4),
+            )
     return descriptor_pb2.FileDescriptorSet(file=[file] * rng.choice((1, 1, 2))).SerializeToString()
 
 

@@ -89,7 +89,8 @@ def odd(rng: random.Random) -> Case:
         kind = rng.choice(
             ("<f8", "|O", "<M8[ns]", "<c16", "<U9", "|V8", "<f2", "<f16", "?", "[('a','<f8')]", "<m8[D]")
         )
-        header = f"{{'descr': '{kind}', 'fortran_order': {rng.choice(('True', 'False', '1', 'None'))}, 'shape': {shape}, }}"
+        order = rng.choice(("True", "False", "1", "None"))
+        header = f"{{'descr': '{kind}', 'fortran_order': {order}, 'shape': {shape}, }}"
         raw = header.encode() + b"\n"
         content = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(raw)) + raw + rng.randbytes(rng.choice((0, 80, 800)))
         return odd_case("odd.npy", content, f"header {header[:60]}", sample_rate_hz=100.0)

@@ -1,6 +1,6 @@
 """Damaged and odd TDMS files: ``python tests/fuzz/fuzz_tdms.py --inputs 20000 --seed 1``.
 
-TDMS has no checksum. Lengths of segments and counts of values must fit, and damage among the numbers changes no others.
+TDMS has no checksum. Lengths of segments and counts of values must fit, damage among the numbers changes no others.
 """
 
 import io

@@ -21,9 +21,9 @@ from tests.io.files.uff_makers import function_set, ibm, response_set, vax_f
 
 ROWS = 60
 ODD_FIELDS: dict[str, tuple[Any, ...]] = {
-    "id1": ODD_TEXTS, "label": ODD_TEXTS, "kind": (0, 1, 2, 4, 12, 99, -1), "node": (0, 3, -1, 2**31), "dir": (-6, 0, 7),
-    "form": (2, 4, 5, 6), "count": (0, 1, -1, 61, 10**9), "even": (0, 1, 2), "step": (0.0, -1.0, 1e300, 1e-300),
-    "least": (1e300, -5.0), "x_type": (17, 18, 0, 99), "type": (8, 12, 13, 0, -1), "axis": ODD_TEXTS,
+    "id1": ODD_TEXTS, "label": ODD_TEXTS, "kind": (0, 1, 2, 4, 12, 99, -1), "node": (0, 3, -1, 2**31),
+    "dir": (-6, 0, 7), "form": (2, 4, 5, 6), "count": (0, 1, -1, 61, 10**9), "even": (0, 1, 2),
+    "step": (0.0, -1.0, 1e300, 1e-300), "least": (1e300, -5.0), "x_type": (17, 18, 0, 99), "type": (8, 12, 13, 0, -1), "axis": ODD_TEXTS,
     "powers": ((9, -9), (0, 0)), "exponent": ("D", "E", "e"), "newline": (b"\r\n", b"\r", b"\n"),
 }  # fmt: skip
 
@@ -56,14 +56,16 @@ def sounds() -> tuple[Sound, ...]:
     """Write one file of each kind."""
     values = np.random.default_rng(1).normal(size=ROWS)
     singles = values.astype(np.float32)
+    # Twelve binary digits are whole digits of sixteen, too.
+    rounded = np.ldexp(np.round(np.ldexp(singles, 12)), -12)
     return (
         text_sound("text", values, 2),
         text_sound("doubles", values, 4),
         raw_sound("bytes", singles.tobytes(), singles, 4),
         raw_sound("big", values.astype(">f8").tobytes(), values, 8, form=4, order=2),
         raw_sound("dec", vax_f(singles), singles, 4, format=1),
-        raw_sound("ibm", ibm(np.ldexp(np.round(np.ldexp(singles, 12)), -12)), np.ldexp(np.round(np.ldexp(singles, 12)), -12), 4, format=3, order=2),
-    )  # fmt: skip
+        raw_sound("ibm", ibm(rounded), rounded, 4, format=3, order=2),
+    )
 
 
 @cache
@@ -81,8 +83,8 @@ def modal() -> tuple[bytes, ...]:
         ),
         pyuff.prepare_55(
             **ids, model_type=1, analysis_type=2, data_ch=2, spec_data_type=8, data_type=2, n_data_per_node=3,
-            r1=np.array([1.0, 2.0]), r2=np.array([0.0, 1.0]), r3=np.array([3.0, 1.0]), load_case=1, mode_n=1, freq=10.0, modal_m=1.0,
-            modal_damp_vis=0.01, modal_damp_his=0.0, node_nums=np.array([1, 2]),
+            r1=np.array([1.0, 2.0]), r2=np.array([0.0, 1.0]), r3=np.array([3.0, 1.0]), load_case=1, mode_n=1,
+            freq=10.0, modal_m=1.0, modal_damp_vis=0.01, modal_damp_his=0.0, node_nums=np.array([1, 2]),
         ),
     ]  # fmt: skip
     found = [response_set(np.exp(1j * np.arange(40.0)))]

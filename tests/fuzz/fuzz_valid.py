@@ -1,8 +1,9 @@
 """Sound logs as odd as they are allowed to be: ``python tests/fuzz/fuzz_valid.py --inputs 3000 --seed 1``.
 
-Topics of random definitions (structures in arrays in structures, arrays of every kind), in ROS 2 CDR, JSON and protobuf;
-several MCAP channels a topic, messages stored out of order, chunks of any size, compressed or not. What a channel's name
-says of each message is looked up in the message as it was written, and must be what is read, at its time.
+Topics of random definitions (structures in arrays in structures, arrays of every kind), in ROS 2 CDR, JSON and
+protobuf; several MCAP channels a topic, messages stored out of order, chunks of any size, compressed or not. What a
+channel's name says of each message is looked up in the message as it was written, and must be what is read, at its
+time.
 """
 
 import io
