@@ -23,7 +23,8 @@ ROWS = 60
 ODD_FIELDS: dict[str, tuple[Any, ...]] = {
     "id1": ODD_TEXTS, "label": ODD_TEXTS, "kind": (0, 1, 2, 4, 12, 99, -1), "node": (0, 3, -1, 2**31),
     "dir": (-6, 0, 7), "form": (2, 4, 5, 6), "count": (0, 1, -1, 61, 10**9), "even": (0, 1, 2),
-    "step": (0.0, -1.0, 1e300, 1e-300), "least": (1e300, -5.0), "x_type": (17, 18, 0, 99), "type": (8, 12, 13, 0, -1), "axis": ODD_TEXTS,
+    "step": (0.0, -1.0, 1e300, 1e-300),
+    "least": (1e300, -5.0), "x_type": (17, 18, 0, 99), "type": (8, 12, 13, 0, -1), "axis": ODD_TEXTS,
     "powers": ((9, -9), (0, 0)), "exponent": ("D", "E", "e"), "newline": (b"\r\n", b"\r", b"\n"),
 }  # fmt: skip
 

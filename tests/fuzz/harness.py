@@ -310,7 +310,7 @@ def run_command(name: str, seed: int, number: int, keep: Path) -> Tally:
         words = format_of(name).command(path, generator(seed, name, number, "command"))
         out, errors = Path(scratch) / "out", Path(scratch) / "errors"
         code, seconds, peak = _timed([sys.executable, "-m", "chladni", *words], out, errors)
-        problem = _wrong(code, seconds, peak, out.read_bytes(), errors.read_bytes())
+        problem = _wrong(code, seconds, peak, out.read_bytes(), errors.read_bytes()) or _left(folder, case)
     tally.add("failed" if problem else REFUSED if code == 2 else WHOLE, seconds, peak)
     if problem:
         how = f"{case.how}; chladni {' '.join(words)}".replace(str(folder), "DIR")
@@ -358,6 +358,19 @@ def _wrong(code: int, seconds: float, peak: int, out: bytes, errors: bytes) -> t
     if seconds > PROCESSOR_SECONDS:
         return "time", f"{seconds:.1f} s"
     return ("memory", f"{peak / 1e6:.0f} MB") if peak > MEMORY_BYTES else None
+
+
+def _left(folder: Path, case: Case) -> tuple[str, str] | None:
+    """Give what is wrong with the files that a command wrote: one that is left over, or JSON that isn't."""
+    for path in folder.rglob("*"):
+        if path.name.startswith("."):
+            return "a stale file", path.name
+        if path.suffix == ".json" and str(path.relative_to(folder)) not in case.files:
+            try:
+                json.dumps(json.loads(path.read_text()), allow_nan=False)
+            except ValueError as error:
+                return "no JSON", str(error)
+    return None
 
 
 # ---------------------------------------------------------------- the program

@@ -281,6 +281,11 @@ def read_case(path: Path, case: Case) -> str:
 def log_command(path: Path, rng: random.Random) -> list[str]:
     """Any command that takes a log or a data file."""
     rate = ["--rate", "100"] if path.suffix == ".npy" else []
-    words = rng.choice((["info"], ["psd"], ["convert"], ["info", "--json", str(path.with_name("info.json"))]))
-    target = [str(path.with_name("out.mcap"))] if words == ["convert"] else []
-    return [words[0], str(path), *target, *words[1:], *rate]
+    name = rng.choice(("info", "psd", "modes", "compare", "convert"))
+    json_file = ["--json", str(path.with_name("out.json"))] if rng.random() < 0.5 else []
+    more = {
+        "modes": ["--operational"],
+        "compare": [str(path)],
+        "convert": [str(path.with_name(rng.choice(("out.mcap", "out.csv", "out.uff", "out.mat"))))],
+    }
+    return [name, str(path), *more.get(name, []), *json_file, *rate]
