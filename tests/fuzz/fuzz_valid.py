@@ -25,8 +25,8 @@ from samples import START_NS, log_command, read_log
 
 COUNT = 40
 STEP_NS = 10_000_000
-NUMBERS = {"float64": "d", "float32": "f", "int32": "i", "int16": "h", "uint8": "B", "int64": "q"}
-OF_PROTOBUF = {"float64": 1, "float32": 2, "int32": 17, "int16": 5, "uint8": 13, "int64": 18}
+NUMBERS = ("float64", "float32", "int32", "int16", "uint16", "int64")
+OF_PROTOBUF = {"float64": 1, "float32": 2, "int32": 17, "int16": 5, "uint16": 13, "int64": 18}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +55,7 @@ def structure(rng: random.Random, depth: int = 0) -> tuple[Member, ...]:
         members.append(
             Member(
                 name=f"{'abcd'[depth]}{number}",
-                kind=structure(rng, depth + 1) if inner else rng.choice(list(NUMBERS)),
+                kind=structure(rng, depth + 1) if inner else rng.choice(NUMBERS),
                 count=rng.choice((-1, -1, 0, 2, 3)),
             )
         )
@@ -204,7 +204,7 @@ def read(path: Path, case: Case) -> str:
             raise BrokenRuleError("a lost sample", f"{name}: {len(values)} of {COUNT}")
     listed = {re.sub(r"\{@channel==\d+\}", "", name) for name in reading.samples}
     missing = [leaf for topic in case.truth for leaf in leaves(topic) if leaf not in listed]
-    if missing and not any("isn't listed" in one for one in reading.said):
+    if missing and not any("listed" in one for one in reading.said):
         raise BrokenRuleError("a lost channel", ", ".join(missing[:5]))
     return TOLD if reading.said else WHOLE
 

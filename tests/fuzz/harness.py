@@ -52,8 +52,9 @@ PROCESSOR_SECONDS = 10
 SECONDS = 60
 """An input that waits for something doesn't use the processor."""
 MEMORY_BYTES = 500_000_000
-ADDRESS_BYTES = 4 << 30
+ADDRESS_BYTES = 8 << 30
 """What a worker may ask for: more would end the machine rather than the input."""
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
 RANGE = 2500
 """Inputs of a worker, after which another one begins with fresh memory."""
 REFUSED, TOLD, WHOLE = "refused", "told", "whole"
@@ -262,7 +263,7 @@ def read_range(name: str, seed: int, numbers: range, keep: Path) -> Tally:
             folder = Path(scratch) / "input"
             arguments = [sys.executable, __file__, name, str(seed), str(first), str(numbers.stop), str(folder)]
             lines = []
-            with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as worker:
+            with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, env=ENVIRONMENT) as worker:
                 for line in worker.stdout or ():
                     if not line.startswith("["):
                         lines.append(line)
@@ -326,12 +327,12 @@ def _timed(arguments: Sequence[str], out: Path, errors: Path) -> tuple[int, floa
 
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (3 * PROCESSOR_SECONDS, 3 * PROCESSOR_SECONDS))
-        resource.setrlimit(resource.RLIMIT_AS, (2 * ADDRESS_BYTES, 2 * ADDRESS_BYTES))
+        resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_BYTES, ADDRESS_BYTES))
 
     with out.open("wb") as stdout, errors.open("wb") as stderr:
         process = subprocess.Popen(
             arguments, stdout=stdout, stderr=stderr, stdin=subprocess.DEVNULL, preexec_fn=limit, cwd=out.parent,
-            env=os.environ | {"PYTHONPATH": str(ROOT)},
+            env=ENVIRONMENT,
         )  # fmt: skip
     deadline = time.monotonic() + 2 * SECONDS
     pid, status, usage = os.wait4(process.pid, os.WNOHANG)
