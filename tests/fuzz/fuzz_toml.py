@@ -195,7 +195,7 @@ NO_NUMBERS = (
     "1_0", "0x10", "１２", "1,5", "1e", "--1", "²", "1 0", "nan", "inf", "", "1e5e5", "0b1", "٣", "½", "1.5.5", "+",
 )  # fmt: skip
 """Put in quotes before the unit of a mass, they're no mass."""
-UNKNOWN = ("unknwon = 1\n", '"\\u001b[31m" = 1\n', '"" = 1\n', "a.b.c = 1\n", "__class__ = 1\n", "NAME = 1\n")
+UNKNOWN = ("unheard_of = 1\n", '"\\u001b[31m" = 1\n', '"" = 1\n', "a.b.c = 1\n", "__class__ = 1\n", "NAME = 1\n")
 
 
 def odd(text: str, rng: random.Random) -> tuple[str, str, bool]:
