@@ -59,7 +59,7 @@ def sounds() -> tuple[Sound, ...]:
         sound_file("packed rate", "a.mat", mat5(True, fs=100.0, acc=values), truth),
         sound_file("packed times", "a.mat", mat5(True, t=times, acc=values), truth),
         sound_file("packed struct", "a.mat", mat5(True, run={"t": times, "acc": values, "who": "me"}), inside),
-        sound_file("7.3", "a.mat", mat73(fs=100.0, acc=values), truth, vague=[rate]),
+        sound_file("7.3", "a.mat", mat73(fs=100.0, acc=values), truth, vague=[rate, b"acc\0", b"fs\0"]),
         sound_file(
             "singles", "a.mat", mat5(False, fs=100.0, acc=singles), single,
             unprotected=[np.asfortranarray(singles)], vague=plain["vague"],
