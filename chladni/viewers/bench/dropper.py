@@ -1,18 +1,20 @@
 """Where a log is dropped: bounded, and put into a private file."""
 
-import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from chladni.signals.errors import LogError
+from chladni.viewers.bench.errors import told
 from chladni.viewers.bench.parts import pn
 from chladni.viewers.bench.theme import WIDGET_CSS
 
 #: A dropped log travels through the browser and memory; a longer one is read from the disk with --log.
 MOST_BYTES = 64_000_000
-_CHUNK_BYTES = 2_000_000
+#: It comes in pieces.
+CHUNK_BYTES = 1_000_000
 
 _DROPPER_CSS = """
 .filepond--root { font-family: inherit; font-size: 12.5px; margin: 0; }
@@ -25,12 +27,20 @@ _DROPPER_CSS = """
 
 
 class Dropper(pn.widgets.FileDropper):  # type: ignore[misc]  # panel has no types
-    """A place for one file, by drag and drop or by choosing it."""
+    """A place for one file, by drag and drop or by choosing it.
 
-    def __init__(self, *, taken: Callable[[str, bytes], None], refused: Callable[[str], None]) -> None:
+    Parameters
+    ----------
+    taken
+        Called with the file's name and the private copy, which the caller removes.
+    refused
+        Called with one line when the file can't be taken.
+    """
+
+    def __init__(self, *, taken: Callable[[str, Path], None], refused: Callable[[str], None]) -> None:
         super().__init__(
             max_file_size=f"{MOST_BYTES // 1_000_000}MB",
-            chunk_size=_CHUNK_BYTES,
+            chunk_size=CHUNK_BYTES,
             multiple=False,
             previews=[],
             height=76,
@@ -39,47 +49,72 @@ class Dropper(pn.widgets.FileDropper):  # type: ignore[misc]  # panel has no typ
             stylesheets=[WIDGET_CSS, _DROPPER_CSS],
         )
         self._taken, self._refused = taken, refused
-        self._received: list[bytes] = []
-        self._bytes = 0
+        self._copy: IO[bytes] | None = None
+        self._pieces = self._bytes = 0
 
     def _process_event(self, event: Any) -> None:
         # In place of the base's, which gathers whatever a browser sends, in memory and without end.
         if event.event_name != "upload_event":
             return
         piece = event.data
-        if piece["chunk"] == 1:
-            self._received, self._bytes = [], 0
-        content = bytes(piece["data"])
-        self._bytes += len(content)
-        if self._bytes > MOST_BYTES:
-            self._received = []
-            # Said once, at the piece that crosses the bound.
-            if self._bytes - len(content) <= MOST_BYTES:
-                self._refused(
-                    f"{piece['name']}: larger than {MOST_BYTES // 1_000_000} MB, all that can be dropped here; "
-                    "name it when starting: chladni bench --log FILE"
-                )
+        try:
+            if piece["chunk"] == 1:
+                self.close()
+                # The name comes from a browser: nothing of it but a plain suffix goes to the disk.
+                self._copy = private_file(Path(str(piece["name"])).suffix)
+            self._take(piece)
+        except LogError as error:
+            self.close()
+            self._refused(told(error))
+
+    def close(self) -> None:
+        """Remove what has come of a file so far."""
+        copy, self._copy = self._copy, None
+        self._pieces = self._bytes = 0
+        if copy is not None:
+            copy.close()
+            Path(copy.name).unlink(missing_ok=True)
+
+    def _take(self, piece: Mapping[str, Any]) -> None:
+        # After a refusal the rest is still on its way.
+        if self._copy is None:
             return
-        self._received.append(content)
-        if piece["chunk"] == piece["total_chunks"]:
-            whole, self._received = b"".join(self._received), []
-            self._taken(str(piece["name"]), whole)
+        content = bytes(piece["data"])
+        self._pieces, self._bytes = self._pieces + 1, self._bytes + len(content)
+        if piece["chunk"] != self._pieces:
+            raise LogError(f"{piece['name']}: its pieces came in another order; drop it again")
+        if self._bytes > MOST_BYTES:
+            raise LogError(
+                f"{piece['name']}: larger than {MOST_BYTES // 1_000_000} MB, all that can be dropped here; "
+                "name it when starting: chladni bench --log FILE"
+            )
+        with _telling():
+            self._copy.write(content)
+            if piece["chunk"] < piece["total_chunks"]:
+                return
+            self._copy.close()
+        whole, self._copy = Path(self._copy.name), None
+        self._taken(str(piece["name"]), whole)
 
 
-def private_file(content: bytes, suffix: str) -> Path:
-    """Write dropped bytes to a file of this suffix that only this user can read; the caller removes it.
+def private_file(suffix: str) -> IO[bytes]:
+    """Open a new file of this suffix that only this user can read; the caller removes it.
 
     Raises
     ------
     LogError
-        When it can't be written.
+        When it can't be made.
     """
+    plain = suffix if suffix[1:].isalnum() and suffix.isascii() else ""
+    with _telling():
+        return tempfile.NamedTemporaryFile(prefix="chladni-", suffix=plain, delete=False)
+
+
+@contextmanager
+def _telling() -> Iterator[None]:
     try:
-        descriptor, name = tempfile.mkstemp(prefix="chladni-", suffix=suffix)
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
+        yield
     except OSError as error:
         raise LogError(
             f"the dropped log can't be kept: {error.strerror or error}; free space or use --log"
         ) from error
-    return Path(name)

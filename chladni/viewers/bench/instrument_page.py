@@ -104,7 +104,7 @@ class InstrumentPage:
         bar = flow(
             self.views,
             flow(self.variants.keep, self._reset_button(), *(one.view for one in self.exports), sizing_mode=None),
-            justify_content="space-between",
+            justify="space-between",
             margin=(0, 0, 6, 0),
         )
         main = column(

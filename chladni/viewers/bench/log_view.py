@@ -13,7 +13,7 @@ from chladni.signals.errors import ChladniError
 from chladni.signals.visible import visible
 from chladni.viewers.bench.board import Board
 from chladni.viewers.bench.desk import Desk
-from chladni.viewers.bench.dropper import Dropper, private_file
+from chladni.viewers.bench.dropper import Dropper
 from chladni.viewers.bench.errors import told
 from chladni.viewers.bench.latest import Latest
 from chladni.viewers.bench.parts import FILLING, choice, column, flow, html, pn, seconds_entry
@@ -78,19 +78,17 @@ class LogView:
 
     def close(self) -> None:
         """End, and let go of the log."""
+        self.dropper.close()
         self._opener.close()
         self._comparer.close()
         self._close_log()
 
-    def _taken(self, name: str, content: bytes) -> None:
-        self._words.object = f"<p>reading {len(content) / 1e6:.1f} MB …</p>"
-        self._opener.submit(partial(self._open_dropped, name, content), self._opened)
+    def _taken(self, name: str, path: Path) -> None:
+        self._words.object = f"<p>reading {path.stat().st_size / 1e6:.1f} MB …</p>"
+        self._opener.submit(partial(self._open_dropped, name, path), self._opened)
 
-    def _open_dropped(self, name: str, content: bytes) -> MeasuredLog:
+    def _open_dropped(self, name: str, path: Path) -> MeasuredLog:
         # On the thread, where waiting for a disk harms nobody.
-        # The name comes from a browser: nothing of it but a plain suffix goes to the disk.
-        suffix = Path(name).suffix
-        path = private_file(content, suffix if suffix[1:].isalnum() and suffix.isascii() else "")
         try:
             return self._tools.open_log(path, name, True)
         except ChladniError:

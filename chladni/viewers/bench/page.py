@@ -1,16 +1,19 @@
 """A whole page around an instrument: heading, look, life of the session."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from bokeh.io import curdoc
 from bokeh.themes import Theme as ChartTheme
+from jinja2 import Template
 
 from chladni.models.core.instrument import Instrument
 from chladni.viewers.bench.instrument_page import InstrumentPage, heading
 from chladni.viewers.bench.parts import column, html, pn
 from chladni.viewers.bench.theme import FONT, Ground, theme
+from chladni.viewers.bench.tile import TICK_JS
 from chladni.viewers.bench.tools import Tools
 
 _FRAME_CSS = """
@@ -26,6 +29,34 @@ _HEAD_CSS = """
 .head h1 { font-size: 17px; font-weight: 600; color: var(--c-text); margin: 0; }
 .head .grow { flex: 1; }
 """
+#: The page around its parts. Panel's own has scripts inside, which the server's policy for content forbids.
+_PAGE = Template(
+    """<!doctype html>
+<html lang="en">
+<head><meta charset="utf-8"><title>{{ heading }}</title><link rel="icon" href="data:,">
+<style>html, body { display: flow-root; box-sizing: border-box; height: 100%; margin: 0; padding: 0; }</style>
+{{ bokeh_css | safe }}
+{% for address in addresses(bokeh_js) %}
+<script src="{{ address }}"></script>
+{% endfor %}
+</head>
+<body>
+{% for root in doc.roots %}
+<div id="{{ root.elementid }}" data-root-id="{{ root.id }}" style="display: contents;"></div>
+{% endfor %}
+<script type="application/json" id="chladni">{{ [doc.to_json()] | tojson }}</script>
+<script src="/start.js"></script>
+</body>
+</html>
+""",
+    autoescape=True,
+)
+#: That policy forbids functions made of text too: here is that of the ticks. In a notebook Bokeh makes it.
+START_JS = (
+    "Bokeh.Models.CustomJSTickFormatter.prototype.doFormat = (all) => all.map((tick, index, ticks) => {"
+    f"{TICK_JS}}});\n"
+    'Bokeh.embed.embed_items("{}", JSON.parse(document.getElementById("chladni").textContent));\n'
+)
 
 
 def page_maker(
@@ -39,13 +70,19 @@ def page_maker(
         ground = wanted_ground(pn.state.session_args.get("theme", []))
         # Inside the page's function: the look belongs to this document, not to the program.
         document.theme = ChartTheme(json=theme(ground).of_charts())
-        document.title = f"{instrument.title} · chladni"
+        document.template = _PAGE
+        document.template_variables.update(heading=f"{instrument.title} · chladni", addresses=script_addresses)
         page = InstrumentPage(instrument, tools, document=document, ground=ground, log=log, variants=variants)
         # Threads and private files end with the page.
         document.on_session_destroyed(lambda _context: page.close())
         return framed(page, instrument, ground)
 
     return make
+
+
+def script_addresses(tags: str) -> list[str]:
+    """Give the addresses in Panel's script tags, without the loader of modules: it makes scripts of text."""
+    return [address for address in re.findall(r'src="([^"]+)"', tags) if "es-module-shims" not in address]
 
 
 def wanted_ground(words: list[bytes]) -> Ground:

@@ -32,9 +32,11 @@ def row(*parts: Any, **layout: Any) -> Any:
     return pn.Row(*parts, **{"margin": 0, **layout})
 
 
-def flow(*parts: Any, **layout: Any) -> Any:
+def flow(*parts: Any, gap: str = "6px", justify: str = "start", **layout: Any) -> Any:
     """Parts side by side as far as there is room, then below."""
-    return pn.FlexBox(*parts, **{"sizing_mode": WIDE, "margin": 0, "gap": "6px", **layout})
+    # Not Panel's box for that: its template becomes a function, which the server's policy for content forbids.
+    styles = {"flex-wrap": "wrap", "gap": gap, "justify-content": justify, "align-items": "start"}
+    return pn.Row(*parts, **{"sizing_mode": WIDE, "margin": 0, "styles": styles, **layout})
 
 
 def drawing(figure: Any, *css: str, **layout: Any) -> Any:

@@ -2,52 +2,49 @@
 
 import asyncio
 import gc
-import re
 import socket
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from bokeh.server.server import BaseServer
-from bokeh.server.tornado import BokehTornado
-from panel.io.application import build_applications
 from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
-from tornado.web import RequestHandler
 from tornado.websocket import WebSocketClosedError
 
 from chladni.signals.errors import SetupError
+from chladni.viewers.bench.guard import MOST_MESSAGE_BYTES, Application
+from chladni.viewers.bench.page import START_JS
 
 ADDRESS = "127.0.0.1"
-OWN_NAMES = (ADDRESS, "localhost")
-#: A page that nobody looks at any more is given up after this.
-UNUSED_MS = 15_000
-_MOST_MESSAGE_BYTES = 16_000_000
+#: Connections besides those of open pages. A browser asks through six.
+MOST_CONNECTIONS = 128
+#: Who takes longer to say what is wanted, or keeps a connection without asking, is let go.
+PATIENCE_S = 10.0
+_MOST_HEADER_BYTES = 16_384
 
 
-class ForeignHost(RequestHandler):
-    """Refuses a request that names another computer.
+class BoundedServer(HTTPServer):
+    """Gives up the connection that has waited longest when there are too many."""
 
-    A page of the web may point its own name at 127.0.0.1 (DNS rebinding). Browsers then see one origin, so that
-    checking where a request comes from isn't enough; but they still name that foreign host.
-    """
+    def initialize(self, *args: Any, **kwargs: Any) -> None:
+        """Begin without connections."""
+        super().initialize(*args, **kwargs)
+        self._waiting: dict[Any, None] = {}
 
-    def prepare(self) -> None:
-        """Answer 403 before anything else happens."""
-        self.set_status(403)
-        self.finish("chladni answers only to this computer's own name\n")
+    def start_request(self, server_conn: Any, request_conn: Any) -> Any:
+        """Note a connection that begins to wait for a request."""
+        self._waiting.pop(server_conn, None)
+        self._waiting[server_conn] = None
+        # Not the newest: whoever opens connections to keep them would keep everybody else out.
+        for oldest in list(self._waiting)[:-MOST_CONNECTIONS]:
+            self._waiting.pop(oldest)
+            oldest.stream.close()
+        return super().start_request(server_conn, request_conn)
 
-
-class Index(RequestHandler):
-    """The first page."""
-
-    def initialize(self, content: str) -> None:
-        """Keep what to send."""
-        self.content = content
-
-    def get(self) -> None:
-        """Send it."""
-        self.set_header("Content-Type", "text/html; charset=utf-8")
-        self.finish(self.content)
+    def on_close(self, server_conn: Any) -> None:
+        """Forget it, closed or become the websocket of a page."""
+        self._waiting.pop(server_conn, None)
+        super().on_close(server_conn)
 
 
 class BenchServer:
@@ -83,11 +80,17 @@ class BenchServer:
         self.port: int = self._socket.getsockname()[1]
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ended: asyncio.Event | None = None
+        self._application: Application | None = None
 
     @property
     def address(self) -> str:
         """Address of the first page."""
         return f"http://{ADDRESS}:{self.port}/"
+
+    @property
+    def open_pages(self) -> int:
+        """Pages that are open now."""
+        return 0 if self._application is None else self._application.open_pages()
 
     def run(self, ready: Callable[[], None] | None = None) -> None:
         """Serve until `stop` or Ctrl-C; `ready` is called once pages can be had."""
@@ -111,8 +114,17 @@ class BenchServer:
     async def _serve(self, ready: Callable[[], None] | None) -> None:
         self._loop, self._ended = asyncio.get_running_loop(), asyncio.Event()
         self._loop.set_exception_handler(_on_exception)
-        application = self._application()
-        http = HTTPServer(application)
+        texts = {"/": (self._index, "text/html"), "/start.js": (START_JS, "text/javascript")}
+        self._application = application = Application(self._pages, texts)
+        http = BoundedServer(
+            application,
+            idle_connection_timeout=PATIENCE_S,
+            body_timeout=PATIENCE_S,
+            max_header_size=_MOST_HEADER_BYTES,
+            # Nothing that is served takes a body; logs come through websockets.
+            max_body_size=0,
+            max_buffer_size=2 * MOST_MESSAGE_BYTES,
+        )
         http.add_sockets([self._socket])
         server = BaseServer(IOLoop.current(), application, http)
         server.start()
@@ -125,28 +137,8 @@ class BenchServer:
             # Browsers keep their connections open, and would keep the port.
             await http.close_all_connections()
 
-    def _application(self) -> BokehTornado:
-        application = BokehTornado(
-            build_applications({f"/{name}": make for name, make in self._pages.items()}),
-            # Without these Bokeh would let in pages of localhost only, and the address that is printed is a number.
-            extra_websocket_origins=[f"{name}:{self.port}" for name in OWN_NAMES],
-            extra_patterns=[(r"/", Index, {"content": self._index})],
-            use_index=False,
-            websocket_max_message_size_bytes=_MOST_MESSAGE_BYTES,
-            unused_session_lifetime_milliseconds=UNUSED_MS,
-        )
-        # Handlers for some hosts come before those for all, whatever the path.
-        application.add_handlers(foreign_hosts(), [(r".*", ForeignHost)])
-        return application
-
 
 def _on_exception(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
     # A message on its way while a browser leaves the page is nobody's mistake.
     if not isinstance(context.get("exception"), WebSocketClosedError):
         loop.default_exception_handler(context)
-
-
-def foreign_hosts() -> str:
-    """Regular expression of host names that aren't this computer's own."""
-    own = "|".join(re.escape(name) for name in OWN_NAMES)
-    return rf"(?!(?:{own})$).*"

@@ -19,8 +19,8 @@ Data = dict[str, Any]
 #: More would turn a chart into a carpet, and a legend into a book.
 LEGEND_FROM, LEGEND_INSIDE, LEGEND_TO = 2, 3, 8
 TICKS = 5
-# Bokeh writes 8.000e-5 and -1.000e-4, too wide to stand side by side under a small chart.
-_TICK_JS = """
+#: Writes a tick of an axis. Bokeh writes 8.000e-5 and -1.000e-4, too wide to stand side by side under a small chart.
+TICK_JS = """
 const size = Math.abs(tick);
 const step = ticks.length > 1 ? Math.abs(ticks[ticks.length - 1] - ticks[0]) / (ticks.length - 1) : size;
 const digits = step > 0 ? Math.ceil(Math.log10(Math.max(size, step) / step)) + 2 : 6;
@@ -148,7 +148,7 @@ def _figure(chart: Chart) -> Any:
     elif not chart.equal:
         made.x_range.range_padding = 0.0
     for axis, scale in ((made.xaxis, chart.x_scale), (made.yaxis, chart.y_scale)):
-        axis.formatter = CustomJSTickFormatter(code=_TICK_JS)
+        axis.formatter = CustomJSTickFormatter(code=TICK_JS)
         axis.major_label_policy = NoOverlap()
         if scale == "linear":
             axis.ticker.desired_num_ticks = TICKS

@@ -38,12 +38,12 @@ def running(server: Any) -> Iterator[Any]:
 
 
 @contextmanager
-def browsing() -> Iterator[Any]:
+def browsing(*arguments: str) -> Iterator[Any]:
     """Give a page of 1280 x 800 that keeps what it complains of in ``page.complaints``, and every request."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        chromium = driver.chromium.launch(executable_path=CHROMIUM, args=[*ARGUMENTS, *arguments])
         page = chromium.new_page(viewport={"width": 1280, "height": 800})
         page.complaints, page.asked = [], []  # type: ignore[attr-defined]
         page.on(

@@ -14,7 +14,7 @@ from tests.viewers.bench.stand_in import OSCILLATOR, read, tools
 
 load_toolkit()
 
-from chladni.viewers.bench.dropper import MOST_BYTES, Dropper, private_file  # noqa: E402  # needs Panel's settings
+from chladni.viewers.bench.dropper import MOST_BYTES, Dropper  # noqa: E402  # needs Panel's settings
 from chladni.viewers.bench.instrument_page import VIEWS, InstrumentPage  # noqa: E402
 
 
@@ -231,25 +231,19 @@ def test_a_log_that_fits_no_signal_waits_for_choices(tmp_path: Path) -> None:
 def test_private_copies_are_removed(page: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     page.log.show(True)
-    page.log._taken("one.mcap", b"log\n/a\n/b")
+    drop(page, "one.mcap", b"log\n/a\n/b")
     (first,) = tmp_path.iterdir()
     assert first.stat().st_mode & 0o077 == 0
-    page.log._taken("two.mcap", b"log\n/a\n/b")
+    drop(page, "two.mcap", b"log\n/a\n/b")
     (second,) = tmp_path.iterdir()
     assert second != first
-    page.log._taken("bad.mcap", b"rubbish")
+    drop(page, "bad.mcap", b"rubbish")
     assert "bad.mcap: is no log" in page.log._words.object
     # Neither that one nor the one before it, whose comparison is gone.
     assert list(tmp_path.iterdir()) == []
-    page.log._taken("three.mcap", b"log\n/a\n/b")
+    drop(page, "three.mcap", b"log\n/a\n/b")
     page.close()
     assert list(tmp_path.iterdir()) == []
-
-
-def test_no_room_for_a_private_copy_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
-    with pytest.raises(Exception, match="the dropped log can't be kept"):
-        private_file(b"log", ".mcap")
 
 
 class Upload:
@@ -257,30 +251,102 @@ class Upload:
 
     event_name = "upload_event"
 
-    def __init__(self, content: bytes, chunk: int, total: int) -> None:
-        self.data = {"name": "a.mcap", "chunk": chunk, "total_chunks": total, "data": content, "type": ""}
+    def __init__(self, content: bytes, chunk: int, total: int, name: str = "a.mcap") -> None:
+        self.data = {"name": name, "chunk": chunk, "total_chunks": total, "data": content, "type": ""}
 
 
-def test_pieces_are_joined() -> None:
-    taken: list[tuple[str, bytes]] = []
-    dropper = Dropper(taken=lambda *got: taken.append(got), refused=lambda _: None)
-    for number, piece in enumerate((b"ab", b"cd", b"e"), start=1):
-        dropper._process_event(Upload(piece, number, 3))
-    assert taken == [("a.mcap", b"abcde")]
+def drop(page: Any, name: str, content: bytes) -> None:
+    page.log.dropper._process_event(Upload(content, 1, 1, name))
 
 
-def test_a_piece_that_takes_it_beyond_the_bound_is_refused_once() -> None:
-    taken: list[Any] = []
-    refused: list[str] = []
-    dropper = Dropper(taken=lambda *got: taken.append(got), refused=refused.append)
+class Dropped:
+    """A dropper, and what it gave: names with contents, and refusals."""
+
+    def __init__(self) -> None:
+        self.taken: list[tuple[str, bytes, str]] = []
+        self.refused: list[str] = []
+        self.dropper = Dropper(taken=self._take, refused=self.refused.append)
+
+    def _take(self, name: str, path: Path) -> None:
+        self.taken.append((name, path.read_bytes(), path.suffix))
+        path.unlink()
+
+    def send(self, *pieces: tuple[bytes, int], total: int, name: str = "a.mcap") -> None:
+        for content, number in pieces:
+            self.dropper._process_event(Upload(content, number, total, name))
+
+
+@pytest.fixture
+def dropped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Dropped:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    return Dropped()
+
+
+def test_no_room_for_a_private_copy_is_told(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, dropped: Dropped
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
+    dropped.send((b"a", 1), (b"b", 2), total=2)
+    assert dropped.taken == []
+    assert dropped.refused == ["the dropped log can't be kept: No such file or directory; free space or use --log"]
+
+
+def test_a_disk_that_fills_up_is_told_and_nothing_stays(tmp_path: Path, dropped: Dropped) -> None:
+    dropped.send((b"a", 1), total=3)
+
+    class Full:
+        name = dropped.dropper._copy.name  # type: ignore[union-attr]
+
+        def write(self, _: bytes) -> int:
+            raise OSError(28, "No space left on device")
+
+        def close(self) -> None: ...
+
+    dropped.dropper._copy = Full()  # type: ignore[assignment]
+    dropped.send((b"b", 2), (b"c", 3), total=3)
+    assert dropped.taken == []
+    assert dropped.refused == ["the dropped log can't be kept: No space left on device; free space or use --log"]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_pieces_are_joined(dropped: Dropped, tmp_path: Path) -> None:
+    dropped.send((b"ab", 1), (b"cd", 2), (b"e", 3), total=3)
+    assert dropped.taken == [("a.mcap", b"abcde", ".mcap")]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "name", ["a.../../x", "a.m\x1b[2J", "a.\u202e", "a", "", ".", "..", "a.\n", "../../etc/a.$(x)", "a.\u00b2"]
+)
+def test_nothing_of_a_name_but_a_plain_suffix_goes_to_the_disk(dropped: Dropped, name: str) -> None:
+    dropped.send((b"x", 1), total=1, name=name)
+    assert dropped.taken == [(name, b"x", "")]
+
+
+@pytest.mark.parametrize("numbers", [(1, 3), (1, 1, 3), (1, 2, 2), (2, 3), (0, 1, 3), (1, -2), (1, 2, 4)])
+def test_pieces_in_another_order_make_no_log(dropped: Dropped, tmp_path: Path, numbers: tuple[int, ...]) -> None:
+    dropped.send(*((b"x", number) for number in numbers), total=3)
+    assert dropped.taken == []
+    dropped.dropper.close()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_log_that_is_still_on_its_way_goes_with_the_page(page: Any, tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    page.log.dropper._process_event(Upload(b"x", 1, 2))
+    assert len(list(tmp_path.iterdir())) == 1
+    page.close()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_piece_that_takes_it_beyond_the_bound_is_refused_once(dropped: Dropped, tmp_path: Path) -> None:
     quarter = bytes(MOST_BYTES // 4)
-    for number in range(1, 8):
-        dropper._process_event(Upload(quarter, number, 7))
-    assert taken == []
-    assert len(refused) == 1
-    assert "larger than 64 MB" in refused[0]
-    assert "--log FILE" in refused[0]
-    assert dropper._received == []
+    dropped.send(*((quarter, number) for number in range(1, 8)), total=7)
+    assert dropped.taken == []
+    assert len(dropped.refused) == 1
+    assert "larger than 64 MB" in dropped.refused[0]
+    assert "--log FILE" in dropped.refused[0]
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_taking_a_file_away_again_changes_nothing() -> None:
