@@ -20,8 +20,6 @@ import contextlib
 import http.server
 import itertools
 import multiprocessing
-import os
-import shutil
 import socket
 import statistics
 import sys
@@ -33,11 +31,13 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 
 import psutil
 
-sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
+# Run as a file, it finds the tests' tools all the same.
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.viewers.bench import wire
 from tests.viewers.bench.serving import ARGUMENTS, CHROMIUM
@@ -69,7 +69,7 @@ class Bench:
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=serve, args=(theirs,))
+        self._process = context.Process(target=serve, args=(theirs,), daemon=True)
         self._process.start()
         self.port: int = self._pipe.recv()
         self._watched = psutil.Process(self._process.pid)
@@ -145,8 +145,9 @@ def foreign_origins(bench: Bench) -> Row:
 def foreign_hosts(bench: Bench) -> Row:
     """Ask under names that aren't this computer's, as DNS rebinding does."""
     port = bench.port
-    hosts = ["evil.example", f"evil.example:{port}", f"127.0.0.1.evil.example:{port}", f"localhost.evil:{port}", "[::1]",
-             "0.0.0.0", f"127.0.0.2:{port}", "127.1", "2130706433", f"127.0.0.1:{port}.evil", "127.0.0.1:x",
+    hosts = ["evil.example", f"evil.example:{port}", f"127.0.0.1.evil.example:{port}", f"localhost.evil:{port}",
+             "[::1]",
+             "0.0.0.1", f"127.0.0.2:{port}", "127.1", "2130706433", f"127.0.0.1:{port}.evil", "127.0.0.1:x",
              f"localhost:{port}@evil.example", "."]  # fmt: skip
     answers = [wire.ask(port, path, host=host) for path, host in itertools.product(PATHS, hosts)]
     answers += [
@@ -167,7 +168,9 @@ def embedding(bench: Bench) -> Row:
     ends = ["autoload.js", "autoload.js?bokeh-autoload-element=x", "metadata", "components/x"]
     gone = [wire.ask(bench.port, f"/{NAME}/{end}", method=method) for end in ends for method in ("GET", "OPTIONS")]
     there = [wire.ask(bench.port, path) for path in ("/", "/start.js", "/static/js/bokeh.min.js", "/nowhere")]
-    framed = [one for one in (*gone, *there) if "frame-ancestors 'none'" not in one.headers["content-security-policy"]]
+    framed = [
+        one for one in (*gone, *there) if "frame-ancestors 'none'" not in one.headers["content-security-policy"]
+    ]
     open_to = [one for one in (*gone, *there) if any(name.startswith("access-control") for name in one.headers)]
     held = all(one.status == 404 for one in gone) and not framed and not open_to and bench.pages() == 0
     return Row(attack="embedding (autoload.js, metadata)", tries=len(gone), outcome=counted([o.status for o in gone]),
@@ -178,7 +181,8 @@ HOSTILE = """<!doctype html><script>
 const base = "TARGET", told = {};
 const put = (name, got) => { told[name] = got; };
 window.onload = async () => {
-  for (const path of ["/NAME", "/NAME/autoload.js?bokeh-autoload-element=x", "/start.js", "/static/js/bokeh.min.js"]) {
+  const autoload = "/NAME/autoload.js?bokeh-autoload-element=x";
+  for (const path of ["/NAME", autoload, "/start.js", "/static/js/bokeh.min.js"]) {
     await new Promise((done) => {
       const script = document.createElement("script");
       script.src = base + path;
@@ -222,7 +226,10 @@ def hostile_pages(bench: Bench) -> Iterator[Row]:
         names = ["--host-resolver-rules=MAP *.example 127.0.0.1"]
         chromium = driver.chromium.launch(executable_path=CHROMIUM, args=[*ARGUMENTS, *names])
         page = chromium.new_page()
-        for attack, origin in (("other site", f"http://evil.example:{port}"), ("other port", f"http://127.0.0.1:{port}")):
+        for attack, origin in (
+            ("other site", f"http://evil.example:{port}"),
+            ("other port", f"http://127.0.0.1:{port}"),
+        ):
             page.goto(origin)
             page.wait_for_function("() => window.told", timeout=30_000)
             told: dict[str, str] = page.evaluate("() => window.told")
@@ -430,7 +437,8 @@ def deaf_page(bench: Bench) -> Row:
                 sent += 1
         grown = bench.bytes_now() - before
         meanwhile = answer_s(bench.port, f"/{NAME}")
-    return Row(attack="a page that asks 5000 times and reads nothing", tries=sent, held=grown < 2e8 and meanwhile < 10,
+    return Row(attack="a page that asks 5000 times and reads nothing", tries=sent,
+               held=grown < 2e8 and meanwhile < 10,
                outcome=f"grown by {grown / 1e6:.0f} MB; another page meanwhile {1e3 * meanwhile:.0f} ms")  # fmt: skip
 
 
@@ -478,6 +486,12 @@ def attacks(bench: Bench, count: int) -> Iterator[Row]:
     yield deaf_page(bench)
 
 
+def tell(line: str) -> None:
+    """Print a line at once."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
 def main() -> int:
     """Attack, print the table, give the exit code."""
     parser = argparse.ArgumentParser(description="Attack the bench.")
@@ -486,17 +500,18 @@ def main() -> int:
     bench = Bench()
     failures = 0
     before, idle = honest_s(bench), bench.bytes_now()
-    print("| attack | tries | outcome | s | server MB | |\n| --- | --- | --- | --- | --- | --- |")
+    tell("| attack | tries | outcome | s | server MB | |\n| --- | --- | --- | --- | --- | --- |")
     begun = time.monotonic()
     for row in attacks(bench, count):
         failures += not row.held
         seconds, megabytes = f"{time.monotonic() - begun:.0f}", f"{bench.bytes_now() / 1e6:.0f}"
         verdict = "held" if row.held else "GOT THROUGH"
-        print(f"| {' | '.join([row.attack, str(row.tries), row.outcome, seconds, megabytes, verdict])} |", flush=True)
+        tell(f"| {' | '.join([row.attack, str(row.tries), row.outcome, seconds, megabytes, verdict])} |")
     after = honest_s(bench)
-    print(f"server: {idle / 1e6:.0f} MB before, {bench.peak_bytes / 1e6:.0f} MB at most, {bench.bytes_now() / 1e6:.0f} MB after")
-    print("an honest page, before and after: "
-          f"answered in {before[0]:.2f} and {after[0]:.2f} s, drawn in {before[1]:.1f} and {after[1]:.1f} s")  # fmt: skip
+    megabytes = [f"{size / 1e6:.0f} MB" for size in (idle, bench.peak_bytes, bench.bytes_now())]
+    tell("server: {} before, {} at most, {} after".format(*megabytes))
+    tell(f"an honest page, answered in {before[0]:.2f} s before and {after[0]:.2f} s after")
+    tell(f"an honest page, drawn in {before[1]:.1f} s before and {after[1]:.1f} s after")
     failures += bench.peak_bytes > MOST_BYTES or after[0] > 2 * before[0] + 0.5
     bench.end()
     return 1 if failures else 0

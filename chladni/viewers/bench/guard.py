@@ -1,4 +1,8 @@
-"""Who may ask the bench for what, and how much of it: origins, headers, pages, messages."""
+"""Who may ask the bench for what, and how much of it: origins, headers, pages, messages.
+
+Bokeh's server is made to be embedded in other pages and reached by many; here one person at one computer asks. So
+every request passes one place, `Application.get_handler_delegate`, which lets few kinds of handlers answer.
+"""
 
 import re
 from collections.abc import Mapping
@@ -144,6 +148,7 @@ class Socket(Guarded, WSHandler):
 
     application: "Application"
     _unread_bytes = 0
+    _ended = False
 
     async def get(self, *args: Any, **kwargs: Any) -> None:
         """Join the page that the token names, which is drawn at random and stands in that page only; ends with it."""
@@ -156,9 +161,16 @@ class Socket(Guarded, WSHandler):
         try:
             await super().get(*args, **kwargs)
         finally:
+            self._ended = True
             self.application.joined.discard(token)
             # On one computer no connection is lost but by closing the page.
             pages[token].request_expiration()
+
+    async def _async_open(self, token: str) -> None:
+        await super()._async_open(token)
+        # Bokeh comes to this later: the browser may have left, and the page would wait for it for ever.
+        if self._ended and self.connection is not None:
+            self.application.client_lost(self.connection)
 
     def check_origin(self, origin: str) -> bool:
         """Ask what was asked of the request; Bokeh would take a list from the environment."""
@@ -253,9 +265,11 @@ class Application(BokehTornado):
         """Say why there can't be another page now; nothing when there can."""
         pages = self.open_pages() + self.making
         if pages >= MOST_PAGES:
-            return f"The bench has {pages} open pages, the most there can be. Close one; this page tries again by itself."
+            return (
+                f"The bench has {pages} open pages, the most there can be. Close one; this one tries again by itself."
+            )
         if pages - len(self.joined) >= MOST_UNJOINED:
-            return f"The bench is busy with {MOST_UNJOINED} new pages. This page tries again by itself."
+            return f"The bench is busy with {MOST_UNJOINED} new pages. This one tries again by itself."
         return ""
 
     async def give_up_unused(self) -> None:

@@ -21,6 +21,8 @@ MOST_CONNECTIONS = 128
 #: Who takes longer to say what is wanted, or keeps a connection without asking, is let go.
 PATIENCE_S = 10.0
 _MOST_HEADER_BYTES = 16_384
+#: Calls that are not answered yet: a page that is being made holds all others up for half a second.
+_MOST_CALLS = 1024
 
 
 class BoundedServer(HTTPServer):
@@ -71,7 +73,7 @@ class BenchServer:
             raise SetupError(f"port {port} of {ADDRESS} can't be had (the highest is 65535); give 0 for any")
         try:
             # Bound at once, so that a taken port is told before anything starts; browsers wait until `run`.
-            self._socket = socket.create_server((ADDRESS, port))
+            self._socket = socket.create_server((ADDRESS, port), backlog=_MOST_CALLS)
         except OSError as error:
             raise SetupError(
                 f"port {port} of {ADDRESS} can't be had ({error}); give another, or 0 for any"

@@ -80,7 +80,7 @@ def test_nothing_is_given_to_another_origin(server: Any, port: int, path: str, l
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize(
     "host", ["evil.example:PORT", "localhost.evil:PORT", "127.0.0.1:PORT.evil", "127.0.0.2:PORT", "127.1:PORT",
-             "[::1]:PORT", "localhost:PORT@evil.example", "127.0.0.1:", "0.0.0.0"],
+             "[::1]:PORT", "localhost:PORT@evil.example", "127.0.0.1:", "0.0.0.1"],
 )  # fmt: skip
 def test_nothing_is_given_under_another_name(server: Any, port: int, path: str, host: str) -> None:
     host = host.replace("PORT", str(port))
@@ -119,7 +119,9 @@ def test_every_answer_has_the_headers_that_keep_others_out(port: int, path: str)
     for line in ("Sec-Fetch-Site: none", "Sec-Fetch-Site: cross-site"):
         headers = wire.ask(port, path, line).headers
         rules = dict(rule.split(" ", 1) for rule in headers["content-security-policy"].split("; "))
-        assert rules["default-src"] == rules["frame-ancestors"] == rules["base-uri"] == rules["form-action"] == "'none'"
+        assert (
+            rules["default-src"] == rules["frame-ancestors"] == rules["base-uri"] == rules["form-action"] == "'none'"
+        )
         # Neither inline nor made of text, nor of another host.
         assert rules["script-src"] == rules["connect-src"] == "'self'"
         assert "http" not in headers["content-security-policy"]
@@ -137,9 +139,7 @@ def test_the_page_has_no_script_of_its_own(port: int) -> None:
     assert "<title>Oscillator &lt;one body&gt; · chladni</title>" in body
 
 
-def test_there_are_no_more_pages_than_there_may_be(
-    server: Any, port: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_there_are_no_more_pages_than_there_may_be(server: Any, port: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chladni.viewers.bench.guard.MOST_PAGES", 3)
     with ExitStack() as held:
         first = wire.ask(port, f"/{NAME}")
@@ -182,6 +182,16 @@ def test_a_page_that_is_closed_makes_room_at_once(server: Any, port: int, monkey
         until(lambda: len(server._application.joined) == 0)
 
 
+def test_a_browser_that_leaves_at_once_leaves_no_page(server: Any, port: int) -> None:
+    for _ in range(5):
+        token = wire.ask(port, f"/{NAME}").token
+        with wire.connect(port) as connection:
+            # Gone before the server has noticed that it came.
+            connection.sendall(wire.request(port, f"/{NAME}/ws", *wire.upgrade_lines(token, own(port))))
+            connection.sendall(wire.frame(b"", 8))
+    until(lambda: server.open_pages == 0)
+
+
 @pytest.mark.parametrize("token", ["", "none", "e30", "a.b", "eyJ9", "x" * 2000])
 def test_made_up_tokens_join_nothing(server: Any, port: int, token: str) -> None:
     answer = wire.ask(port, f"/{NAME}/ws", *wire.upgrade_lines(token, own(port)))
@@ -222,6 +232,7 @@ def test_nobody_chooses_the_name_of_a_page(port: int, path: str) -> None:
 
 
 LONG = b"x" * 3_000_000
+BUFFER = wire.frame(b'{"id": "a"}')
 
 
 @pytest.mark.parametrize(
@@ -231,8 +242,8 @@ LONG = b"x" * 3_000_000
         [wire.frame(LONG, wire.BINARY)],
         [wire.frame(LONG[:500_000], last=False)] + [wire.frame(LONG[:500_000], 0, last=False)] * 5,
         [wire.frame(b"", length=1 << 62)],
-        [*wire.message({}, buffers=10**9), *[wire.frame(b'{"id": "a"}'), wire.frame(LONG[:900_000], wire.BINARY)] * 3],
-        [*wire.message({}, buffers=10**9), *[wire.frame(b'{"id": "a"}'), wire.frame(b"", wire.BINARY)] * 6000],
+        [*wire.message({}, buffers=10**9), *[BUFFER, wire.frame(LONG[:900_000], wire.BINARY)] * 3],
+        [*wire.message({}, buffers=10**9), *[BUFFER, wire.frame(b"", wire.BINARY)] * 6000],
         [*wire.message({})[:2], wire.frame(b"[" * 1_000_000)],
         [wire.frame(b"[]")] * 3,
         [wire.frame(b"\xff\xfe")],
@@ -291,9 +302,7 @@ def test_bodies_and_long_headers_are_refused(
 
 
 @pytest.mark.parametrize("sent", [b"", b"GET / HT", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: "])
-def test_slow_clients_keep_nobody_out_and_are_let_go(
-    port: int, sent: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_slow_clients_keep_nobody_out_and_are_let_go(port: int, sent: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chladni.viewers.bench.server.MOST_CONNECTIONS", 5)
     with ExitStack() as kept:
         slow = [kept.enter_context(wire.connect(port, timeout_s=20)) for _ in range(30)]

@@ -34,7 +34,7 @@ def request(port: int, path: str, *lines: str, host: str = "", method: str = "GE
     return "\r\n".join([*head, "", ""]).encode()
 
 
-def connect(port: int, *, timeout_s: float = 60.0) -> socket.socket:
+def connect(port: int, *, timeout_s: float = 300.0) -> socket.socket:
     """Open a connection to this computer."""
     return socket.create_connection(("127.0.0.1", port), timeout=timeout_s)
 
