@@ -4,6 +4,7 @@ Bokeh's server is made to be embedded in other pages and reached by many; here o
 every request passes one place, `Application.get_handler_delegate`, which lets few kinds of handlers answer.
 """
 
+import asyncio
 import re
 from collections.abc import Mapping
 from functools import cache
@@ -24,8 +25,7 @@ from chladni.viewers.bench.dropper import CHUNK_BYTES
 MOST_PAGES = 32
 #: A page that no browser has joined is given up after this; one that a browser has left, at the next look.
 UNUSED_MS, LOOK_MS = 15_000, 1000
-#: Pages that no browser has joined yet. Making one takes half a second: in 15 s more could be made than there may be,
-#: for ever.
+#: Pages that no browser has joined yet, those that wait to be made among them. Making one takes half a second.
 MOST_UNJOINED = 8
 #: A message from a browser, in all its pieces. The longest one brings a piece of a dropped log, which takes four
 #: thirds of its bytes as text.
@@ -136,9 +136,14 @@ class PageHandler(Guarded, DocHandler):
             return
         self.application.making += 1
         try:
-            made = super().get(*args, **kwargs)
-            if made is not None:
-                await made
+            async with self.application.turn:
+                # All requests that have come meanwhile are counted, or refused, before the next page is made.
+                await asyncio.sleep(0)
+                if self.request.connection.stream.closed():
+                    return
+                made = super().get(*args, **kwargs)
+                if made is not None:
+                    await made
         finally:
             self.application.making -= 1
 
@@ -219,13 +224,15 @@ class Application(BokehTornado):
     Attributes
     ----------
     making
-        Pages that are being made.
+        Pages that are being made, or wait for their turn.
+    turn
+        Held while a page is made.
     joined
         Tokens of the pages that a browser has.
     """
 
     def __init__(self, pages: Mapping[str, Any], texts: Mapping[str, tuple[str, str]]) -> None:
-        self.making = 0
+        self.making, self.turn = 0, asyncio.Lock()
         self.joined: set[str] = set()
         super().__init__(
             build_applications({f"/{name}": make for name, make in pages.items()}),

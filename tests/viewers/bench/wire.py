@@ -95,6 +95,12 @@ def joined(port: int, name: str, token: str) -> Iterator[socket.socket]:
             head += piece
         if b" 101 " not in head.split(b"\r\n")[0]:
             raise ConnectionError(head.decode("latin-1"))
+        # Bokeh takes nothing before it has said so.
+        while b'"ACK"' not in head:
+            piece = connection.recv(65536)
+            if not piece:
+                raise ConnectionError("closed before it was acknowledged")
+            head += piece
         yield connection
 
 
