@@ -119,6 +119,7 @@ class PageHandler(Guarded, DocHandler):
     """Makes a page, as long as there are few."""
 
     application: "Application"
+    _left = False
 
     async def get(self, *args: Any, **kwargs: Any) -> None:
         """Make it, or say that there are too many."""
@@ -134,18 +135,23 @@ class PageHandler(Guarded, DocHandler):
             self.set_header("Refresh", "3")
             self.refuse(503, full)
             return
-        self.application.making += 1
-        try:
-            async with self.application.turn:
-                # All requests that have come meanwhile are counted, or refused, before the next page is made.
-                await asyncio.sleep(0)
-                if self.request.connection.stream.closed():
-                    return
-                made = super().get(*args, **kwargs)
-                if made is not None:
-                    await made
-        finally:
-            self.application.making -= 1
+        application = self.application
+        application.waiting += 1
+        async with application.turn:
+            # All requests that have come meanwhile are counted, or refused, before the next page is made.
+            await asyncio.sleep(0)
+            application.waiting -= 1
+            if self._left:
+                return
+            # The page is among the open ones before anybody else has the word.
+            made = super().get(*args, **kwargs)
+            if made is not None:
+                await made
+
+    def on_connection_close(self) -> None:
+        """Note that nobody waits for the page any more."""
+        self._left = True
+        super().on_connection_close()
 
 
 class Socket(Guarded, WSHandler):
@@ -223,8 +229,8 @@ class Application(BokehTornado):
 
     Attributes
     ----------
-    making
-        Pages that are being made, or wait for their turn.
+    waiting
+        Requests for pages that wait for their turn.
     turn
         Held while a page is made.
     joined
@@ -232,7 +238,7 @@ class Application(BokehTornado):
     """
 
     def __init__(self, pages: Mapping[str, Any], texts: Mapping[str, tuple[str, str]]) -> None:
-        self.making, self.turn = 0, asyncio.Lock()
+        self.waiting, self.turn = 0, asyncio.Lock()
         self.joined: set[str] = set()
         super().__init__(
             build_applications({f"/{name}": make for name, make in pages.items()}),
@@ -270,7 +276,7 @@ class Application(BokehTornado):
 
     def full(self) -> str:
         """Say why there can't be another page now; nothing when there can."""
-        pages = self.open_pages() + self.making
+        pages = self.open_pages() + self.waiting
         if pages >= MOST_PAGES:
             return (
                 f"The bench has {pages} open pages, the most there can be. Close one; this one tries again by itself."
