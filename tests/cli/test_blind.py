@@ -104,7 +104,7 @@ def test_a_file_in_the_place_of_the_folder_is_one_line(run: Run, tmp_path: Path,
     (tmp_path / "file").write_text("")
     done = run("blind", "make", tmp_path / "file", "--count", 1, "--jobs", jobs)
     assert (done.code, done.err.count("\n")) == (2, 1)
-    assert "can't be made a folder (Not a directory)" in done.err
+    assert "is no folder" in done.err
 
 
 def test_jobs_below_one_are_refused() -> None:

@@ -94,7 +94,8 @@ def test_place_and_value_are_each_others_inverse(
     assert scale.place(scale.value(place)) == pytest.approx(place, abs=tolerance)
 
 
-@given(low=st.floats(-1e6, 1e6), width=st.floats(1e-6, 1e6))
+# Sizes that no model works with are refused before.
+@given(low=st.floats(-1e6, 1e6).map(lambda low: round(low, 9)), width=st.floats(1e-6, 1e6))
 def test_steps_are_round_and_as_many_as_a_hand_can_turn(low: float, width: float) -> None:
     scale = KnobScale.of(Parameter(name="p", value=low, low=low, high=low + width))
     if scale.logarithmic:
