@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.mcap.message_batch import MessageBatch
+from chladni.signals.stray_stamps import find_strays
 
 #: Percentile of the steps forward that is the longest usual one, and the step over one lost message in its units.
 _MOST, _LOST = 90, 2
@@ -144,6 +145,9 @@ def _stored_out_of_order(arrivals: Arrivals) -> bool:
     as_stored, by_time = _repeats(arrivals.sequence), _repeats(arrivals.sequence[order])
     if as_stored != by_time and min(as_stored, by_time) == 0:
         return by_time == 0
+    # A wrong log time of a message that stands in its place may well fit before the first one or behind the last.
+    if _rises(np.delete(arrivals.log_ns, find_strays(arrivals.log_ns))):
+        return False
     return _fit_end_to_end(arrivals.log_ns) or _evener_by_time(arrivals.log_ns, arrivals.log_ns[order])
 
 

@@ -34,9 +34,13 @@ class LostMessages:
     def add_untimed(self, placements: Iterable[Placement]) -> None:
         """Count the messages whose stamps turned out to be no times beside all others of their topic."""
         for placement in placements:
-            if placement.untimed:
-                key = (placement.stream.topic.name, f"{placement.stream.choice.label} is no time in this log")
-                self.counts[key] = max(placement.untimed, self.counts.get(key, 0))
+            for messages, why in (
+                (placement.untimed, "is no time in this log"),
+                (placement.time_base.strays.size, "contradicts the count of the messages around"),
+            ):
+                if messages:
+                    key = (placement.stream.topic.name, f"{placement.stream.choice.label} {why}")
+                    self.counts[key] = max(messages, self.counts.get(key, 0))
 
     def merge(self, other: "LostMessages") -> None:
         """Keep the larger count of each: a log that is read again loses the same messages again."""

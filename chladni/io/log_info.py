@@ -43,7 +43,7 @@ class ChannelInfo:
     clipped
         Samples at the sensor's limit.
     untimed
-        Messages left out because their stamp is no time.
+        Messages left out because their stamp is no time, or contradicts the count of those around it.
     publishers
         How many publish the channel's topic at once.
     """

@@ -15,7 +15,6 @@ from chladni.io.grid_buffer import GridBuffer, grid_rows
 from chladni.io.mcap.container import McapContainer
 from chladni.io.placement import (
     ALIGNED,
-    NOWHERE,
     Group,
     Placement,
     StatedRate,
@@ -26,6 +25,7 @@ from chladni.io.repeats import digests_of
 from chladni.io.stream import Piece, Stream, read_pieces
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
+from chladni.signals.grid_index import NOWHERE
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import counted
 

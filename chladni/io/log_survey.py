@@ -75,7 +75,7 @@ def _channels(
                     breaks_s=tuple((base.breaks_s[:, 1] + offset_s).tolist()),
                     clipped=monitor.clipped(channel.name),
                     publishers=max(placement.publishers, content.publishing_with(stream.topic.name)),
-                    untimed=placement.untimed + monitor.gathering.untimed,
+                    untimed=placement.without_time + monitor.gathering.untimed,
                 ),
             )
 

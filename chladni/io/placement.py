@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 from chladni.io.repeats import repeats_of
 from chladni.io.stream import Stream
 from chladni.signals.clock_steps import ClockSteps
+from chladni.signals.grid_index import NOWHERE
 from chladni.signals.time_base import TimeBase, fit_batch_time_base, fit_time_base
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.uniform import message_index
-
-#: Index of samples that have no place on the grid.
-NOWHERE = -(1 << 62)
 
 #: A rate that is stated is for stamps that tell it within this share.
 STATED_NEAR = 0.05
@@ -86,6 +84,11 @@ class Placement:
     def left_out(self) -> int:
         """Samples left out because an earlier one has their place."""
         return 0 if self.taken is None else int(self.taken.sum())
+
+    @property
+    def without_time(self) -> int:
+        """Messages left out because their stamps are no times, or not those of their samples."""
+        return self.untimed + int(self.time_base.strays.size)
 
     @property
     def values(self) -> int:
@@ -240,8 +243,11 @@ def _placed(
     placement = Placement(stream=stream, time_base=base, index=np.zeros(0, np.int64), counts=counts)
     if not stamps_ns.size:
         return placement
+    placed = np.delete(np.arange(chosen_ns.size), base.strays)
     placement = replace(
-        placement, first_ns=int(chosen_ns[0]), end_ns=_end_ns(base.clock.run_on(chosen_ns), counts, base.rate_hz)
+        placement,
+        first_ns=int(chosen_ns[placed[0]]),
+        end_ns=_end_ns(base.clock.run_on(chosen_ns)[placed], None if counts is None else counts[placed], base.rate_hz),
     )
     if not base.uniform:
         return placement
@@ -249,7 +255,7 @@ def _placed(
     if kept is not None and twins is not None:
         index = index[np.searchsorted(kept, twins)]
         steps = replace(base.clock, message=kept[base.clock.message])
-        placement = replace(placement, time_base=replace(base, clock=steps))
+        placement = replace(placement, time_base=replace(base, clock=steps, strays=kept[base.strays]))
     return replace(placement, index=index, taken=_taken(stamps_ns, index, counts))
 
 
@@ -261,13 +267,12 @@ class _Seen:
     clock: ClockSteps | None
     logged_ns: NDArray[np.int64] | None
 
-    def kept(self, kept: NDArray[np.bool_]) -> "_Seen":
+    def kept(self, kept: NDArray[np.int64]) -> "_Seen":
         """Give the same for some of the messages."""
         clock, logged_ns = self.clock, self.logged_ns
-        number = np.cumsum(kept, dtype=np.int64)
         return replace(
             self,
-            clock=None if clock is None else replace(clock, message=number[clock.message - 1]),
+            clock=None if clock is None else clock.among(kept),
             logged_ns=None if logged_ns is None else logged_ns[kept],
         )
 
@@ -296,9 +301,9 @@ def _fit_messages(
         base = seen.fit(stamps_ns)
         if base.uniform and not base.duplicates:
             return None, base
-    kept = repeats.twin == np.arange(stamps_ns.size)
+    kept = np.flatnonzero(repeats.twin == np.arange(stamps_ns.size))
     base = seen.kept(kept).fit(stamps_ns[kept])
-    again = int(np.count_nonzero(~kept))
+    again = stamps_ns.size - kept.size
     return repeats.twin, replace(base, samples=stamps_ns.size, duplicates=base.duplicates + again)
 
 
@@ -321,6 +326,7 @@ def _taken(
     reached = np.maximum.accumulate(index[order] + sizes[order])
     taken = np.zeros(index.size, np.int64)
     taken[order[1:]] = np.clip(reached[:-1] - index[order[1:]], 0, sizes[order[1:]])
+    taken[index == NOWHERE] = 0
     return taken if taken.any() else None
 
 

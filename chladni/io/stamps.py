@@ -13,6 +13,7 @@ from chladni.io.known_schemas import message_type
 from chladni.io.mcap.message_batch import MessageBatch
 from chladni.io.untimed import untimed
 from chladni.signals.errors import LogError
+from chladni.signals.stray_stamps import find_strays
 
 StampKind = Literal["header", "publish", "log"]
 StampRequest = Literal["auto", "header", "publish", "log"]
@@ -226,9 +227,12 @@ def head_of(batches: Sequence[MessageBatch], own: OwnStamp | None, decoded: Sequ
 
 
 def _timed(stamps_ns: NDArray[np.int64], logged_ns: NDArray[np.int64], by_ns: NDArray[np.int64] | None) -> Times:
-    """Leave out the stamps that are no times."""
+    """Leave out the stamps that are no times, and those that contradict the count of the messages around."""
     away = untimed(stamps_ns, by_ns)
-    return (stamps_ns, logged_ns) if away is None else (stamps_ns[~away], logged_ns[~away])
+    if away is not None:
+        stamps_ns, logged_ns = stamps_ns[~away], logged_ns[~away]
+    strays = find_strays(stamps_ns)
+    return np.delete(stamps_ns, strays), np.delete(logged_ns, strays)
 
 
 def _unit_ns(numbers: NDArray[np.float64], log_ns: NDArray[np.int64]) -> int | None:

@@ -1,6 +1,6 @@
 """Steps of a clock: where it was set while messages were stamped by it, and how their time is made to run on."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from statistics import median
 from typing import Self
@@ -86,14 +86,13 @@ class ClockSteps(Value):
         """Count the steps before each of so many messages, in the order of arrival."""
         return np.repeat(np.arange(self.count + 1, dtype=np.int32), np.diff(self.message, prepend=0, append=messages))
 
+    def among(self, kept: Ints) -> Self:
+        """Count the messages among some of them, whose numbers rise."""
+        return replace(self, message=np.searchsorted(kept, self.message))
+
     def moved(self, by_ns: Ints) -> Self:
         """Add to the shift after each step."""
-        return type(self)(
-            message=self.message,
-            before_ns=self.before_ns,
-            after_ns=self.after_ns,
-            shift_ns=self.shift_ns + by_ns,
-        )
+        return replace(self, shift_ns=self.shift_ns + by_ns)
 
 
 def find_clock_steps(stamps_ns: Ints, before: Ints | None = None, *, logged_ns: Ints | None = None) -> ClockSteps:

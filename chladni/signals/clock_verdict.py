@@ -20,7 +20,8 @@ JITTERED = 0.05
 COARSE = 0.5
 # As many gaps at chance intervals don't look like the ticks of a coarse clock.
 _FEW = 2
-#: Advice where nothing speaks for a clock.
+#: Advice where nothing speaks against a clock, and where nothing speaks for one.
+SOUND = "the clock is sound"
 EVENTS = "messages come at events and not on a grid; a spectrum needs uniform samples"
 
 
@@ -66,7 +67,7 @@ def advice(base: "TimeBase", unless_hz: float = 0.0) -> str:
             f"stamps scatter by {base.jitter_s * 1e3:.3g} ms RMS; if the sampling does, amplitudes are 10 % "
             f"uncertain at {limit_hz:.3g} Hz, more above"
         )
-    return "; ".join(_remarks(base)) or "the clock is sound"
+    return "; ".join(_remarks(base)) or SOUND
 
 
 def uneven(steps_ns: NDArray[np.int64]) -> str:
@@ -88,6 +89,18 @@ def ticking(steps_ns: NDArray[np.int64]) -> str:
     return (
         f"stamps come in ticks of {quantum_ns * 1e-6:.4g} ms, coarser than the sampling, less evenly than samples "
         "do: some are lost or doubled, so the rate can't be told; state it: --rate HZ, in Python sample_rate_hz"
+    )
+
+
+def with_strays(base: "TimeBase", strays: NDArray[np.int64], kept: NDArray[np.int64]) -> "TimeBase":
+    """Give the time base of the messages `kept` for all of them, of which `strays` are left out."""
+    stamps = "stamp contradicts" if strays.size == 1 else "stamps contradict"
+    told = f"{strays.size} {stamps} the count of samples around, left out"
+    return replace(
+        base,
+        strays=strays,
+        clock=replace(base.clock, message=kept[base.clock.message]),
+        advice=told if base.advice == SOUND else f"{base.advice}; {told}",
     )
 
 

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 Ints = NDArray[np.int64]
 
+#: Index of samples that have no place on the grid.
+NOWHERE = -(1 << 62)
 #: Widths of the running median that are tried in turn; the smallest without collisions is the sharpest at gaps.
 SMOOTHINGS = (1, 9, 65)
 # Slices of the log on which the smoothing is chosen.
@@ -69,6 +71,41 @@ def grid_index(
     low = np.repeat(np.append(np.iinfo(np.int64).min, cuts[:, 1]), lengths)
     high = np.repeat(np.append(cuts[:, 0] - 1, np.iinfo(np.int64).max), lengths)
     return np.clip(nearest, low, high)
+
+
+def side_by_side(index: Ints, time_ns: Ints, cuts: Ints) -> Ints:
+    """Part two samples on one point where the point beside is free: their order tells their places.
+
+    One that moves is nearer to the other's point by its stamp, but the count of samples around says that it's the
+    one beside. Of two with one stamp it isn't known whether one repeats the other: the one that may belong to the
+    free point is left there without a place.
+
+    Parameters
+    ----------
+    index, time_ns
+        ``[..., item]`` grid indices by the stamps alone, and the stamps, rising.
+    cuts
+        As in `TimeBase`: there points are free on purpose.
+
+    Returns
+    -------
+    int64 array ``[..., item]``
+        New where anything moves, with `NOWHERE` for what has no place.
+    """
+    steps = np.diff(index, axis=-1)
+    twice = steps == 0
+    if not twice.any():
+        return index
+    room = steps > 1
+    # A place that is left out between two stretches is none.
+    left_out = np.searchsorted(cuts[:, 0], index, side="left")
+    room &= np.diff(left_out, axis=-1) == 0
+    never = np.zeros_like(twice[..., :1])
+    first = np.concatenate((twice & np.concatenate((never, room[..., :-1]), axis=-1), never), axis=-1)
+    second = np.concatenate((never, twice & np.concatenate((room[..., 1:], never), axis=-1)), axis=-1) & ~first
+    alike = np.concatenate((np.diff(time_ns, axis=-1) == 0, never), axis=-1)
+    moved: Ints = np.where(first & alike, NOWHERE, index - first + (second & ~np.roll(alike, 1, axis=-1)))
+    return moved
 
 
 def _smoothed(nearest: Ints, order: Ints, smoothing: int) -> Ints:

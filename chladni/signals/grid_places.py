@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chladni.signals.clock_count import Counted
 from chladni.signals.clock_fit import Clock
-from chladni.signals.grid_index import choose_smoothing, grid_index
+from chladni.signals.grid_index import NOWHERE, choose_smoothing, grid_index, side_by_side
 from chladni.signals.stamp_gaps import list_gaps, spans_between
 from chladni.signals.stamp_order import Untangled
 from chladni.signals.time_series import NS_PER_S
@@ -72,7 +72,7 @@ def place_by_phase(base: "TimeBase", tangled: Untangled) -> "TimeBase":
         return _with_gaps(base, tangled, one, set_at, begin, end, rising_ns.size + int(shift[-1]))
     after = np.union1d(np.flatnonzero(tangled.steps > 1.5 * NS_PER_S / base.rate_hz) + 1, set_at)
     if smoothing == 1:
-        begin, end = (clock(rising_ns[place], place) for place in (after, after - 1))
+        begin, end = _parted_ends(rising_ns, after, clock, base.cuts)
     else:
         index = clock(rising_ns, np.arange(rising_ns.size), smoothing=smoothing)
         begin, end = index[after], index[after - 1]
@@ -80,6 +80,23 @@ def place_by_phase(base: "TimeBase", tangled: Untangled) -> "TimeBase":
     last = rising_ns.size + lost + _cut_out(base)
     base = _with_gaps(base, tangled, one, after[gap], begin[gap], end[gap] + 1, last)
     return replace(base, missing=max(0, lost + base.duplicates), smoothing=smoothing)
+
+
+def _parted_ends(
+    rising_ns: NDArray[np.int64],
+    after: NDArray[np.int64],
+    clock: Callable[..., NDArray[np.int64]],
+    cuts: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Grid indices of messages and of those before them, two on one point parted where there's room."""
+    # With one more message on each side.
+    beside = after[:, None] + np.arange(-2, 2)
+    inside = np.clip(beside, 0, rising_ns.size - 1)
+    message, back = np.unique(inside, return_inverse=True)
+    index = clock(rising_ns[message], message)[back].reshape(beside.shape) + beside - inside
+    parted = side_by_side(index, rising_ns[inside], cuts)
+    parted = np.where(parted == NOWHERE, index, parted)
+    return parted[:, 2], parted[:, 1]
 
 
 def _with_gaps(

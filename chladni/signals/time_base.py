@@ -12,11 +12,21 @@ from chladni.signals.clock_check import grid_agrees
 from chladni.signals.clock_count import Counted, count_batches, count_messages, count_stated
 from chladni.signals.clock_fit import Clock, cut_by_one, fit_clock, measure_wander
 from chladni.signals.clock_steps import LONGEST_NS, ClockSteps
-from chladni.signals.clock_verdict import EVENTS, advice, ticking, uneven, verdict, with_nominal, with_round_rate
+from chladni.signals.clock_verdict import (
+    EVENTS,
+    advice,
+    ticking,
+    uneven,
+    verdict,
+    with_nominal,
+    with_round_rate,
+    with_strays,
+)
 from chladni.signals.errors import EstimateError
 from chladni.signals.grid_places import place_by_phase, place_in_order, straight_pieces
 from chladni.signals.stamp_gaps import spans_between
 from chladni.signals.stamp_order import Untangled, require_stamps, untangle
+from chladni.signals.stray_stamps import find_strays
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.value import Value, require_shape
 
@@ -43,7 +53,7 @@ class TimeBase(Value):
     start_ns
         Time of the grid's index 0, nanoseconds since the Unix epoch.
     samples
-        Samples (messages, or all samples of batch messages) that the stamps stand for.
+        Samples (messages, or all samples of batch messages) that the stamps stand for, without those of `strays`.
     verdict
         ``regular``; ``jittered`` (scatter above 5 % of a period); ``coarse`` (the stamps' ticks are longer than half
         a period) and ``bursts`` (several messages nearly at once, then silence), where samples are counted in order;
@@ -86,6 +96,9 @@ class TimeBase(Value):
         index.
     cuts
         ``[step, 2]`` where the clock was set: the first grid index that is left out, and the first one after.
+    strays
+        ``[stray]`` numbers, in the order of arrival, of messages that have no place: their stamps contradict the
+        count of those around them.
     """
 
     rate_hz: float
@@ -113,6 +126,7 @@ class TimeBase(Value):
     resumed: NDArray[np.int64] = field(default_factory=_none)
     resumed_shift: NDArray[np.int64] = field(default_factory=_none)
     cuts: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
+    strays: NDArray[np.int64] = field(default_factory=_none)
 
     def __post_init__(self) -> None:
         require_shape("knots_index", self.knots_index, self.knots_ns.shape, "knots_ns")
@@ -142,6 +156,8 @@ def fit_time_base(
     logged_ns: NDArray[np.int64] | None = None,
 ) -> TimeBase:
     """Fit rate and start to message stamps, ignoring jitter, ticks, gaps, disorder, steps of the clock and bursts.
+
+    A message whose stamp contradicts the count of those around it is left out: see `find_strays`.
 
     Messages with the same stamp are samples, as a clock makes them that ticks more slowly than they are taken, when
     that explains all of the stamps; else they are repeats. Who knows that they are repeats leaves them out.
@@ -211,6 +227,32 @@ def _require_rate(rate_hz: float | None) -> None:
 
 
 def _fit(
+    stamps: NDArray[np.int64],
+    counts: NDArray[np.int64] | None,
+    nominal_hz: float | None,
+    known: ClockSteps | None,
+    logged_ns: NDArray[np.int64] | None,
+) -> TimeBase:
+    strays = find_strays(stamps, counts)
+    if known is not None:
+        # On either side of a step the count isn't known.
+        strays = np.setdiff1d(strays, np.concatenate((known.message, known.message - 1)))
+    if strays.size:
+        kept = np.delete(np.arange(stamps.size), strays)
+        base = _fit_all(
+            stamps[kept],
+            None if counts is None else counts[kept],
+            nominal_hz,
+            None if known is None else known.among(kept),
+            None if logged_ns is None else logged_ns[kept],
+        )
+        # Where the others make no grid, there's nothing that a stamp could contradict.
+        if base.uniform:
+            return with_strays(base, strays, kept)
+    return _fit_all(stamps, counts, nominal_hz, known, logged_ns)
+
+
+def _fit_all(
     stamps: NDArray[np.int64],
     counts: NDArray[np.int64] | None,
     nominal_hz: float | None,

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
-from chladni.signals.grid_index import grid_index
+from chladni.signals.grid_index import NOWHERE, grid_index, side_by_side
 from chladni.signals.stamp_order import require_stamps
 from chladni.signals.time_base import TimeBase
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
+_Clock = Callable[[NDArray[np.int64], NDArray[np.int64]], NDArray[np.int64]]
 # Messages that wait for late ones before them.
 _HELD = 64
 
@@ -32,7 +33,8 @@ def place(
 
     Each sample goes to the nearest grid point (as the time base tells it, drift and late delivery allowed for), and
     keeps its value: what it was sampled early or late is an error of about `TimeBase.amplitude_error`. Of several
-    samples on one grid point the earliest stays.
+    samples on one grid point the earliest stays, unless its neighbour's point is free: then both are where their
+    order says. The strays of the time base are left out.
 
     Parameters
     ----------
@@ -78,6 +80,11 @@ def message_index(
     stamps_ns, counts
         ``[message]`` as the time base was fitted to.
 
+    Returns
+    -------
+    int64 array ``[message]``
+        `NOWHERE` for the strays of the time base.
+
     Raises
     ------
     EstimateError
@@ -86,6 +93,15 @@ def message_index(
     clock = _clock(time_base)
     time_ns = time_base.clock.run_on(require_stamps(stamps_ns))
     sizes = None if counts is None else np.asarray(counts, dtype=np.int64)
+    if time_base.strays.size:
+        kept = np.delete(np.arange(time_ns.size), time_base.strays)
+        spread = np.full(time_ns.size, NOWHERE, np.int64)
+        spread[kept] = _rising_index(time_ns[kept], clock, None if sizes is None else sizes[kept])
+        return spread
+    return _rising_index(time_ns, clock, sizes)
+
+
+def _rising_index(time_ns: NDArray[np.int64], clock: _Clock, sizes: NDArray[np.int64] | None) -> NDArray[np.int64]:
     # The usual log needs no sorting, which takes as long as all the rest.
     if np.all(time_ns[1:] >= time_ns[:-1]):
         return clock(time_ns, _samples_before(sizes, time_ns.size))
@@ -156,7 +172,10 @@ class Placer:
         # Whole numbers can't say "missing".
         floating = values if values.dtype.kind == "f" else values.astype(np.float64)
         time_ns = self._base.clock.run_on(stamps, first=self._messages)
+        kept = np.isin(np.arange(self._messages, self._messages + stamps.size), self._base.strays, invert=True)
         self._messages += stamps.size
+        if not kept.all():
+            time_ns, floating, sizes = time_ns[kept], floating[:, np.repeat(kept, sizes)], sizes[kept]
         self._waiting = self._waiting.followed_by(_Messages(time_ns, sizes, floating)).in_order()
         ready = self._waiting.time_ns.size - (0 if last else self._hold)
         return self._release(ready) if ready > 0 else None
@@ -252,10 +271,11 @@ def _expanded(first: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDArray[np.
     return run
 
 
-def _clock(base: TimeBase) -> Callable[[NDArray[np.int64], NDArray[np.int64]], NDArray[np.int64]]:
+def _clock(base: TimeBase) -> _Clock:
     if not base.uniform:
         raise EstimateError(f"samples can't be placed on a grid: {base.advice}")
-    return partial(
+    set_at = base.clock.message
+    indexed = partial(
         grid_index,
         knots_ns=base.knots_ns,
         knots_index=base.knots_index,
@@ -263,6 +283,14 @@ def _clock(base: TimeBase) -> Callable[[NDArray[np.int64], NDArray[np.int64]], N
         smoothing=base.smoothing,
         resumed=base.resumed,
         resumed_shift=base.resumed_shift,
-        cut_order=None if base.resumed.size else base.clock.message,
+        # Strays aren't among the samples that are counted.
+        cut_order=None if base.resumed.size else set_at - np.searchsorted(base.strays, set_at),
         cuts=base.cuts,
     )
+    if base.smoothing > 1 or base.resumed.size:
+        return indexed
+
+    def clock(time_ns: NDArray[np.int64], order: NDArray[np.int64]) -> NDArray[np.int64]:
+        return side_by_side(indexed(time_ns, order), time_ns, base.cuts)
+
+    return clock

@@ -164,7 +164,12 @@ def placed_rows(
         start_time_ns=grid.start_time_ns + origin_ns,
     )
     notes = [] if base.verdict == "regular" else [f"{where}: the times are {base.verdict}: {base.advice}."]
-    lost = int(np.isfinite(rows).any(axis=0).sum() - np.isfinite(grid.values).any(axis=0).sum())
+    there = np.isfinite(rows).any(axis=0)
+    lost = int(np.delete(there, base.strays).sum() - np.isfinite(grid.values).any(axis=0).sum())
+    if base.strays.size:
+        notes.append(
+            f"{where}: {counted(base.strays.size, 'row')} left out, whose time contradicts the count of rows around."
+        )
     if lost:
         notes.append(f"{where}: {counted(lost, 'sample')} left out: another one came at the same time.")
     return FileContents(series=(series,), notes=tuple(notes), time_bases=(base,))

@@ -1,0 +1,111 @@
+"""Stray stamps: those that contradict the count of the samples around them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chladni.signals.clock_check import JITTERS
+from chladni.signals.clock_count import SHORT
+from chladni.signals.sample_count import robust_std
+
+Ints = NDArray[np.int64]
+
+# Stray stamps in a row; three that run on together may be a clock that was set.
+_MOST = 2
+# A clock whose intervals scatter by a quarter is none, and from there on neighbours don't tell how many they are.
+_UNEVEN = 0.25
+
+
+def find_strays(stamps_ns: Ints, sizes: Ints | None = None) -> Ints:
+    """Find messages whose stamps contradict the count of samples around them.
+
+    A message that is late leaves no hole where it came, and fills one where its stamp says. A stray one is neither:
+    the messages before and after it leave exactly its place empty, and its stamp lies where others have all places,
+    amid a pause, or beyond all others. What it does say isn't known, and must move no other sample.
+
+    Parameters
+    ----------
+    stamps_ns
+        ``[message]`` nanoseconds, in the order of arrival.
+    sizes
+        ``[message]`` samples of each; None when every message is one sample.
+
+    Returns
+    -------
+    int64 array ``[stray]``
+        Their numbers in the order of arrival, rising. Empty for stamps that rise, for too few, and for
+        uneven ones.
+
+    Examples
+    --------
+    >>> find_strays(np.array([0, 10, 20, 30, 40, 50, 12, 70, 80, 90]))
+    array([6])
+    >>> find_strays(np.array([0, 10, 30, 40, 50, 20, 60, 70, 80, 90]))
+    array([], dtype=int64)
+    """
+    steps = np.diff(stamps_ns)
+    back = np.flatnonzero(steps < 0) + 1
+    none = np.zeros(0, np.int64)
+    if not back.size or stamps_ns.size < SHORT:
+        return none
+    counts = np.ones_like(stamps_ns) if sizes is None else sizes
+    intervals = (steps / counts[:-1])[steps > 0]
+    period_ns = float(np.median(intervals)) if intervals.size else 0.0
+    scatter = robust_std(intervals) / period_ns if period_ns else np.inf
+    if scatter > _UNEVEN:
+        return none
+    # In periods, from the first stamp: small enough for doubles to tell nanoseconds of a log that lasts days.
+    time = (stamps_ns - stamps_ns[0]) / period_ns
+    found = none
+    for run in range(1, _MOST + 1):
+        starts = np.unique(np.concatenate([back - ahead for ahead in range(run + 1)]))
+        starts = starts[(starts >= 0) & (starts + run <= time.size)]
+        fits = starts[_leave_a_place(time, counts, starts, run, JITTERS * scatter / np.sqrt(2))]
+        found = np.union1d(found, (fits[:, None] + np.arange(run)).ravel())
+    return found[~_fill_a_hole(time, counts, found)] if found.size else none
+
+
+def _leave_a_place(
+    time: NDArray[np.float64], counts: Ints, starts: Ints, run: int, reach: float
+) -> NDArray[np.bool_]:
+    """Whether the messages around each run leave exactly its place empty, and none of it lies near there.
+
+    At an end of the log there's room for any run, if the others go on as evenly as ever.
+    """
+    last = time.size - 1
+    before, after = starts - 1, starts + run
+    inner = (before >= 0) & (after <= last)
+    before = np.where(before < 0, after, np.minimum(before, last))
+    after = np.where(after > last, before, after)
+    members = np.minimum(starts[:, None] + np.arange(run), last)
+    needed, half = counts[members].sum(axis=1), 0.5 * counts[members].min(axis=1)
+    room = time[after] - time[before] - counts[before]
+    # The step beside the run, at an end of the log.
+    low = np.clip(np.where(starts == 0, after, before - 1), 0, last - 1)
+    beside = time[low + 1] - time[low] - counts[low]
+    fits = np.where(inner, np.abs(room - needed) < half, np.abs(beside) < half)
+    # Where the run begins if it follows the one before, or else ends where the one after begins.
+    place = np.where(starts == 0, time[after] - needed, time[before] + counts[before])
+    own = place[:, None] + np.cumsum(counts[members], axis=1) - counts[members]
+    stamps = time[members]
+    floor = np.where(starts == 0, -np.inf, time[before])[:, None]
+    ceiling = np.where(starts + run > last, np.inf, time[after])[:, None]
+    outside = ((stamps < floor) | (stamps > ceiling)) & (np.abs(stamps - own) > reach)
+    rising = np.sort(time)
+    # What came earlier or later may lie there.
+    first = np.where(starts == 0, 0, np.searchsorted(rising, time[before], side="right"))
+    end = np.where(starts + run > last, time.size, np.searchsorted(rising, time[after], side="left"))
+    told: NDArray[np.bool_] = fits & outside.all(axis=1) & (first >= end)
+    return told
+
+
+def _fill_a_hole(time: NDArray[np.float64], counts: Ints, found: Ints) -> NDArray[np.bool_]:
+    """Whether the others leave a free place where a stamp says, next to one of them: a late message follows on."""
+    order = np.argsort(time, kind="stable")
+    rank = np.empty_like(order)
+    rank[order] = np.arange(order.size)
+    inside = (rank[found] > 0) & (rank[found] < order.size - 1)
+    before, after = (order[np.clip(rank[found] + step, 0, order.size - 1)] for step in (-1, 1))
+    behind, ahead = time[found] - time[before] - counts[before], time[after] - time[found] - counts[found]
+    half, nearest = 0.5 * counts[found], np.minimum(behind, ahead)
+    free: NDArray[np.bool_] = inside & (behind + ahead > -half) & (np.abs(nearest) < half)
+    return free
