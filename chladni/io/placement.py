@@ -243,12 +243,8 @@ def _placed(
     placement = Placement(stream=stream, time_base=base, index=np.zeros(0, np.int64), counts=counts)
     if not stamps_ns.size:
         return placement
-    placed = np.delete(np.arange(chosen_ns.size), base.strays)
-    placement = replace(
-        placement,
-        first_ns=int(chosen_ns[placed[0]]),
-        end_ns=_end_ns(base.clock.run_on(chosen_ns)[placed], None if counts is None else counts[placed], base.rate_hz),
-    )
+    first_ns, end_ns = _span_ns(chosen_ns, counts, base)
+    placement = replace(placement, first_ns=first_ns, end_ns=end_ns)
     if not base.uniform:
         return placement
     index = message_index(chosen_ns, base, counts=counts)
@@ -304,15 +300,19 @@ def _fit_messages(
     kept = np.flatnonzero(repeats.twin == np.arange(stamps_ns.size))
     base = seen.kept(kept).fit(stamps_ns[kept])
     again = stamps_ns.size - kept.size
-    return repeats.twin, replace(base, samples=stamps_ns.size, duplicates=base.duplicates + again)
+    return repeats.twin, replace(base, samples=base.samples + again, duplicates=base.duplicates + again)
 
 
-def _end_ns(time_ns: NDArray[np.int64], counts: NDArray[np.int64] | None, rate_hz: float) -> int:
-    """End of the last sample, at least its stamp."""
-    period_ns = NS_PER_S / rate_hz if rate_hz > 0 else 0.0
+def _span_ns(stamps_ns: NDArray[np.int64], counts: NDArray[np.int64] | None, base: TimeBase) -> tuple[int, int]:
+    """First stamp, and the end of the last sample, at least its stamp; strays say nothing of either."""
+    time_ns = base.clock.run_on(stamps_ns)
+    if base.strays.size:
+        kept = np.delete(np.arange(stamps_ns.size), base.strays)
+        stamps_ns, time_ns, counts = stamps_ns[kept], time_ns[kept], None if counts is None else counts[kept]
+    period_ns = NS_PER_S / base.rate_hz if base.rate_hz > 0 else 0.0
     if counts is None:
-        return int(time_ns.max()) + round(period_ns)
-    return int((time_ns + np.rint(counts * period_ns).astype(np.int64)).max())
+        return int(stamps_ns[0]), int(time_ns.max()) + round(period_ns)
+    return int(stamps_ns[0]), int((time_ns + np.rint(counts * period_ns).astype(np.int64)).max())
 
 
 def _taken(

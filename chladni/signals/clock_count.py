@@ -164,8 +164,8 @@ def _count_untold(tangled: Untangled, mean_ns: float, quantum_ns: float, *, burs
     by_phase = count_by_phase(time_ns, steps, guess, cuts)
     # Records of a few samples each, with pauses of any length, look like bursts; of two or three any grid is chance.
     told = not bursts or time_ns.size >= SHORT * by_phase.resumed.size
-    # A stamp that others have too tells no sample's place.
-    told &= int(np.count_nonzero(steps == 0)) <= _SHARED * steps.size
+    # A stamp that others have too tells no sample's place; a single one of a short log may be wrong.
+    told &= int(np.count_nonzero(steps == 0)) <= max(1, _SHARED * steps.size)
     # Chance gives a coherence of 0.055 over windows of 256.
     if told and by_phase.coherence > 0.09 + 2.5 / np.sqrt(time_ns.size) and _mostly_filled(steps, guess):
         yield Counted(count=by_phase, item_size=1, period_ns=guess, in_order=False)

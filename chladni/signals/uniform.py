@@ -172,10 +172,11 @@ class Placer:
         # Whole numbers can't say "missing".
         floating = values if values.dtype.kind == "f" else values.astype(np.float64)
         time_ns = self._base.clock.run_on(stamps, first=self._messages)
-        kept = np.isin(np.arange(self._messages, self._messages + stamps.size), self._base.strays, invert=True)
-        self._messages += stamps.size
-        if not kept.all():
+        if self._base.strays.size:
+            number = np.arange(self._messages, self._messages + stamps.size)
+            kept = np.isin(number, self._base.strays, invert=True)
             time_ns, floating, sizes = time_ns[kept], floating[:, np.repeat(kept, sizes)], sizes[kept]
+        self._messages += stamps.size
         self._waiting = self._waiting.followed_by(_Messages(time_ns, sizes, floating)).in_order()
         ready = self._waiting.time_ns.size - (0 if last else self._hold)
         return self._release(ready) if ready > 0 else None

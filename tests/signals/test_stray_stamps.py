@@ -89,10 +89,9 @@ def test_blocks_of_a_log_with_a_wrong_stamp_are_those_of_the_whole(
 ) -> None:
     stamps, _ = spoiled(samples, jitter, seed, kind, at, share)
     base, numbers = fit_time_base(stamps), np.arange(samples, dtype=float)[None]
-    placer, blocks = Placer(base, CHANNELS), []
-    for first in range(0, samples, 50):
-        blocks.append(placer.push(stamps[first : first + 50], numbers[:, first : first + 50]))
-    blocks.append(placer.finish())
+    placer = Placer(base, CHANNELS)
+    parts = [slice(first, first + 50) for first in range(0, samples, 50)]
+    blocks = [*(placer.push(stamps[part], numbers[:, part]) for part in parts), placer.finish()]
     in_blocks = np.concatenate([block.values[0] for block in blocks if block is not None])
     np.testing.assert_array_equal(in_blocks, place(stamps, numbers, base, CHANNELS).values[0])
 
