@@ -92,11 +92,13 @@ def _leave_a_place(
     floor = np.where(starts == 0, -np.inf, time[before])[:, None]
     ceiling = np.where(starts + run > last, np.inf, time[after])[:, None]
     outside = ((stamps < floor) | (stamps > ceiling)) & (np.abs(stamps - own) > reach)
-    rising = np.sort(time)
-    # What came earlier or later may lie there.
-    first = np.where(starts == 0, 0, np.searchsorted(rising, time[before], side="right"))
-    end = np.where(starts + run > last, time.size, np.searchsorted(rising, time[after], side="left"))
-    told: NDArray[np.bool_] = fits & outside.all(axis=1) & (first >= end)
+    told: NDArray[np.bool_] = fits & outside.all(axis=1)
+    if told.any():
+        # What came earlier or later may lie there.
+        rising = np.sort(time)
+        first = np.where(starts == 0, 0, np.searchsorted(rising, time[before], side="right"))
+        end = np.where(starts + run > last, time.size, np.searchsorted(rising, time[after], side="left"))
+        told &= first >= end
     return told
 
 
