@@ -45,10 +45,14 @@ class Judged:
 
 def run(*arguments: str) -> Answer:
     """Run a command in this process."""
-    out, err = io.StringIO(), io.StringIO()
+    # Documents are written as bytes.
+    written, err = io.BytesIO(), io.StringIO()
+    out = io.TextIOWrapper(written, encoding="utf-8")
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = chladni([*arguments, "--json", "-"])
-    return Answer(code, json.loads(out.getvalue()) if code == 0 else None, err.getvalue())
+    out.flush()
+    document = json.loads(written.getvalue()) if code == 0 else None
+    return Answer(code, document, err.getvalue())
 
 
 def remedy(history: History, answer: Answer) -> list[str]:

@@ -92,14 +92,17 @@ def _limit(seconds: int) -> Iterator[None]:
 
 def run(arguments: Sequence[str]) -> Reply:
     """Run a command in this process, its output captured."""
-    output, errors = io.StringIO(), io.StringIO()
+    # Documents are written as bytes.
+    written, errors = io.BytesIO(), io.StringIO()
+    output = io.TextIOWrapper(written, encoding="utf-8")
     try:
         with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors), _limit(LIMIT_S):
             code = main(arguments)
     except _TooLong:
         raise DefectError(f"{' '.join(arguments)}: still running after {LIMIT_S} s") from None
+    output.flush()
     try:
-        document = json.loads(output.getvalue()) if output.getvalue().strip() else {}
+        document = json.loads(written.getvalue()) if written.getvalue().strip() else {}
     except json.JSONDecodeError as error:
         raise DefectError(f"{' '.join(arguments)}: standard output is no JSON: {error}") from None
     return Reply(code, document, errors.getvalue())
