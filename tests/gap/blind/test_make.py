@@ -226,6 +226,7 @@ def test_an_effect_has_the_severity_that_was_asked_for(kind):
 
 
 @pytest.mark.usefixtures("short")
+@pytest.mark.nightly
 def test_a_case_with_two_effects_has_both_at_different_sites():
     case = draw_case(Order(kind="two", words=("quadratic_damping", "gain_error")), np.random.default_rng(7))
     assert [one.effect for one in case.effects] == ["quadratic_damping", "gain_error"]
