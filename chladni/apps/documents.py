@@ -45,7 +45,7 @@ def psd_document(densities: Sequence[PowerSpectralDensity]) -> Document:
     channels = []
     for density in densities:
         own_axis = {} if density is first else _axis(density)
-        channels += [_channel_density(density, channel.name) | own_axis for channel in density.channels]
+        channels += [_channel_density(density, row) | own_axis for row in range(len(density.channels))]
     notes = [note for density in densities for note in density.provenance.notes]
     return {"format": "chladni.psd/1", **_axis(first), "channels": channels, "notes": notes}
 
@@ -123,10 +123,10 @@ def _axis(estimate: PowerSpectralDensity | FrequencyResponse) -> Document:
     }
 
 
-def _channel_density(density: PowerSpectralDensity, name: str) -> Document:
-    alone = density.select([name])
+def _channel_density(density: PowerSpectralDensity, row: int) -> Document:
+    alone = density.rows([row])
     return {
-        "name": name,
+        "name": alone.channels[0].name,
         "channel_unit": alone.channels[0].unit,
         "psd_unit": alone.units[0],
         "psd": plain(alone.values[0]),

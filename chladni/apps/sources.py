@@ -14,8 +14,6 @@ from chladni.io.log_reader import MostlyEmptyError, several_grids
 from chladni.signals.errors import LogError
 from chladni.signals.resampling import JoinMethod, join_note, join_resampled
 from chladni.signals.time_series import TimeSeries
-from chladni.spectral.accumulator import require_fitting_result
-from chladni.spectral.segmentation import SHORTEST_SEGMENT
 
 Progress = Callable[[float], None]
 
@@ -108,14 +106,7 @@ def _with_moments(known: tuple[int, float, float], row: NDArray[np.floating[Any]
 def watched_grids(
     log: Log, channels: Sequence[str] | None, span: Span, *, progress: Progress = no_progress
 ) -> Iterator[Watched]:
-    """Give the log's channels, one stream of blocks for each sampling grid.
-
-    Raises
-    ------
-    EstimateError
-        When no average of so many channels fits, however coarse: that's known before any sample is read.
-    """
-    require_fitting_result(len(log.channels if channels is None else channels), SHORTEST_SEGMENT)
+    """Give the log's channels, one stream of blocks for each sampling grid."""
     if is_small(log):
         # Long pauses take memory, which blocks do without.
         with suppress(MostlyEmptyError):

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from chladni.apps.excitation import excitation_names, stored_functions
 from chladni.apps.sources import Progress, Span, Watched, no_progress, on_one_grid, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
-from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -17,15 +18,19 @@ from chladni.signals.provenance import Provenance
 from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import rounded_up
-from chladni.spectral.adaptive import adaptive_cross_spectra
+from chladni.spectral.adaptive import adaptive_auto_spectra, adaptive_cross_spectra
 from chladni.spectral.bands import band_rms, total_rms
 from chladni.spectral.blocks import Source
 from chladni.spectral.excitation import HAMMER_RANGE
 from chladni.spectral.frequency_response import Estimator, frequency_response
 from chladni.spectral.peaks import judged_above_hz
 from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.products import PAIRS
 from chladni.spectral.response_advice import longest_segment_s
+from chladni.spectral.segmentation import SHORTEST_SEGMENT
 from chladni.spectral.windows import Window
+
+SpectraT = TypeVar("SpectraT", CrossSpectra, PowerSpectralDensity)
 
 # A tenth of the variance is half a decibel: less than that is lost at the ends of any record.
 MISSING_TOLD = 0.1
@@ -38,6 +43,12 @@ class Averaging:
     resolution_hz: float | None = None
     window: Window | None = None
     overlap: float | None = None
+
+    def powers(self, source: Source) -> AutoSpectra:
+        """Average the auto-spectrum of each of the source's channels so."""
+        return adaptive_auto_spectra(
+            source, resolution_hz=self.resolution_hz, window=self.window, overlap=self.overlap
+        )
 
     def spectra(self, source: Source, references: Sequence[str] | None) -> CrossSpectra:
         """Average the source's cross-spectra so."""
@@ -286,13 +297,12 @@ def _require_moving(watched: Watched, references: Sequence[str]) -> None:
 
 
 def _density(source: TimeSeries | Watched, averaging: Averaging) -> PowerSpectralDensity:
-    spectra = averaging.spectra(source, None)
+    density = power_spectral_density(averaging.powers(source))
     if isinstance(source, Watched):
-        density = power_spectral_density(_without_constant(spectra, source, keep=()))
+        density = _without_constant(density, source, keep=())
         # Segments that were skipped hold variance, too, and that is told.
         whole = [0.0 if density.provenance.skipped else source.variance(one.name) for one in density.channels]
     else:
-        density = power_spectral_density(spectra)
         whole = [0.0] * len(density.channels)
     return replace(density, provenance=density.provenance.with_notes(*_slow_variance(density, whole)))
 
@@ -342,18 +352,20 @@ def _grid_of(
     wanted = set(references if names is None else log.names(names))
     for grid in watched_grids(log, names, span, progress=progress):
         if wanted <= set(grid.names):
+            # Known before a sample of a large log is read.
+            PAIRS.require_fitting(len(grid.names), SHORTEST_SEGMENT)
             return grid
     return on_one_grid(log, sorted(wanted), span, progress=progress)
 
 
-def _without_constant(spectra: CrossSpectra, watched: Watched, *, keep: Sequence[str]) -> CrossSpectra:
+def _without_constant(spectra: SpectraT, watched: Watched, *, keep: Sequence[str]) -> SpectraT:
     """Leave out channels that never changed: their spectra are zero, and a table of zeros hides the rest."""
-    constant = [name for name in watched.constant() if name not in keep]
+    constant = dict.fromkeys(name for name in watched.constant() if name not in keep)
     if not constant:
         return spectra
     moving = [channel.name for channel in spectra.channels if channel.name not in constant]
     if not moving:
-        raise EstimateError(f"no channel changes: {some_of(constant)}; nothing to make a spectrum of")
-    note = f"channels that never change are left out: {some_of(constant)}"
+        raise EstimateError(f"no channel changes: {some_of(list(constant))}; nothing to make a spectrum of")
+    note = f"channels that never change are left out: {some_of(list(constant))}"
     chosen = spectra.select(moving)
     return replace(chosen, provenance=chosen.provenance.with_notes(note))

@@ -17,12 +17,15 @@ from rich.text import Text
 from chladni.io.atomic import Place, atomic_write
 from chladni.signals.errors import LogError
 from chladni.signals.visible import visible, visible_json, visible_lines
+from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
     from chladni.signals.study import Study
 
 PROGRESS_AFTER_S = 1.0
 STANDARD_OUTPUT = 1
+# Rows of a table: terminals keep about as many lines to scroll back through.
+MOST_ROWS = 1000
 
 
 class Progress(Protocol):
@@ -93,11 +96,13 @@ class Output:
         for number, column in enumerate(columns):
             # A heading may be broken into lines; it's a word of ours.
             table.add_column(escape(visible_lines(column)), justify="right" if number else "left", overflow="fold")
-        for row in rows:
+        for row in rows[:MOST_ROWS]:
             table.add_row(*(escape(visible(cell)) for cell in row))
         # Not as the table's own title, which would wrap at the table's width.
         self.line(title, style="bold")
         self.console.print(table)
+        if len(rows) > MOST_ROWS:
+            self.line(f"... and {counted(len(rows) - MOST_ROWS, 'more row')}; --json FILE holds all of them")
 
     def pictures(self, study: "Study", *, figures: Path | None, report: Path | None) -> None:
         """Save figures and report where they were asked for, and say where they are."""

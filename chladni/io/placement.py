@@ -24,6 +24,10 @@ STATED_ABOUT = 0.2
 ALIGNED = 0.01
 #: ... or than their stamps' scatter can tell, up to this share.
 LOOSELY_ALIGNED = 0.05
+#: ... and whose rates differ by at most this share.
+RATES_ALIKE = 0.01
+#: A grid over two recordings has at most so many places for a message.
+SPARSEST = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -428,17 +432,53 @@ def group_placements(placements: Sequence[Placement]) -> tuple[Group, ...]:
     """Put streams that share rate and grid together, in the order of their first stream."""
     groups: list[Group] = []
     members: list[list[Placement]] = []
+    near = _Near(len(placements))
     for placement in placements:
-        for position, group in enumerate(groups):
-            moved = _moved_onto(group, placement)
+        for position in near.positions(placement):
+            moved = _moved_onto(groups[position], placement)
             if moved is not None:
                 groups[position], more = moved
                 members[position].append(more)
+                near.put(position, groups[position])
                 break
         else:
             groups.append(Group.of(placement))
             members.append([placement])
+            near.put(len(groups) - 1, groups[-1])
     return tuple(replace(group, placements=tuple(some)) for group, some in zip(groups, members, strict=True))
+
+
+class _Near:
+    """Rates, extents and messages of groups, which rule most of them out before a grid is compared."""
+
+    def __init__(self, most: int) -> None:
+        self._count = 0
+        self._rate_hz, self._first_s, self._last_s, self._messages = np.zeros((4, most))
+
+    def put(self, position: int, group: Group) -> None:
+        """Note a group, or what became of it."""
+        self._count = max(self._count, position + 1)
+        self._rate_hz[position], self._messages[position] = group.rate_hz, group.messages
+        self._first_s[position], self._last_s[position] = _extent_s(group)
+
+    def positions(self, placement: Placement) -> list[int]:
+        """Groups that a stream may join, in their order."""
+        rate_hz, first_s, last_s, messages = (
+            one[: self._count] for one in (self._rate_hz, self._first_s, self._last_s, self._messages)
+        )
+        base = placement.time_base
+        may = np.abs(rate_hz - base.rate_hz) <= RATES_ALIKE * rate_hz
+        if placement.counts is None:
+            begin_s, end_s = _extent_s(Group.of(placement))
+            together_s = np.maximum(last_s, end_s) - np.minimum(first_s, begin_s)
+            # A hundredth for the clocks of two streams, by which the index of one on the grid of the other differs.
+            may &= together_s * rate_hz * 0.99 <= SPARSEST * (messages + placement.index.size) + 1
+        return [int(position) for position in np.flatnonzero(may)]
+
+
+def _extent_s(group: Group) -> tuple[float, float]:
+    start_s = group.start_ns / NS_PER_S
+    return start_s + group.first / group.rate_hz, start_s + group.last / group.rate_hz
 
 
 def _moved_onto(group: Group, placement: Placement) -> tuple[Group, Placement] | None:
@@ -446,7 +486,7 @@ def _moved_onto(group: Group, placement: Placement) -> tuple[Group, Placement] |
     ours, theirs = group.placements[0].time_base, placement.time_base
     if group.placements[0].clock != placement.clock:
         return None
-    if abs(ours.rate_hz - theirs.rate_hz) > 0.01 * ours.rate_hz:
+    if abs(ours.rate_hz - theirs.rate_hz) > RATES_ALIKE * ours.rate_hz:
         return None
     times_ns = _common_times(ours, theirs)
     distance = _index_at(ours, times_ns) - _index_at(theirs, times_ns)
@@ -463,7 +503,7 @@ def _moved_onto(group: Group, placement: Placement) -> tuple[Group, Placement] |
         misalignment=max(group.misalignment, misalignment),
     )
     # Two recordings that lie hours apart aren't one measurement; a grid over both would be mostly empty.
-    if together.last - together.first > 100 * together.messages and placement.counts is None:
+    if together.last - together.first > SPARSEST * together.messages and placement.counts is None:
         return None
     return together, moved
 

@@ -69,6 +69,12 @@ def find_channel(channels: Sequence[Channel], name: str, *, role: str = "channel
     raise EstimateError(f"no {role} {name!r}; {role}s: {', '.join(names)}")
 
 
+def find_channels(channels: Sequence[Channel], names: Iterable[str], *, role: str = "channel") -> list[int]:
+    """Rows of the channels, each as `find_channel` finds it, in one look at all of them."""
+    rows = {channel.name: row for row, channel in reversed(list(enumerate(channels)))}
+    return [rows[name] if name in rows else find_channel(channels, name, role=role) for name in names]
+
+
 def unit_direction(direction: str | Iterable[float]) -> Vector:
     """Turn ``"+x"`` ... ``"-z"`` or any non-zero vector into a unit vector.
 

@@ -1,4 +1,4 @@
-"""The averaged matrix of cross-spectra, from which every estimate is derived."""
+"""Averaged spectra, from which every estimate is derived: of all pairs of channels, or of each channel alone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.channel import Channel, find_channel
+from chladni.signals.channel import Channel, find_channel, find_channels
 from chladni.signals.provenance import Provenance
 from chladni.signals.value import Value, require_frequency_axis, require_shape
 
@@ -52,7 +52,7 @@ class CrossSpectra(Value):
 
     def select(self, names: Sequence[str]) -> Self:
         """Give the spectra of the named channels and their pairs, in the order asked for."""
-        rows = [self.index(name) for name in names]
+        rows = find_channels(self.channels, names)
         pairs = np.ix_(rows, rows)
         return replace(
             self,
@@ -64,3 +64,31 @@ class CrossSpectra(Value):
     def index(self, name: str) -> int:
         """Row of the named channel; `EstimateError` naming those there are when it's missing."""
         return find_channel(self.channels, name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AutoSpectra(Value):
+    """One-sided auto-spectral densities alone: the diagonal of `CrossSpectra`, as many as there are channels.
+
+    Attributes
+    ----------
+    density, noise_density
+        ``[channel, frequency]``, real; else as in `CrossSpectra`.
+    frequency_hz, channels, bandwidth_hz, provenance
+        See `CrossSpectra`.
+    """
+
+    frequency_hz: NDArray[np.float64]
+    density: NDArray[np.float64]
+    channels: tuple[Channel, ...]
+    bandwidth_hz: float
+    noise_density: NDArray[np.float64] | None = None
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        require_frequency_axis(self.frequency_hz)
+        expected = (len(self.channels), self.frequency_hz.size)
+        require_shape("density", self.density, expected, "channels x frequencies")
+        if self.noise_density is not None:
+            require_shape("noise_density", self.noise_density, expected, "channels x frequencies")
+        self._freeze()

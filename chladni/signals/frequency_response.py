@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.channel import Channel, find_channel
+from chladni.signals.channel import Channel, find_channel, find_channels
 from chladni.signals.provenance import Provenance
 from chladni.signals.units import quotient
 from chladni.signals.value import Value, require_frequency_axis, require_shape
@@ -61,7 +61,7 @@ class FrequencyResponse(Value):
 
     def select(self, responses: Sequence[str]) -> Self:
         """Give the functions of the named responses, in the order asked for."""
-        rows = [find_channel(self.responses, name, role="response") for name in responses]
+        rows = find_channels(self.responses, responses, role="response")
         return replace(
             self,
             values=self.values[rows],

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.channel import Channel, find_channel
+from chladni.signals.channel import Channel, find_channels
 from chladni.signals.provenance import Provenance
 from chladni.signals.units import power_density_unit
 from chladni.signals.value import Value, require_frequency_axis, require_shape
@@ -55,10 +55,13 @@ class PowerSpectralDensity(Value):
 
     def select(self, names: Sequence[str]) -> Self:
         """Give the densities of the named channels; `EstimateError` naming those there are when one is missing."""
-        rows = [find_channel(self.channels, name) for name in names]
+        return self.rows(find_channels(self.channels, names))
+
+    def rows(self, rows: Sequence[int]) -> Self:
+        """Give the densities of some rows, in the order asked for."""
         return replace(
             self,
-            values=self.values[rows],
-            std=self.std[rows],
+            values=self.values[list(rows)],
+            std=self.std[list(rows)],
             channels=tuple(self.channels[row] for row in rows),
         )

@@ -1,24 +1,24 @@
-"""Averages cross-spectra of all channel pairs from consecutive blocks, and merges with others of its kind."""
+"""Averages spectra from consecutive blocks, of all channel pairs or of each alone, and merges with its kind."""
 
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from math import exp, isclose
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Generic, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.channel import Channel
-from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.number_range import LARGEST, largest_magnitudes, require_in_range
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import rounded_up
-from chladni.spectral.averaging import PeakHold, SegmentAverage, WeightedSum
 from chladni.spectral.held_samples import HeldSamples
+from chladni.spectral.products import PAIRS, POWERS, Products, SpectraT
 from chladni.spectral.segment_spectra import segment_spectra
 from chladni.spectral.segmentation import SHORTEST_SEGMENT, Segmentation
 from chladni.spectral.stretches import Stretch, valid_runs
@@ -31,14 +31,12 @@ AVERAGINGS = ("linear", "exponential", "peak-hold")
 # Segments of one matrix product: enough to make BLAS worth calling, and spectra of at most so many bytes.
 MOST_SEGMENTS_TOGETHER = 128
 BYTES_TOGETHER = 20 << 20
-# A matrix of more than this is a mistyped resolution more often than a wish.
-MOST_RESULT_BYTES = 2 << 30
 # More threads than this wait for memory.
 MOST_THREADS = 8
 
 
-class CrossSpectraAccumulator:
-    """Running average of cross-spectra; mutable, the result is a frozen `CrossSpectra`.
+class SpectraAccumulator(Generic[SpectraT]):
+    """Abstract running average of spectra; mutable, the result is a frozen value.
 
     Blocks of one stretch of time may have any lengths: the end of each is kept until the next arrives, so that the
     result doesn't depend on where the blocks were cut. A break in time or an invalid sample in any channel ends a
@@ -76,6 +74,8 @@ class CrossSpectraAccumulator:
     array([0.25, 0.  ])
     """
 
+    products: ClassVar[Products[Any]]
+
     def __init__(
         self,
         channels: Sequence[Channel],
@@ -90,15 +90,15 @@ class CrossSpectraAccumulator:
         self.segmentation = segmentation
         self.averaging = averaging
         self.time_constant_s = time_constant_s
-        require_fitting_result(len(self.channels), segmentation.samples)
+        self.products.require_fitting(len(self.channels), segmentation.samples)
         # The window is the first to be made: a wrong name is to be told before any memory is taken.
         self._window = window_samples(segmentation.window, segmentation.samples)
         decay = _decay(averaging, time_constant_s, segmentation.hop / self.sample_rate_hz)
         lines = segmentation.samples // 2 + 1
-        self.average: SegmentAverage = (
-            PeakHold(lines, len(self.channels))
+        self.average = (
+            self.products.hold(lines, len(self.channels))
             if averaging == "peak-hold"
-            else WeightedSum(lines, len(self.channels), decay)
+            else self.products.sum(lines, len(self.channels), decay)
         )
         self.count = EffectiveAverages(self._window, segmentation.hop, decay)
         self.stretch = Stretch(segmentation)
@@ -159,7 +159,7 @@ class CrossSpectraAccumulator:
         self.stretch.merge(flushed.stretch)
         self.largest = np.maximum(self.largest, flushed.largest)
 
-    def result(self) -> CrossSpectra:
+    def result(self) -> SpectraT:
         """Give the average so far; more blocks may follow.
 
         Raises
@@ -177,13 +177,14 @@ class CrossSpectraAccumulator:
         samples, rate = self.segmentation.samples, self.sample_rate_hz
         density = flushed.average.mean()
         density *= one_sided_weights(samples) / (rate * np.sum(self._window**2))
-        return CrossSpectra(
+        result: SpectraT = self.products.spectra(
             frequency_hz=line_frequencies_hz(samples, rate),
             density=density,
             channels=self.channels,
             bandwidth_hz=noise_bandwidth_bins(self._window) * rate / samples,
             provenance=self._provenance(flushed.count),
         )
+        return result
 
     def _take(self, values: NDArray[np.floating[Any]], executor: Executor) -> None:
         # Segments go to the average in batches of a fixed number, counted from the start of the run: so sums are
@@ -298,6 +299,18 @@ class CrossSpectraAccumulator:
             self.stretch.require_before(other.stretch)
 
 
+class CrossSpectraAccumulator(SpectraAccumulator[CrossSpectra]):
+    """Running average of the cross-spectra of all channel pairs; see `SpectraAccumulator`."""
+
+    products = PAIRS
+
+
+class AutoSpectraAccumulator(SpectraAccumulator[AutoSpectra]):
+    """Running average of each channel's auto-spectrum alone; see `SpectraAccumulator`."""
+
+    products = POWERS
+
+
 def line_frequencies_hz(samples: int, sample_rate_hz: float) -> NDArray[np.float64]:
     """Give the frequencies of a real transform's lines, each computed from its number so that no error adds up."""
     return np.asarray(np.arange(samples // 2 + 1) * sample_rate_hz / samples, dtype=np.float64)
@@ -323,16 +336,6 @@ def _decay(averaging: SegmentAveraging, time_constant_s: float | None, hop_s: fl
     if not 0 < time_constant_s < float("inf"):
         raise SetupError(f"time constant {time_constant_s} s must be finite and above 0")
     return exp(-hop_s / time_constant_s)
-
-
-def require_fitting_result(channels: int, samples: int) -> None:
-    """Raise `EstimateError` when the matrix of cross-spectra would take more than `MOST_RESULT_BYTES`."""
-    size = 16 * channels**2 * (samples // 2 + 1)
-    if size > MOST_RESULT_BYTES:
-        raise EstimateError(
-            f"{channels} channels x {samples // 2 + 1} lines would take {size / 2**30:.3g} GB; "
-            "ask for a coarser resolution or fewer channels"
-        )
 
 
 def require_finite(block: TimeSeries, runs: Sequence[tuple[int, int]]) -> NDArray[np.float64]:

@@ -1,20 +1,23 @@
 """Averages in the way that suits the excitation: hits of a hammer, whole periods, or windowed segments."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Generic
 
 import numpy as np
 
-from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.number_range import require_in_range
+from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.accumulator import require_finite
 from chladni.spectral.blocks import Source, leading_part
-from chladni.spectral.cross_spectra import cross_spectra
-from chladni.spectral.impact import find_impacts, impact_cross_spectra, is_impact_test
-from chladni.spectral.period import Period, find_period
-from chladni.spectral.periodic import periodic_cross_spectra
+from chladni.spectral.cross_spectra import auto_spectra, cross_spectra
+from chladni.spectral.impact import Impacts, find_impacts, impact_auto_spectra, impact_cross_spectra, is_impact_test
+from chladni.spectral.period import Period, first_period
+from chladni.spectral.periodic import periodic_auto_spectra, periodic_cross_spectra
+from chladni.spectral.products import SpectraT
 from chladni.spectral.segmentation import Detrend, require_resolution
 from chladni.spectral.stretches import valid_runs
 from chladni.spectral.windows import Window
@@ -61,6 +64,62 @@ def adaptive_cross_spectra(
     SetupError
         When an option is out of its range.
     """
+    return _average(
+        _CROSS,
+        source,
+        references=references,
+        resolution_hz=resolution_hz,
+        window=window,
+        overlap=overlap,
+        detrend=detrend,
+    )
+
+
+@in_one_thread()
+def adaptive_auto_spectra(
+    source: Source,
+    *,
+    references: str | Sequence[str] | None = None,
+    resolution_hz: float | None = None,
+    window: Window | None = None,
+    overlap: float | None = None,
+    detrend: Detrend = "constant",
+) -> AutoSpectra:
+    """Average each channel's auto-spectrum alone: the diagonal of `adaptive_cross_spectra`, which see."""
+    return _average(
+        _AUTO,
+        source,
+        references=references,
+        resolution_hz=resolution_hz,
+        window=window,
+        overlap=overlap,
+        detrend=detrend,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Estimators(Generic[SpectraT]):
+    """What averages segments, whole periods and hits."""
+
+    segments: Callable[..., SpectraT]
+    periods: Callable[[Source, Period], SpectraT]
+    hits: Callable[[TimeSeries, Impacts], SpectraT]
+
+
+_CROSS = _Estimators(cross_spectra, periodic_cross_spectra, impact_cross_spectra)
+_AUTO = _Estimators(auto_spectra, periodic_auto_spectra, impact_auto_spectra)
+
+
+def _average(
+    estimators: _Estimators[SpectraT],
+    source: Source,
+    *,
+    references: str | Sequence[str] | None,
+    resolution_hz: float | None,
+    window: Window | None,
+    overlap: float | None,
+    detrend: Detrend,
+) -> SpectraT:
     lead, blocks = leading_part(source, SAMPLES_EXAMINED)
     start = _joined(lead)
     # Said once and by name, before periods and hits are looked for in what no number holds.
@@ -69,12 +128,12 @@ def adaptive_cross_spectra(
         require_in_range(source.channels, largest)
     hammer = _hammer(start, references)
     if hammer is not None and window is None and overlap is None:
-        return _hits(tuple(blocks), hammer, resolution_hz)
-    period = _first_period(start, references)
+        return _hits(estimators, tuple(blocks), hammer, resolution_hz)
+    period = first_period(start, _excitations(start, references))
     chosen = resolution_hz is None and window is None and overlap is None
     if period is not None and period.whole and chosen:
-        return periodic_cross_spectra(blocks, period)
-    spectra = cross_spectra(
+        return estimators.periods(blocks, period)
+    spectra = estimators.segments(
         source if isinstance(source, TimeSeries) else blocks,
         resolution_hz=resolution_hz,
         window=DEFAULT_WINDOW if window is None else window,
@@ -83,19 +142,25 @@ def adaptive_cross_spectra(
     )
     if period is None:
         return spectra
-    return replace(spectra, provenance=spectra.provenance.with_notes(_price(period, spectra)))
+    return _noted(spectra, _price(period, spectra.provenance))
 
 
-def _hits(blocks: tuple[TimeSeries, ...], force: str, resolution_hz: float | None) -> CrossSpectra:
+def _hits(
+    estimators: _Estimators[SpectraT], blocks: tuple[TimeSeries, ...], force: str, resolution_hz: float | None
+) -> SpectraT:
     series = _joined(blocks)
     if resolution_hz is not None:
         require_resolution(resolution_hz, series.sample_rate_hz)
     record_s = None if resolution_hz is None else 1 / resolution_hz
-    spectra = impact_cross_spectra(series, find_impacts(series, force=force, record_s=record_s))
+    spectra = estimators.hits(series, find_impacts(series, force=force, record_s=record_s))
     beyond_s = sum(block.duration_s for block in blocks) - series.duration_s
     if beyond_s * series.sample_rate_hz < 0.5:
         return spectra
     note = f"hits after the break in time at {series.duration_s:g} s are not used: {beyond_s:g} s of record"
+    return _noted(spectra, note)
+
+
+def _noted(spectra: SpectraT, note: str) -> SpectraT:
     return replace(spectra, provenance=spectra.provenance.with_notes(note))
 
 
@@ -108,19 +173,11 @@ def _hammer(series: TimeSeries, references: str | Sequence[str] | None) -> str |
     return names[0] if len(names) == 1 and is_impact_test(series, names[0]) else None
 
 
-def _first_period(series: TimeSeries, references: str | Sequence[str] | None) -> Period | None:
-    for name in _excitations(series, references):
-        period = find_period(series, channel=name)
-        if period is not None:
-            return period
-    return None
-
-
-def _excitations(series: TimeSeries, references: str | Sequence[str] | None) -> tuple[str, ...]:
+def _excitations(series: TimeSeries, references: str | Sequence[str] | None) -> Sequence[int]:
     if references is not None:
-        return (references,) if isinstance(references, str) else tuple(references)
-    marked = tuple(channel.name for channel in series.channels if channel.role == "reference")
-    return marked or tuple(channel.name for channel in series.channels)
+        return [series.index(name) for name in ([references] if isinstance(references, str) else references)]
+    marked = [row for row, channel in enumerate(series.channels) if channel.role == "reference"]
+    return marked or range(len(series.channels))
 
 
 def _joined(lead: tuple[TimeSeries, ...]) -> TimeSeries:
@@ -141,8 +198,7 @@ def _joined(lead: tuple[TimeSeries, ...]) -> TimeSeries:
     return replace(lead[0], values=np.concatenate([block.values for block in joined], axis=1), valid=valid)
 
 
-def _price(period: Period, spectra: CrossSpectra) -> str:
-    account = spectra.provenance
+def _price(period: Period, account: Provenance) -> str:
     repeats = f"{period.channel} repeats every {period.period_s:.6g} s"
     if not period.whole:
         return (

@@ -1,7 +1,9 @@
-"""Sums over segments: linear, exponential in time, and peak hold."""
+"""Sums over segments: linear, exponential in time, and peak hold; of all pairs of channels, or of each alone."""
 
+from abc import ABC, abstractmethod
 from concurrent.futures import Executor
-from typing import Protocol, Self
+from copy import copy
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,8 @@ from chladni.spectral.segment_spectra import run_all
 
 # Lines handled together, so that a product still sits in the cache when it's added to the sum.
 LINES_TOGETHER = 512
+# Channels squared in one call of BLAS: of fewer, the calls cost more than the pairs that nobody looks at.
+SQUARED_TOGETHER = 4
 
 
 class SegmentAverage(Protocol):
@@ -24,22 +28,21 @@ class SegmentAverage(Protocol):
     def copy(self) -> Self:
         """Give an independent copy."""
 
-    def mean(self) -> NDArray[np.complex128]:
-        """Give ``[channel, channel, frequency]``: conj(X_i) X_j averaged or held, unscaled."""
+    def mean(self) -> NDArray[Any]:
+        """Give ``[channel, channel, frequency]``, conj(X_i) X_j averaged or held, unscaled; or its real diagonal."""
 
 
-class WeightedSum:
-    """Sum of X X^H with weights that shrink by `decay` with each later segment; 1 gives the linear average.
+class _Sum(ABC):
+    """Sum of products with weights that shrink by `decay` with each later segment; 1 gives the linear average.
 
-    The sum is kept as the real symmetric products of [Re X_1, Im X_1, Re X_2, ...]: one symmetric rank-k update of
-    BLAS does half the work of the complex product, and real and imaginary parts are sorted out once at the end.
+    They are real products of [Re X_1, Im X_1, Re X_2, ...], whose parts are sorted out once at the end.
     """
 
-    def __init__(self, lines: int, channels: int, decay: float = 1.0) -> None:
+    def __init__(self, products: NDArray[np.float64], decay: float) -> None:
         self.decay = decay
         self.segments = 0
         self.weight = 0.0
-        self.products = np.zeros((lines, 2 * channels, 2 * channels))
+        self.products = products
 
     def add(self, spectra: NDArray[np.complex128], executor: Executor | None = None) -> None:
         """See `SegmentAverage`."""
@@ -54,9 +57,8 @@ class WeightedSum:
         parts = spectra.view(np.float64)
 
         def accumulate(first: int) -> None:
-            lines = parts[first : first + LINES_TOGETHER]
-            # NumPy sees a matrix times its own transpose and calls the symmetric product.
-            self.products[first : first + LINES_TOGETHER] += np.matmul(lines.transpose(0, 2, 1), lines)
+            lines = slice(first, first + LINES_TOGETHER)
+            self.products[lines] += self._of(parts[lines])
 
         run_all(accumulate, range(0, len(parts), LINES_TOGETHER), executor)
 
@@ -68,19 +70,16 @@ class WeightedSum:
 
     def copy(self) -> Self:
         """See `SegmentAverage`."""
-        twin = type(self)(0, 0, self.decay)
-        twin.segments, twin.weight, twin.products = self.segments, self.weight, self.products.copy()
+        twin = copy(self)
+        twin.products = self.products.copy()
         return twin
 
-    def mean(self) -> NDArray[np.complex128]:
+    def mean(self) -> NDArray[Any]:
         """See `SegmentAverage`."""
-        # conj(a + jb)(c + jd) = (ac + bd) + j(ad - bc)
-        products = self.products.transpose(1, 2, 0)
-        density = np.empty((products.shape[0] // 2, products.shape[1] // 2, products.shape[2]), dtype=np.complex128)
-        density.real = products[0::2, 0::2] + products[1::2, 1::2]
-        density.imag = products[0::2, 1::2] - products[1::2, 0::2]
         # The sum of weights, not the number of segments: right from the first segment of an exponential average.
-        density /= self.weight
+        # Times its inverse, as NumPy divides complex numbers: so the powers are those of the matrix to the last bit.
+        density = self._density()
+        density *= 1 / self.weight
         return density
 
     def _fade(self, segments: int) -> None:
@@ -90,12 +89,65 @@ class WeightedSum:
             self.weight *= fading
             self.products *= fading
 
+    @abstractmethod
+    def _of(self, parts: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Products of ``[line, segment, part]``, summed over segments."""
 
-class PeakHold:
-    """For each pair and line the product of largest magnitude that any segment had."""
+    @abstractmethod
+    def _density(self) -> NDArray[Any]:
+        """Sum of conj(X_i) X_j, with the lines last."""
 
-    def __init__(self, lines: int, channels: int) -> None:
-        self.held = np.zeros((lines, channels, channels), dtype=np.complex128)
+
+class WeightedSum(_Sum):
+    """Sum of X X^H, all pairs of channels.
+
+    One symmetric rank-k update of BLAS does half the work of the complex product.
+    """
+
+    def __init__(self, lines: int, channels: int, decay: float = 1.0) -> None:
+        super().__init__(np.zeros((lines, 2 * channels, 2 * channels)), decay)
+
+    def _of(self, parts: NDArray[np.float64]) -> NDArray[np.float64]:
+        # NumPy sees a matrix times its own transpose and calls the symmetric product.
+        return np.asarray(np.matmul(parts.transpose(0, 2, 1), parts), dtype=np.float64)
+
+    def _density(self) -> NDArray[np.complex128]:
+        # conj(a + jb)(c + jd) = (ac + bd) + j(ad - bc)
+        products = self.products.transpose(1, 2, 0)
+        density = np.empty((products.shape[0] // 2, products.shape[1] // 2, products.shape[2]), dtype=np.complex128)
+        density.real = products[0::2, 0::2] + products[1::2, 1::2]
+        density.imag = products[0::2, 1::2] - products[1::2, 0::2]
+        return density
+
+
+class WeightedPowers(_Sum):
+    """Sum of |X|^2, each channel alone: the diagonal of `WeightedSum` to the last bit, without the pairs."""
+
+    def __init__(self, lines: int, channels: int, decay: float = 1.0) -> None:
+        super().__init__(np.zeros((lines, 2 * channels)), decay)
+
+    def _of(self, parts: NDArray[np.float64]) -> NDArray[np.float64]:
+        # The same product of BLAS as for the pairs, of a few channels each: a sum of squares would be summed in
+        # another order, and be slower.
+        lines, segments, count = parts.shape
+        powers = np.empty((lines, count))
+        whole = count - count % (2 * SQUARED_TOGETHER)
+        for some, width in ((slice(0, whole), 2 * SQUARED_TOGETHER), (slice(whole, count), count - whole)):
+            if some.start < some.stop:
+                groups = parts[..., some].reshape(lines, segments, -1, width)
+                squares = np.matmul(groups.transpose(0, 2, 3, 1), groups.transpose(0, 2, 1, 3))
+                powers[:, some] = squares.diagonal(axis1=2, axis2=3).reshape(lines, -1)
+        return powers
+
+    def _density(self) -> NDArray[np.float64]:
+        return np.ascontiguousarray((self.products[:, 0::2] + self.products[:, 1::2]).T)
+
+
+class _Hold(ABC):
+    """The product of largest magnitude that any segment had, on each line."""
+
+    def __init__(self, held: NDArray[Any]) -> None:
+        self.held = held
 
     def add(self, spectra: NDArray[np.complex128], executor: Executor | None = None) -> None:
         """See `SegmentAverage`."""
@@ -104,7 +156,7 @@ class PeakHold:
             lines = slice(first, first + LINES_TOGETHER)
             # A segment at a time: all at once would take as many matrices as there are segments.
             for segment in spectra[lines].transpose(1, 0, 2):
-                self._keep_larger(lines, segment.conj()[:, :, np.newaxis] * segment[:, np.newaxis, :])
+                self._keep_larger(lines, self._of(segment))
 
         run_all(hold, range(0, len(spectra), LINES_TOGETHER), executor)
 
@@ -114,14 +166,38 @@ class PeakHold:
 
     def copy(self) -> Self:
         """See `SegmentAverage`."""
-        twin = type(self)(0, 0)
+        twin = copy(self)
         twin.held = self.held.copy()
         return twin
 
-    def mean(self) -> NDArray[np.complex128]:
+    def mean(self) -> NDArray[Any]:
         """See `SegmentAverage`."""
-        return np.ascontiguousarray(self.held.transpose(1, 2, 0))
+        return np.ascontiguousarray(np.moveaxis(self.held, 0, -1))
 
-    def _keep_larger(self, lines: slice, candidate: NDArray[np.complex128]) -> None:
+    def _keep_larger(self, lines: slice, candidate: NDArray[Any]) -> None:
         held = self.held[lines]
         np.copyto(held, candidate, where=np.abs(candidate) > np.abs(held))
+
+    @abstractmethod
+    def _of(self, segment: NDArray[np.complex128]) -> NDArray[Any]:
+        """Products of the spectra of one segment, ``[line, channel]``."""
+
+
+class PeakHold(_Hold):
+    """Peak hold of all pairs of channels."""
+
+    def __init__(self, lines: int, channels: int) -> None:
+        super().__init__(np.zeros((lines, channels, channels), dtype=np.complex128))
+
+    def _of(self, segment: NDArray[np.complex128]) -> NDArray[Any]:
+        return np.asarray(segment.conj()[:, :, np.newaxis] * segment[:, np.newaxis, :])
+
+
+class PowerHold(_Hold):
+    """Peak hold of each channel alone: the diagonal of `PeakHold`."""
+
+    def __init__(self, lines: int, channels: int) -> None:
+        super().__init__(np.zeros((lines, channels)))
+
+    def _of(self, segment: NDArray[np.complex128]) -> NDArray[Any]:
+        return np.asarray((segment.conj() * segment).real)

@@ -1,10 +1,20 @@
-"""Averaged cross-spectra of a series or a stream of blocks."""
+"""Averaged spectra of a series or a stream of blocks."""
 
-from chladni.signals.cross_spectra import CrossSpectra
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from chladni.signals.channel import Channel
+from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.linear_algebra import in_one_thread
-from chladni.spectral.accumulator import CrossSpectraAccumulator, SegmentAveraging
+from chladni.spectral.accumulator import (
+    AutoSpectraAccumulator,
+    CrossSpectraAccumulator,
+    SegmentAveraging,
+    SpectraAccumulator,
+)
 from chladni.spectral.blocks import Source, leading_part, samples_known
-from chladni.spectral.segmentation import SAMPLES_TO_CHOOSE_FROM, Detrend, plan_segmentation
+from chladni.spectral.products import SpectraT
+from chladni.spectral.segmentation import SAMPLES_TO_CHOOSE_FROM, Detrend, Segmentation, plan_segmentation
 from chladni.spectral.stretches import run_lengths
 from chladni.spectral.windows import Window
 
@@ -35,7 +45,7 @@ def cross_spectra(
     detrend
         ``none``, ``constant`` or ``linear``, removed from each segment.
     averaging, time_constant_s
-        See `CrossSpectraAccumulator`.
+        See `SpectraAccumulator`.
 
     Returns
     -------
@@ -65,6 +75,45 @@ def cross_spectra(
     >>> float(round(spectra.density[0, 0, 50].real * spectra.bandwidth_hz, 12))  # RMS^2 of the sine
     1.0
     """
+    return _average(
+        partial(CrossSpectraAccumulator, averaging=averaging, time_constant_s=time_constant_s),
+        source,
+        resolution_hz=resolution_hz,
+        window=window,
+        overlap=overlap,
+        detrend=detrend,
+    )
+
+
+@in_one_thread()
+def auto_spectra(
+    source: Source,
+    *,
+    resolution_hz: float | None = None,
+    window: Window = "hann",
+    overlap: float = 0.5,
+    detrend: Detrend = "constant",
+) -> AutoSpectra:
+    """Average each channel's auto-spectrum alone: the diagonal of `cross_spectra`, which see."""
+    return _average(
+        AutoSpectraAccumulator,
+        source,
+        resolution_hz=resolution_hz,
+        window=window,
+        overlap=overlap,
+        detrend=detrend,
+    )
+
+
+def _average(
+    make: Callable[[Sequence[Channel], float, Segmentation], SpectraAccumulator[SpectraT]],
+    source: Source,
+    *,
+    resolution_hz: float | None,
+    window: Window,
+    overlap: float,
+    detrend: Detrend,
+) -> SpectraT:
     # The default segment hangs on the length of the record, which a stream doesn't tell; the lead tells enough of it.
     lead, blocks = leading_part(source, SAMPLES_TO_CHOOSE_FROM)
     first = lead[0]
@@ -77,9 +126,7 @@ def cross_spectra(
         overlap=overlap,
         detrend=detrend,
     )
-    accumulator = CrossSpectraAccumulator(
-        first.channels, first.sample_rate_hz, plan, averaging=averaging, time_constant_s=time_constant_s
-    )
+    accumulator = make(first.channels, first.sample_rate_hz, plan)
     for block in blocks:
         accumulator.update(block)
     return accumulator.result()

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import require_in_range
 from chladni.signals.provenance import Provenance
@@ -19,6 +19,7 @@ from chladni.spectral.force_pulses import (
     typical_peak,
 )
 from chladni.spectral.hits import Hit, Impacts, Judge, Rejection
+from chladni.spectral.products import PAIRS, POWERS, Products, SpectraT
 from chladni.spectral.stretches import valid_runs
 
 # Widths of the pulse after the trigger during which the force window is one, and then falls to zero.
@@ -26,7 +27,15 @@ FORCE_WINDOW_PULSES = 4
 # A response whose last tenth still holds this share of its energy has not died away: its record is cut off.
 STILL_RINGING = 1e-3
 
-__all__ = ["Hit", "Impacts", "Rejection", "find_impacts", "impact_cross_spectra", "is_impact_test"]
+__all__ = [
+    "Hit",
+    "Impacts",
+    "Rejection",
+    "find_impacts",
+    "impact_auto_spectra",
+    "impact_cross_spectra",
+    "is_impact_test",
+]
 
 Samples = NDArray[np.float64]
 
@@ -170,6 +179,17 @@ def impact_cross_spectra(
     G_ij = 2/(M T) sum over hits of conj(X_i) X_j with X the Fourier integral of the record. Windows after Halvorsen &
     Brown (1977), the correction of damping after Fladung & Rost (1997).
     """
+    return _average(series, impacts, PAIRS, force_window=force_window, decay_per_s=decay_per_s)
+
+
+def impact_auto_spectra(series: TimeSeries, impacts: Impacts) -> AutoSpectra:
+    """Average each channel's auto-spectrum of the accepted hits alone; see `impact_cross_spectra`."""
+    return _average(series, impacts, POWERS, force_window=True, decay_per_s=0.0)
+
+
+def _average(
+    series: TimeSeries, impacts: Impacts, products: Products[SpectraT], *, force_window: bool, decay_per_s: float
+) -> SpectraT:
     if not impacts.accepted:
         raise EstimateError(f"no hit of {impacts.force!r} was accepted{_why_none(impacts)}")
     if not 0 <= decay_per_s < np.inf:
@@ -178,14 +198,18 @@ def impact_cross_spectra(
     rate_hz = series.sample_rate_hz
     length = round(impacts.record_s * rate_hz)
     windows = _windows(series, impacts, length, force_window=force_window, decay_per_s=decay_per_s)
-    total: NDArray[np.complex128] = np.zeros((*2 * (len(series.channels),), length // 2 + 1), dtype=np.complex128)
+    products.require_fitting(len(series.channels), length)
+    total = products.zeros(len(series.channels), length // 2 + 1)
     # One hit at a time: the memory stays that of one record, however many hits there are.
     for hit in impacts.accepted:
         spectrum = scipy.fft.rfft(_record(series, impacts, hit, length) * windows) / rate_hz
-        total += spectrum.conj()[:, np.newaxis] * spectrum
-    return CrossSpectra(
+        products.add(total, spectrum, spectrum)
+    total *= one_sided_weights(length)
+    # Times the inverse, as NumPy divides complex numbers: so the powers are those of the matrix to the last bit.
+    total *= 1 / (len(impacts.accepted) * impacts.record_s)
+    return products.spectra(
         frequency_hz=line_frequencies_hz(length, rate_hz),
-        density=total * one_sided_weights(length) / (len(impacts.accepted) * impacts.record_s),
+        density=total,
         channels=series.channels,
         bandwidth_hz=1 / impacts.record_s,
         provenance=_provenance(series, impacts, force_window=force_window, decay_per_s=decay_per_s),

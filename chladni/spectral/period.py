@@ -1,5 +1,6 @@
 """Finds the period of a repeating broadband excitation."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
 from typing import Any
@@ -117,8 +118,17 @@ def find_period(series: TimeSeries, *, channel: str) -> Period | None:
     >>> period.samples, period.count
     (500, 6)
     """
-    row = series.index(channel)
-    first, last = _active(series, row)
+    return first_period(series, [series.index(channel)])
+
+
+def first_period(series: TimeSeries, rows: Iterable[int]) -> Period | None:
+    """Give the period of the first of the channels in which `find_period` finds one; None when it does in none."""
+    run = max(valid_runs(series), key=lambda run: run[1] - run[0], default=(0, 0))
+    return next(filter(None, (_period_of(series, row, run) for row in rows)), None)
+
+
+def _period_of(series: TimeSeries, row: int, run: Run) -> Period | None:
+    first, last = _active(series, row, run)
     excitation = np.asarray(series.values[row, first:last], dtype=np.float64)
     if excitation.size < FEWEST_PERIODS * SHORTEST_PERIOD:
         return None
@@ -139,13 +149,14 @@ def find_period(series: TimeSeries, *, channel: str) -> Period | None:
 
 def _period(series: TimeSeries, row: int, active: Run, length: float) -> Period | None:
     samples, first = round(length), active[0]
-    periods = _cut(series, active, length)
-    begin, end = _repeating(periods[row])
+    own = _cut(series.values[row], active, length)
+    begin, end = _repeating(own)
     if end - begin < FEWEST_PERIODS:
         return None
-    periods, first = periods[:, begin:end], first + round(begin * length)
-    if not _is_broadband(periods[row].mean(axis=0)):
+    if not _is_broadband(own[begin:end].mean(axis=0)):
         return None
+    # All channels at last: most that are looked at hold no period.
+    periods, first = _cut(series.values, active, length)[:, begin:end], first + round(begin * length)
     count, dropped = end - begin, _transients(periods)
     drift = (length - samples) * count
     return Period(
@@ -161,15 +172,15 @@ def _period(series: TimeSeries, row: int, active: Run, length: float) -> Period 
     )
 
 
-def _active(series: TimeSeries, row: int) -> Run:
-    """Give the longest valid run without its quiet ends."""
-    first, last = max(valid_runs(series), key=lambda run: run[1] - run[0], default=(0, 0))
+def _active(series: TimeSeries, row: int, run: Run) -> Run:
+    """Give a run without its quiet ends in the channel."""
+    first, last = run
     size = max(SHORTEST_PERIOD, (last - first) // ACTIVITY_BLOCKS)
     blocks = (last - first) // size
     if blocks == 0:
         return first, last
-    run = np.asarray(series.values[row, first : first + blocks * size], dtype=np.float64)
-    rms = np.sqrt(np.mean((run - np.median(run)).reshape(blocks, size) ** 2, axis=1))
+    signal = np.asarray(series.values[row, first : first + blocks * size], dtype=np.float64)
+    rms = np.sqrt(np.mean((signal - np.median(signal)).reshape(blocks, size) ** 2, axis=1))
     loud = np.flatnonzero(rms > QUIET * rms.max())
     if loud.size == 0:
         return first, first
@@ -231,13 +242,13 @@ def _height(three: NDArray[np.floating[Any]]) -> float:
     return float(three[1] - (three[0] - three[2]) * _parabola(three) / 4)
 
 
-def _cut(series: TimeSeries, active: Run, length: float) -> Floats:
-    """Cut ``[channel, period, sample]``; a period between samples begins at the sample nearest to its begin."""
+def _cut(values: NDArray[np.floating[Any]], active: Run, length: float) -> Floats:
+    """Cut ``[..., period, sample]``; a period between samples begins at the sample nearest to its begin."""
     samples = round(length)
     starts = active[0] + np.rint(np.arange((active[1] - active[0]) / length + 1) * length).astype(np.intp)
     starts = starts[starts + samples <= active[1]]
     index = starts[:, np.newaxis] + np.arange(samples)
-    return np.asarray(series.values[:, index], dtype=np.float64)
+    return np.asarray(values[..., index], dtype=np.float64)
 
 
 def _repeating(periods: Floats) -> Run:

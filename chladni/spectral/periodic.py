@@ -1,14 +1,14 @@
 """Averages whole periods of a repeating excitation: mean, and scatter from period to period."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any, Generic
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import largest_magnitudes, require_in_range
 from chladni.signals.provenance import Provenance
@@ -17,13 +17,13 @@ from chladni.spectral.accumulator import (
     line_frequencies_hz,
     one_sided_weights,
     require_finite,
-    require_fitting_result,
 )
 from chladni.spectral.blocks import Source, leading_part
 from chladni.spectral.period import LARGEST_RESIDUAL, Period, find_period
+from chladni.spectral.products import PAIRS, POWERS, Products, SpectraT
 from chladni.spectral.stretches import valid_runs
 
-__all__ = ["Period", "find_period", "periodic_cross_spectra"]
+__all__ = ["Period", "find_period", "periodic_auto_spectra", "periodic_cross_spectra"]
 
 
 def periodic_cross_spectra(source: Source, period: Period) -> CrossSpectra:
@@ -61,14 +61,23 @@ def periodic_cross_spectra(source: Source, period: Period) -> CrossSpectra:
     >>> float(spectra.frequency_hz[1]), spectra.provenance.averages
     (2.0, 6)
     """
+    return _average(source, period, PAIRS)
+
+
+def periodic_auto_spectra(source: Source, period: Period) -> AutoSpectra:
+    """Average each channel's auto-spectrum alone; see `periodic_cross_spectra`."""
+    return _average(source, period, POWERS)
+
+
+def _average(source: Source, period: Period, products: Products[SpectraT]) -> SpectraT:
     if not period.whole:
         raise EstimateError(
             f"the period {period.period_s:.9g} s of {period.channel} drifts by {period.drift_samples:.2g} samples "
             "over the record; average with a window, or resample so that it is a whole number of samples"
         )
     (first, *_), blocks = leading_part(source, 1)
-    require_fitting_result(len(first.channels), period.samples)
-    scatter = _PeriodScatter(row=first.index(period.channel), largest=np.zeros(len(first.channels)))
+    products.require_fitting(len(first.channels), period.samples)
+    scatter = _PeriodScatter(products, row=first.index(period.channel), largest=np.zeros(len(first.channels)))
     # A period at a time: memory holds one, and the matrix, however long the log is.
     for cut in _periods(blocks, period):
         scatter.add(cut)
@@ -81,16 +90,18 @@ def periodic_cross_spectra(source: Source, period: Period) -> CrossSpectra:
     return _spectra(first, period, scatter)
 
 
-@dataclass(slots=True, kw_only=True)
-class _PeriodScatter:
+@dataclass(slots=True)
+class _PeriodScatter(Generic[SpectraT]):
     """Running mean of period spectra ``[channel, frequency]`` and sum of products about it (Welford 1962)."""
 
+    products: Products[SpectraT]
+    _: KW_ONLY
     row: int
     largest: NDArray[np.float64]
     count: int = 0
     skipped: int = 0
     mean: NDArray[np.complex128] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.complex128))
-    products: NDArray[np.complex128] = field(default_factory=lambda: np.zeros((0, 0, 0), dtype=np.complex128))
+    total: NDArray[Any] = field(default_factory=lambda: np.zeros(0))
 
     def add(self, period: NDArray[np.float64] | None) -> None:
         if period is None:
@@ -100,7 +111,7 @@ class _PeriodScatter:
         spectra = fft.rfft(period - period.mean(axis=-1, keepdims=True), axis=-1)
         if self.count == 0:
             self.mean = np.zeros_like(spectra)
-            self.products = np.zeros((len(spectra), *spectra.shape), dtype=np.complex128)
+            self.total = self.products.zeros(*spectra.shape)
         elif self._differs(spectra[self.row]):
             self.skipped += 1
             return
@@ -108,10 +119,7 @@ class _PeriodScatter:
         # Deviations from the running mean, before and after it moves: no difference of large sums loses the scatter.
         before = spectra - self.mean
         self.mean += before / self.count
-        # One row at a time: the whole outer product would double the memory of the largest array.
-        after = spectra - self.mean
-        for row, conjugate in enumerate(before.conj()):
-            self.products[row] += conjugate * after
+        self.products.add(self.total, before, spectra - self.mean)
 
     def _differs(self, excitation: NDArray[np.complex128]) -> bool:
         # Twice the limit of the search: the first mean is a single period, with noise of its own.
@@ -119,23 +127,26 @@ class _PeriodScatter:
         return bool(residual > 2 * LARGEST_RESIDUAL * np.sum(np.abs(self.mean[self.row, 1:]) ** 2))
 
 
-def _spectra(first: TimeSeries, period: Period, scatter: _PeriodScatter) -> CrossSpectra:
+def _spectra(first: TimeSeries, period: Period, scatter: _PeriodScatter[SpectraT]) -> SpectraT:
     samples, rate, count = period.samples, first.sample_rate_hz, scatter.count
     scale = one_sided_weights(samples) / (rate * samples)
-    products = scatter.products
-    products *= scale
-    # The mean of products is the product of means and the scatter about them.
-    density = scatter.mean.conj()[:, np.newaxis] * scatter.mean[np.newaxis] * scale
-    density += products / count
-    products /= count - 1
-    _make_hermitian(density)
-    _make_hermitian(products)
-    return CrossSpectra(
+    products, noise_density = scatter.products, scatter.total
+    noise_density *= scale
+    # The mean of products is the product of means and the scatter about them. Times inverses, as NumPy divides
+    # complex numbers: so the powers are those of the matrix to the last bit.
+    density = products.zeros(*scatter.mean.shape)
+    products.add(density, scatter.mean, scatter.mean)
+    density *= scale
+    density += noise_density * (1 / count)
+    noise_density *= 1 / (count - 1)
+    products.make_hermitian(density)
+    products.make_hermitian(noise_density)
+    return products.spectra(
         frequency_hz=line_frequencies_hz(samples, rate),
         density=density,
         channels=first.channels,
         bandwidth_hz=rate / samples,
-        noise_density=products,
+        noise_density=noise_density,
         provenance=Provenance(
             window="boxcar",
             segment_s=samples / rate,
@@ -149,14 +160,7 @@ def _spectra(first: TimeSeries, period: Period, scatter: _PeriodScatter) -> Cros
     )
 
 
-def _make_hermitian(matrix: NDArray[np.complex128]) -> None:
-    # Sums of rounded products are Hermitian but for their last digits.
-    for row in range(len(matrix)):
-        matrix[row, row].imag = 0.0
-        matrix[row + 1 :, row] = matrix[row, row + 1 :].conj()
-
-
-def _notes(period: Period, scatter: _PeriodScatter) -> tuple[str, ...]:
+def _notes(period: Period, scatter: _PeriodScatter[SpectraT]) -> tuple[str, ...]:
     transient = f", {period.dropped} transient left out" if period.dropped else ""
     repeats = f"{period.channel} repeats every {period.period_s:.6g} s"
     notes = [f"{repeats}: {scatter.count} whole periods averaged without window{transient}"]

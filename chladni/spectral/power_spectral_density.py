@@ -1,19 +1,21 @@
 """Power spectral densities from averaged cross-spectra."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 
 
-def power_spectral_density(spectra: CrossSpectra) -> PowerSpectralDensity:
+def power_spectral_density(spectra: CrossSpectra | AutoSpectra) -> PowerSpectralDensity:
     """Take the auto-spectral densities with their random errors.
 
     Parameters
     ----------
     spectra
-        Averaged cross-spectra of the channels.
+        Averaged spectra of the channels.
 
     Returns
     -------
@@ -45,12 +47,12 @@ def power_spectral_density(spectra: CrossSpectra) -> PowerSpectralDensity:
     )
 
 
-def auto_densities(density: NDArray[np.complexfloating]) -> NDArray[np.float64]:
-    """Give the diagonal of ``[channel, channel, frequency]`` as ``[channel, frequency]``, real."""
-    return np.asarray(np.einsum("iif->if", density).real, dtype=np.float64)
+def auto_densities(density: NDArray[Any]) -> NDArray[np.float64]:
+    """Give the diagonal of ``[channel, channel, frequency]`` as ``[channel, frequency]``, real; or what is that."""
+    return np.asarray((np.einsum("iif->if", density) if density.ndim == 3 else density).real, dtype=np.float64)
 
 
-def _std(spectra: CrossSpectra, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _std(spectra: CrossSpectra | AutoSpectra, values: NDArray[np.float64]) -> NDArray[np.float64]:
     if spectra.noise_density is None:
         return np.asarray(values / np.sqrt(spectra.provenance.effective_averages), dtype=np.float64)
     # Scatter of |mean + noise|^2: the noise beats with the mean, and with itself.

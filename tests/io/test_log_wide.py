@@ -5,7 +5,7 @@ import struct
 import tracemalloc
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
+from unittest.mock import Mock, patch
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 
 import chladni
-from chladni.io import catalog, stream, topic
+from chladni.io import catalog, placement, stream, topic
 from chladni.io.decoding.decoder import make_decoder
 from chladni.io.log import open_log
 from chladni.signals.errors import EstimateError, LogError
@@ -155,15 +155,18 @@ def test_fields_times_messages_take_bounded_memory(tmp_path: Path, monkeypatch: 
     assert peak < 8 * fields * messages
 
 
-def test_an_average_of_too_many_channels_is_refused_before_any_is_read(
+def test_an_average_of_too_many_pairs_is_refused_before_any_sample_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_wide(tmp_path / "a.mcap", {"/a": 40})
-    monkeypatch.setattr("chladni.spectral.accumulator.MOST_RESULT_BYTES", 16 * 30**2 * 3)
+    monkeypatch.setattr("chladni.spectral.products.MOST_RESULT_BYTES", 16 * 30**2 * 3)
+    monkeypatch.setattr("chladni.apps.sources.IN_MEMORY_BYTES", 0)
     with open_log(tmp_path / "a.mcap") as log:
-        monkeypatch.setattr(type(log), "read_groups", lambda *_, **__: pytest.fail("read"))
+        # Powers alone fit.
+        assert chladni.psd(log).values.shape[0] == 40
+        monkeypatch.setattr(type(log), "blocks", lambda *_, **__: iter([pytest.fail("read")] for _ in "1"))
         with pytest.raises(EstimateError, match=r"40 channels x 3 lines would take .* fewer channels"):
-            chladni.psd(log)
+            chladni.frf(log, reference="/a.f0")
 
 
 def test_many_streams_of_one_grid_are_one_series(tmp_path: Path) -> None:
@@ -184,3 +187,23 @@ def test_a_field_that_isnt_listed_and_isnt_there_is_refused_by_name(
             log.read()
         with pytest.raises(LogError, match="f12"):
             log.read(["/wide.f12"])
+
+
+@pytest.mark.parametrize("apart", ["rates", "hours"])
+def test_streams_of_other_grids_are_not_compared_with_each_other(
+    tmp_path: Path, apart: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    streams = 40
+    with LogMaker(tmp_path / "a.mcap") as maker:
+        for number in range(streams):
+            channel = maker.ros2(f"/c{number}", "t/msg/A", "float64 x")
+            period_ns = round(PERIOD_NS * 1.05**number) if apart == "rates" else PERIOD_NS
+            begin_ns = number * 3_600_000_000_000 if apart == "hours" else 0
+            for place in range(8):
+                maker.write(channel, {"x": float(place % 3)}, START_NS + begin_ns + place * period_ns)
+    compared = Mock(side_effect=placement._moved_onto)
+    monkeypatch.setattr(placement, "_moved_onto", compared)
+    with open_log(tmp_path / "a.mcap") as log:
+        assert len(log.grids()) == streams
+    # All with all would be 780.
+    assert compared.call_count < streams

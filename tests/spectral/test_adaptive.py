@@ -1,5 +1,6 @@
 """The default way of averaging, chosen by the excitation."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -8,12 +9,13 @@ import pytest
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.testing import assert_close
 from chladni.spectral import adaptive as module
-from chladni.spectral.adaptive import adaptive_cross_spectra
+from chladni.spectral.adaptive import adaptive_auto_spectra, adaptive_cross_spectra
 from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.excitation import excited_lines
 from chladni.spectral.frequency_response import frequency_response
 from chladni.spectral.impact import find_impacts, impact_cross_spectra
 from chladni.spectral.periodic import find_period, periodic_cross_spectra
+from chladni.spectral.power_spectral_density import power_spectral_density
 from tests.spectral.aircraft import PAYLOAD, SHAKER, aircraft
 from tests.spectral.made_signals import blocks, multisine, noise, part, series
 
@@ -165,3 +167,30 @@ def test_a_hammer_excites_to_30_db_below_its_plateau():
     # The plateau is flat at low frequency, where the 99th percentile is as good as the maximum.
     np.testing.assert_array_equal(mask, power > 1e-3 * np.percentile(power, 99))
     assert 500 < spectra.frequency_hz[mask].max() < 2000
+
+
+@pytest.mark.parametrize("options", [{}, {"window": "hann"}, {"resolution_hz": 5.0}])
+@pytest.mark.parametrize(
+    ("source", "averaging"),
+    [(series(noise(7, 20_000)), "linear"), (with_role(repeating(), "b"), "periodic"), (hammer_test(), "impact")],
+    ids=["segments", "periods", "hits"],
+)
+def test_powers_alone_are_those_of_the_matrix_to_the_last_bit(source, averaging, options):
+    pairs, alone = adaptive_cross_spectra(source, **options), adaptive_auto_spectra(source, **options)
+    assert options or alone.provenance.averaging == averaging
+    assert_close(power_spectral_density(alone), power_spectral_density(pairs), rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("make", [noise, lambda channels, samples: np.tile(noise(channels, samples // 8), 8)])
+def test_powers_alone_take_memory_by_the_channel(make):
+    def peak(channels):
+        source = series(make(channels, 800), names=[f"c{number}" for number in range(channels)])
+        source = with_role(source, "c0")
+        tracemalloc.start()
+        assert adaptive_auto_spectra(source).density.shape[0] == channels
+        found = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return found
+
+    # Four times as much, were there nothing besides; pairs take sixteen times as much.
+    assert peak(400) < 5 * peak(100)

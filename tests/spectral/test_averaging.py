@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chladni.spectral import averaging as module
-from chladni.spectral.averaging import PeakHold, WeightedSum
+from chladni.spectral.averaging import PeakHold, PowerHold, WeightedPowers, WeightedSum
 
 LINES, SEGMENTS, CHANNELS = 5, 7, 3
 
@@ -47,7 +47,25 @@ def test_peak_hold_keeps_the_largest_of_each_pair_and_line(spectra):
     np.testing.assert_allclose(average.mean(), largest, rtol=1e-14)
 
 
-@pytest.mark.parametrize("make", [WeightedSum, PeakHold, lambda *size: WeightedSum(*size, 0.7)])
+@pytest.mark.parametrize("decay", [1.0, 0.8])
+@pytest.mark.parametrize("channels", [1, 3, 4, 5, 8, 13])
+def test_powers_alone_are_the_diagonal_to_the_last_bit(channels, decay):
+    rng = np.random.default_rng(channels)
+    spectra = rng.standard_normal((LINES, 60, channels)) + 1j * rng.standard_normal((LINES, 60, channels))
+    for pairs, alone in (
+        (WeightedSum(LINES, channels, decay), WeightedPowers(LINES, channels, decay)),
+        (PeakHold(LINES, channels), PowerHold(LINES, channels)),
+    ):
+        for average in (pairs, alone):
+            average.add(spectra[:, :37])
+            average.add(spectra[:, 37:])
+        np.testing.assert_array_equal(alone.mean(), np.einsum("iif->if", pairs.mean()).real)
+
+
+ALL = [WeightedSum, PeakHold, WeightedPowers, PowerHold, lambda *size: WeightedSum(*size, 0.7)]
+
+
+@pytest.mark.parametrize("make", ALL)
 def test_merged_parts_are_the_whole_and_copies_are_independent(spectra, make):
     whole, early, late = make(LINES, CHANNELS), make(LINES, CHANNELS), make(LINES, CHANNELS)
     whole.add(spectra)
