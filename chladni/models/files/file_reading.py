@@ -110,7 +110,8 @@ class FileReading:
         Names are not looked at when `parameters` is None, because the model itself couldn't be read.
         """
         default, by_name = None, {}
-        for loc, key, found in _flat(("tolerance",), self.content.get("tolerance")):
+        stated = self.content.get("tolerance")
+        for loc, key, found in _flat(("tolerance",), stated) if isinstance(stated, dict) else []:
             value = self.number(loc, found, "1", at_least=0.0)
             if isinstance(found, bool) or not isinstance(found, int | float | str):
                 self.mistakes.add(loc, f"found {found!r:.60}; must be a number: one sigma over the value")
@@ -163,10 +164,8 @@ class FileReading:
         return self.numbers((*loc, "parameters"), found, units, what="parameter"), source
 
 
-def _flat(loc: Loc, found: object, prefix: str = "") -> list[tuple[Loc, str, object]]:
+def _flat(loc: Loc, found: object) -> list[tuple[Loc, str, object]]:
     """Entries of nested tables: the bare key ``elbow.stiffness`` is a table in a table to TOML."""
     if not isinstance(found, dict):
-        return [(loc, prefix, found)] if prefix else []
-    return [
-        entry for key, one in found.items() for entry in _flat((*loc, key), one, f"{prefix}.{key}" if prefix else key)
-    ]
+        return [(loc, ".".join(map(str, loc[1:])), found)]
+    return [entry for key, one in found.items() for entry in _flat((*loc, key), one)]
