@@ -157,7 +157,9 @@ def _channel_faults(
         place = np.flatnonzero(valid)
         values = values[place]
     if values.size >= _FEWEST:
-        faults += _faults_of(_record(channel, values), place)
+        # A step between the largest numbers is infinite, and compares as such.
+        with np.errstate(over="ignore"):
+            faults += _faults_of(_record(channel, values), place)
     return [replace(one, first_s=one.first_s / rate_hz, last_s=one.last_s / rate_hz) for one in faults]
 
 
@@ -349,12 +351,13 @@ def _spikes(record: _Record) -> Ints:
     away, back = record.leaps[:-1], record.leaps[1:]
     close = back - away <= _WIDEST_SPIKE
     away, back = away[close], back[close]
-    samples = record.samples
-    there, again = samples[away + 1] - samples[away], samples[back + 1] - samples[back]
+    # Of quarters, neither differences nor their sum are beyond the largest number.
+    at, back_at = (np.stack([record.samples[place], record.samples[place + 1]]) / 4 for place in (away, back))
+    there, again = at[1] - at[0], back_at[1] - back_at[0]
     # Vibration that begins with a leap goes on with others; a spike stands alone.
     around = np.arange(1, _QUIET_AROUND + 1)
     nearby = np.maximum(record.step(away[:, None] - around), record.step(back[:, None] + around)).max(axis=1)
-    chosen = (np.abs(there + again) < 0.3 * np.abs(there)) & (nearby < 0.25 * np.abs(there))
+    chosen = (np.abs(there + again) < 0.3 * np.abs(there)) & (nearby / 4 < 0.25 * np.abs(there))
     return _filled(away[chosen] + 1, (back - away)[chosen])
 
 

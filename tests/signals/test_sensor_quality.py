@@ -315,6 +315,19 @@ def test_spikes(width: int) -> None:
     assert "connectors" in fault.sentence
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_faults_are_the_same_up_to_the_largest_number(dtype: type) -> None:
+    signal = noise().astype(dtype)
+    for place in range(5000, SAMPLES, 9000):
+        signal[place] = 40 * (-1) ** (place // 1000)
+        signal[place + 3000 : place + 3012] = 0
+    # A power of two changes no digit; leaps of 80 are then beyond the largest number.
+    scale = 2.0 ** (np.finfo(dtype).maxexp - 6)
+    kinds = [(fault.kind, fault.count) for fault in faults_of(signal)]
+    assert [kind for kind, _ in kinds] == ["dropouts", "spikes"]
+    assert [(fault.kind, fault.count) for fault in faults_of(signal * dtype(scale))] == kinds
+
+
 def test_what_is_wider_than_three_samples_is_no_spike() -> None:
     values = noise()
     values[5000:5004] += 80.0
