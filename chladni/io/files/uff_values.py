@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from chladni.signals.errors import LogError
 from chladni.signals.text_reading import real_number
+from chladni.signals.wording import counted
 
 Numbers = NDArray[np.float64]
 
@@ -21,6 +23,9 @@ _NUMBER = re.compile(
     rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+|[-+]\d{3}(?![\d.]))?|[-+]?(?:nan|inf(?:inity)?)\b", re.IGNORECASE
 )
 _DOUBLE = 8
+# Columns of a single and of a double, and of a line (E13.5 and E20.12 of the specification of dataset 58).
+_WIDTHS = {4: 13, 8: 20}
+_LINE = 80
 _DEC, _IEEE, _IBM = 1, 2, 3
 _IEEE_LITTLE, _IEEE_BIG = "IEEE little endian", "IEEE big endian"
 _LITTLE, _BIG = 1, 2
@@ -60,6 +65,16 @@ class Layout:
         if self.even or self.width == 4:
             return (self.numbers * self.width,)
         return (self.numbers * self.width, self.count * (4 + self.parts * self.width))
+
+    def odd_lines(self, body: bytes) -> int:
+        """Lines that aren't as long as they are due, where most of them have the columns of the specification."""
+        width = self.parts * _WIDTHS[self.width] + (0 if self.even else _WIDTHS[4])
+        a_line = _LINE // width
+        due = [a_line * width] * (self.count // a_line) + [self.count % a_line * width]
+        lengths = [len(line.rstrip()) for line in body.split(b"\n")]
+        found = [length for length in lengths if length]
+        odd = sum(length != expected for length, expected in zip_longest(found, filter(None, due)))
+        return odd if 2 * found.count(due[0]) > len(found) else 0
 
     def arranged(self, numbers: Numbers) -> tuple[Numbers | None, NDArray[Any]]:
         """Take apart abscissae and values, which stand one after the other."""
@@ -128,8 +143,12 @@ def text_values(body: bytes, layout: Layout) -> Values:
         raise LogError(f"announces {layout.count} values and holds {count}; it's cut short")
     x, data = layout.arranged(numbers)
     spare = len(words) - layout.numbers
-    notes = (f"holds {spare} numbers more than it announces, which were left out",) if spare else ()
-    return Values(x=x, data=data, notes=notes)
+    notes = [f"holds {spare} numbers more than it announces, which were left out"] if spare else []
+    odd = layout.odd_lines(body)
+    if odd:
+        told = f"{counted(odd, 'line')} of values shorter or longer than the columns of the format"
+        notes.append(f"has {told}; it's damaged, and numbers there may be wrong: export it again")
+    return Values(x=x, data=data, notes=tuple(notes))
 
 
 def _parsed(words: list[bytes]) -> Numbers | None:

@@ -237,3 +237,46 @@ def test_more_numbers_than_announced_are_told() -> None:
     values = text_values(b"1 2 3 4", layout)
     np.testing.assert_array_equal(values.data, [1, 2])
     assert values.notes == ("holds 2 numbers more than it announces, which were left out",)
+
+
+def in_columns(rows: NDArray, widths: list[int]) -> bytes:
+    """Numbers in the columns of the specification, as many rows a line as have room in 80 columns."""
+    cells = ["".join(f"{number:{width}.5e}" for number, width in zip(row, widths, strict=True)) for row in rows]
+    a_line = 80 // sum(widths)
+    return "".join("".join(cells[first : first + a_line]) + "\n" for first in range(0, len(cells), a_line)).encode()
+
+
+@pytest.mark.parametrize("form", [2, 4, 5, 6])
+@pytest.mark.parametrize("even", [True, False])
+@pytest.mark.parametrize("count", [59, 60, 61])
+@pytest.mark.parametrize("newline", [b"\n", b"\r\n", b"   \n"])
+def test_a_piece_that_is_missing_in_a_line_of_columns_is_told(
+    form: int, even: bool, count: int, newline: bytes
+) -> None:
+    widths = ([] if even else [13]) + [13 if form in (2, 5) else 20] * (2 if form > 4 else 1)
+    body = in_columns(WAVE[: count * len(widths)].reshape(count, -1), widths).replace(b"\n", newline)
+    layout = layout_of(form, count, even=even)
+    assert layout is not None
+    sound = text_values(body, layout)
+    assert sound.notes == ()
+    wrong = 0
+    for place in range(0, len(body) - 10, 7):
+        for size in (1, 4, 9):
+            try:
+                read = text_values(body[:place] + body[place + size :], layout)
+            except LogError:
+                continue
+            same = np.array_equal(read.data, sound.data)
+            same = same and (even or np.array_equal(read.x, sound.x))  # type: ignore[arg-type]
+            wrong += not same
+            assert same or read.notes, body[place - 20 : place + 20]
+    assert wrong > 10
+
+
+def test_numbers_between_blanks_have_lines_of_any_length() -> None:
+    layout = layout_of(2, 60, even=True)
+    assert layout is not None
+    for text in ("{:g} ", "{:.3f}\n", "{:13.5e}\n", "{} {}\n"):
+        numbers = iter(WAVE[:60].tolist())
+        body = "".join(text.format(number, next(numbers) if text.count("{") > 1 else 0) for number in numbers)
+        assert text_values(body.encode(), layout).notes == ()
