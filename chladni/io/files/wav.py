@@ -147,13 +147,17 @@ class _Chunk:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Encoding:
-    """How samples are stored: the order of bytes, the kind of number (i, u or f), and bytes of each."""
+    """How samples are stored: the order of bytes, the kind of number (i, u or f), and bytes of each.
+
+    `doubt` says how the description contradicts itself, empty when it doesn't.
+    """
 
     rate_hz: int
     channels: int
     order: str
     letter: str
     width: int
+    doubt: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -217,11 +221,13 @@ def _sound(
         elif chunk.name == b"data" and encoding is not None:
             # 64 bits of size stand apart, where 32 bits say that they don't know.
             if chunk.length == _UNKNOWN_SIZE and len(sizes) >= 16:
-                chunk = replace(chunk, length=struct.unpack("<Q", sizes[8:16])[0])
+                (length,) = struct.unpack("<Q", sizes[8:16])
+                chunk = replace(chunk, length=length, next=chunk.start + length + length % 2)
             there, notes, unread = _extent(path, container, chunk)
             frames = _frames(file, chunk.start, there, encoding)
             if frames.size:
-                return encoding, frames, notes, unread
+                told = (f"{path}: {encoding.doubt}.",) if encoding.doubt else ()
+                return encoding, frames, (*told, *notes), unread
             break
     raise LogError(f"{path}: holds no samples behind a description of them")
 
@@ -229,7 +235,7 @@ def _sound(
 def _encoding(path: Path, described: bytes, order: str) -> _Encoding:
     if len(described) < 16:
         raise LogError(f"{path}: can't be read: its samples are described in {len(described)} bytes, 16 are due")
-    kind, channels, rate_hz, _, frame_bytes, _ = struct.unpack(f"{order}HHIIHH", described[:16])
+    kind, channels, rate_hz, second_bytes, frame_bytes, bits = struct.unpack(f"{order}HHIIHH", described[:16])
     # The extensible form keeps the code at the start of a GUID.
     if kind == _EXTENSIBLE and len(described) >= 26:
         kind = struct.unpack(f"{order}H", described[24:26])[0]
@@ -240,7 +246,15 @@ def _encoding(path: Path, described: bytes, order: str) -> _Encoding:
             f"{path}: can't be read: encoding {kind} of {frame_bytes} bytes for {channels} channels at {rate_hz} Hz; "
             "PCM of 8, 16, 24 or 32 bits and floating point of 32 or 64 are read"
         )
-    return _Encoding(rate_hz=rate_hz, channels=channels, order=order, letter=letter, width=width)
+    # Bytes a second and a frame are said twice. 24 bits and fewer may lie in four bytes.
+    doubts = []
+    if second_bytes != rate_hz * frame_bytes:
+        doubts.append(f"{rate_hz} Hz of {frame_bytes} bytes a frame aren't {second_bytes} bytes a second")
+    if -(-bits // 8) not in (width, 3 if width == 4 else width):
+        doubts.append(f"{channels} channels of {bits} bits aren't {frame_bytes} bytes a frame")
+    told = "times and samples may be wrong: compare them with what was recorded, or record it again"
+    doubt = f"contradicts itself: {' and '.join(doubts)}; {told}" if doubts else ""
+    return _Encoding(rate_hz=rate_hz, channels=channels, order=order, letter=letter, width=width, doubt=doubt)
 
 
 def _extent(

@@ -232,3 +232,55 @@ def test_big_endian_and_extensible_files(tmp_path: Path) -> None:
     np.testing.assert_array_equal(
         read_wav(tmp_path / "b.wav").series[0].values[0], np.linspace(-3, 3, 10, dtype="<f4")
     )
+
+
+def described(kind: int, channels: int, rate_hz: int, width: int, bits: int) -> bytes:
+    frame = channels * width
+    return struct.pack("<HHIIHH", kind, channels, rate_hz, rate_hz * frame, frame, bits)
+
+
+def with_description(description: bytes) -> bytes:
+    body = b"WAVEfmt " + struct.pack("<I", len(description)) + description
+    body += b"data" + struct.pack("<I", 240) + np.arange(120, dtype="<i2").tobytes()
+    return b"RIFF" + struct.pack("<I", len(body)) + body
+
+
+@pytest.mark.parametrize(
+    "described_as",
+    [(1, 2, 8000, 1, 8), (1, 1, 8000, 2, 16), (1, 6, 48000, 2, 12), (1, 2, 8000, 3, 24), (1, 1, 8000, 3, 20)]
+    + [(1, 2, 8000, 4, 32), (1, 2, 8000, 4, 24), (3, 2, 8000, 4, 32), (3, 1, 44100, 8, 64)],
+)
+def test_any_bit_of_a_description_that_changes_what_is_read_is_told(
+    tmp_path: Path, described_as: tuple[int, int, int, int, int]
+) -> None:
+    sound = described(*described_as)
+    path = tmp_path / "a.wav"
+    path.write_bytes(with_description(sound))
+    contents = read_wav(path)
+    assert contents.notes == ()
+    (series,) = contents.series
+    # The first two bytes are the kind of number, which stands but once.
+    for bit in range(16, 8 * len(sound)):
+        flipped = bytearray(sound)
+        flipped[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(with_description(bytes(flipped)))
+        try:
+            read = read_wav(path)
+        except LogError:
+            continue
+        same = read.series[0].sample_rate_hz == series.sample_rate_hz
+        same = same and np.array_equal(read.series[0].values, series.values)
+        assert same or "contradicts itself" in read.notes[0], bit
+
+
+def test_what_lies_behind_a_long_file_is_told_too(tmp_path: Path) -> None:
+    before = b"ds64" + struct.pack("<I", 28) + LONG
+    for behind in (b"\x01", b"\x01" * 9):
+        content = riff(b"RF64", size=0xFFFFFFFF, data=0xFFFFFFFF, samples=RAW, before=before, after=behind)
+        (tmp_path / "a.wav").write_bytes(content)
+        assert read_wav(tmp_path / "a.wav").unread[0][0] == f"{len(behind)} bytes at the end"
+    after = b"LIST" + struct.pack("<I", 4) + b"INFO"
+    (tmp_path / "a.wav").write_bytes(
+        riff(b"RF64", size=0xFFFFFFFF, data=0xFFFFFFFF, samples=RAW, before=before, after=after)
+    )
+    assert read_wav(tmp_path / "a.wav").unread == ()
