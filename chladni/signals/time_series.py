@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import isfinite
+from math import inf
 from typing import Any, Self
 
 import numpy as np
@@ -13,6 +13,19 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value, require_shape
 
 NS_PER_S = 1_000_000_000
+_CENTURIES_NS = 2**63
+"""What nanoseconds of 64 bits count to, either way from 1970."""
+
+
+def is_sample_rate(rate_hz: float) -> bool:
+    """Whether a number can be a sample rate: finite, positive, its period one that nanoseconds of 64 bits hold.
+
+    Examples
+    --------
+    >>> [is_sample_rate(rate_hz) for rate_hz in (100.0, 1e-3, 0.0, float("nan"), float("inf"), 1e-320)]
+    [True, True, False, False, False, False]
+    """
+    return NS_PER_S / _CENTURIES_NS < rate_hz < inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,7 +49,7 @@ class TimeSeries(Value):
     Raises
     ------
     EstimateError
-        When shapes, rate or channel names don't fit together.
+        When shapes, rate or channel names don't fit together, or times are beyond what nanoseconds hold.
 
     Examples
     --------
@@ -52,8 +65,10 @@ class TimeSeries(Value):
     valid: NDArray[np.bool_] | None = field(default=None)
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.sample_rate_hz) and self.sample_rate_hz > 0):
-            raise EstimateError(f"sample rate {self.sample_rate_hz} Hz must be finite and positive")
+        if not is_sample_rate(self.sample_rate_hz):
+            raise EstimateError(
+                f"sample rate {self.sample_rate_hz} Hz must be finite and positive, its period no centuries"
+            )
         if self.values.ndim != 2 or not np.issubdtype(self.values.dtype, np.floating):
             raise EstimateError(
                 f"values must be floating point [channel, sample], got {self.values.dtype} {self.values.shape}"
@@ -64,6 +79,11 @@ class TimeSeries(Value):
             (len(self.channels), self.values.shape[1]),
             f"{len(self.channels)} channels",
         )
+        if not abs(self.start_time_ns) + self.duration_s * NS_PER_S < _CENTURIES_NS:
+            raise EstimateError(
+                f"{self.samples} samples at {self.sample_rate_hz:g} Hz from {self.start_time_ns} ns on end farther "
+                "from 1970 than nanoseconds of 64 bits count; check the rate and the start"
+            )
         if self.valid is not None:
             require_shape("valid", self.valid, self.values.shape, "the shape of values")
         names = [channel.name for channel in self.channels]

@@ -266,7 +266,7 @@ def _part(path: Path, table: _Table, axis: int | None, column: int, options: Tim
         return Part(columns=(), times=Times(columns=(_AXIS,), stamps_ns=stamps_ns, known=times.known, told=""))
     steps = {(segment.cell("Delta_X", column), segment.cell("X_Unit_Label", column)) for segment in table.segments}
     rate_hz, told = _rate_hz(path, steps, options)
-    offsets_ns = [_offset_ns(segment, column) for segment in table.segments]
+    offsets_ns = [_offset_ns(path, segment, column) for segment in table.segments]
     if len(table.segments) == 1 or options.column == NO_TIMES:
         return Part(columns=(), stated_rate_hz=rate_hz, stated_by=told, start_ns=int(starts_ns[0]) + offsets_ns[0])
     counts = np.concatenate([np.arange(segment.rows) for segment in table.segments])
@@ -276,9 +276,12 @@ def _part(path: Path, table: _Table, axis: int | None, column: int, options: Tim
     return Part(columns=(), times=Times(columns=("Delta_X",), stamps_ns=stamps_ns, known=known, told=""))
 
 
-def _offset_ns(segment: _Segment, column: int) -> int:
-    first = _decimal(segment.cell("X0", column))
-    return 0 if first is None else round(first * NS_OF[_axis_unit(segment.cell("X_Unit_Label", column))])
+def _offset_ns(path: Path, segment: _Segment, column: int) -> int:
+    text = segment.cell("X0", column)
+    offset_ns = round((_decimal(text) or 0) * NS_OF[_axis_unit(segment.cell("X_Unit_Label", column))])
+    if not abs(offset_ns) < 2**62:
+        raise LogError(f"{path}: begins at X0 = {text}, which isn't within 146 years")
+    return offset_ns
 
 
 def _axis_unit(label: str) -> str:

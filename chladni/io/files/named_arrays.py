@@ -13,7 +13,7 @@ from chladni.io.files.table import Part, series_of_parts
 from chladni.io.files.time_column import is_time_name
 from chladni.io.files.time_reading import NO_TIMES, NS_OF, UNIT_OF, TimeOptions, words_of
 from chladni.signals.errors import LogError, SetupError
-from chladni.signals.time_series import NS_PER_S
+from chladni.signals.time_series import NS_PER_S, is_sample_rate
 
 _RATE_NAMES: Final = frozenset(
     {"fs", "sr", "fsamp", "fsample", "sfreq", "framerate"}
@@ -145,15 +145,20 @@ def _rates(arrays: Mapping[str, Any]) -> dict[str, list[_Rate]]:
 
 
 def rate_of_scalar(name: str, number: float) -> float | None:
-    """Give the rate in Hz that a number of this name states, None when it states none.
+    """Give the rate in Hz that a number of this name states, None when it states none, or none that can be.
 
     Examples
     --------
     >>> [rate_of_scalar(name, 0.5) for name in ("fs", "sample_rate_kHz", "dt", "dt_ms", "mass")]
     [0.5, 500.0, 2.0, 2000.0, None]
+    >>> [rate_of_scalar("fs", number) for number in (0.0, 1e-320, float("inf"))], rate_of_scalar("dt", 5e-324)
+    ([None, None, None], None)
     """
-    if not (np.isfinite(number) and number > 0):
-        return None
+    rate_hz = _stated_by(name, number) if 0 < number < np.inf else None
+    return rate_hz if rate_hz is not None and is_sample_rate(rate_hz) else None
+
+
+def _stated_by(name: str, number: float) -> float | None:
     words = words_of(name)
     joined = "".join(words)
     if joined in _RATE_NAMES:

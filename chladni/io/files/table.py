@@ -88,7 +88,7 @@ def series_of_parts(
         first = failed[0][1]
         # What could have said it may be among what isn't read.
         told = "".join(f"; {name!r} isn't read: {reason}" for name, reason in unread[:3])
-        raise type(first)(f"{first}{told}") from first
+        raise type(first)(f"{where}: {str(first).removeprefix(f'{where}: ')}{told}") from first
     reasons = [(name, str(error).removeprefix(f"{where}: ")) for part, error in failed for name in part.names]
     contents = joined(found)
     return replace(contents, unread=(*unread, *contents.unread, *reasons))
@@ -217,8 +217,6 @@ def _rate_hz(columns: Sequence[Column], options: TimeOptions, where: str) -> flo
             f"{where}: nothing says the sample rate{rising}; give the sample rate (--rate HZ){take}; it has "
             f"{', '.join(column.name for column in columns[:12])}"
         )
-    if not (np.isfinite(rate_hz) and rate_hz > 0):
-        raise SetupError(f"{where}: the sample rate {rate_hz} Hz must be finite and positive")
     return rate_hz
 
 

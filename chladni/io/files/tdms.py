@@ -21,7 +21,7 @@ from chladni.io.files.time_reading import NO_TIMES, NS_OF, UNIT_OF, TimeOptions,
 from chladni.io.regular_file import open_regular
 from chladni.signals.clock_verdict import round_rate
 from chladni.signals.errors import LogError
-from chladni.signals.time_series import NS_PER_S
+from chladni.signals.time_series import NS_PER_S, is_sample_rate
 
 # Property names of National Instruments, in the order of belief.
 _UNITS: Final = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
@@ -161,13 +161,13 @@ def _channels(path: Path, file: Any, budget: Budget) -> tuple[list[_Channel], tu
             _take(path, budget, 8 * length)
         try:
             numbers = np.empty(0) if reason else _answer(path, partial(_values, channel))
+            rate_hz, start_ns = (None, 0) if reason else _waveform(channel.properties)
         except LogError as error:
             reason = str(error).removeprefix(f"{path}: ")
         if reason:
             unread.append((name, reason))
             continue
         said = next((str(channel.properties[key]) for key in _UNITS if channel.properties.get(key)), None)
-        rate_hz, start_ns = _waveform(channel.properties)
         column = Column(name=name, numbers=numbers, unit=said)
         channels.append(_Channel(column=column, group=group, rate_hz=rate_hz, start_ns=start_ns))
     return channels, tuple(unread)
@@ -194,21 +194,28 @@ def _why_unread(dtype: np.dtype[Any], length: int, properties: Mapping[str, Any]
 
 
 def _waveform(properties: Mapping[str, Any]) -> tuple[float | None, int]:
-    """Give the rate, None when there's no waveform, and the start in nanoseconds since 1970, 0 when nobody knows."""
+    """Give the rate, None when there's no waveform, and the start in nanoseconds since 1970, 0 when nobody knows.
+
+    Raises
+    ------
+    LogError
+        When it starts beyond what nanoseconds hold.
+    """
     unit_ns = NS_OF[UNIT_OF[spelled(str(properties.get("wf_xunit_string") or "s"))]]
     step = properties.get("wf_increment")
-    if not isinstance(step, int | float | np.number) or not 0 < step < np.inf:
+    rate_hz = NS_PER_S / (float(step) * unit_ns) if isinstance(step, int | float | np.number) and step > 0 else 0.0
+    if not is_sample_rate(rate_hz):
         return None, 0
-    rate_hz = NS_PER_S / (float(step) * unit_ns)
     offset = properties.get("wf_start_offset", 0.0)
-    offset_ns = (
-        round(float(offset) * unit_ns) if isinstance(offset, int | float | np.number) and np.isfinite(offset) else 0
-    )
+    offset_ns = float(offset) * unit_ns if isinstance(offset, int | float | np.number) else 0.0
     start = properties.get("wf_start_time")
-    # LabVIEW's clock begins in 1904: a start there is none.
-    start_ns = int(start.astype("M8[ns]").astype(np.int64)) if isinstance(start, np.datetime64) else 0
+    # LabVIEW's clock begins in 1904: a start there is none. A date beyond what nanoseconds hold would wrap around.
+    begun = isinstance(start, np.datetime64) and start > np.datetime64(0, "s")
+    start_ns = int(start.astype("M8[us]").astype(np.int64)) * 1000 if begun else 0
+    if not start_ns + abs(offset_ns) < 2**62:
+        raise LogError(f"begins at {start} and {offset} more (wf_start_offset), which isn't within 146 years of 1970")
     # The division leaves a rounding in the last digit, which a rate of few digits doesn't have.
-    return round_rate(rate_hz, 4e-16 * rate_hz) or rate_hz, max(0, start_ns) + offset_ns
+    return round_rate(rate_hz, 4e-16 * rate_hz) or rate_hz, start_ns + round(offset_ns)
 
 
 def _contents(

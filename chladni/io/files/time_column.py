@@ -142,7 +142,8 @@ def is_row_number(column: Column, *, first: bool) -> bool:
     named = column.name.startswith("__index_level_") or (first and column.name.lower() in _COUNTERS)
     if not named or numbers is None or numbers.dtype.kind not in "fiu" or numbers.size < 3:
         return False
-    return bool((np.diff(numbers) == 1).all())
+    # Where a difference overflows, a sum with one doesn't.
+    return bool((numbers[1:] == numbers[:-1] + 1).all())
 
 
 def rises(column: Column) -> bool:
@@ -231,7 +232,7 @@ def _is_remainder(whole: Column, part: Column) -> bool:
     if seconds is None or rest is None or seconds.dtype.kind not in "fiu" or rest.dtype.kind not in "fiu":
         return False
     below = NS_PER_S // NS_OF[units[1]]
-    return bool(((rest >= 0) & (rest < below)).all()) and _mostly_rising(seconds)
+    return bool((rest >= 0).all()) and float(rest.max(initial=0)) < below and _mostly_rising(seconds)
 
 
 def _may_be_time(column: Column, texts: dict[str, TextTimes]) -> bool:

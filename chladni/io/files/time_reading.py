@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chladni.io.files.columns import Column
 from chladni.io.files.time_text import NS_PER_DAY, TextTimes
 from chladni.signals.errors import LogError, SetupError
-from chladni.signals.time_series import NS_PER_S
+from chladni.signals.time_series import NS_PER_S, is_sample_rate
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -91,6 +91,8 @@ class TimeOptions:
     def __post_init__(self) -> None:
         if self.unit is not None and spelled(self.unit) not in UNIT_OF:
             raise SetupError(f"the time unit {self.unit!r} is none of {', '.join(TIME_UNITS)}")
+        if self.rate_hz is not None and not is_sample_rate(self.rate_hz):
+            raise SetupError(f"the sample rate {self.rate_hz} Hz must be finite and positive, its period no centuries")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -185,7 +187,10 @@ def times_of_numbers(column: Column, options: TimeOptions, *, where: str) -> Tim
 def _numbers_of(column: Column) -> NDArray[Any]:
     if column.numbers is None:
         raise SetupError(f"column {column.name!r} holds text that is no time; name another column (--time NAME)")
-    return column.numbers
+    numbers = column.numbers
+    # What times are compared with, and a count of nanoseconds, is beyond the narrow kinds of floating point.
+    with np.errstate(over="ignore"):
+        return numbers.astype(np.float64) if numbers.dtype.kind == "f" else numbers
 
 
 def _reading(column: Column, numbers: NDArray[Any], options: TimeOptions, where: str) -> _Reading:
@@ -268,7 +273,8 @@ def _typical_step(numbers: NDArray[Any]) -> float:
     """Median of the mean step over 32 rows, which neither repeats nor gaps nor steps back change."""
     # Differences of the numbers themselves: nanoseconds of our days are too long for double precision.
     lag = max(1, min(32, (numbers.size - 1) // 2))
-    steps = np.abs((numbers[lag:] - numbers[:-lag]).astype(np.float64))
+    with np.errstate(over="ignore"):
+        steps = np.abs((numbers[lag:] - numbers[:-lag]).astype(np.float64))
     return float(np.median(steps)) / lag if steps.size else 0.0
 
 
@@ -276,8 +282,7 @@ def _stamps_ns(
     column: Column, numbers: NDArray[Any], known: NDArray[np.bool_], reading: _Reading, where: str
 ) -> NDArray[np.int64]:
     ns = NS_OF[reading.unit]
-    # In single precision, or less, a count of nanoseconds overflows.
-    kept = numbers[known] if numbers.dtype.kind in "iu" else numbers[known].astype(np.float64)
+    kept = numbers[known]
     largest = float(np.abs(kept.astype(np.float64) - reading.zero).max(initial=0.0)) * ns + abs(column.start_ns)
     if not largest < 2**62:
         raise LogError(

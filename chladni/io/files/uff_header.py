@@ -2,12 +2,12 @@
 
 import re
 from datetime import UTC, datetime
-from math import ceil, floor, isfinite, log10
+from math import ceil, floor, log10
 from typing import Any
 
 from chladni.signals.channel import AXES, Channel, Vector
 from chladni.signals.errors import LogError
-from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.time_series import NS_PER_S, TimeSeries, is_sample_rate
 from chladni.signals.visible import visible
 
 TIME_RESPONSE = 1
@@ -79,7 +79,7 @@ def rate_of_header(header: dict[str, Any], second: float = 1.0) -> float | None:
     65536.0
     """
     increment = float(header["abscissa_inc"])
-    if not (isfinite(increment) and 1e-15 < increment < 1e15):
+    if not (1e-15 < increment and is_sample_rate(1 / (increment * second))):
         return None
     # Half a unit in the last of the six digits, which is how far the true increment may be.
     half = 0.5 * 10.0 ** (floor(log10(increment)) - _INCREMENT_DIGITS + 1)

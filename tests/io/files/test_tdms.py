@@ -174,3 +174,20 @@ def test_bytes_behind_the_last_segment_are_told(tmp_path: Path, behind: bytes) -
     assert read_tdms(path).unread == ()
     path.write_bytes(path.read_bytes() + behind)
     assert f"{len(behind)} bytes at the end" in dict(read_tdms(path).unread)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"wf_increment": step} for step in (0.0, -1.0, 5e-324, 1e308, 1e12, float("nan"), float("inf"))]
+    + [{"wf_start_offset": offset} for offset in (1e300, -1e300, float("nan"), 1e11)]
+    + [{"wf_start_time": np.datetime64(year, "Y").astype("M8[us]")} for year in (30_000, 200_000)],
+)
+def test_a_waveform_at_no_time_costs_its_channel_alone(tmp_path: Path, wrong: dict[str, object]) -> None:
+    sound = ("daq", "sound", SIGNAL, waveform())
+    contents = read_tdms(written(tmp_path / "a.tdms", sound, ("daq", "odd", SIGNAL, waveform(**wrong))))
+    (series,) = contents.series
+    assert [channel.name for channel in series.channels] == ["sound"]
+    assert (series.sample_rate_hz, series.start_time_ns) == (200.0, START_NS)
+    ((name, reason),) = contents.unread
+    assert name == "odd"
+    assert ("sample rate" if "wf_increment" in wrong else "isn't within 146 years") in reason

@@ -1,5 +1,6 @@
 """Which column holds the times and what its numbers count: one mechanism, whatever the file."""
 
+import contextlib
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -17,7 +18,7 @@ from chladni.io.files.contents import FileContents
 from chladni.io.files.formats import read_file
 from chladni.io.files.time_column import is_row_number, is_time_name
 from chladni.io.files.time_reading import TimeOptions, times_of_numbers
-from chladni.signals.errors import SetupError
+from chladni.signals.errors import ChladniError, SetupError
 
 RATE_HZ = 200.0
 SAMPLES = 400
@@ -312,3 +313,39 @@ def test_names_of_times(name: str) -> None:
 @pytest.mark.parametrize("name", ["s", "min", "h", "tau", "time_constant", "force", "stamp_force", "x", "temp", ""])
 def test_names_that_are_no_times(name: str) -> None:
     assert not is_time_name(name)
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64, np.longdouble])
+@pytest.mark.parametrize("name", ["t", "t_ns", "date", "sec", "index"])
+def test_numbers_as_large_as_their_kind_holds_are_no_time_and_no_warning(
+    tmp_path: Path, dtype: type, name: str
+) -> None:
+    numbers = np.array([-1, 0, 0.5, 1, 1], dtype) * np.finfo(dtype).max
+    with contextlib.suppress(ChladniError):
+        npz(tmp_path / "a.npz", {name: numbers, "nsec": numbers * 0, "x": np.arange(5.0)})
+        read_file(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32])
+def test_times_of_few_digits_are_times(tmp_path: Path, dtype: type) -> None:
+    columns = {"t_ms": np.arange(200).astype(dtype), "x": np.arange(200.0) ** 2}
+    assert only(read_file(npz(tmp_path / "a.npz", columns)))[0] == 1000.0
+
+
+@pytest.mark.parametrize("rate_hz", [0.0, -1.0, 1e-320, 5e-324, float("nan"), float("inf"), 1e-10])
+def test_a_rate_that_can_be_none_is_neither_taken_nor_divided_by(tmp_path: Path, rate_hz: float) -> None:
+    columns = {"t": np.arange(50) * 0.01, "x": np.arange(50.0)}
+    assert only(read_file(npz(tmp_path / "a.npz", columns | {"fs": np.array(rate_hz)})))[0] == 100.0
+    timeless = npz(tmp_path / "b.npz", {"x": columns["x"], "fs": np.array(rate_hz)})
+    with pytest.raises(SetupError, match="nothing says the sample rate"):
+        read_file(timeless)
+    with pytest.raises(SetupError, match="must be finite and positive, its period no centuries"):
+        read_file(timeless, sample_rate_hz=rate_hz)
+    assert only(read_file(timeless, sample_rate_hz=100.0))[0] == 100.0
+
+
+def test_rows_that_last_longer_than_nanoseconds_count_are_refused_by_name(tmp_path: Path) -> None:
+    path = npz(tmp_path / "a.npz", {"x": np.arange(50.0), "fs": np.array(1e-9)})
+    with pytest.raises(ChladniError, match=r"a\.npz: .*farther from 1970 than nanoseconds") as caught:
+        read_file(path)
+    assert "check the rate" in str(caught.value)
