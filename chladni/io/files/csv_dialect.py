@@ -12,6 +12,7 @@ from chladni.io.files.time_reading import UNIT_OF, spelled
 from chladni.io.files.time_text import is_time_text
 from chladni.signals.errors import LogError
 from chladni.signals.text_reading import lines_of
+from chladni.signals.wording import counted
 
 # Enough for most heads; the larger one for tables of thousands of columns, and for long remarks.
 _HEAD_BYTES: Final = (2**16, 2**22)
@@ -21,6 +22,8 @@ _NUMBER: Final = re.compile(NUMBER, re.ASCII)
 # Three digits behind a comma or point, and no zero before it, may as well be thousands.
 _GROUPED: Final = re.compile(r"^[+-]?[1-9]\d{0,2}[.,]\d{3}$", re.ASCII)
 _DELIMITERS: Final = (";", "\t", ",", " ")
+# What parts names of several columns; within a name stands a comma with a blank behind it, as in "F, kN".
+_BETWEEN_NAMES: Final = re.compile(r"(?<=[^\s;,])(?:;|\t|,(?=\S))(?=[^;,])")
 LONE: Final = "\n"
 """In place of a delimiter: there's one column."""
 _MARKS: Final = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
@@ -256,13 +259,18 @@ def _titles(path: Path, lines: Sequence[str], rows: _Rows) -> tuple[tuple[str, .
     # np.savetxt puts # before the titles; some writers end only the rows, others only the titles, with a delimiter.
     # Spreadsheets write the delimiter itself into the first line.
     lines = ["" if line.startswith("sep=") else line for line in lines]
-    titles = [_fitted(split_cells(line.lstrip("# "), rows.delimiter), rows) for line in lines]
+    titles = [
+        []
+        if rows.delimiter == LONE and '"' not in line and _BETWEEN_NAMES.search(line.strip())
+        else _fitted(split_cells(line.lstrip("# "), rows.delimiter), rows)
+        for line in lines
+    ]
     found = [(cells, place) for place, cells in enumerate(titles, start=1) if any(cells)]
     if not found:
         if any(line.strip() and not line.startswith("#") for line in lines):
             raise LogError(
-                f"{path}: line {len(lines) + 1} has {columns} columns, but none of the lines above it has as many "
-                "names; give each column a name, or take the lines out"
+                f"{path}: line {len(lines) + 1} has {counted(columns, 'column')}, but none of the lines above it has "
+                "as many names; give each column a name (in quotes where it holds a delimiter), or take the lines out"
             )
         return (), (), 0
     units: list[str] = []

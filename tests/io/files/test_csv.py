@@ -461,3 +461,24 @@ def test_numbers_above_the_first_row_are_never_passed_over(tmp_path: Path) -> No
     contents = read_csv(file_of(tmp_path, f"{''.join(rows[:15])}time [s],a\n{''.join(rows[15:])}"))
     np.testing.assert_array_equal(contents.series[0].values, [np.arange(15, 60)])
     assert "15 lines of numbers above the titles left out, the first is line 1." in contents.notes[-1]
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+@pytest.mark.parametrize("rows", [["-0."], ["1.5", "2.5", "-3"]])
+def test_names_of_several_columns_are_not_the_name_of_one(tmp_path: Path, delimiter: str, rows: list[str]) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([delimiter.join(["a [N]", "b [m/s^2]", "c"]), *rows]) + "\n")
+    with pytest.raises(LogError, match=r"line 2 has 1 column, but none .* \(in quotes where it holds a delimiter\)"):
+        read_csv(path, sample_rate_hz=100.0)
+    # Both remedies work.
+    path.write_text(path.read_text().replace(path.read_text().split("\n")[0], f'"a{delimiter}filtered [N]"'))
+    (channel,) = read_csv(path, sample_rate_hz=100.0).series[0].channels
+    assert (channel.name, channel.unit) == (f"a{delimiter}filtered", "N")
+    path.write_text("\n".join(rows) + "\n")
+    assert read_csv(path, sample_rate_hz=100.0).series[0].samples == len(rows)
+
+
+@pytest.mark.parametrize("title", ["F", "F, filtered", "F;", "# F"])
+def test_one_column_may_be_called_so(tmp_path: Path, title: str) -> None:
+    (tmp_path / "a.csv").write_text(f"made by; x\n{title}\n1.5\n2.5\n")
+    np.testing.assert_array_equal(read_csv(tmp_path / "a.csv", sample_rate_hz=100.0).series[0].values, [[1.5, 2.5]])
