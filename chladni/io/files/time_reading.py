@@ -92,7 +92,9 @@ class TimeOptions:
         if self.unit is not None and spelled(self.unit) not in UNIT_OF:
             raise SetupError(f"the time unit {self.unit!r} is none of {', '.join(TIME_UNITS)}")
         if self.rate_hz is not None and not is_sample_rate(self.rate_hz):
-            raise SetupError(f"the sample rate {self.rate_hz} Hz must be finite and positive, its period no centuries")
+            raise SetupError(
+                f"the sample rate {self.rate_hz} Hz must be finite and positive, its period no centuries"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -79,7 +79,7 @@ def rate_of_header(header: dict[str, Any], second: float = 1.0) -> float | None:
     65536.0
     """
     increment = float(header["abscissa_inc"])
-    if not (1e-15 < increment and is_sample_rate(1 / (increment * second))):
+    if not (increment > 1e-15 and is_sample_rate(1 / (increment * second))):
         return None
     # Half a unit in the last of the six digits, which is how far the true increment may be.
     half = 0.5 * 10.0 ** (floor(log10(increment)) - _INCREMENT_DIGITS + 1)

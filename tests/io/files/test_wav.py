@@ -247,8 +247,17 @@ def with_description(description: bytes) -> bytes:
 
 @pytest.mark.parametrize(
     "described_as",
-    [(1, 2, 8000, 1, 8), (1, 1, 8000, 2, 16), (1, 6, 48000, 2, 12), (1, 2, 8000, 3, 24), (1, 1, 8000, 3, 20)]
-    + [(1, 2, 8000, 4, 32), (1, 2, 8000, 4, 24), (3, 2, 8000, 4, 32), (3, 1, 44100, 8, 64)],
+    [
+        (1, 2, 8000, 1, 8),
+        (1, 1, 8000, 2, 16),
+        (1, 6, 48000, 2, 12),
+        (1, 2, 8000, 3, 24),
+        (1, 1, 8000, 3, 20),
+        (1, 2, 8000, 4, 32),
+        (1, 2, 8000, 4, 24),
+        (3, 2, 8000, 4, 32),
+        (3, 1, 44100, 8, 64),
+    ],
 )
 def test_any_bit_of_a_description_that_changes_what_is_read_is_told(
     tmp_path: Path, described_as: tuple[int, int, int, int, int]
