@@ -1,4 +1,4 @@
-"""Signals that ask a process to end: files stay whole, and nothing is left beside them, nobody behind it."""
+"""Signals that ask a process to end: files stay whole, and nothing is left beside them."""
 
 import os
 import signal
@@ -40,7 +40,7 @@ class Listener:
 
     def listen(self) -> None:
         """Let Ctrl-C raise `KeyboardInterrupt`, SIGTERM and SIGHUP raise `Stopped`, in the main thread."""
-        _on_signals(self, "SIGINT", "SIGTERM", "SIGHUP")
+        on_signals(self, "SIGINT", "SIGTERM", "SIGHUP")
 
     def __call__(self, number: int, _frame: FrameType | None) -> None:
         """Take a signal."""
@@ -65,35 +65,8 @@ def end_at_once(number: int, _frame: FrameType | None = None) -> NoReturn:
     os._exit(128 + number)
 
 
-def begin_worker(*then: Callable[[], object]) -> None:
-    """Let a worker process end at SIGTERM and SIGHUP, and when the process that started it ends, in whatever way.
-
-    Not by Linux's PR_SET_PDEATHSIG: other systems have none, and it would leave parts of files. This module imports
-    little, so that a worker listens before it imports what it works with.
-
-    Parameters
-    ----------
-    then
-        What else a worker begins with.
-    """
-    # A terminal interrupts the whole group: each process would give its case up, begin the next, and say so.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _on_signals(end_at_once, "SIGTERM", "SIGHUP")
-    threading.Thread(target=_wait_for_parent, daemon=True, name="chladni-parent").start()
-    for begin in then:
-        begin()
-
-
-def _wait_for_parent() -> None:
-    import multiprocessing
-
-    # The parent holds the other end of a pipe, which the system closes with it.
-    if (parent := multiprocessing.parent_process()) is not None:
-        parent.join()
-        end_at_once(signal.SIGTERM)
-
-
-def _on_signals(handler: Callable[[int, FrameType | None], object], *names: str) -> None:
+def on_signals(handler: Callable[[int, FrameType | None], object], *names: str) -> None:
+    """Have signals handled, where this system has them."""
     for name in names:
         number = getattr(signal, name, None)
         # What whoever started us ignores stays ignored: nohup, and what a shell runs in the background.

@@ -31,7 +31,7 @@ WAITS = {
 }
 WORKERS = """
 import os, sys, time
-from chladni.apps.blind import workers
+from chladni.apps.processes import workers
 def case(path):
     open(path, "w").write(str(os.getpid()))
     time.sleep(60)

@@ -4,7 +4,7 @@ import pytest
 
 from chladni.apps import blind
 from chladni.gap.blind.seal import seal_case
-from chladni.signals.errors import EstimateError, SetupError
+from chladni.signals.errors import EstimateError
 from tests.cli.conftest import Run
 
 
@@ -105,13 +105,3 @@ def test_a_file_in_the_place_of_the_folder_is_one_line(run: Run, tmp_path: Path,
     done = run("blind", "make", tmp_path / "file", "--count", 1, "--jobs", jobs)
     assert (done.code, done.err.count("\n")) == (2, 1)
     assert "is no folder" in done.err
-
-
-def test_jobs_below_one_are_refused() -> None:
-    with pytest.raises(SetupError, match="jobs 0"), blind.workers(0):
-        pass
-
-
-def test_one_job_is_this_process() -> None:
-    with blind.workers(1) as executor:
-        assert executor is None
