@@ -37,7 +37,7 @@ channel = "/a.acc"
 """
 #: The least denormal's neighbourhood, what squares lose at both ends, and what only sums or fourth powers lose.
 OUTSIDE = [1e-321, 1e-300, 1e-160, 1e-100, 1e-62, 1e61, 1e155, 1e306]
-INSIDE = [1e-59, 1e-40, 1e38, 1e57]
+INSIDE = [1e-59, *(pytest.param(size, marks=pytest.mark.nightly) for size in (1e-40, 1e38)), 1e57]
 
 Verb = Callable[[Path, Path, Path], list[object]]
 VERBS: dict[str, Verb] = {
@@ -93,7 +93,7 @@ def test_sizes_that_no_estimator_can_square_are_one_line(
     assert not (folder / "o.json").exists()
 
 
-@pytest.mark.parametrize("size", [1e-200, 1e153])
+@pytest.mark.parametrize("size", [pytest.param(1e-200, marks=pytest.mark.nightly), 1e153])
 def test_a_diagnosis_says_nothing_else(folder: Path, size: float) -> None:
     # As a program of its own: compiled libraries write to standard output themselves.
     command = ["gap", folder / "one.toml", write(folder / "log.mcap", size, size)]
