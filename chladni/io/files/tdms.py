@@ -27,8 +27,8 @@ from chladni.signals.time_series import NS_PER_S, is_sample_rate
 _UNITS: Final = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
 
 _MOST_SAID: Final = 3
-# Up to the length of a segment; its offset of raw data follows.
-_LEAD_IN: Final = struct.Struct("<12xQ")
+# The length of a segment stands before its offset of raw data.
+_LEAD_IN: Final = struct.Struct("<12xQ8x")
 _NEVER_CLOSED: Final = 2**64 - 1
 _Answer = TypeVar("_Answer")
 
@@ -98,7 +98,7 @@ def _behind_segments(file: BinaryIO, size: int) -> tuple[tuple[str, str], ...]:
             reason = "no whole segment; where bytes were added or lost, numbers before them may be wrong or missing"
             return ((f"{size - place} bytes at the end", reason),)
         (length,) = _LEAD_IN.unpack(head)
-        place = size if length == _NEVER_CLOSED else place + _LEAD_IN.size + 8 + length
+        place = size if length == _NEVER_CLOSED else place + _LEAD_IN.size + length
     return ()
 
 
@@ -210,8 +210,7 @@ def _waveform(properties: Mapping[str, Any]) -> tuple[float | None, int]:
     offset_ns = float(offset) * unit_ns if isinstance(offset, int | float | np.number) else 0.0
     start = properties.get("wf_start_time")
     # LabVIEW's clock begins in 1904: a start there is none. A date beyond what nanoseconds hold would wrap around.
-    begun = isinstance(start, np.datetime64) and start > np.datetime64(0, "s")
-    start_ns = int(start.astype("M8[us]").astype(np.int64)) * 1000 if begun else 0
+    start_ns = max(0, int(start.astype("M8[us]").astype(np.int64)) * 1000) if isinstance(start, np.datetime64) else 0
     if not start_ns + abs(offset_ns) < 2**62:
         raise LogError(f"begins at {start} and {offset} more (wf_start_offset), which isn't within 146 years of 1970")
     # The division leaves a rounding in the last digit, which a rate of few digits doesn't have.

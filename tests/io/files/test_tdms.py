@@ -168,7 +168,9 @@ def test_wrong_bytes_never_crash(tmp_path: Path) -> None:
     assert refused > 20
 
 
-@pytest.mark.parametrize("behind", [b"\x00" * 9, b"TDSm"])
+@pytest.mark.parametrize(
+    "behind", [b"\x00" * 9, b"TDSm", b"TDSm" + bytes(16), b"TDSm" + bytes([14, 0, 0, 0, 105, 18, 0, 0] + [9] * 15)]
+)
 def test_bytes_behind_the_last_segment_are_told(tmp_path: Path, behind: bytes) -> None:
     path = written(tmp_path / "a.tdms", ("daq", "x", SIGNAL, waveform()))
     assert read_tdms(path).unread == ()
