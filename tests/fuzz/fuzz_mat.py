@@ -10,6 +10,7 @@ import struct
 import sys
 import tempfile
 import zlib
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -60,16 +61,21 @@ def sounds() -> tuple[Sound, ...]:
         sound_file("packed times", "a.mat", mat5(True, t=times, acc=values), truth),
         sound_file("packed struct", "a.mat", mat5(True, run={"t": times, "acc": values, "who": "me"}), inside),
         sound_file("7.3", "a.mat", mat73(fs=100.0, acc=values), truth, vague=[rate, b"acc\0", b"fs\0"]),
-        sound_file(
-            "singles", "a.mat", mat5(False, fs=100.0, acc=singles), single,
-            unprotected=[np.asfortranarray(singles)], vague=plain["vague"],
-        ),
+        singles_file(singles, single, plain["vague"]),
         sound_file(
             "plain times", "a.mat", mat5(False, t=times, acc=values), truth,
             unprotected=[np.asfortranarray(values), times.reshape(-1, 1)], vague=[b"acc\0", b"t\0\0\0"],
         ),
     ]  # fmt: skip
     return tuple(found)
+
+
+def singles_file(singles: Any, truth: Truth, vague: list[bytes]) -> Sound:
+    """Write singles; arrays may be stored as other numbers than they are, so how these are stored stands but once."""
+    content = mat5(False, fs=100.0, acc=singles)
+    sound = sound_file("singles", "a.mat", content, truth, unprotected=[np.asfortranarray(singles)], vague=vague)
+    stored = content.index(struct.pack("<II", 7, singles.nbytes))
+    return replace(sound, vague=(*sound.vague, (stored, stored + 4)))
 
 
 def tag(kind: int, content: bytes) -> bytes:
