@@ -15,7 +15,7 @@ import sys, warnings, os, time
 sys.path.insert(0, {here!r})
 import harness
 from pathlib import Path
-harness.PROCESSOR_SECONDS, harness.SECONDS = 0.3, 2
+{limits}
 harness.MEMORY_BYTES = 300_000_000
 
 def read(path, case):
@@ -36,9 +36,9 @@ def harness(monkeypatch: pytest.MonkeyPatch):
     return importlib.import_module("harness")
 
 
-def worked(body: str, folder: Path) -> tuple[int, list[list[object]], str]:
+def worked(body: str, folder: Path, limits: str = "") -> tuple[int, list[list[object]], str]:
     """Run a worker on two inputs; give its exit code, what it told of each, and the rest of what it wrote."""
-    program = PROGRAM.format(here=str(HERE), body=body, folder=str(folder))
+    program = PROGRAM.format(here=str(HERE), body=body, folder=str(folder), limits=limits)
     found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     lines = found.stdout.splitlines()
     told = [json.loads(line) for line in lines if line.startswith("[")]
@@ -67,7 +67,7 @@ def test_what_becomes_of_an_input(body, outcome, kind, tmp_path):
 
 @pytest.mark.parametrize("body", ["while True: pass", "sum(range(10**12))", "time.sleep(60)", "os.abort()"])
 def test_an_input_that_ends_the_worker_leaves_a_trace(body, tmp_path):
-    code, told, trace = worked(body, tmp_path)
+    code, told, trace = worked(body, tmp_path, "harness.PROCESSOR_SECONDS, harness.SECONDS = 0.3, 2")
     assert code != 0
     assert told == []
     assert "in read" in trace
