@@ -109,7 +109,7 @@ def test_other_sizes_are_answered(run: Run, folder: Path, usual: Path, verb: str
     assert "nan" not in outcome.out.lower().replace("resonan", "")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(("force_size", "answer_size"), [(1e-20, 1e-20), (1.0, 1e-40)])
 def test_a_diagnosis_answers_though_log_and_model_are_worlds_apart(
     run: Run, folder: Path, usual: Path, force_size: float, answer_size: float

@@ -118,6 +118,7 @@ def written(pair: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -
     return tmp_path_factory.mktemp("wild"), tmp_path_factory.mktemp("plain")
 
 
+@pytest.mark.slow
 def test_every_command_prints_and_writes_harmless_names(
     run: Run, pair: tuple[Path, Path], written: tuple[Path, Path]
 ) -> None:

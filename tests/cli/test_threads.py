@@ -30,10 +30,15 @@ def program(folder: Path, threads: int, *command: object) -> dict[str, bytes]:
     "command",
     [
         ("modes", "arm.mcap", "--json", "out.json", "--csv", "out.csv"),
-        ("modes", "arm.mcap", "--operational", "--json", "out.json"),
-        ("frf", "arm.mcap", "--json", "out.json"),
-        ("simulate", "robot-arm", "--seconds", 2, "--noise", 0.01, "--out", "out.mcap", "--json", "out.json"),
-        ("convert", "arm.mcap", "out.mat", "--json", "out.json"),
+        *(
+            pytest.param(command, marks=pytest.mark.nightly)
+            for command in (
+                ("modes", "arm.mcap", "--operational", "--json", "out.json"),
+                ("frf", "arm.mcap", "--json", "out.json"),
+                ("simulate", "robot-arm", "--seconds", 2, "--noise", 0.01, "--out", "out.mcap", "--json", "out.json"),
+                ("convert", "arm.mcap", "out.mat", "--json", "out.json"),
+            )
+        ),
     ],
     ids=lambda command: " ".join(map(str, command[:3])),
 )

@@ -17,6 +17,7 @@ from tests.viewers.bench.serving import browsing, needs_chromium, open_page, run
 from tests.viewers.bench.stand_in import OSCILLATOR, tools
 
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
 ]
