@@ -159,8 +159,11 @@ def write_npz(
     content: dict[str, NDArray[Any]] = {"format": np.array(SERIES_FORMAT)}
     for number, part in enumerate(parts, start=1):
         content |= {f"series_{number}.{name}": array for name, array in series_fields(part).items()}
-    with atomic_write(path, overwrite=overwrite) as file:
-        np.savez_compressed(file, allow_pickle=False, **content)
+    # As np.savez_compressed writes; its older versions leave the archive open where the disk is full.
+    with atomic_write(path, overwrite=overwrite) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, array in content.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, array, allow_pickle=False)
     return ()
 
 
