@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.grid_buffer import GridBuffer
-from chladni.io.placement import Group
+from chladni.io.shared_grid import Group
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 

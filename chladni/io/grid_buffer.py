@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.placement import Group
+from chladni.io.shared_grid import Group
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 

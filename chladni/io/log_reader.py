@@ -13,15 +13,9 @@ from chladni.io.gathering import Gathering, LostMessages, gather, place_all, run
 from chladni.io.grid_blocks import BlockGrid, PlacedPiece, blocks_of, complete
 from chladni.io.grid_buffer import GridBuffer, grid_rows
 from chladni.io.mcap.container import McapContainer
-from chladni.io.placement import (
-    ALIGNED,
-    Group,
-    Placement,
-    StatedRate,
-    group_placements,
-    lowest_index,
-)
+from chladni.io.placement import Placement, StatedRate, lowest_index
 from chladni.io.repeats import digests_of
+from chladni.io.shared_grid import ALIGNED, Group, group_placements
 from chladni.io.stream import Piece, Stream, read_pieces
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError

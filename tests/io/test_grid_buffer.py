@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chladni.io.grid_buffer import GridBuffer
-from chladni.io.placement import Group
+from chladni.io.shared_grid import Group
 from chladni.signals.channel import Channel
 
 CHANNELS = tuple(Channel(name=name, unit="m/s^2") for name in "abc")

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 
 import chladni
-from chladni.io import catalog, placement, stream, topic
+from chladni.io import catalog, shared_grid, stream, topic
 from chladni.io.decoding.decoder import make_decoder
 from chladni.io.log import open_log
 from chladni.signals.errors import EstimateError, LogError
@@ -201,8 +201,8 @@ def test_streams_of_other_grids_are_not_compared_with_each_other(
             begin_ns = number * 3_600_000_000_000 if apart == "hours" else 0
             for place in range(8):
                 maker.write(channel, {"x": float(place % 3)}, START_NS + begin_ns + place * period_ns)
-    compared = Mock(side_effect=placement._moved_onto)
-    monkeypatch.setattr(placement, "_moved_onto", compared)
+    compared = Mock(side_effect=shared_grid._moved_onto)
+    monkeypatch.setattr(shared_grid, "_moved_onto", compared)
     with open_log(tmp_path / "a.mcap") as log:
         assert len(log.grids()) == streams
     # All with all would be 780.

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from chladni.signals.mode_set import ModeSet
     from chladni.signals.time_base import TimeBase
 
-# As for the topics of a log, see `chladni.io.placement`: points of one grid are never farther apart than this share
+# As for the topics of a log, see `chladni.io.shared_grid`: points of one grid are never farther apart than this share
 # of a period, and a grid isn't this many times as long as the samples on it.
 _ALIGNED, _SPARSE = 0.01, 100
 
