@@ -99,6 +99,12 @@ def test_late_messages_are_no_steps(seed: int) -> None:
     np.testing.assert_array_equal(message_index(grid(100.0, 4000)[order], base), order)
 
 
+def test_a_few_late_messages_among_many_lost_are_no_steps() -> None:
+    """They fill no hole where all is holes, but no clock is set back for one message."""
+    order = np.array([0, 1, 2, 4, 7, 8, 12, 13, 16, 18, 19, 20, 14, 21, 11, 15, 22, 23, 25, 27, 29, 33, 36, 37, 39])
+    assert find_clock_steps(grid(100.0, 40)[order]).count == 0
+
+
 def test_many_messages_that_fill_the_hole_they_left_are_late() -> None:
     # A buffer of twenty that is sent behind three later messages, as a second thread may.
     order = np.arange(600)
