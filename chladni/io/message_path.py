@@ -2,10 +2,13 @@
 
 import re
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import dataclass
+from math import isnan
 from typing import Literal
 
 from chladni.signals.errors import LogError
+from chladni.signals.text_reading import real_number
 from chladni.signals.visible import as_meant, visible
 from chladni.signals.wording import near_words
 
@@ -18,7 +21,6 @@ _FILTER = re.compile(
     r"""\{\s*(?P<field>[^\s=!<>{}"']+)\s*(?P<operator>==|!=|<=|>=|<|>)\s*"""
     r"""(?:"(?P<double>(?:[^"\\]|\\.)*)"|'(?P<single>(?:[^'\\]|\\.)*)'|(?P<bare>[^\s{}"']+))\s*\}"""
 )
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _INDEX_DIGITS = 18
 """Digits of an index that 64 bits hold."""
 
@@ -134,7 +136,7 @@ def quoted(name: str) -> str:
     >>> quoted("ch1"), quoted("top floor")
     ('ch1', '"top floor"')
     """
-    return name if _PLAIN_NAME.fullmatch(name) else _in_quotes(name)
+    return name if _PLAIN_NAME.fullmatch(name) else in_quotes(name)
 
 
 def topic_text(topic: str) -> str:
@@ -145,7 +147,7 @@ def topic_text(topic: str) -> str:
     >>> topic_text("/imu"), topic_text(r"/imu\x1b")
     ('/imu', '"/imu\\\\x1b"')
     """
-    return _in_quotes(topic) if "\\" in topic else topic
+    return in_quotes(topic) if "\\" in topic else topic
 
 
 def element_text(name: str) -> str:
@@ -157,10 +159,11 @@ def element_text(name: str) -> str:
     ('[elbow]', '["3"]', '["a]"]')
     """
     bare = _BRACKET.fullmatch(f"[{name}]")
-    return f"[{name}]" if bare and bare[4] == name and "\\" not in name else f"[{_in_quotes(name)}]"
+    return f"[{name}]" if bare and bare[4] == name and "\\" not in name else f"[{in_quotes(name)}]"
 
 
-def _in_quotes(name: str) -> str:
+def in_quotes(name: str) -> str:
+    """Write a name or a text in quotes, as paths read it."""
     escaped = name.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'
 
@@ -193,7 +196,7 @@ def _topic_of(text: str, topics: Collection[str]) -> tuple[str, int]:
 
 def _length_of(topic: str, text: str) -> int | None:
     """How much of a path is its topic, as it is or in quotes; None where it's another one."""
-    for written in (topic, quoted(topic), _in_quotes(topic)):
+    for written in (topic, quoted(topic), in_quotes(topic)):
         if text.startswith(written) and text[len(written) : len(written) + 1] in ("", ".", "[", "{"):
             return len(written)
     return None
@@ -216,14 +219,14 @@ def _next_step(text: str, position: int) -> tuple[Step, int]:
 
 
 def _bracket_step(text: str, found: re.Match[str]) -> Step:
-    index, everything, in_quotes, bare = found.groups()
+    index, everything, named, bare = found.groups()
     if index is not None:
         if len(index) > _INDEX_DIGITS:
             raise LogError(f"{text!r}: no array has an element {index[:20]}...")
         return IndexStep(index=int(index))
     if everything is not None:
         return IndexStep(index=None)
-    return KeyStep(name=bare if in_quotes is None else _unescaped(in_quotes))
+    return KeyStep(name=bare if named is None else _unescaped(named))
 
 
 def _filter_step(text: str, found: re.Match[str]) -> FilterStep:
@@ -238,11 +241,12 @@ def _filter_value(text: str, found: re.Match[str]) -> FilterValue:
     bare = found["bare"]
     if bare in ("true", "false"):
         return bare == "true"
-    if _NUMBER.fullmatch(bare) is None:
-        raise LogError(
-            f"{text!r}: {bare!r} in the filter is neither a number nor true or false; put text into quotes"
-        )
-    return float(bare)
+    with suppress(ValueError):
+        number = real_number(bare)
+        # Nothing compares with what is no number, and no message would be left.
+        if not isnan(number):
+            return number
+    raise LogError(f"{text!r}: {bare!r} in the filter is neither a number nor true or false; put text into quotes")
 
 
 def _unescaped(text: str) -> str:

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from chladni.io.decoding.columns import Column, Decoded, Strings
 from chladni.io.field_selector import ElementChoice, FieldFilter, FieldSelector
 from chladni.io.message_path import Operator
-
-_NAME_LENGTH = 60
-"""Characters of a name that a sentence holds: a message may call an element anything."""
+from chladni.signals.wording import shown
 
 _COMPARISONS: Mapping[Operator, Callable[[Any, Any], Any]] = {
     "==": operator.eq,
@@ -240,8 +238,9 @@ def _several(filters: Sequence[FieldFilter]) -> str:
 
 def _otherwise_called(selector: FieldSelector, names: Collection[str | None]) -> str:
     (one,) = names if len(names) == 1 else (None,)
-    told = "otherwise" if one is None else repr(one[:_NAME_LENGTH])
-    first = "nothing" if selector.called is None else repr(selector.called[:_NAME_LENGTH])
+    # A message may call an element anything.
+    told = "otherwise" if one is None else shown(one)
+    first = "nothing" if selector.called is None else shown(selector.called)
     return (
         f"element {selector.elements[-1]} of {selector.names_leaf} is called {told}, in the first messages {first}; "
         "read it by name"

@@ -22,7 +22,16 @@ from chladni.io.field_selector import (
 )
 from chladni.io.known_schemas import MAX_LISTED_ELEMENTS, has_signals, is_signal
 from chladni.io.loss import Unread
-from chladni.io.message_path import FieldStep, IndexStep, MessagePath, element_text, near_matches, quoted, topic_text
+from chladni.io.message_path import (
+    FieldStep,
+    IndexStep,
+    MessagePath,
+    element_text,
+    in_quotes,
+    near_matches,
+    quoted,
+    topic_text,
+)
 from chladni.io.publishers import at_once
 from chladni.io.selected_numbers import element_names, list_places, select
 from chladni.io.topic import Topic
@@ -294,8 +303,7 @@ class TopicChannels:
 
 
 def _written(frame: FieldFilter) -> str:
-    escaped = str(frame.value).replace("\\", "\\\\").replace('"', '\\"')
-    return f'{{{frame.leaf}=="{escaped}"}}'
+    return f"{{{frame.leaf}=={in_quotes(str(frame.value))}}}"
 
 
 def _with_indices(leaf: str, indices: tuple[int, ...]) -> str:

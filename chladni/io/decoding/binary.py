@@ -104,10 +104,10 @@ class BinaryDecoder:
     def __init__(self, record: Record, *, encapsulated: bool) -> None:
         self.record = record
         self._encapsulated = encapsulated
-        # Until messages tell another.
         # Channels that share the definition share its layouts, too.
         self._made = FormsOf(record)
         known = leaves(record)
+        # Until messages tell another.
         self._form = next(forms_of(record, "plain")) if encapsulated else ros1_form(record)
         # Last bit of the number in the header; None until messages tell.
         self._order: int | None = None

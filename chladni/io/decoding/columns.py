@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from chladni.signals.errors import LogError
+from chladni.signals.wording import near_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -252,9 +253,7 @@ def require_known(
         if unread and path in unread:
             raise LogError(f"{schema_name}: {path} {unread[path]}")
         if path not in known:
-            from difflib import get_close_matches
-
-            near = get_close_matches(path, known, n=3) or sorted(known)[:5]
+            near = near_words(path, (info.path for info in fields), count=3) or sorted(known)[:5]
             raise LogError(
                 f"{schema_name or 'message without schema'} has no field {path!r}; near: {', '.join(near) or 'none'}"
             )

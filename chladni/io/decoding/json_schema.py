@@ -12,6 +12,7 @@ import numpy as np
 from chladni.io.decoding.schema import MAX_NESTING, Array, FieldType, Member, Primitive, Record, Stamp, Text
 from chladni.io.message_path import quoted
 from chladni.signals.errors import LogError
+from chladni.signals.text_reading import real_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -29,9 +30,6 @@ DURATION: Final = Stamp(kind="duration", seconds=np.dtype(np.int64), nanoseconds
 LARGEST_EXACT: Final = 2**53
 """Largest number up to which a double holds every integer."""
 
-_NUMBER: Final = re.compile(
-    r"\s*[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|inf(?:inity)?)\s*", re.ASCII | re.IGNORECASE
-)
 _SURROGATES: Final = re.compile("[\ud800-\udfff]")
 _CONTAINERS: Final[dict[type, str]] = {list: "list", dict: "object"}
 _SCALARS: Final[dict[str, FieldType]] = {"number": FLOAT, "integer": INTEGER, "boolean": BOOLEAN, "string": Text()}
@@ -247,7 +245,10 @@ def number_in(text: str) -> float | None:
     >>> number_in("-0.5e3"), number_in("nan"), number_in("1_000"), number_in("0x1F"), number_in("n/a")
     (-500.0, nan, None, None, None)
     """
-    return float(text) if _NUMBER.fullmatch(text) else None
+    try:
+        return real_number(text)
+    except ValueError:
+        return None
 
 
 def _word(kind: FieldType) -> str:
