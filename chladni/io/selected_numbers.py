@@ -60,7 +60,6 @@ class Selected:
     lost: Mapping[str, int] = field(default_factory=dict)
 
 
-@np.errstate(invalid="ignore")  # a damaged number may be a NaN that signals
 def select(decoded: Decoded, selector: FieldSelector, wanted: NDArray[np.bool_]) -> Selected:
     """Take one number out of each message.
 

@@ -155,7 +155,7 @@ class _Near:
         )
         base = placement.time_base
         may = np.abs(rate_hz - base.rate_hz) <= RATES_ALIKE * rate_hz
-        if placement.counts is None:
+        if placement.counts is None and may.any():
             begin_s, end_s = _extent_s(Group.of(placement))
             together_s = np.maximum(last_s, end_s) - np.minimum(first_s, begin_s)
             # A hundredth for the clocks of two streams, by which the index of one on the grid of the other differs.

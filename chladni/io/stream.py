@@ -327,7 +327,8 @@ def read_pieces(
             for index in reader.streams:
                 piece = streams[index].piece(part, decoded, stretch=stretch, with_values=with_values)
                 yield index, counted.once(piece, streams[index])
-                decoded = replace(decoded, reasons={}, told={})
+                if decoded.reasons or decoded.told:
+                    decoded = replace(decoded, reasons={}, told={})
 
 
 class _Counted:

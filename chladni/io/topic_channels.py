@@ -242,6 +242,7 @@ class TopicChannels:
     def _with_name(self, selector: FieldSelector, called: tuple[str, ...]) -> FieldSelector:
         return replace(selector, called=called[0]) if len(called) == 1 else selector
 
+    @np.errstate(invalid="ignore")  # a damaged number may be a NaN that signals
     def _require_one_element(self, selector: FieldSelector, path: MessagePath) -> None:
         """Refuse filters that leave several elements, in most of the first messages."""
         if not selector.element_filters:
