@@ -21,7 +21,7 @@ _TITLE = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>.
 # "F / N" is how ISO 80000-1 heads a table, "F, N" how spreadsheets do.
 _DIVIDED = re.compile(r"^(?P<name>.*?\S)(?:\s+/\s*|\s*,\s+)(?P<unit>\S+)$")
 # Our own titles carry the start, so that a table keeps absolute time without a column of 19 digits.
-_TIME_FROM = re.compile(r"^(?P<unit>\w+) from (?P<start>-?\d{1,12}(\.\d{1,30})?)$", re.ASCII)
+_TIME_FROM = re.compile(r"^(?P<unit>\w+) from (?P<start>-?[0-9]{1,12}(\.[0-9]{1,30})?)$")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

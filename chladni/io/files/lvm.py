@@ -24,7 +24,7 @@ from chladni.io.files.time_text import read_time_text
 from chladni.signals.clock_verdict import round_rate
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.text_reading import lines_of, real_number
-from chladni.signals.time_series import NS_PER_S
+from chladni.signals.time_series import NS_PER_S, is_sample_rate
 
 _MAGIC: Final = "LabVIEW Measurement"
 _END: Final = "***End_of_Header***"
@@ -289,13 +289,16 @@ def _axis_unit(label: str) -> str:
 
 
 def _decimal(text: str) -> Decimal | None:
+    plain = text.strip().replace(",", ".")
     try:
-        plain = text.strip().replace(",", ".")
-        # No clock steps by less than a double tells from 0, or by decades.
-        believable = 1e-300 < abs(real_number(plain) or 1.0) < 1e9
+        number = real_number(plain)
     except ValueError:
         return None
-    return Decimal(plain) if believable else None
+    # No clock steps by decades.
+    if not abs(number) < 1e9:
+        return None
+    # What a double can't tell from 0 is 0: a decimal may have no room for its exponent.
+    return Decimal(plain) if number else Decimal(0)
 
 
 def _decimals(number: Decimal) -> int:
@@ -313,12 +316,12 @@ def _rate_hz(path: Path, steps: set[tuple[str, str]], options: TimeOptions) -> t
     step = _decimal(text)
     # Half of the last digit that is written is what the step may be off by.
     doubt = float(Decimal(5).scaleb(-_decimals(step) - 1) / step) if step else np.inf
-    if step is None or not 0 < doubt < _UNKNOWN_STEP:
+    rate_hz = NS_PER_S / (float(step) * NS_OF[_axis_unit(label)]) if step else 0.0
+    if not (0 < doubt < _UNKNOWN_STEP and is_sample_rate(rate_hz)):
         if options.rate_hz is None:
             raise SetupError(
                 f"{path}: has no axis of times, and the step {text!r} has too few digits to tell the rate; give the "
                 "sample rate (--rate HZ)"
             )
         return options.rate_hz, ""
-    rate_hz = NS_PER_S / (float(step) * NS_OF[_axis_unit(label)])
     return round_rate(rate_hz, max(doubt / 2, 4e-16) * rate_hz) or rate_hz, f"its step of {text}"

@@ -419,6 +419,13 @@ def test_a_name_that_a_spreadsheet_would_run_is_text_and_comes_back(tmp_path: Pa
     assert [channel.name for channel in read_csv(path).series[0].channels] == [name, "other"]
 
 
+@pytest.mark.parametrize(("unit", "step"), [("s", 0.01), ("ms", 10), ("us", 1e4), ("µs", 1e4), ("μs", 1e4)])
+def test_a_title_may_say_the_start_of_times_in_any_unit(tmp_path: Path, unit: str, step: float) -> None:
+    rows = "".join(f"{n * step},{n}\n" for n in range(50))
+    (series,) = read_csv(file_of(tmp_path, f"time [{unit} from 1700000000.5],a\n{rows}".encode())).series
+    assert (series.sample_rate_hz, series.start_time_ns) == (100.0, 1_700_000_000_500_000_000)
+
+
 def test_columns_that_are_shown_alike_are_told_apart(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("time [s],a\u200b,a\\u200b\n0,1,2\n1,3,4\n2,5,6\n", encoding="utf-8")

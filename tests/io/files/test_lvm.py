@@ -101,6 +101,18 @@ def test_a_step_of_too_few_digits_is_asked_about(tmp_path: Path) -> None:
     assert read_lvm(path, sample_rate_hz=51200.0).series[0].sample_rate_hz == 51200.0
 
 
+@pytest.mark.parametrize(
+    "number", [f"{sign}1.000000E{power}" for sign in ("", "-") for power in ("-315", "-400", "-99999999999999999999")]
+)
+def test_a_number_that_a_double_does_not_tell_from_zero_is_zero(tmp_path: Path, number: str) -> None:
+    path = lvm(tmp_path / "a.lvm", segment(number), of_file={"X_Columns": "No"})
+    with pytest.raises(SetupError, match="to tell the rate"):
+        read_lvm(path)
+    path = lvm(tmp_path / "a.lvm", segment("0.0050000000", X0=[number] * 2), of_file={"X_Columns": "No"})
+    (series,) = read_lvm(path).series
+    assert (series.sample_rate_hz, series.start_time_ns) == (200.0, START_NS)
+
+
 @pytest.mark.parametrize("columns", ["One", "No"])
 def test_segments_follow_one_another_in_time(tmp_path: Path, columns: str) -> None:
     axis = None if columns == "No" else np.arange(SAMPLES) / 200
