@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chladni.io.atomic import atomic_path
 from chladni.io.files.arrow_tables import arrow_table, is_text
-from chladni.io.files.bounds import Budget, TooLargeError
+from chladni.io.files.bounds import Budget
 from chladni.io.files.columns import Column, distinct, parse_titles
 from chladni.io.files.contents import FileContents, joined, one_line, one_series
 from chladni.io.files.named_arrays import rate_of_scalar
@@ -75,8 +75,6 @@ def read_arrow(
             own = _own(table, metadata.get("series", ""), str(path))
             return joined([told, FileContents(series=restated([own], units, where=str(path)))])
         columns, unread = _columns(table, metadata, budget)
-    except TooLargeError as error:
-        raise LogError(f"{path}: {error}") from error
     # Names and texts are decoded when they're looked at.
     except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError) as error:
         raise LogError(f"{path}: this Arrow file can't be read: {one_line(error)}") from error

@@ -35,12 +35,15 @@ class Budget:
 
     Attributes
     ----------
+    path
+        The file, which the refusal names.
     most
         Bytes that are allowed together.
     taken
         Bytes that were announced so far.
     """
 
+    path: Path
     most: int
     taken: int = 0
 
@@ -58,12 +61,12 @@ class Budget:
         if max_bytes is not None:
             if isinstance(max_bytes, bool) or not isinstance(max_bytes, int | float) or not 0 < max_bytes < 2**63:
                 raise SetupError(f"{path}: max_bytes {max_bytes!r:.40} must be a number of bytes above zero")
-            return cls(most=int(max_bytes))
+            return cls(path=path, most=int(max_bytes))
         try:
             size = path.stat().st_size
         except OSError as error:
             raise LogError(f"{path}: can't be read: {error.strerror or error}") from error
-        return cls(most=min(max(SMALL_BYTES, _PACKING * size), memory_bytes()))
+        return cls(path=path, most=min(max(SMALL_BYTES, _PACKING * size), memory_bytes()))
 
     def take(self, size: int) -> None:
         """Count bytes that are about to be taken.
@@ -74,18 +77,18 @@ class Budget:
             When it's more than is left.
         """
         self.taken += size
-        if self.taken > self.most:
-            raise TooLargeError(self.taken, self.most)
+        if self.taken <= self.most:
+            return
+        remedy = f"if it's sound, raise max_bytes to read it (--read max_bytes={memory_bytes()})"
+        if self.taken > memory_bytes():
+            remedy = "it's more than half of this machine's memory; read it on a larger one, or save it in parts"
+        raise TooLargeError(
+            f"{self.path}: its content takes {self.taken} bytes in memory or more, {self.most} are allowed; {remedy}"
+        )
 
 
 class TooLargeError(LogError):
     """The content of a file takes more memory than is allowed."""
-
-    def __init__(self, size: int, most: int) -> None:
-        remedy = f"if it's sound, raise max_bytes to read it (--read max_bytes={memory_bytes()})"
-        if size > memory_bytes():
-            remedy = "it's more than half of this machine's memory; read it on a larger one, or save it in parts"
-        super().__init__(f"its content takes {size} bytes in memory or more, {most} are allowed; {remedy}")
 
 
 def read_whole(path: Path) -> bytes:
@@ -96,11 +99,9 @@ def read_whole(path: Path) -> bytes:
     LogError
         When it can't be read, or is larger than this machine can hold.
     """
-    budget = Budget(most=memory_bytes())
+    budget = Budget(path=path, most=memory_bytes())
     try:
         budget.take(path.stat().st_size)
         return path.read_bytes()
     except OSError as error:
         raise LogError(f"{path}: can't be read: {error.strerror or error}") from error
-    except TooLargeError as error:
-        raise LogError(f"{path}: {error}") from error

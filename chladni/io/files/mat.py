@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from chladni.io.atomic import atomic_path
-from chladni.io.files.bounds import Budget, read_whole
+from chladni.io.files.bounds import Budget, TooLargeError, read_whole
 from chladni.io.files.contents import FileContents
 from chladni.io.files.mat_elements import HEADER_BYTES, Unreadable, read_mat_elements
 from chladni.io.files.mat_hdf5 import read_mat_hdf5
@@ -56,14 +56,16 @@ def read_mat(
         When nothing says the sample rate, or a unit is unknown.
     """
     path = Path(path)
-    most = Budget.of_file(path, max_bytes).most
+    budget = Budget.of_file(path, max_bytes)
     with open_regular(path, LogError) as file:
         header = file.read(HEADER_BYTES)
     try:
         if header.startswith((b"MATLAB 7.3", b"\x89HDF")):
-            variables = read_mat_hdf5(path, max_bytes=most)
+            variables = read_mat_hdf5(path, budget)
         else:
-            variables = read_mat_elements(read_whole(path), max_bytes=most)
+            variables = read_mat_elements(read_whole(path), budget)
+    except TooLargeError:
+        raise
     except LogError as error:
         raise LogError(f"{path}: this mat file can't be read: {error}") from error
     flat, unread = _flat(variables)

@@ -43,15 +43,15 @@ class Unreadable:
     reason: str
 
 
-def read_mat_elements(raw: bytes, *, max_bytes: int) -> dict[str, Any]:
+def read_mat_elements(raw: bytes, budget: Budget) -> dict[str, Any]:
     """Give the variables of a file.
 
     Parameters
     ----------
     raw
         The whole file.
-    max_bytes
-        Most bytes that the variables may take, together.
+    budget
+        Memory that the variables may take, together.
 
     Returns
     -------
@@ -62,13 +62,13 @@ def read_mat_elements(raw: bytes, *, max_bytes: int) -> dict[str, Any]:
     Raises
     ------
     LogError
-        When nothing can be read, or the variables unpack to more than `max_bytes`.
+        When nothing can be read, or the variables take more than the budget has.
     """
     if raw[126:128] not in (b"IM", b"MI"):
         raise LogError("it is no mat file of versions 5 to 7.3")
     order = "<" if raw[126:128] == b"IM" else ">"
     variables: dict[str, Any] = {}
-    place, limits = HEADER_BYTES, _Limits(memory=Budget(most=max_bytes))
+    place, limits = HEADER_BYTES, _Limits(memory=budget)
     while place + 8 <= len(raw):
         kind, length = struct.unpack_from(f"{order}II", raw, place)
         body = memoryview(raw)[place + 8 : place + 8 + length]

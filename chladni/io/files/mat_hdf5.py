@@ -25,13 +25,13 @@ _OPAQUE: Final = ("string", "datetime", "duration", "table", "timetable", "categ
 _DAMAGED: Final = (OSError, KeyError, ValueError, RuntimeError, TypeError, AttributeError)
 
 
-def read_mat_hdf5(path: Path, *, max_bytes: int) -> dict[str, Any]:
+def read_mat_hdf5(path: Path, budget: Budget) -> dict[str, Any]:
     """Give the variables of a file, in the form of `chladni.io.files.mat_elements.read_mat_elements`.
 
     Raises
     ------
     LogError
-        When h5py isn't installed, the file is damaged, or its variables take more than `max_bytes`.
+        When h5py isn't installed, the file is damaged, or its variables take more memory than the budget has.
     """
     try:
         import h5py
@@ -42,7 +42,7 @@ def read_mat_hdf5(path: Path, *, max_bytes: int) -> dict[str, Any]:
         ) from error
     try:
         with h5py.File(path, "r") as file:
-            variables: dict[str, Any] = _Reader(h5py, file, max_bytes).group(file, 0)
+            variables: dict[str, Any] = _Reader(h5py, file, budget).group(file, 0)
             return variables
     except _DAMAGED as error:
         raise LogError(f"its HDF5 structure is damaged ({one_line(error)})") from error
@@ -51,10 +51,10 @@ def read_mat_hdf5(path: Path, *, max_bytes: int) -> dict[str, Any]:
 class _Reader:
     """Walks over the groups and datasets of one file."""
 
-    def __init__(self, h5py: Any, file: Any, max_bytes: int) -> None:
+    def __init__(self, h5py: Any, file: Any, budget: Budget) -> None:
         self._h5py = h5py
         self._file = file
-        self._memory = Budget(most=max_bytes)
+        self._memory = budget
         self._objects = 0
         self._groups = {self._address(file)}
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.atomic import atomic_write
-from chladni.io.files.bounds import Budget, TooLargeError
+from chladni.io.files.bounds import Budget
 from chladni.io.files.contents import FileContents, one_line
 from chladni.io.files.named_arrays import series_of_arrays
 from chladni.io.files.series_fields import SERIES_FORMAT, restated, series_fields, series_of_fields
@@ -124,7 +124,7 @@ def read_npy(
             shape, dtype = _header(file)
             held = path.stat().st_size - file.tell()
             size = _size_held(str(path), shape, dtype, held)
-            _take(str(path), Budget.of_file(path, max_bytes), size)
+            Budget.of_file(path, max_bytes).take(size)
         array = np.load(path, allow_pickle=False)
     except _DAMAGED as error:
         raise LogError(f"{path}: this npy file can't be read: {one_line(error)}") from error
@@ -193,7 +193,7 @@ def _wanted(path: Path, archive: zipfile.ZipFile, budget: Budget) -> tuple[list[
         if len(shape) > _MOST_AXES or dtype.kind not in _READ_KINDS:
             unread.append((name, f"{dtype} {shape}, which are no samples"))
             continue
-        _take(where, budget, size)
+        budget.take(size)
         wanted.append(name)
     return wanted, tuple(unread)
 
@@ -207,13 +207,6 @@ def _size_held(where: str, shape: tuple[int, ...], dtype: np.dtype[Any], held: i
     if min(shape, default=0) < 0 or size > held:
         raise LogError(f"{where} announces {size} bytes and holds {held}")
     return size
-
-
-def _take(where: str, budget: Budget, size: int) -> None:
-    try:
-        budget.take(size)
-    except TooLargeError as error:
-        raise LogError(f"{where}: {error}") from error
 
 
 def _header(file: Any) -> tuple[tuple[int, ...], np.dtype[Any]]:

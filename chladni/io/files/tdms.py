@@ -12,7 +12,7 @@ from typing import Any, BinaryIO, Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.files.bounds import Budget, TooLargeError
+from chladni.io.files.bounds import Budget
 from chladni.io.files.columns import Column
 from chladni.io.files.contents import FileContents, one_line, with_notes
 from chladni.io.files.table import Part, series_of_parts
@@ -158,7 +158,7 @@ def _channels(path: Path, file: Any, budget: Budget) -> tuple[list[_Channel], tu
             raise LogError(f"{path}: {name!r} announces {length} numbers, the file has {size} bytes")
         reason = _why_unread(dtype, length, channel.properties)
         if not reason:
-            _take(path, budget, 8 * length)
+            budget.take(8 * length)
         try:
             numbers = np.empty(0) if reason else _answer(path, partial(_values, channel))
             rate_hz, start_ns = (None, 0) if reason else _waveform(channel.properties)
@@ -171,13 +171,6 @@ def _channels(path: Path, file: Any, budget: Budget) -> tuple[list[_Channel], tu
         column = Column(name=name, numbers=numbers, unit=said)
         channels.append(_Channel(column=column, group=group, rate_hz=rate_hz, start_ns=start_ns))
     return channels, tuple(unread)
-
-
-def _take(path: Path, budget: Budget, size: int) -> None:
-    try:
-        budget.take(size)
-    except TooLargeError as error:
-        raise LogError(f"{path}: {error}") from error
 
 
 def _values(channel: Any) -> NDArray[Any]:

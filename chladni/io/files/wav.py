@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.atomic import atomic_write
-from chladni.io.files.bounds import Budget, TooLargeError, memory_bytes
+from chladni.io.files.bounds import Budget, memory_bytes
 from chladni.io.files.contents import FileContents, one_series, require_no_gaps, series_of_rows, unit_of
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
@@ -65,11 +65,8 @@ def read_wav(
     from chladni.signals.units import parse_quantity
 
     path = Path(path)
-    try:
-        with path.open("rb") as file:
-            encoding, frames, notes, unread = _sound(path, file)
-    except TooLargeError as error:
-        raise LogError(f"{path}: {error}") from error
+    with path.open("rb") as file:
+        encoding, frames, notes, unread = _sound(path, file)
     scale, scale_unit = parse_quantity(full_scale)
     values = _fractions(frames).T
     if scale != 1.0:
@@ -224,7 +221,7 @@ def _sound(
                 (length,) = struct.unpack("<Q", sizes[8:16])
                 chunk = replace(chunk, length=length, next=chunk.start + length + length % 2)
             there, notes, unread = _extent(path, container, chunk)
-            frames = _frames(file, chunk.start, there, encoding)
+            frames = _frames(path, file, chunk.start, there, encoding)
             if frames.size:
                 told = (f"{path}: {encoding.doubt}.",) if encoding.doubt else ()
                 return encoding, frames, (*told, *notes), unread
@@ -276,10 +273,10 @@ def _extent(
     return chunk.length, (), ((f"{behind} bytes at the end", "they lie behind the samples that the file announces"),)
 
 
-def _frames(file: IO[bytes], start: int, length: int, encoding: _Encoding) -> NDArray[Any]:
+def _frames(path: Path, file: IO[bytes], start: int, length: int, encoding: _Encoding) -> NDArray[Any]:
     """Read whole frames, ``[frame, channel]``, integers of three bytes widened to four."""
     frames = length // (encoding.channels * encoding.width)
-    Budget(most=memory_bytes()).take(8 * frames * encoding.channels)
+    Budget(path=path, most=memory_bytes()).take(8 * frames * encoding.channels)
     file.seek(start)
     raw = np.fromfile(file, dtype=np.uint8, count=frames * encoding.channels * encoding.width)
     if encoding.width == 3:

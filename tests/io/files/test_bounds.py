@@ -71,7 +71,9 @@ def test_bombs_are_refused_before_memory_is_taken(tmp_path: Path, bomb: str) -> 
     assert path.stat().st_size < ZEROS // 64
     before = pa.total_allocated_bytes()
     tracemalloc.start()
-    with pytest.raises(LogError, match=r"takes \d+ bytes in memory or more, \d+ are allowed; .*--read max_bytes="):
+    with pytest.raises(
+        LogError, match=rf"^{path}: its content takes \d+ bytes in .*, \d+ are allowed; .*--read max_bytes="
+    ):
         read_file(path, sample_rate_hz=1.0)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
@@ -108,9 +110,9 @@ def test_an_impossible_limit_is_refused(tmp_path: Path, wrong: object) -> None:
 
 
 def test_a_budget_is_used_up() -> None:
-    budget = Budget(most=10)
+    budget = Budget(path=Path("a.mat"), most=10)
     budget.take(10)
-    with pytest.raises(TooLargeError, match="takes 11 bytes in memory or more, 10 are allowed"):
+    with pytest.raises(TooLargeError, match=r"^a\.mat: its content takes 11 bytes in memory or more, 10 are allowed"):
         budget.take(1)
 
 

@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import loadmat, savemat
 
+from chladni.io.files.bounds import Budget
 from chladni.io.files.mat import read_mat, write_mat
 from chladni.io.files.mat_elements import read_mat_elements
 from chladni.io.files.npz import read_npz, write_npz
@@ -275,7 +276,7 @@ def test_mat_elements_agree_with_scipy(tmp_path: Path) -> None:
     }
     for compressed in (False, True):
         savemat(tmp_path / "a.mat", variables, do_compression=compressed)
-        found = read_mat_elements((tmp_path / "a.mat").read_bytes(), max_bytes=10**6)
+        found = read_mat_elements((tmp_path / "a.mat").read_bytes(), Budget(path=tmp_path, most=10**6))
         expected = loadmat(tmp_path / "a.mat", simplify_cells=True)
         assert list(found) == list(variables)
         for name in ("whole", "single", "cube", "complex", "flags"):
@@ -286,17 +287,18 @@ def test_mat_elements_agree_with_scipy(tmp_path: Path) -> None:
 
 
 def test_big_endian_files_and_struct_arrays() -> None:
+    budget = Budget(path=Path("a.mat"), most=100)
     dimensions = struct.pack(">II2i", 5, 8, 1, 2)
     body = struct.pack(">IIII", 6, 8, 7, 0) + dimensions + struct.pack(">HH4s", 1, 1, b"y\0\0\0")
     body += struct.pack(">II2f", 7, 8, 1.5, -2.0)
     big = b"MATLAB".ljust(124) + b"\x01\x00MI" + struct.pack(">II", 14, len(body)) + body
-    np.testing.assert_array_equal(read_mat_elements(big, max_bytes=100)["y"], [1.5, -2.0])
+    np.testing.assert_array_equal(read_mat_elements(big, budget)["y"], [1.5, -2.0])
     rows = mat_file(
         matrix(
             2, element(5, struct.pack("<i", 4)), element(1, b"a\0\0\0"), matrix(6, ONE), matrix(6, ONE), shape=(1, 2)
         )
     )
-    assert read_mat_elements(rows, max_bytes=100) == {"x": [{"a": 1.5}, {"a": 1.5}]}
+    assert read_mat_elements(rows, budget) == {"x": [{"a": 1.5}, {"a": 1.5}]}
 
 
 @pytest.mark.parametrize("kind", KINDS)
