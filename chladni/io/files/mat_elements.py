@@ -81,7 +81,7 @@ def read_mat_elements(raw: bytes, budget: Budget) -> dict[str, Any]:
             if kind == _MATRIX and len(body):
                 name, content = _Matrix(body=body, order=order, limits=limits).read()
                 variables[name] = content
-            elif kind != _MATRIX and any(body):
+            elif kind != _MATRIX and _holds_any(body):
                 variables[f"element {len(variables) + 1}"] = Unreadable(
                     reason=f"of the type {kind}, which is no array"
                 )
@@ -89,7 +89,7 @@ def read_mat_elements(raw: bytes, budget: Budget) -> dict[str, Any]:
             raise
         except LogError as error:
             variables[f"variable {len(variables) + 1}"] = Unreadable(reason=str(error))
-    if any(raw[place:]):
+    if _holds_any(memoryview(raw)[place:]):
         reason = "they belong to no variable; where bytes were added, the numbers behind them are wrong"
         variables[f"{len(raw) - place} bytes at the end"] = Unreadable(reason=reason)
     read = [content for content in variables.values() if not isinstance(content, Unreadable)]
@@ -102,6 +102,11 @@ def read_mat_elements(raw: bytes, budget: Budget) -> dict[str, Any]:
 def _require_whole(body: memoryview, length: int) -> None:
     if len(body) < length:
         raise LogError(f"a variable claims {length} bytes, {len(body)} are there; it's cut short")
+
+
+def _holds_any(part: memoryview) -> bool:
+    """Whether bytes are more than padding."""
+    return bool(np.frombuffer(part, np.uint8).any())
 
 
 def _unpacked(packed: memoryview, order: str, memory: Budget) -> memoryview:
@@ -194,7 +199,7 @@ class _Matrix:
         kind = flags & 0xFF
         if kind in _NUMERIC:
             array = self._array(_NUMERIC[kind], shape, is_complex=bool(flags & _COMPLEX))
-            if any(self.body[self.place :]):
+            if _holds_any(self.body[self.place :]):
                 raise LogError("an array has bytes behind its numbers; where they were added, others are wrong")
             return array
         if kind == _CHAR:

@@ -165,6 +165,20 @@ def test_the_size_is_checked_before_memory_is_taken(tmp_path: Path) -> None:
         read_arrow(path, sample_rate_hz=1.0, max_bytes=1_000_000)
 
 
+def test_a_page_of_parquet_whose_checksum_is_wrong_costs_its_column(tmp_path: Path) -> None:
+    table = pa.table({"x": SIGNAL, "y": SIGNAL + 2})
+    path = tmp_path / "a.parquet"
+    parquet.write_table(
+        table, path, write_page_checksum=True, compression="none", use_dictionary=False, write_statistics=False
+    )
+    raw = bytearray(path.read_bytes())
+    raw[raw.index(SIGNAL.tobytes()) + 8] ^= 1
+    path.write_bytes(raw)
+    contents = read_arrow(path, sample_rate_hz=1.0)
+    np.testing.assert_array_equal(contents.series[0].values, [SIGNAL + 2])
+    assert [name for name, _ in contents.unread] == ["x"]
+
+
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_garbage_is_one_line(tmp_path: Path, suffix: str) -> None:
     (tmp_path / f"a{suffix}").write_bytes(b"not at all " * 30)

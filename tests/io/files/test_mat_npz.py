@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from scipy.io import loadmat, savemat
 
 from chladni.io.files.bounds import Budget
+from chladni.io.files.formats import read_file
 from chladni.io.files.mat import read_mat, write_mat
 from chladni.io.files.mat_elements import read_mat_elements
 from chladni.io.files.npz import read_npz, write_npz
@@ -260,6 +261,40 @@ def test_bad_mat_files(tmp_path: Path, content: bytes, match: str) -> None:
     (tmp_path / "a.mat").write_bytes(content)
     with pytest.raises(LogError, match=match):
         read_mat(tmp_path / "a.mat")
+
+
+NUMBERS = element(9, np.arange(20.0).tobytes())
+WHOLE = mat_file(matrix(6, NUMBERS, shape=(1, 20)))
+NPY = (
+    np.lib.format.magic(1, 0)
+    + struct.pack("<H", 118)
+    + (b"{'descr': '<f8', 'fortran_order': False, 'shape': (20,), }".ljust(117) + b"\n" + np.arange(20.0).tobytes())
+)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "content", "told"),
+    [
+        (".npy", NPY, None),
+        (".npy", NPY + b"\x00", "1 bytes at the end"),
+        (".npy", NPY + b"\x01" * 9, "9 bytes at the end"),
+        (".mat", WHOLE, None),
+        (".mat", WHOLE + bytes(5), None),
+        (".mat", WHOLE + b"\x00\x01\x00", "3 bytes at the end"),
+        (".mat", WHOLE + element(1, b"\x00"), None),
+        (".mat", WHOLE + element(1, b"\x00\x01"), "element 2"),
+        (".mat", WHOLE + matrix(6, NUMBERS, bytes(8), shape=(1, 20)), None),
+        (".mat", WHOLE + matrix(6, NUMBERS, element(9, b"\x01"), shape=(1, 20)), "variable 2"),
+    ],
+)
+def test_bytes_that_belong_to_no_array_are_told(
+    tmp_path: Path, suffix: str, content: bytes, told: str | None
+) -> None:
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(content)
+    contents = read_file(path, sample_rate_hz=1.0)
+    np.testing.assert_array_equal(contents.series[0].values, [np.arange(20.0)])
+    assert [name for name, _ in contents.unread] == ([] if told is None else [told])
 
 
 def test_mat_elements_agree_with_scipy(tmp_path: Path) -> None:
