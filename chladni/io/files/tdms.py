@@ -27,8 +27,9 @@ from chladni.signals.time_series import NS_PER_S, is_sample_rate
 _UNITS: Final = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
 
 _MOST_SAID: Final = 3
-# The length of a segment stands before its offset of raw data.
-_LEAD_IN: Final = struct.Struct("<12xQ8x")
+# Tag, flags, version, length, offset of raw data; a flag says that the numbers behind it have their high byte first.
+_LEAD_IN_BYTES: Final = 28
+_BIG_ENDIAN: Final = 64
 _NEVER_CLOSED: Final = 2**64 - 1
 _Answer = TypeVar("_Answer")
 
@@ -93,12 +94,12 @@ def _behind_segments(file: BinaryIO, size: int) -> tuple[tuple[str, str], ...]:
     place = 0
     while place < size:
         file.seek(place)
-        head = file.read(_LEAD_IN.size)
-        if len(head) < _LEAD_IN.size or not head.startswith(b"TDSm"):
+        head = file.read(_LEAD_IN_BYTES)
+        if len(head) < _LEAD_IN_BYTES or not head.startswith(b"TDSm"):
             reason = "no whole segment; where bytes were added or lost, numbers before them may be wrong or missing"
             return ((f"{size - place} bytes at the end", reason),)
-        (length,) = _LEAD_IN.unpack(head)
-        place = size if length == _NEVER_CLOSED else place + _LEAD_IN.size + length
+        (length,) = struct.unpack_from(">Q" if head[4] & _BIG_ENDIAN else "<Q", head, 12)
+        place = size if length == _NEVER_CLOSED else place + _LEAD_IN_BYTES + length
     return ()
 
 
@@ -139,6 +140,7 @@ def _answer(where: object, call: Callable[[], _Answer]) -> _Answer:
     """Ask nptdms, which believes lengths and types of the file, and raises whatever comes of wrong ones."""
     try:
         return call()
+    # No narrower: nptdms itself raises `Exception`, as for strain gauges and mixtures of DAQmx data that it refuses.
     except Exception as error:
         raise LogError(f"{where}: this TDMS file can't be read: {one_line(error)}") from error
 

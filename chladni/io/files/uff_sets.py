@@ -292,8 +292,8 @@ def append_datasets(path: Path, datasets: list[Dataset]) -> None:
 def _write_one(file: "pyuff.UFF", dataset: Dataset) -> None:
     try:
         file.write_sets(dataset, mode="add")
+    # No narrower: pyuff raises `Exception`, behind which it hides what the operating system says, and signals.
     except Exception as error:
-        # Pyuff hides what the operating system says, and signals, behind an error of no kind.
         if isinstance(error.__context__, (OSError, KeyboardInterrupt, SystemExit)):
             raise error.__context__ from None
         raise

@@ -1,5 +1,6 @@
 """TDMS files as LabVIEW writes them, made by nptdms."""
 
+import struct
 import sys
 from pathlib import Path
 
@@ -168,14 +169,32 @@ def test_wrong_bytes_never_crash(tmp_path: Path) -> None:
     assert refused > 20
 
 
+def big_endian() -> bytes:
+    """One segment as LabVIEW writes it on machines whose numbers have their high byte first."""
+
+    def text(written: str) -> bytes:
+        return struct.pack(">I", len(written)) + written.encode()
+
+    data = SIGNAL.astype(">f8").tobytes()
+    channel = text("/'daq'/'x'") + struct.pack(">IIIQ", 20, 10, 1, SAMPLES)
+    described = struct.pack(">I", 1) + channel + struct.pack(">I", 1) + text("wf_increment")
+    described += struct.pack(">Id", 10, 0.005)
+    # New objects, metadata and raw data in it; all numbers from here on are big endian.
+    flags = struct.pack("<I", 2 | 4 | 8 | 64)
+    lengths = struct.pack(">IQQ", 4713, len(described) + len(data), len(described))
+    return b"TDSm" + flags + lengths + described + data
+
+
 @pytest.mark.parametrize(
     "behind", [b"\x00" * 9, b"TDSm", b"TDSm" + bytes(16), b"TDSm" + bytes([14, 0, 0, 0, 105, 18, 0, 0] + [9] * 15)]
 )
 def test_bytes_behind_the_last_segment_are_told(tmp_path: Path, behind: bytes) -> None:
-    path = written(tmp_path / "a.tdms", ("daq", "x", SIGNAL, waveform()))
-    assert read_tdms(path).unread == ()
-    path.write_bytes(path.read_bytes() + behind)
-    assert f"{len(behind)} bytes at the end" in dict(read_tdms(path).unread)
+    sound = written(tmp_path / "a.tdms", ("daq", "x", SIGNAL, waveform())).read_bytes()
+    for whole in (sound, sound * 2, big_endian(), big_endian() * 2):
+        (tmp_path / "a.tdms").write_bytes(whole)
+        assert read_tdms(tmp_path / "a.tdms").unread == ()
+        (tmp_path / "a.tdms").write_bytes(whole + behind)
+        assert f"{len(behind)} bytes at the end" in dict(read_tdms(tmp_path / "a.tdms").unread)
 
 
 @pytest.mark.parametrize(
