@@ -1,6 +1,5 @@
 """Which column holds the times and what its numbers count: one mechanism, whatever the file."""
 
-import contextlib
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -315,15 +314,28 @@ def test_names_that_are_no_times(name: str) -> None:
     assert not is_time_name(name)
 
 
-@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64, np.longdouble])
+def largest(path: Path, dtype: type, name: str) -> Path:
+    """Times as large as their kind of number holds."""
+    numbers = np.array([-1, 0, 0.5, 1, 1], dtype) * np.finfo(dtype).max
+    return npz(path, {name: numbers, "nsec": numbers * 0, "x": np.arange(5.0)})
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.longdouble])
 @pytest.mark.parametrize("name", ["t", "t_ns", "date", "sec", "index"])
 def test_numbers_as_large_as_their_kind_holds_are_no_time_and_no_warning(
     tmp_path: Path, dtype: type, name: str
 ) -> None:
-    numbers = np.array([-1, 0, 0.5, 1, 1], dtype) * np.finfo(dtype).max
-    with contextlib.suppress(ChladniError):
-        npz(tmp_path / "a.npz", {name: numbers, "nsec": numbers * 0, "x": np.arange(5.0)})
-        read_file(tmp_path / "a.npz")
+    path = largest(tmp_path / "a.npz", dtype, name)
+    told = "has no unit|within 146 years of 1970|don't make a sampled signal|nothing says the sample rate"
+    with pytest.raises(ChladniError, match=told):
+        read_file(path)
+
+
+@pytest.mark.parametrize(("name", "second"), [("t_ns", 1e9), ("sec", 1.0)])
+def test_the_largest_numbers_of_half_precision_are_times(tmp_path: Path, name: str, second: float) -> None:
+    # Five rows over twice 65 504.
+    (series,) = read_file(largest(tmp_path / "a.npz", np.float16, name)).series
+    assert series.sample_rate_hz == pytest.approx(4 / (2 * 65504) * second)
 
 
 @pytest.mark.parametrize("dtype", [np.float16, np.float32])
