@@ -121,8 +121,6 @@ def _require_paths(source: Path, target: Path, *, overwrite: bool) -> None:
     written = (MCAP, *WRITTEN_SUFFIXES)
     if target.suffix.lower() not in written:
         raise SetupError(f"{target}: the suffix {target.suffix!r} isn't written; supported are {', '.join(written)}")
-    if not source.exists():
-        raise LogError(f"{source}: no such file")
     require_regular(source, LogError)
     # Said before the question of overwriting, whose answer would destroy the source.
     if Place.of(target).is_same(Place.of(source)):

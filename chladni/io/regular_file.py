@@ -36,6 +36,8 @@ def require_regular(path: Path, kind: type[ChladniError]) -> None:
     """Refuse what isn't there, or is no regular file, as `open_regular` does."""
     try:
         mode = path.stat().st_mode
+    except FileNotFoundError:
+        raise kind(f"{path}: no such file") from None
     except (OSError, ValueError) as error:
         # A name may hold what no file's does.
         raise kind(f"{path}: can't be read: {getattr(error, 'strerror', None) or error}") from None

@@ -61,7 +61,7 @@ def test_rows_need_an_instrument() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (None, "rows.csv: can't be read"),
+        (None, "rows.csv: no such file"),
         ("name,colour\na,3\n", "colour"),
         ("name,active_area [kg]\na,3\n", "kg"),
         ("name,active_area\na,nan\n", "nan"),

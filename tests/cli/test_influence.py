@@ -91,7 +91,7 @@ def test_figures_are_written(run: Run, tmp_path: Path) -> None:
     ("arguments", "words"),
     [
         (["no-such-thing"], "no instrument of this name; instruments: pneumatic-motor"),
-        (["missing.toml"], "missing.toml: can't be read"),
+        (["missing.toml"], "missing.toml: no such file"),
         (["pneumatic-motor", "--set", "activ_area=1"], "did you mean active_area?"),
         (["pneumatic-motor", "--set", "active_area"], "not of the form NAME=VALUE"),
         (["pneumatic-motor", "--set", "active_area=3 kg"], "is in kg, the parameter in m^2"),

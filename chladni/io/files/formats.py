@@ -15,7 +15,6 @@ The contract of a reader, which every command relies on::
 A writer is ``writer(series, path, *, overwrite, **options) -> losses``.
 """
 
-import os
 import re
 from collections.abc import Callable
 from inspect import signature
@@ -135,8 +134,6 @@ def read_file(path: Path | str, *, kind: str | None = None, **options: Any) -> F
         When the suffix isn't known, an option isn't, or an option is missing.
     """
     reader = reader_of(f"a{kind}" if kind else path)
-    if not os.path.exists(path):  # noqa: PTH110  # the method raises for names that no file has
-        raise LogError(f"{path}: no such file")
     require_regular(Path(path), LogError)
     try:
         contents: FileContents = call_with_options(reader, Path(path), options)

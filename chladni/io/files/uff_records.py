@@ -138,8 +138,6 @@ def open_uff(path: Path) -> UniversalFile:
     LogError
         When there is no file, or no dataset in it.
     """
-    if not path.exists():
-        raise LogError(f"{path}: no such file")
     require_regular(path, LogError)
     content = read_whole(path)
     spans = tuple(_spans(content))
