@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from chladni.gap.blind import documents
@@ -108,32 +109,26 @@ class Mark:
         return self.naive is not None and self.naive[0] in [effect for effect, _ in self.hidden]
 
 
-def mark(name: str, truth: Mapping[str, Any], result: Mapping[str, Any]) -> Mark:
+def mark(name: str, truth: Mapping[str, Any], result: Mapping[str, Any], *, path: Path | None = None) -> Mark:
     """Hold an answer against the truth.
 
     Parameters
     ----------
     result
         ``chladni.gap/1``; anything else is a failed diagnosis.
+    path
+        The file of the result, which a refusal names; the case where there is none.
 
     Raises
     ------
     SetupError
         When truth or answer break their format, with the key.
     """
-    return _marked(name, truth_read(truth, name), result_read(result, name))
-
-
-def truth_read(content: Mapping[str, Any], where: str) -> Truth:
-    """Give a truth as what a score goes by; `SetupError` when it breaks its format."""
-    return read_as(Truth, content, where, "seal a whole truth")
-
-
-def result_read(content: Mapping[str, Any], where: str) -> Result | None:
-    """Give an answer as what a score goes by, None of a failed diagnosis; `SetupError` when it breaks its format."""
-    if content.get("format") != RESULT_FORMAT:
-        return None
-    return read_as(Result, content, where, "remove this result, and run the case again")
+    hidden = read_as(Truth, truth, name, "seal a whole truth")
+    answer = None
+    if result.get("format") == RESULT_FORMAT:
+        answer = read_as(Result, result, str(path or name), "remove this result, and run the case again")
+    return _marked(name, hidden, answer)
 
 
 def _marked(name: str, truth: Truth, result: Result | None) -> Mark:

@@ -11,7 +11,7 @@ import numpy as np
 from chladni.gap.blind.case_folder import case_folders, read_json, truth_of_case
 from chladni.gap.blind.documents import RESULT_FORMAT
 from chladni.gap.blind.intervals import Share, calibration_error, reliability, share_of
-from chladni.gap.blind.marking import FAILED, Mark, mark, result_read
+from chladni.gap.blind.marking import FAILED, Mark, mark
 from chladni.gap.blind.run import FAILURE_FORMAT
 from chladni.gap.blind.seal import write_json
 from chladni.gap.blind.vocabulary import FAMILY_OF
@@ -42,7 +42,8 @@ def score_cases(directory: Path) -> dict[str, Any]:
         truth = truth_of_case(directory, case)
         path = directory / "results" / f"{case.name}.json"
         if path.is_file():
-            marks.append(mark(case.name, truth, _result(path)))
+            result = read_json(path, RESULT_FORMAT, FAILURE_FORMAT)
+            marks.append(mark(case.name, truth, result, path=path))
         else:
             missing.append(case.name)
     if not marks:
@@ -50,13 +51,6 @@ def score_cases(directory: Path) -> dict[str, Any]:
     score = scored(marks) | {"missing": missing}
     write_json(directory / "score.json", score)
     return score
-
-
-def _result(path: Path) -> dict[str, Any]:
-    content = read_json(path, RESULT_FORMAT, FAILURE_FORMAT)
-    # Here, where the file can be named.
-    result_read(content, str(path))
-    return content
 
 
 def scored(marks: Sequence[Mark]) -> dict[str, Any]:
