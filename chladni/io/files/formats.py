@@ -137,6 +137,8 @@ def read_file(path: Path | str, *, kind: str | None = None, **options: Any) -> F
     require_regular(Path(path), LogError)
     try:
         contents: FileContents = call_with_options(reader, Path(path), options)
+    except OSError as error:
+        raise LogError(f"{path}: can't be read: {error.strerror or error}") from error
     except MemoryError as error:
         raise LogError(f"{path}: takes more memory than there is; save it in parts, and read these") from error
     return contents

@@ -76,3 +76,12 @@ def test_no_kind_of_file_waits_for_a_pipe(tmp_path: Path, suffix: str) -> None:
     os.mkfifo(path)
     with pytest.raises(LogError, match=rf"a\{suffix}: is a named pipe; files alone are read"):
         read_file(path)
+
+
+@pytest.mark.skipif(not Path("/proc/self/mem").exists(), reason="needs a file that no byte can be read of")
+@pytest.mark.parametrize("suffix", FILE_SUFFIXES)
+def test_what_the_operating_system_refuses_is_told_with_the_file(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    path.symlink_to("/proc/self/mem")
+    with pytest.raises(LogError, match=rf"a\{suffix}: .*can't be read"):
+        read_file(path)
