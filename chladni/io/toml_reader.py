@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 import tomllib
 from typing import TYPE_CHECKING, Any, Final
 
@@ -27,7 +28,6 @@ MAX_MISTAKES: Final = 50
 # Deep enough for any setup or model; messages and checks go as deep as what they are about.
 _MAX_DEPTH: Final = 32
 _TOO_DEEP: Final = "nested too deeply for a file of this kind"
-_MANY_DIGITS: Final = re.compile(r"[0-9_]{4300}")
 _NO_INTEGER: Final = (
     "a whole number has 64 bits, and must be finite, and within double precision; write one with a decimal point"
 )
@@ -124,7 +124,8 @@ class TomlDocument:
             raise kind(f"{name}:1: tables or lists are {_TOO_DEEP}") from None
         except ValueError:
             # The only one that is left to Python: more digits than it makes a number of.
-            line = next((n for n, one in enumerate(self._text.split("\n"), 1) if _MANY_DIGITS.search(one)), 1)
+            digits = re.compile(rf"[0-9_]{{{sys.get_int_max_str_digits()}}}")
+            line = next((n for n, one in enumerate(self._text.split("\n"), 1) if digits.search(one)), 1)
             raise kind(f"{name}:{line}: found a number of thousands of digits; {_NO_INTEGER}") from None
         found = _impossible(self.content)
         if found is not None:

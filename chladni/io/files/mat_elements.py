@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from chladni.io.files.bounds import Budget, TooLargeError
 from chladni.signals.errors import LogError
+from chladni.signals.wording import counted
 
 HEADER_BYTES = 128
 
@@ -91,7 +92,7 @@ def read_mat_elements(raw: bytes, budget: Budget) -> dict[str, Any]:
             variables[f"variable {len(variables) + 1}"] = Unreadable(reason=str(error))
     if _holds_any(memoryview(raw)[place:]):
         reason = "they belong to no variable; where bytes were added, the numbers behind them are wrong"
-        variables[f"{len(raw) - place} bytes at the end"] = Unreadable(reason=reason)
+        variables[f"{counted(len(raw) - place, 'byte')} at the end"] = Unreadable(reason=reason)
     read = [content for content in variables.values() if not isinstance(content, Unreadable)]
     damaged = [content.reason for content in variables.values() if isinstance(content, Unreadable)]
     if damaged and not read:

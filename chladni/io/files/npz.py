@@ -19,6 +19,7 @@ from chladni.io.files.series_fields import SERIES_FORMAT, restated, series_field
 from chladni.io.files.time_reading import TimeOptions
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.wording import counted
 
 _MAX_HEADER = 10_000
 # Vectors and matrices are signals; of our own layout also texts.
@@ -130,7 +131,7 @@ def read_npy(
         raise LogError(f"{path}: this npy file can't be read: {one_line(error)}") from error
     fields = {name: array[name] for name in dtype.names} if dtype.names else {path.stem: array}
     options = TimeOptions(column=time, unit=time_unit, rate_hz=sample_rate_hz)
-    behind = (f"{held - size} bytes at the end", "they lie behind the numbers that the header announces")
+    behind = (f"{counted(held - size, 'byte')} at the end", "they lie behind the numbers that the header announces")
     unread = (behind,) if held > size else ()
     return series_of_arrays(fields, options, where=str(path), units=units, unread=unread)
 

@@ -22,6 +22,7 @@ from chladni.io.regular_file import open_regular
 from chladni.signals.clock_verdict import round_rate
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import NS_PER_S, is_sample_rate
+from chladni.signals.wording import counted
 
 # Property names of National Instruments, in the order of belief.
 _UNITS: Final = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
@@ -97,7 +98,7 @@ def _behind_segments(file: BinaryIO, size: int) -> tuple[tuple[str, str], ...]:
         head = file.read(_LEAD_IN_BYTES)
         if len(head) < _LEAD_IN_BYTES or not head.startswith(b"TDSm"):
             reason = "no whole segment; where bytes were added or lost, numbers before them may be wrong or missing"
-            return ((f"{size - place} bytes at the end", reason),)
+            return ((f"{counted(size - place, 'byte')} at the end", reason),)
         (length,) = struct.unpack_from(">Q" if head[4] & _BIG_ENDIAN else "<Q", head, 12)
         place = size if length == _NEVER_CLOSED else place + _LEAD_IN_BYTES + length
     return ()

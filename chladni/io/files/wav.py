@@ -19,6 +19,7 @@ from chladni.io.files.contents import FileContents, one_series, require_no_gaps,
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.wording import counted
 
 _MAX_DATA_BYTES: Final = 2**32 - 1024  # the sizes in a RIFF file are 32 bits wide
 _UNKNOWN_SIZE: Final = 0xFFFFFFFF
@@ -270,7 +271,8 @@ def _extent(
     # Behind an odd length stands a byte that counts for nothing, and which some writers leave out.
     if container.size <= chunk.next or container.ends_in_chunks(chunk.next):
         return chunk.length, (), ()
-    return chunk.length, (), ((f"{behind} bytes at the end", "they lie behind the samples that the file announces"),)
+    unread = (f"{counted(behind, 'byte')} at the end", "they lie behind the samples that the file announces")
+    return chunk.length, (), (unread,)
 
 
 def _frames(path: Path, file: IO[bytes], start: int, length: int, encoding: _Encoding) -> NDArray[Any]:

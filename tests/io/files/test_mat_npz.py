@@ -276,7 +276,7 @@ NPY = (
     ("suffix", "content", "told"),
     [
         (".npy", NPY, None),
-        (".npy", NPY + b"\x00", "1 bytes at the end"),
+        (".npy", NPY + b"\x00", "1 byte at the end"),
         (".npy", NPY + b"\x01" * 9, "9 bytes at the end"),
         (".mat", WHOLE, None),
         (".mat", WHOLE + bytes(5), None),

@@ -12,6 +12,7 @@ from chladni.io.files.wav import read_wav, write_wav
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.wording import counted
 
 
 def series_of(values: np.ndarray, **fields: object) -> TimeSeries:
@@ -287,7 +288,7 @@ def test_what_lies_behind_a_long_file_is_told_too(tmp_path: Path) -> None:
     for behind in (b"\x01", b"\x01" * 9):
         content = riff(b"RF64", size=0xFFFFFFFF, data=0xFFFFFFFF, samples=RAW, before=before, after=behind)
         (tmp_path / "a.wav").write_bytes(content)
-        assert read_wav(tmp_path / "a.wav").unread[0][0] == f"{len(behind)} bytes at the end"
+        assert read_wav(tmp_path / "a.wav").unread[0][0] == f"{counted(len(behind), 'byte')} at the end"
     after = b"LIST" + struct.pack("<I", 4) + b"INFO"
     (tmp_path / "a.wav").write_bytes(
         riff(b"RF64", size=0xFFFFFFFF, data=0xFFFFFFFF, samples=RAW, before=before, after=after)
