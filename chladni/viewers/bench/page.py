@@ -51,10 +51,23 @@ _PAGE = Template(
 """,
     autoescape=True,
 )
+#: Style comes after the first layout, and a message later: text grows, and charts shrink beside it. Bokeh's parts
+#: then note the new sizes of the parts in them, but lay out anew only where their own has changed too.
+_LAYOUT_JS = """
+let parts = Bokeh.Models.Row.prototype.default_view.prototype;
+while (!Object.hasOwn(parts, "layoutable_views")) { parts = Object.getPrototypeOf(parts); }
+const any_part = Object.getPrototypeOf(parts);
+parts.update_bbox = function () {
+  // All of them, whatever the first says.
+  const changed = [...this.layoutable_views.map((part) => part.update_bbox()), any_part.update_bbox.call(this)];
+  if (this.layout != null) { this.layout.visible = this.is_displayed; }
+  return changed.includes(true);
+};
+"""
 #: That policy forbids functions made of text too: here is that of the ticks. In a notebook Bokeh makes it.
 START_JS = (
     "Bokeh.Models.CustomJSTickFormatter.prototype.doFormat = (all) => all.map((tick, index, ticks) => {"
-    f"{TICK_JS}}});\n"
+    f"{TICK_JS}}});\n{_LAYOUT_JS}"
     'Bokeh.embed.embed_items("{}", JSON.parse(document.getElementById("chladni").textContent));\n'
 )
 

@@ -277,6 +277,35 @@ def test_the_page_fits_a_window_of_1280_by_800(page: Any) -> None:
     assert page.evaluate("() => document.documentElement.scrollWidth") <= 1280
 
 
+#: Overhang of each chart's canvas over its figure, in pixels, and the figures' heights together.
+CHARTS_JS = """() => {
+  const parts = (root) => [...root.querySelectorAll("*")]
+    .flatMap((part) => [part, ...(part.shadowRoot ? parts(part.shadowRoot) : [])]);
+  const figures = parts(document).filter((part) => part.matches(".bk-Figure") && part.offsetParent);
+  const sizes = figures.map((figure) => {
+    const canvas = parts(figure.shadowRoot).find((part) => part.matches("canvas"));
+    return [figure.getBoundingClientRect(), canvas.getBoundingClientRect()];
+  });
+  return {
+    over: Math.max(...sizes.map(([figure, canvas]) => Math.abs(canvas.bottom - figure.bottom))),
+    height: sizes.reduce((sum, [figure]) => sum + figure.height, 0),
+  };
+}"""
+
+
+@needs_chromium
+def test_charts_keep_their_axes_when_what_stands_above_them_grows(page: Any) -> None:
+    """Style and messages come after the first layout."""
+    page.wait_for_function(f"() => ({CHARTS_JS})().over < 1")
+    before = page.evaluate(CHARTS_JS)["height"]
+    # Not the row of the table.
+    strip = page.locator("span").get_by_text("overshoot", exact=True)
+    for padding, charts in (("60px", f"height < {before - 60}"), ("", f"height > {before - 1}")):
+        strip.evaluate(f"(words) => {{ words.getRootNode().host.style.paddingTop = '{padding}'; }}")
+        page.wait_for_function(f"() => ({CHARTS_JS})().{charts}")
+        page.wait_for_function(f"() => ({CHARTS_JS})().over < 1")
+
+
 @needs_chromium
 def test_dark_ground(page: Any) -> None:
     page.get_by_text("dark", exact=True).click()
