@@ -39,8 +39,8 @@ def connect(port: int, *, timeout_s: float = 300.0) -> socket.socket:
     return socket.create_connection(("127.0.0.1", port), timeout=timeout_s)
 
 
-def read_answer(connection: socket.socket) -> Answer:
-    """Read one answer to its end."""
+def read_answer(connection: socket.socket, *, method: str = "GET") -> Answer:
+    """Read one answer to its end; that of HEAD tells the length of a body that doesn't come."""
     received = b""
     with contextlib.suppress(ConnectionError):
         while b"\r\n\r\n" not in received and (piece := connection.recv(65536)):
@@ -48,7 +48,7 @@ def read_answer(connection: socket.socket) -> Answer:
         head, _, body = received.partition(b"\r\n\r\n")
         first, *lines = head.decode("latin-1").split("\r\n")
         headers = {name.lower(): value.strip() for name, _, value in (line.partition(":") for line in lines)}
-        length = int(headers.get("content-length", 0))
+        length = 0 if method == "HEAD" else int(headers.get("content-length", 0))
         while len(body) < length and (piece := connection.recv(65536)):
             body += piece
         if first:
@@ -62,7 +62,7 @@ def ask(port: int, path: str, *lines: str, host: str = "", method: str = "GET", 
         # A server that refuses may close before it has read everything.
         with contextlib.suppress(ConnectionError):
             connection.sendall(request(port, path, *lines, host=host, method=method) + body)
-        return read_answer(connection)
+        return read_answer(connection, method=method)
 
 
 def upgrade_lines(token: str = "none", origin: str = "") -> list[str]:  # noqa: S107  # a page's name, no password
