@@ -56,7 +56,12 @@ def test_a_folder_that_refuses_is_told_before_anything_is_computed(
         require_places(reads=(), writes={"--json": str(tmp_path / "x.json")})
 
 
-def test_standard_output_and_what_was_not_given_are_no_files(log: Path) -> None:
+def test_standard_output_and_what_was_not_given_are_no_files(
+    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    # As a file, it would be refused: a folder has its name.
+    (tmp_path / "-").mkdir()
     require_places(reads=[log], writes={"--json": "-", "--html": None}, folders={"--figures": None})
 
 

@@ -349,11 +349,14 @@ def test_a_piece_that_takes_it_beyond_the_bound_is_refused_once(dropped: Dropped
     assert list(tmp_path.iterdir()) == []
 
 
-def test_taking_a_file_away_again_changes_nothing() -> None:
-    dropper = Dropper(taken=lambda *_: None, refused=lambda _: None)
+def test_taking_a_file_away_again_changes_nothing(dropped: Dropped) -> None:
     event = Upload(b"", 1, 1)
     event.event_name = "delete_event"
-    dropper._process_event(event)
+    dropped.send((b"a", 1), total=2)
+    dropped.dropper._process_event(event)
+    dropped.send((b"b", 2), total=2)
+    assert dropped.taken == [("a.mcap", b"ab", ".mcap")]
+    assert dropped.refused == []
 
 
 def test_a_model_that_cannot_be_built_for_a_log_is_told(tmp_path: Path) -> None:
