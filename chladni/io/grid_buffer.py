@@ -1,5 +1,7 @@
 """Samples laid onto a grid: all at once, or block by block as a log is read."""
 
+import mmap
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -62,7 +64,7 @@ class GridBuffer:
         self._group = group
         self._channels = channels
         self._first = first
-        self._values = np.empty((len(channels), last - first), dtype)
+        self._values = _memory(len(channels), last - first, dtype)
         # Up to here each row has samples, or NaN. Filling all with NaN first would write most of the memory twice.
         self._reached = [0] * len(channels)
         self._finite = True
@@ -120,6 +122,18 @@ class GridBuffer:
             self._values[row, self._reached[row] : place] = np.nan
             self._reached[row] = place
             self._finite = False
+
+
+def _memory(rows: int, samples: int, dtype: np.dtype[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Memory for ``[row, sample]`` that is taken as it's written to, so that pieces can go as their samples come.
+
+    NumPy asks for huge pages, each of them many rows of a short record, and the first samples would take them all.
+    """
+    size = rows * samples * dtype.itemsize
+    if sys.platform == "win32" or not size:
+        return np.empty((rows, samples), dtype)
+    pages = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    return np.frombuffer(pages, dtype).reshape(rows, samples)
 
 
 def _surely_finite(values: NDArray[np.floating[Any]]) -> bool:

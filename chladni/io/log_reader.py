@@ -324,9 +324,11 @@ class LogReader:
         buffer = GridBuffer(group, rows.channels, first, last, dtype)
         for placement, gathering, row in zip(group.placements, members, rows.rows, strict=True):
             start = 0
-            for values, messages in zip(gathering.values, gathering.stamps_ns, strict=True):
+            # Let go of as they are laid out: all samples twice would be the most memory that a log takes.
+            gathering.values.reverse()
+            for messages in gathering.stamps_ns:
                 part = slice(start, start + messages.size)
-                buffer.put(row, placement.samples_index(part), values)
+                buffer.put(row, placement.samples_index(part), gathering.values.pop())
                 start = part.stop
         return buffer.series()
 

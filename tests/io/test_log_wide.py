@@ -2,6 +2,8 @@
 
 import json
 import struct
+import subprocess
+import sys
 import tracemalloc
 from pathlib import Path
 from typing import Any
@@ -207,3 +209,25 @@ def test_streams_of_other_grids_are_not_compared_with_each_other(
         assert len(log.grids()) == streams
     # All with all would be 780.
     assert compared.call_count < streams
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="peak memory is read from /proc")
+def test_samples_of_many_fields_are_held_once(tmp_path: Path) -> None:
+    """Pieces of the log go as their samples are laid out; memory of the process, since pages count when written to."""
+    fields, messages = 10_000, 1500
+    schema = {"type": "object", "properties": {f"f{field}": {"type": "number"} for field in range(fields)}}
+    with LogMaker(tmp_path / "a.mcap") as maker:
+        channel = maker.json("/j", schema)
+        for place in range(messages):
+            maker.write(channel, {f"f{place % fields}": 1.0}, START_NS + place * PERIOD_NS)
+    program = (
+        "import re, sys\nfrom pathlib import Path\nfrom chladni.io.log import open_log\n"
+        "def peak(): return 1024 * int(re.search(r'VmHWM:\\s+(\\d+)', Path('/proc/self/status').read_text())[1])\n"
+        "log = open_log(sys.argv[1])\nlog.channels\nbefore = peak()\nvalues = log.read().values\n"
+        "print(peak() - before, values.nbytes)"
+    )
+    told = subprocess.run([sys.executable, "-c", program, str(tmp_path / "a.mcap")], capture_output=True, check=True)
+    taken, held = map(int, told.stdout.split())
+    assert held == 8 * fields * messages
+    # The samples, an eighth as much that says which are valid, a piece, and a page ahead in each row.
+    assert taken < 1.75 * held

@@ -159,7 +159,9 @@ def joined_column(found: Sequence[Found], bad: NDArray[np.bool_], *, empty: NDAr
         parts, table = _one_table([one.values for one in found if isinstance(one.values, Strings)])
     else:
         parts = [np.asarray(one.values) for one in found]
-    flat = np.concatenate([empty.codes if isinstance(empty, Strings) else empty, *parts])
+    none = empty.codes if isinstance(empty, Strings) else empty
+    # Of one block, nothing has to be joined: of thousands of leaves, that is most of the work.
+    flat = parts[0] if len(parts) == 1 and parts[0].dtype == none.dtype else np.concatenate([none, *parts])
     lengths = [np.concatenate(level) for level in zip(*(one.lengths for one in found), strict=True)]
     values, counts, nested = _placed(flat, lengths, bad)
     if isinstance(empty, Strings):

@@ -214,7 +214,12 @@ class _Rows:
 
     def found(self) -> list[Found]:
         """Give the values of each leaf in all messages that could be used."""
-        return [self._spread(place, found_of(leaf, self._rows[place])) for place, leaf in enumerate(self._leaves)]
+        # One for all the leaves that no message holds: a schema may state thousands that nobody fills.
+        absent = Found(values=np.full(self._sound, np.nan))
+        return [
+            self._spread(place, found_of(leaf, rows)) if rows or not (self._sound and _may_lack(leaf)) else absent
+            for place, (leaf, rows) in enumerate(zip(self._leaves, self._rows, strict=True))
+        ]
 
     def _spread(self, place: int, found: Found) -> Found:
         places = self._places[place]
