@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Generic
 
 import numpy as np
@@ -11,9 +12,9 @@ from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.number_range import require_in_range
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import TimeSeries
-from chladni.spectral.accumulator import require_finite
+from chladni.spectral.accumulator import AutoSpectraAccumulator, require_finite
 from chladni.spectral.blocks import Source, leading_part
-from chladni.spectral.cross_spectra import auto_spectra, cross_spectra
+from chladni.spectral.cross_spectra import cross_spectra, segment_average
 from chladni.spectral.impact import Impacts, find_impacts, impact_auto_spectra, impact_cross_spectra, is_impact_test
 from chladni.spectral.period import Period, first_period
 from chladni.spectral.periodic import periodic_auto_spectra, periodic_cross_spectra
@@ -79,22 +80,12 @@ def adaptive_cross_spectra(
 def adaptive_auto_spectra(
     source: Source,
     *,
-    references: str | Sequence[str] | None = None,
     resolution_hz: float | None = None,
     window: Window | None = None,
     overlap: float | None = None,
-    detrend: Detrend = "constant",
 ) -> AutoSpectra:
     """Average each channel's auto-spectrum alone: the diagonal of `adaptive_cross_spectra`, which see."""
-    return _average(
-        _AUTO,
-        source,
-        references=references,
-        resolution_hz=resolution_hz,
-        window=window,
-        overlap=overlap,
-        detrend=detrend,
-    )
+    return _average(_AUTO, source, resolution_hz=resolution_hz, window=window, overlap=overlap)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,18 +98,18 @@ class _Estimators(Generic[SpectraT]):
 
 
 _CROSS = _Estimators(cross_spectra, periodic_cross_spectra, impact_cross_spectra)
-_AUTO = _Estimators(auto_spectra, periodic_auto_spectra, impact_auto_spectra)
+_AUTO = _Estimators(partial(segment_average, AutoSpectraAccumulator), periodic_auto_spectra, impact_auto_spectra)
 
 
 def _average(
     estimators: _Estimators[SpectraT],
     source: Source,
     *,
-    references: str | Sequence[str] | None,
+    references: str | Sequence[str] | None = None,
     resolution_hz: float | None,
     window: Window | None,
     overlap: float | None,
-    detrend: Detrend,
+    detrend: Detrend = "constant",
 ) -> SpectraT:
     lead, blocks = leading_part(source, SAMPLES_EXAMINED)
     start = _joined(lead)

@@ -4,10 +4,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from chladni.signals.channel import Channel
-from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
+from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.linear_algebra import in_one_thread
 from chladni.spectral.accumulator import (
-    AutoSpectraAccumulator,
     CrossSpectraAccumulator,
     SegmentAveraging,
     SpectraAccumulator,
@@ -75,7 +74,7 @@ def cross_spectra(
     >>> float(round(spectra.density[0, 0, 50].real * spectra.bandwidth_hz, 12))  # RMS^2 of the sine
     1.0
     """
-    return _average(
+    return segment_average(
         partial(CrossSpectraAccumulator, averaging=averaging, time_constant_s=time_constant_s),
         source,
         resolution_hz=resolution_hz,
@@ -85,27 +84,7 @@ def cross_spectra(
     )
 
 
-@in_one_thread()
-def auto_spectra(
-    source: Source,
-    *,
-    resolution_hz: float | None = None,
-    window: Window = "hann",
-    overlap: float = 0.5,
-    detrend: Detrend = "constant",
-) -> AutoSpectra:
-    """Average each channel's auto-spectrum alone: the diagonal of `cross_spectra`, which see."""
-    return _average(
-        AutoSpectraAccumulator,
-        source,
-        resolution_hz=resolution_hz,
-        window=window,
-        overlap=overlap,
-        detrend=detrend,
-    )
-
-
-def _average(
+def segment_average(
     make: Callable[[Sequence[Channel], float, Segmentation], SpectraAccumulator[SpectraT]],
     source: Source,
     *,
@@ -114,6 +93,7 @@ def _average(
     overlap: float,
     detrend: Detrend,
 ) -> SpectraT:
+    """Average what accumulators of one kind take of segments; the rest is as in `cross_spectra`."""
     # The default segment hangs on the length of the record, which a stream doesn't tell; the lead tells enough of it.
     lead, blocks = leading_part(source, SAMPLES_TO_CHOOSE_FROM)
     first = lead[0]
