@@ -3,8 +3,9 @@
 import mmap
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from numpy.typing import NDArray
 from chladni.io.shared_grid import Group
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
+
+#: Bytes of a huge page, for which NumPy asks Linux of all large arrays; on x86-64 and ARM, with pages of 4 KiB.
+_HUGE_PAGE: Final = 2**21
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,12 +131,20 @@ class GridBuffer:
 def _memory(rows: int, samples: int, dtype: np.dtype[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Memory for ``[row, sample]`` that is taken as it's written to, so that pieces can go as their samples come.
 
-    NumPy asks for huge pages, each of them many rows of a short record, and the first samples would take them all.
+    A huge page is faster, but many rows of a short record: the first samples would take them all.
     """
     size = rows * samples * dtype.itemsize
-    if sys.platform == "win32" or not size:
+    if sys.platform == "win32" or size <= _HUGE_PAGE or samples * dtype.itemsize >= _HUGE_PAGE:
         return np.empty((rows, samples), dtype)
-    pages = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    try:
+        pages = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    except OSError as error:
+        # As of any other array.
+        raise MemoryError(f"{size} bytes of samples: {error.strerror}") from error
+    if sys.platform == "linux":
+        # Some systems give huge pages unasked; a kernel that has none refuses the wish.
+        with suppress(OSError):
+            pages.madvise(mmap.MADV_NOHUGEPAGE)
     return np.frombuffer(pages, dtype).reshape(rows, samples)
 
 
