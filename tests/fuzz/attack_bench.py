@@ -177,43 +177,6 @@ def embedding(bench: Bench) -> Row:
                held=held)  # fmt: skip
 
 
-HOSTILE = """<!doctype html><script>
-const base = "TARGET", told = {};
-const put = (name, got) => { told[name] = got; };
-window.onload = async () => {
-  const autoload = "/NAME/autoload.js?bokeh-autoload-element=x";
-  for (const path of ["/NAME", autoload, "/start.js", "/static/js/bokeh.min.js"]) {
-    await new Promise((done) => {
-      const script = document.createElement("script");
-      script.src = base + path;
-      script.onload = () => { put("script " + path, "loaded"); done(); };
-      script.onerror = () => { put("script " + path, "refused"); done(); };
-      document.body.append(script);
-    });
-    try { put("fetch " + path, "read " + (await (await fetch(base + path)).text()).length); }
-    catch { put("fetch " + path, "refused"); }
-    try { put("blind fetch " + path, (await fetch(base + path, {mode: "no-cors"})).type + " answer"); }
-    catch { put("blind fetch " + path, "refused"); }
-  }
-  await new Promise((done) => {
-    const frame = document.createElement("iframe");
-    frame.src = base + "/NAME";
-    frame.onload = () => done();
-    document.body.append(frame);
-    setTimeout(done, 3000);
-  });
-  for (const protocols of [[], ["bokeh", "TOKEN"]]) {
-    await new Promise((done) => {
-      const socket = new WebSocket(base.replace("http", "ws") + "/NAME/ws", protocols);
-      socket.onopen = () => { put("websocket " + protocols.length, "open"); done(); };
-      socket.onerror = () => { put("websocket " + protocols.length, "refused"); done(); };
-    });
-  }
-  window.told = told;
-};
-</script><body></body>"""
-
-
 def hostile_pages(bench: Bench) -> Iterator[Row]:
     """Let pages of other origins try, in a browser: another site, another port, and a name that points at us."""
     from playwright.sync_api import sync_playwright
@@ -221,7 +184,14 @@ def hostile_pages(bench: Bench) -> Iterator[Row]:
     token = wire.ask(bench.port, f"/{NAME}").token
     made = bench.pages()
     target = f"http://127.0.0.1:{bench.port}"
-    text = HOSTILE.replace("TARGET", target).replace("NAME", NAME).replace("TOKEN", token)
+    text = (
+        Path(__file__)
+        .with_name("hostile.html")
+        .read_text()
+        .replace("TARGET", target)
+        .replace("NAME", NAME)
+        .replace("TOKEN", token)
+    )
     with another_server(text) as port, sync_playwright() as driver:
         names = ["--host-resolver-rules=MAP *.example 127.0.0.1"]
         chromium = driver.chromium.launch(executable_path=CHROMIUM, args=[*ARGUMENTS, *names])

@@ -35,34 +35,17 @@ from pathlib import Path
 from chladni.gap.blind.seal import seal_case
 from chladni.io.mcap.container import McapContainer
 
+# Run as a file, it finds the tests' tools all the same.
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from tests.cli.test_simulate import MODEL
+
 ORPHANS_AFTER_S = 5.0
 #: A command that hasn't ended so long after a signal hangs.
 PATIENCE_S = 60.0
 SIGNALS = (signal.SIGTERM, signal.SIGHUP, signal.SIGKILL)
 OLD = b"as it was before"
 CASES = 3
-
-MODEL = """format = "chladni.model/1"
-name = "one"
-kind = "structure"
-[[body]]
-name = "mass"
-mass = 2.0
-[[joint]]
-name = "spring"
-between = ["ground", "mass"]
-stiffness = 8000.0
-damping = {damping}
-[[input]]
-name = "hammer"
-at = "mass"
-channel = "/hammer.wrench.force.x"
-[[output]]
-name = "acc"
-measures = "acceleration"
-at = "mass"
-channel = "/mass.accel.linear.x"
-"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,10 +106,15 @@ def run_whole(words: Sequence[str], environment: dict[str, str]) -> None:
         raise AssertionError(f"{' '.join(words)}: {done.returncode}: {done.stderr}")
 
 
+def damped(damping: float) -> str:
+    """Give the model with another damper."""
+    return MODEL.replace("damping = 8.0", f"damping = {damping}")
+
+
 def make_inputs(folder: Path, environment: dict[str, str]) -> None:
     """Make a model, logs of a machine that is damped otherwise, and a sealed campaign of such."""
-    (folder / "one.toml").write_text(MODEL.format(damping=8.0))
-    (folder / "truth.toml").write_text(MODEL.format(damping=16.0))
+    (folder / "one.toml").write_text(damped(8.0))
+    (folder / "truth.toml").write_text(damped(16.0))
     for name, seconds in (("one", "8"), ("long", "600")):
         run_whole(["simulate", str(folder / "truth.toml"), "--seconds", seconds, "--rate", "250", "--noise", "0.01",
                    "--out", str(folder / f"{name}.mcap")], environment)  # fmt: skip
@@ -134,7 +122,7 @@ def make_inputs(folder: Path, environment: dict[str, str]) -> None:
     for number in range(1, CASES + 1):
         case = campaign / "cases" / f"case-{number}"
         case.mkdir(parents=True)
-        (case / "model.toml").write_text(MODEL.format(damping=8.0 + number))
+        (case / "model.toml").write_text(damped(8.0 + number))
         shutil.copy(folder / "one.mcap", case / "log.mcap")
         seal_case(campaign, case.name, {"kind": "parameters", "effects": []})
 
