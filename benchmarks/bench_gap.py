@@ -16,7 +16,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from chladni.apps.blind import make_campaign, run_campaign, score_campaign
 from chladni.apps.campaign_pictures import campaign_album
-from chladni.gap.blind.score_table import (
+from chladni.viewers.figures.saving import save_album
+from chladni_withheld.score_table import (
     HEADER,
     confusion_rows,
     detection_rows,
@@ -24,7 +25,6 @@ from chladni.gap.blind.score_table import (
     reliability_rows,
     score_rows,
 )
-from chladni.viewers.figures.saving import save_album
 
 
 @contextmanager
@@ -95,6 +95,7 @@ if __name__ == "__main__":
     parser.add_argument("directory", type=Path, help="folder of the campaign; made when it isn't there")
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, required=True, help="one that was never looked at")
+    parser.add_argument("--generator", default="chains", help="what draws the machines")
     parser.add_argument("--kind", action="append", default=[], help="such as three=20; may be repeated")
     parser.add_argument("--jobs", type=int, default=None)
     parser.add_argument("--figures", type=Path, default=None, help="folder for confusion, reliability, detection")
@@ -103,8 +104,8 @@ if __name__ == "__main__":
     folder.mkdir(parents=True, exist_ok=True)
     if not (away := folder.with_name(f"{folder.name}-truth")).is_dir():
         make_campaign(
-            folder, count=arguments.count, seed=arguments.seed, kinds=arguments.kind, jobs=arguments.jobs,
-            progress=shares("made"),
+            folder, count=arguments.count, seed=arguments.seed, generator=arguments.generator, kinds=arguments.kind,
+            jobs=arguments.jobs, progress=shares("made"),
         )  # fmt: skip
     else:
         show(f"the truths are in {away}: the campaign is made, and its run goes on")

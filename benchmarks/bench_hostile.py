@@ -25,7 +25,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from chladni.gap.blind.seal import seal_case
+from chladni_withheld.folders import seal_case
 
 DATA = Path(os.environ.get("CHLADNI_DATA", Path(__file__).parents[2] / "shared" / "data")) / "hostile"
 MOST_SECONDS, MOST_MB = 10.0, 500.0

@@ -1,6 +1,6 @@
 """A withheld case: what a generator gives, whatever its machines are; folders, seals and scores are made of it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -140,3 +140,20 @@ class WithheldCase:
 
 #: ``draw_case(seed, index, kind)``: the same three give the same case, to the byte, in any process; index is from 1.
 DrawCase = Callable[[int, int, Kind], WithheldCase]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Generator:
+    """What draws the cases of a campaign.
+
+    Attributes
+    ----------
+    composition
+        How many cases of each kind a usual campaign has, in proportion; zero of a kind that is drawn when asked for.
+    draws
+        ``draws(counts, seed)`` gives a function without arguments for each case, that worker processes can call, in
+        the order of the campaign; ``counts`` is the number of cases of each kind.
+    """
+
+    composition: Mapping[Kind, int]
+    draws: Callable[[Mapping[Kind, int], int], Sequence[Callable[[], WithheldCase]]]

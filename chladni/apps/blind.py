@@ -6,10 +6,8 @@ from typing import Any
 
 from chladni.apps.diagnose import diagnosis_json
 from chladni.apps.processes import workers
-from chladni.gap.blind.composition import composition_of
-from chladni.gap.blind.make import make_cases
-from chladni.gap.blind.run import RunReport, run_cases
-from chladni.gap.blind.score import score_cases
+from chladni_withheld.campaign import RunReport, make_cases, run_cases
+from chladni_withheld.score import score_cases
 
 Progress = Callable[[float], None]
 
@@ -19,6 +17,7 @@ def make_campaign(
     *,
     count: int,
     seed: int,
+    generator: str = "chains",
     kinds: Sequence[str] = (),
     jobs: int | None = None,
     progress: Progress = lambda _share: None,
@@ -27,21 +26,14 @@ def make_campaign(
 
     Parameters
     ----------
-    directory
-        Where cases and truths go, see `chladni.gap.blind.make.make_cases`.
-    count, seed
-        Number of cases, and where everything random in them comes from.
-    kinds
-        How many of which kind in proportion, see `chladni.gap.blind.composition.composition_of`.
+    directory, count, seed, generator, kinds, progress
+        See `chladni_withheld.campaign.make_cases`.
     jobs
         Processes; as many as the machine has cores if None.
-    progress
-        Gets the share done.
     """
-    composition = composition_of(kinds)
     with workers(jobs) as executor:
         return make_cases(
-            directory, count=count, seed=seed, composition=composition, executor=executor, progress=progress
+            directory, count=count, seed=seed, generator=generator, kinds=kinds, executor=executor, progress=progress
         )
 
 
@@ -52,12 +44,10 @@ def run_campaign(
 
     Parameters
     ----------
-    directory, seed
-        See `chladni.gap.blind.run.run_cases`.
+    directory, seed, progress
+        See `chladni_withheld.campaign.run_cases`.
     jobs
         Processes; as many as the machine has cores if None.
-    progress
-        Gets the share done.
     """
     with workers(jobs) as executor:
         return run_cases(directory, diagnosis_json, seed=seed, executor=executor, progress=progress)

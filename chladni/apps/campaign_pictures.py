@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from chladni.gap.blind.intervals import Share
 from chladni.signals.errors import SetupError
 from chladni.viewers.figures.album import Album
 from chladni.viewers.figures.campaign import (
@@ -50,14 +49,12 @@ def _calibration(told: Mapping[str, Any]) -> Figure | None:
 
 
 def _bin(one: Mapping[str, Any]) -> ReliabilityBin:
-    # Scores keep the share alone; of whole numbers the product is whole but for rounding.
-    share = Share(right=round(one["right"] * one["count"]), count=one["count"])
     return ReliabilityBin(
         low=one["low"],
         high=one["high"],
         said=one["probability"],
         right=one["right"],
-        interval=(share.low, share.high),
+        interval=tuple(one["interval"]),
         cases=one["count"],
     )
 

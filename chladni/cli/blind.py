@@ -42,6 +42,7 @@ def make(
     *,
     count: Annotated[int, typer.Option(metavar="N", min=1, help="Number of cases.")] = 200,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of everything random in them.")] = 0,
+    generator: Annotated[str, typer.Option(metavar="NAME", help="What draws the machines: chains.")] = "chains",
     kind: Kinds = None,
     jobs: Jobs = None,
     json: options.Json = None,
@@ -52,12 +53,14 @@ def make(
     require_places(reads=(), writes={"--json": json}, folders={"DIR": directory})
     to = Output(json)
     with to.progress("making cases") as show:
-        made = make_campaign(directory, count=count, seed=seed, kinds=kind or (), jobs=jobs, progress=show)
+        made = make_campaign(
+            directory, count=count, seed=seed, generator=generator, kinds=kind or (), jobs=jobs, progress=show
+        )
     there = f"; {counted(count - made)} of {counted(count)} were there" if made < count else ""
     to.line(f"made {cases(made, 'case')} in {directory / 'cases'}{there}")
     to.line(f"their truths are in {directory / 'truth'}: move it away before the run, and back for the score")
     to.json({"format": "chladni.blind-make/1", "directory": str(directory), "count": count, "seed": seed,
-             "made": made})  # fmt: skip
+             "generator": generator, "made": made})  # fmt: skip
 
 
 @blind.command()
@@ -89,7 +92,7 @@ def run(
 def score(directory: Folder, *, figures: options.Figures = None, json: options.Json = None) -> None:
     """Verify the seals and hold the answers against the truths."""
     from chladni.apps.blind import score_campaign
-    from chladni.gap.blind.score_table import (
+    from chladni_withheld.score_table import (
         HEADER,
         confusion_rows,
         detection_rows,

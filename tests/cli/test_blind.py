@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 
 from chladni.apps import blind
-from chladni.gap.blind.seal import seal_case
 from chladni.signals.errors import EstimateError
+from chladni_withheld.folders import seal_case
 from tests.cli.conftest import Run
 
 

@@ -18,9 +18,9 @@ from typing import Any
 from damage import BYTES, damaged, odd_json
 from harness import TOLD, WHOLE, BrokenRuleError, Case, Format, main
 
-from chladni.gap.blind.score import score_cases
-from chladni.gap.blind.seal import seal_case, seal_of
 from chladni.signals.errors import ChladniError
+from chladni_withheld.folders import seal_case, seal_of
+from chladni_withheld.score import score_cases
 
 CASE, TRUTH, RESULT = "cases/one/case.json", "truth/one.json", "results/one.json"
 MEANT = {

@@ -32,8 +32,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from chladni.gap.blind.seal import seal_case
 from chladni.io.mcap.container import McapContainer
+from chladni_withheld.folders import seal_case
 
 # Run as a file, it finds the tests' tools all the same.
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))

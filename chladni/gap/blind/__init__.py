@@ -1,1 +1,0 @@
-"""The withheld check: cases whose cause is sealed before the diagnosis runs."""

@@ -1,0 +1,1 @@
+"""Chains, trees and drives with hidden effects: their own equations, laws and integrator."""
