@@ -151,8 +151,7 @@ def _keep_to_one(path: Path, told: dict[str, Any]) -> None:
     With the truths, since whoever knows the seed can make them again.
     """
     if path.is_file():
-        # There was one generator when campaigns didn't name theirs.
-        found = {"generator": "chains", **read_json(path, CAMPAIGN_FORMAT)}
+        found = _begun(path)
         if any(found.get(key) != value for key, value in told.items()):
             kinds = found.get("composition")
             of = ", ".join(f"{kind}={share}" for kind, share in kinds.items()) if isinstance(kinds, dict) else "?"
@@ -162,6 +161,17 @@ def _keep_to_one(path: Path, told: dict[str, Any]) -> None:
             )
     else:
         write_json(path, {"format": CAMPAIGN_FORMAT, **told})
+
+
+def generator_in(directory: Path) -> str | None:
+    """Name of the generator that made a campaign, which its truths tell; None of cases of one's own."""
+    path = directory / "truth" / "campaign.json"
+    return str(_begun(path)["generator"]) if path.is_file() else None
+
+
+def _begun(path: Path) -> dict[str, Any]:
+    # There was one generator when campaigns didn't name theirs.
+    return {"generator": "chains", **read_json(path, CAMPAIGN_FORMAT)}
 
 
 @in_one_thread()

@@ -313,11 +313,16 @@ def truth_of_case(directory: Path, case: CaseFolder) -> Mapping[str, Any]:
         )
     read = read_as(Truth, truth, str(path), "seal a whole truth")
     if read.files is not None:
-        require_sealed(case, read.files)
+        require_files(case, read.files)
     return truth
 
 
-def require_sealed(case: CaseFolder, checksums: Mapping[str, str]) -> None:
+def checksums(case: CaseFolder) -> dict[str, str]:
+    """SHA-256 of a case's model and log, by the names of the files."""
+    return {file.name: checksum(file) for file in (case.model, case.log)}
+
+
+def require_files(case: CaseFolder, sealed: Mapping[str, str]) -> None:
     """Refuse a model or a log that isn't the one that was sealed.
 
     Raises
@@ -325,11 +330,11 @@ def require_sealed(case: CaseFolder, checksums: Mapping[str, str]) -> None:
     SetupError
         With the file, when its checksum is another.
     """
-    for file in (case.model, case.log):
-        if checksums.get(file.name) != checksum(file):
+    for name, found in checksums(case).items():
+        if sealed.get(name) != found:
             raise SetupError(
-                f"{file}: isn't what was sealed: an answer to it can't be scored; put the sealed one back, and run "
-                "the case again"
+                f"{case.model.with_name(name)}: isn't what was sealed: an answer to it can't be scored; put the "
+                "sealed one back, and run the case again"
             )
 
 

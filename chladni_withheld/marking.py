@@ -6,11 +6,18 @@ from pathlib import Path
 from typing import Any
 
 from chladni_withheld import folders
+from chladni_withheld.case import PARAMETER, Kind
 from chladni_withheld.folders import RESULT_FORMAT, Result, Truth, read_as
 from chladni_withheld.vocabulary import FAMILY_OF, OUTSIDE
 
 #: What a case counts as whose diagnosis failed; it's never right.
 FAILED = "failed"
+#: Effects that move the outputs by at least so many times the noise must be found.
+CLEAR_RATIO = 3.0
+#: Cases that no word of the run's catalogue is right for, and cases whose model is wrong in itself.
+STRANGE: tuple[Kind, ...] = ("leave_out", "outside")
+MODEL_WRONG: tuple[Kind, ...] = ("topology", "value", "value_and_effect")
+_NAMEABLE: tuple[Kind, ...] = ("effect", "parameters", "two", "three", *MODEL_WRONG)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,20 +40,20 @@ class Cause:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """One case: what was true, what was answered, and what that is worth.
+    """One case: what was true, what was answered, and what that is worth. Sites that are pairs are in order.
 
     Attributes
     ----------
     hidden
-        ``(effect, site)`` of what was hidden.
+        ``(effect, site)`` of what was hidden, wrong values among it.
     off
-        Parameter beyond its tolerance, or empty.
+        Further parameters beyond their tolerance.
     causes
         As named, most probable first.
     alternatives
         Words that the answer says can't be told from the first cause.
     naive
-        Effect and site that leave the smallest RMS.
+        Effect that leaves the smallest RMS.
     ratio, ratio_tuned
         Effect over noise, before and after tuning; None when nothing was hidden.
     closed
@@ -54,59 +61,110 @@ class Mark:
     """
 
     name: str
-    kind: str
+    kind: Kind
     coloured: bool
     hidden: tuple[tuple[str, str], ...]
-    off: str
+    off: tuple[str, ...]
     verdict: str
     causes: tuple[Cause, ...]
-    naive: tuple[str, str] | None
+    naive: str | None
     ratio: float | None
     ratio_tuned: float | None
     closed: float | None
     alternatives: tuple[str, ...] = ()
 
     @property
+    def named(self) -> tuple[Cause, ...]:
+        """Causes of a verdict that names any."""
+        return self.causes if self.verdict in ("effect", "parameters") else ()
+
+    @property
     def first(self) -> Cause | None:
-        """First cause of a verdict ``effect``."""
-        return self.causes[0] if self.verdict == "effect" and self.causes else None
+        """First effect of a verdict ``effect``, beside whatever wrong values."""
+        effects = (one for one in self.causes if one.effect != PARAMETER)
+        return next(effects, None) if self.verdict == "effect" else None
 
     @property
     def word_is_right(self) -> bool:
-        """Whether the first cause has the word of something hidden."""
+        """Whether the first effect has the word of something hidden."""
         return self.first is not None and self.first.effect in [effect for effect, _ in self.hidden]
 
     @property
     def family_is_right(self) -> bool:
-        """Whether the first cause is of the family of something hidden."""
-        families = [FAMILY_OF.get(effect, OUTSIDE.get(effect, "")) for effect, _ in self.hidden]
-        return self.first is not None and FAMILY_OF.get(self.first.effect, "?") in families
+        """Whether the first effect is of the family of something hidden."""
+        return self.first is not None and self._is_sibling(self.first)
 
     @property
     def site_is_right(self) -> bool:
-        """Whether the first cause's site, or its group, holds the site of something hidden."""
+        """Whether the first effect's site, or its group, holds the site of something hidden."""
         return self.first is not None and any(self.first.at(site) for _, site in self.hidden)
 
     @property
     def is_right(self) -> bool:
-        """Whether the first cause is something that was hidden, where it was hidden."""
+        """Whether the first effect is something that was hidden, where it was hidden."""
         return self.first is not None and any(self.first.fits(*one) for one in self.hidden)
 
     @property
     def is_among_the_alike(self) -> bool:
-        """Whether the right word is the first cause's, or one that the answer says the log can't tell from it."""
+        """Whether the right word is the first effect's, or one that the answer says the log can't tell from it."""
         words = [effect for effect, _ in self.hidden]
         return self.first is not None and (self.word_is_right or any(one in words for one in self.alternatives))
-
-    def found(self) -> int:
-        """How many of the hidden effects were named, at their sites."""
-        named = self.causes if self.verdict == "effect" else ()
-        return sum(any(cause.fits(*one) for cause in named) for one in self.hidden)
 
     @property
     def naive_is_right(self) -> bool:
         """Whether the smallest RMS alone names the right effect."""
-        return self.naive is not None and self.naive[0] in [effect for effect, _ in self.hidden]
+        return self.naive in [effect for effect, _ in self.hidden]
+
+    @property
+    def recognised(self) -> bool:
+        """Whether a case without a right word was answered ``unknown``, or with a sibling of what was hidden."""
+        return self.verdict == "unknown" or self.family_is_right
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether what is hidden stands so far out of the noise that it must be found."""
+        return self.ratio is None or self.ratio >= CLEAR_RATIO
+
+    @property
+    def is_nameable(self) -> bool:
+        """Whether something clear is hidden that words of the catalogue, or parameters, name."""
+        return self.kind in _NAMEABLE and self.is_clear
+
+    def found(self, *, least: float = 0.0) -> int:
+        """How many of the hidden effects and values were named at their sites, with a probability of `least`."""
+        return sum(
+            any(cause.fits(*one) and cause.probability >= least for cause in self.named) for one in self._true_causes
+        )
+
+    def all_found(self, *, least: float = 0.0) -> bool:
+        """Whether all that is hidden was named, at its sites."""
+        return self.found(least=least) == len(self._true_causes)
+
+    def wrongly_named(self, least: float) -> bool:
+        """Whether anything was named, with a probability of `least` or more, that isn't true."""
+        return any(one.probability >= least and not self._is_true(one) for one in self.named)
+
+    @property
+    def whole_is_right(self) -> bool:
+        """Whether the answer is what its kind of case asks for."""
+        if self.kind in STRANGE:
+            return self.recognised
+        if self.kind in ("none", "parameters"):
+            return self.verdict == self.kind
+        return self.is_right if self.kind in ("effect", "faint") else self.all_found()
+
+    @property
+    def _true_causes(self) -> tuple[tuple[str, str], ...]:
+        return (*self.hidden, *((PARAMETER, name) for name in self.off if (PARAMETER, name) not in self.hidden))
+
+    def _is_true(self, cause: Cause) -> bool:
+        if self.kind in STRANGE:
+            return self._is_sibling(cause)
+        return any(cause.fits(*one) for one in self._true_causes)
+
+    def _is_sibling(self, cause: Cause) -> bool:
+        families = [FAMILY_OF.get(effect, OUTSIDE.get(effect, "")) for effect, _ in self.hidden]
+        return FAMILY_OF.get(cause.effect, "?") in families
 
 
 def mark(name: str, truth: Mapping[str, Any], result: Mapping[str, Any], *, path: Path | None = None) -> Mark:
@@ -135,32 +193,36 @@ def _marked(name: str, truth: Truth, result: Result | None) -> Mark:
     answer = result or Result(verdict="unknown")
     named = answer.causes or ()
     closed = answer.gap.closed if answer.gap else None
+    first = next((one for one in named if one.effect != PARAMETER), None)
     return Mark(
         name=name,
         kind=truth.kind,
         coloured=truth.coloured,
-        hidden=tuple((one.effect, one.site) for one in truth.effects),
-        off=next(iter(truth.off or {}), ""),
+        hidden=tuple((one.effect, _ordered(one.site)) for one in truth.effects),
+        off=tuple(truth.off or ()),
         verdict=answer.verdict if result else FAILED,
-        causes=tuple(_cause(one) for one in named if one.effect != "parameter"),
+        causes=tuple(_cause(one) for one in named),
         naive=_naive(answer),
         ratio=truth.ratio,
         ratio_tuned=truth.ratio_tuned,
         closed=None if closed is None else closed / (truth.ideal or 1.0),
-        alternatives=tuple(one.effect for one in (named[0].alternatives or () if named else ())),
+        alternatives=tuple(one.effect for one in (first.alternatives or () if first else ())),
     )
 
 
 def _cause(one: folders.Cause) -> Cause:
-    return Cause(effect=one.effect, site=one.site, group=tuple(one.group or ()), probability=one.probability or 0.0)
+    return Cause(effect=one.effect, site=_ordered(one.site), group=tuple(_ordered(site) for site in one.group or ()),
+                 probability=one.probability or 0.0)  # fmt: skip
 
 
-def _naive(result: Result) -> tuple[str, str] | None:
+def _ordered(site: str) -> str:
+    """A pair in one order: ``b~a`` is ``a~b``."""
+    return "~".join(sorted(site.split("~")))
+
+
+def _naive(result: Result) -> str | None:
     """Largest drop in RMS: said by the result, or the smallest gap of its ranking."""
     if result.naive is not None:
-        return result.naive.effect, result.naive.site
-    ranked = [(one.gap, place) for place, one in enumerate(result.ranking or ()) if one.gap is not None]
-    if not ranked or result.ranking is None:
-        return None
-    least = result.ranking[min(ranked)[1]]
-    return least.effect, least.site
+        return result.naive.effect
+    ranked = [one for one in result.ranking or () if one.gap is not None]
+    return min(ranked, key=lambda one: one.gap or 0.0).effect if ranked else None

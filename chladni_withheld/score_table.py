@@ -3,9 +3,14 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from chladni_withheld.score import QUESTIONS, Question
+
 Row = list[str]
 _ROUNDING = 1e-9
 HEADER = ("what", "measured", "95 % interval", "cases", "must be", "met")
+PAIRED_HEADER = ("what", "cases", "here", "there", "only here", "only there", "p")
+#: What must be of another generator's machines, where it isn't what must be of the first one's.
+_MUST_BE: Mapping[str, Mapping[str, float]] = {"networks": {"effect": 0.90, "site": 0.95, "false_alarm": 0.02}}
 
 
 def score_rows(score: Mapping[str, Any]) -> list[Row]:
@@ -14,44 +19,53 @@ def score_rows(score: Mapping[str, Any]) -> list[Row]:
     A share that meets what must be, of so few cases that a single wrong one would miss it, is ``too few``; a quantile
     or a mean of so few is, either way.
     """
-    faint, two, closed = score["faint"], score["two"], score["closed"]
-    rows = [
-        _share("right effect, first place", score["effect"], at_least=0.92),
-        _share("right effect, or told to be like the named one", score["effect_or_alternative"]),
-        _share("right family", score["family"], at_least=0.96),
-        _share("right effect by the lowest RMS alone (naive)", score["effect_naive"]),
-        _share("right site, or a group that holds it", score["site"], at_least=0.95),
-        _share("false alarm: an effect named where there is none", score["false_alarm"], at_most=0.03),
-        _share("of those, with coloured noise", score["false_alarm_coloured"]),
-        _share("unknown where nothing is missing", score["false_unknown"]),
-        _share("wrong parameter: verdict parameters", score["parameter_named"]),
-        _share("left out or outside: unknown, or a sibling", score["strange_recognised"], at_least=0.90),
-        _share("unknown where the effect was in the catalogue", score["unknown_in_catalogue"], at_most=0.05),
+    closed, calibration = score["closed"], score["calibration"]
+    rows = [row for question in QUESTIONS if (row := _question(score, question))]
+    return [
+        *rows,
         _number("gap closed over the true law's, median", closed["median"], closed["count"], at_least=0.98,
                 may_miss=0.5),
         _number("gap closed, 10th percentile", closed["tenth_percentile"], closed["count"], at_least=0.92,
                 may_miss=0.1),
-        _number("expected calibration error", score["calibration"]["expected_error"], score["calibration"]["count"],
-                at_most=0.07, may_miss=0.07),
-        _share("two effects: both named", two["both"], at_least=0.75),
-        _share("two effects: at least one", two["at_least_one"], at_least=0.95),
-        _share("faint: wrong name with probability over 0.8", faint["confidently_wrong"], at_most=0.05),
-        _share("faint: named rightly", faint["named"]),
+        _number("expected calibration error", calibration["expected_error"], calibration["count"], at_most=0.05,
+                may_miss=0.05),
     ]  # fmt: skip
-    return rows + _three_rows(score["three"])
 
 
-def _three_rows(three: Mapping[str, Any]) -> list[Row]:
-    """Only campaigns that were asked for machines with three effects have them."""
-    titles = {"all": "all named", "at_least_two": "at least two", "at_least_one": "at least one"}
-    return [_share(f"three effects: {title}", three[key]) for key, title in titles.items() if three[key]["count"]]
+def _question(score: Mapping[str, Any], question: Question) -> Row | None:
+    outer, _, inner = question.key.partition(".")
+    told = score[outer][inner] if inner else score[outer]
+    if question.optional and not told["count"]:
+        return None
+    must = _MUST_BE.get(score.get("generator") or "", {}).get(question.key)
+    least, most = (None if bound is None else must or bound for bound in (question.at_least, question.at_most))
+    return _share(question.what, told, at_least=least, at_most=most)
+
+
+def paired_rows(against: Mapping[str, Any]) -> list[Row]:
+    """Give one row for each share of two versions' answers to the same cases, where any case counts."""
+    return [
+        [one["what"], *(str(one[key]) for key in ("count", "here", "there", "only_here", "only_there")),
+         "-" if one["p"] is None else f"{one['p']:.3f}"]
+        for one in against["rows"] if one["count"]
+    ]  # fmt: skip
+
+
+def changed_rows(against: Mapping[str, Any]) -> tuple[list[str], list[Row]]:
+    """Give header and rows of the cases that one of two versions answers rightly and the other doesn't."""
+    rows = [
+        [one["here"]["case"], one["here"]["kind"], _hidden(one["here"]), _answer(one["here"]), _answer(one["there"]),
+         "here" if one["here"]["right"] else "there"]
+        for one in against["changed"]
+    ]  # fmt: skip
+    return ["case", "kind", "hidden", "here", "there", "right"], rows
 
 
 def _share(what: str, told: Mapping[str, Any], *, at_least: float | None = None, at_most: float | None = None) -> Row:
     low, high = told["interval"]
     interval = f"{100 * low:.1f} to {100 * high:.1f} %" if told["count"] else "-"
     shown = "-" if told["share"] is None else f"{100 * told['share']:.1f} % ({told['right']})"
-    demand, met = _demand(told["share"], at_least, at_most, "{:.0%}")
+    demand, met = _demand(told["share"], at_least, at_most, percent=True)
     wrong_may_be = 1.0 - at_least if at_least is not None else at_most
     # Where not even one may be wrong, what is met by all of so few is met by chance.
     few = wrong_may_be is not None and told["count"] * wrong_may_be < 1.0 - _ROUNDING
@@ -61,18 +75,19 @@ def _share(what: str, told: Mapping[str, Any], *, at_least: float | None = None,
 def _number(what: str, value: float | None, count: int, *, may_miss: float, at_least: float | None = None,
             at_most: float | None = None) -> Row:  # fmt: skip
     """A row of what one number tells of many cases, of which the share `may_miss` may miss what must be."""
-    demand, met = _demand(value, at_least, at_most, "{:g}")
+    demand, met = _demand(value, at_least, at_most, percent=False)
     if value is not None and count * may_miss < 1.0 - _ROUNDING:
         met = "too few"
     return [what, "-" if value is None else f"{value:.4f}", "", str(count), demand, met]
 
 
-def _demand(value: float | None, at_least: float | None, at_most: float | None, form: str) -> tuple[str, str]:
-    if at_least is None and at_most is None:
+def _demand(value: float | None, at_least: float | None, at_most: float | None, *, percent: bool) -> tuple[str, str]:
+    bound = at_most if at_least is None else at_least
+    if bound is None:
         return "", ""
-    if at_least is not None:
-        return f"at least {form.format(at_least)}", "-" if value is None else "yes" if value >= at_least else "no"
-    return f"at most {form.format(at_most)}", "-" if value is None else "yes" if value <= (at_most or 0.0) else "no"
+    meets = value is not None and (value >= bound if at_most is None else value <= bound)
+    shown = f"{100 * bound:g}%" if percent else f"{bound:g}"
+    return f"at {'least' if at_most is None else 'most'} {shown}", "-" if value is None else "yes" if meets else "no"
 
 
 def confusion_rows(table: Mapping[str, Mapping[str, int]]) -> tuple[list[str], list[Row]]:
@@ -106,11 +121,19 @@ def detection_rows(score: Mapping[str, Any]) -> tuple[list[str], list[Row]]:
 def missed_rows(score: Mapping[str, Any]) -> tuple[list[str], list[Row]]:
     """Give header and rows of the cases that were answered wrongly."""
     rows = [
-        [one["case"], one["kind"], _pairs(one["hidden"]) or one["off"] or "nothing",
-         _pairs(one["named"]) or one["verdict"], "-" if one["probability"] is None else f"{one['probability']:.2f}"]
+        [one["case"], one["kind"], _hidden(one), _answer(one),
+         "-" if one["probability"] is None else f"{one['probability']:.2f}"]
         for one in score["marks"] if not one["right"]
     ]  # fmt: skip
     return ["case", "kind", "hidden", "named", "probability"], rows
+
+
+def _hidden(mark: Mapping[str, Any]) -> str:
+    return _pairs(mark["hidden"]) or mark["off"] or "nothing"
+
+
+def _answer(mark: Mapping[str, Any]) -> str:
+    return _pairs(mark["named"]) or str(mark["verdict"])
 
 
 def _pairs(named: Sequence[Sequence[str]]) -> str:

@@ -53,6 +53,12 @@ def run_campaign(
         return run_cases(directory, diagnosis_json, seed=seed, executor=executor, progress=progress)
 
 
-def score_campaign(directory: Path) -> Mapping[str, Any]:
-    """Verify the seals, mark the answers, write ``score.json`` and give its content."""
-    return score_cases(directory)
+def score_campaign(directory: Path, *, against: Path | None = None) -> Mapping[str, Any]:
+    """Verify the seals, mark the answers, write ``score.json`` and give its content.
+
+    Parameters
+    ----------
+    directory, against
+        See `chladni_withheld.score.score_cases`.
+    """
+    return score_cases(directory, against=against)

@@ -30,7 +30,8 @@ Kinds = Annotated[
     typer.Option(
         metavar="KIND=N",
         help="Share of a kind of cases, and of no others: effect, none, parameters, two, three, faint, leave_out, "
-        "outside; may be repeated. All but three if not given.",
+        "outside, topology, value, value_and_effect, as far as the generator draws them; may be repeated. Its usual "
+        "ones if not given.",
         show_default=False,
     ),
 ]
@@ -89,21 +90,35 @@ def run(
 
 
 @blind.command()
-def score(directory: Folder, *, figures: options.Figures = None, json: options.Json = None) -> None:
+def score(
+    directory: Folder,
+    *,
+    against: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR2", help="The same cases, answered by another version: what differs.", show_default=False
+        ),
+    ] = None,
+    figures: options.Figures = None,
+    json: options.Json = None,
+) -> None:
     """Verify the seals and hold the answers against the truths."""
     from chladni.apps.blind import score_campaign
     from chladni_withheld.score_table import (
         HEADER,
+        PAIRED_HEADER,
+        changed_rows,
         confusion_rows,
         detection_rows,
         missed_rows,
+        paired_rows,
         reliability_rows,
         score_rows,
     )
 
     require_places(reads=(), writes={"--json": json}, folders={"--figures": figures})
     to = Output(json)
-    found = score_campaign(directory)
+    found = score_campaign(directory, against=against)
     to.table(f"Score of {found['cases']} cases", HEADER, score_rows(found))
     for title, (header, rows) in (
         ("Families: hidden and named", confusion_rows(found["confusion_family"])),
@@ -115,6 +130,12 @@ def score(directory: Folder, *, figures: options.Figures = None, json: options.J
     if missed:
         more = f", the first {MOST_MISSED}; all are in score.json" if len(missed) > MOST_MISSED else ""
         to.table(f"Answered wrongly: {len(missed)}{more}", header, missed[:MOST_MISSED])
+    if against is not None:
+        told = found["against"]
+        to.table(f"Against {against}, {counted(told['pairs'])} pairs", PAIRED_HEADER, paired_rows(told))
+        header, changed = changed_rows(told)
+        if changed:
+            to.table(f"Right in one of the two only: {len(changed)}", header, changed)
     if found["missing"]:
         to.lines([f"Warning: {len(found['missing'])} cases have no result yet; chladni blind run {directory}"])
     to.line(f"wrote {directory / 'score.json'}")

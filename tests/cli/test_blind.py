@@ -1,3 +1,4 @@
+import shutil
 from pathlib import Path
 
 import pytest
@@ -59,6 +60,41 @@ def test_pictures_of_a_score(run: Run, campaign: Path, tmp_path: Path, monkeypat
     assert f"figure: {pictures / 'confusion.png'}" in done.out
 
 
+def test_a_score_against_another_version_tells_what_differs(
+    run: Run, campaign: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(blind, "diagnosis_json", diagnosis)
+    other = tmp_path_factory.mktemp("other") / "campaign"
+    shutil.copytree(campaign, other)
+    assert run("blind", "run", campaign, "--jobs", 1).code == 0
+
+    def unsure(_model: Path, _logs: object, *, leave_out: frozenset[str], seed: int) -> dict[str, object]:
+        return {"format": "chladni.gap/1", "verdict": "unknown", "causes": [], "ranking": []}
+
+    monkeypatch.setattr(blind, "diagnosis_json", unsure)
+    assert run("blind", "run", other, "--jobs", 1).code == 0
+    done = run("blind", "score", campaign, "--against", other, "--json", "-")
+    assert done.code == 0
+    assert done.document["against"]["pairs"] == 2
+    (row,) = [row for row in done.document["against"]["rows"] if row["key"] == "effect"]
+    assert (row["only_here"], row["only_there"], row["p"]) == (1, 0, 1.0)
+    lines = done.err.splitlines()
+    start = next(place for place, line in enumerate(lines) if line.startswith("Right in one of the two only: 1"))
+    (changed,) = [line for line in lines[start:] if line.startswith("case-0001")]
+    assert changed.split() == [
+        "case-0001",
+        "effect",
+        "delay",
+        "at",
+        "motor",
+        "delay",
+        "at",
+        "motor",
+        "unknown",
+        "here",
+    ]
+
+
 def test_a_broken_seal_is_one_line(run: Run, campaign: Path) -> None:
     path = campaign / "truth" / "case-0001.json"
     path.write_text(path.read_text().replace("delay", "lag"))
@@ -79,6 +115,13 @@ def test_a_kind_that_there_is_not_is_one_line(run: Run, tmp_path: Path) -> None:
     assert done.code == 2
     assert "'four=2' names no kind of case; there are effect, none, parameters, two, three" in done.err
     assert done.err.count("\n") == 1
+    assert not (tmp_path / "campaign").exists()
+
+
+def test_a_generator_that_there_is_not_is_one_line(run: Run, tmp_path: Path) -> None:
+    done = run("blind", "make", tmp_path / "campaign", "--generator", "rust")
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    assert "'rust' is no generator of cases; there are chains" in done.err
     assert not (tmp_path / "campaign").exists()
 
 

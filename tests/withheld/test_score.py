@@ -1,6 +1,7 @@
 """Marks and figures on answers made up for the purpose."""
 
 import json
+import shutil
 from copy import deepcopy
 from functools import reduce
 
@@ -9,8 +10,17 @@ import pytest
 from chladni.signals.errors import SetupError
 from chladni_withheld.folders import read_json, seal_case
 from chladni_withheld.marking import mark
-from chladni_withheld.score import Share, calibration_error, reliability, score_cases, scored
-from chladni_withheld.score_table import HEADER, confusion_rows, detection_rows, markdown, missed_rows, score_rows
+from chladni_withheld.score import Share, calibration_error, paired, reliability, score_cases, scored
+from chladni_withheld.score_table import (
+    HEADER,
+    changed_rows,
+    confusion_rows,
+    detection_rows,
+    markdown,
+    missed_rows,
+    paired_rows,
+    score_rows,
+)
 
 
 def answered(kind, hidden, named, *, verdict="effect", p=0.9, ratio=10.0, closed=0.99, coloured=False, off=None,
@@ -122,7 +132,7 @@ def test_of_three_effects_it_is_told_how_many_are_found():
     three = score["three"]
     assert [three[key]["right"] for key in ("all", "at_least_two", "at_least_one")] == [1, 2, 3]
     # Only where there are such machines: a campaign in the default composition has none.
-    assert [row[:2] for row in score_rows(score)[-3:]] == [
+    assert [row[:2] for row in score_rows(score) if row[0].startswith("three")] == [
         ["three effects: all named", "33.3 % (1)"],
         ["three effects: at least two", "66.7 % (2)"],
         ["three effects: at least one", "100.0 % (3)"],
@@ -153,7 +163,7 @@ def test_the_share_closed_is_that_of_the_true_law():
     assert (closed["count"], closed["without"]) == (3, 1)
 
 
-@pytest.mark.parametrize(("count", "met"), [(9, "too few"), (10, "yes")])
+@pytest.mark.parametrize(("count", "met"), [(14, "too few"), (15, "yes")])
 def test_a_share_that_may_miss_one_is_of_enough(count, met):
     marks = [answered("leave_out", "delay@m", "lag@m") for _ in range(count)]
     rows = {row[0]: row for row in score_rows(scored(marks))}
@@ -176,12 +186,157 @@ def test_cases_that_were_missed_are_listed():
     ]
 
 
+def counted(score, key):
+    """``right, count`` of a share, wherever it stands."""
+    outer, _, inner = key.partition(".")
+    told = score[outer][inner] if inner else score[outer]
+    return told["right"], told["count"]
+
+
+def test_a_wrong_value_among_the_causes_of_an_effect_is_a_cause():
+    hidden = "parameter@tool.mass coulomb_friction@elbow"
+    marks = [
+        answered("value_and_effect", hidden, "coulomb_friction@elbow parameter@tool.mass"),
+        answered("value_and_effect", hidden, "parameter@tool.mass coulomb_friction@wrist,elbow"),
+        answered("value_and_effect", hidden, "coulomb_friction@elbow"),
+        answered("value_and_effect", hidden, "parameter@tool.mass", verdict="parameters"),
+        answered("value_and_effect", hidden, "coulomb_friction@elbow parameter@arm.mass"),
+    ]
+    score = scored(marks)
+    assert counted(score, "model_wrong.value_and_effect") == (2, 5)
+    assert [one["right"] for one in score["marks"]] == [True, True, False, False, False]
+    # A value that isn't wrong is a wrong name.
+    assert counted(score, "model_wrong.wrong") == (1, 5)
+    assert score["marks"][3]["named"] == [["parameter", "tool.mass"]]
+
+
+def test_each_of_several_wrong_values_must_be_named():
+    hidden = "parameter@elbow.stiffness parameter@tool.mass"
+    marks = [
+        answered("value", hidden, "parameter@tool.mass parameter@elbow.stiffness", verdict="parameters"),
+        answered("value", hidden, "parameter@tool.mass", verdict="parameters"),
+        answered("value", "parameter@elbow.stiffness", "parameter@elbow.stiffness", verdict="parameters"),
+        answered("value", "parameter@elbow.stiffness", "added_mass@tool", p=0.7),
+        answered("value", "parameter@elbow.stiffness", "", verdict="unknown"),
+    ]
+    score = scored(marks)
+    assert counted(score, "model_wrong.value") == counted(score, "model_wrong.named") == (2, 5)
+    assert counted(score, "model_wrong.wrong") == (1, 5)
+    assert (counted(score, "named_rightly"), counted(score, "unknown_nameable")) == ((2, 5), (1, 5))
+    rows = {row[0]: row[1] for row in score_rows(score)}
+    assert rows["of those, wrong values"] == "40.0 % (2)"
+    assert "of those, a missing link" not in rows
+    assert not any("wrong model" in row[0] for row in score_rows(scored([answered("none", "", "", verdict="none")])))
+
+
+@pytest.mark.parametrize("named", ["missing_link@wrist~ground", "missing_link@arm~wrist,wrist~ground"])
+def test_a_pair_is_a_site_in_any_order(named):
+    score = scored([answered("topology", "missing_link@ground~wrist", named)])
+    assert counted(score, "model_wrong.topology") == (1, 1)
+    swapped = answered("effect", "swapped_channels@y2~y1", "swapped_channels@y1~y2")
+    assert swapped.is_right
+    assert not answered("topology", "missing_link@ground~wrist", "missing_link@ground~arm").is_right
+
+
+def test_what_is_named_with_confidence_and_isn_t_true_is_counted():
+    marks = [
+        answered("effect", "delay@m", "delay@m clipping@y", p=0.95),
+        answered("effect", "delay@m", "lag@m", p=0.7),
+        answered("effect", "delay@m", "delay@other", p=0.89),
+        answered("effect", "delay@m", "delay@m", p=0.99),
+        answered("faint", "delay@m", "lag@m", p=0.9, ratio=1.0),
+        answered("none", "", "delay@m", p=0.92),
+        answered("parameters", "", "parameter@k", verdict="parameters", off="k", p=1.0),
+        answered("parameters", "", "parameter@c", verdict="parameters", off="k", p=1.0),
+        # No word was right; a sibling is no wrong name, and what isn't named isn't either.
+        answered("leave_out", "delay@m", "lag@m", p=0.95),
+        answered("outside", "viscoelastic@j", "lag@m", p=0.95),
+        answered("none", "", "delay@m", verdict="unknown", p=0.99),
+    ]
+    score = scored(marks)
+    assert counted(score, "wrong.0.9") == (5, 11)
+    assert counted(score, "wrong.0.6") == (7, 11)
+
+
+def test_of_what_words_can_name_all_must_be_named_and_nothing_else():
+    marks = [
+        answered("effect", "delay@m", "delay@m", p=0.6),
+        answered("effect", "delay@m", "delay@m", p=0.59),
+        answered("effect", "delay@m", "delay@m lag@m", p=0.7),
+        answered("two", "delay@m clipping@y", "clipping@y delay@m", p=0.7),
+        answered("two", "delay@m clipping@y", "clipping@y", p=0.7),
+        answered("parameters", "", "parameter@k", verdict="parameters", off="k"),
+        answered("effect", "delay@m", "", verdict="unknown"),
+    ]
+    # What is faint, missing, or has no word isn't asked.
+    others = [
+        answered("effect", "delay@m", "", verdict="unknown", ratio=2.0),
+        answered("faint", "delay@m", "", verdict="unknown", ratio=2.0),
+        answered("none", "", "", verdict="unknown"),
+        answered("outside", "viscoelastic@j", "", verdict="unknown"),
+    ]
+    score = scored([*marks, *others])
+    assert counted(score, "named_rightly") == (3, 7)
+    assert counted(score, "unknown_nameable") == (1, 7)
+
+
+def test_bins_of_the_reliability_diagram_have_wilsons_interval():
+    right = [answered("effect", "delay@m", "delay@m", p=0.95) for _ in range(50)]
+    half = [answered("effect", "delay@m", "delay@m" if place % 2 else "lag@m", p=0.55) for place in range(10)]
+    first, last = scored([*right, *half])["calibration"]["bins"]
+    # Of 5 of 10 and of 50 of 50, from tables.
+    assert first["interval"] == pytest.approx((0.2366, 0.7634), abs=1e-4)
+    assert last["interval"] == pytest.approx((0.9287, 1.0), abs=1e-4)
+    assert (first["count"], first["right"], last["count"], last["right"]) == (10, 0.5, 50, 1.0)
+
+
+@pytest.mark.parametrize(("generator", "must"), [
+    ("chains", ["at least 95%", "at least 97%", "at most 1.5%"]),
+    ("networks", ["at least 90%", "at least 95%", "at most 2%"]),
+    (None, ["at least 95%", "at least 97%", "at most 1.5%"]),
+])  # fmt: skip
+def test_what_must_be_is_the_generators_own(generator, must):
+    score = scored([answered("effect", "delay@m", "delay@m")]) | {"generator": generator}
+    rows = {row[0].partition(":")[0]: row[4] for row in score_rows(score)}
+    assert [rows[what] for what in ("right effect, first place", "right site, or a group that holds it",
+                                    "false alarm")] == must  # fmt: skip
+
+
+def row_of(compared, key):
+    return next(row for row in compared["rows"] if row["key"] == key)
+
+
+def test_versions_are_told_apart_by_the_pairs_that_differ():
+    right, wrong = answered("effect", "delay@m", "delay@m"), answered("effect", "delay@m", "saturation@m")
+    faint = answered("faint", "delay@m", "", verdict="none", ratio=1.0)
+    pairs = [*[(right, right)] * 30, *[(right, wrong)] * 6, *[(wrong, right)], *[(wrong, wrong)] * 2, (faint, faint)]
+    compared = paired(pairs)
+    row = row_of(compared, "effect")
+    assert {key: row[key] for key in ("count", "here", "there", "only_here", "only_there")} == {
+        "count": 39, "here": 36, "there": 31, "only_here": 6, "only_there": 1
+    }  # fmt: skip
+    # Seven throws of a coin that give one head or none, or as many tails.
+    assert row["p"] == pytest.approx(2 * (1 + 7) / 2**7)
+    # Of the same family: nothing differs, and nothing can be said.
+    assert (row_of(compared, "family")["only_here"], row_of(compared, "family")["p"]) == (0, None)
+    assert compared["pairs"] == 40
+    assert [one["here"]["right"] for one in compared["changed"]] == [True] * 6 + [False]
+    told = {row[0]: row[1:] for row in paired_rows(compared)}
+    assert told["right effect, first place"] == ["39", "36", "31", "6", "1", "0.125"]
+    assert "right family" in told
+    assert "left out or outside: unknown, or a sibling" not in told
+    header, rows = changed_rows(compared)
+    assert header == ["case", "kind", "hidden", "here", "there", "right"]
+    assert rows[-1] == ["x", "effect", "delay at m", "saturation at m", "delay at m", "there"]
+
+
 def test_wilsons_interval_has_its_published_values():
     # Newcombe, Statistics in Medicine 17 (1998), table I: 81 of 263 and 15 of 148.
     for right, count, low, high in ((81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605)):
         share = Share(right=right, count=count)
-        assert (share.low, share.high) == pytest.approx((low, high), abs=5e-5)
-    assert (Share(right=0, count=5).low, Share(right=5, count=5).high) == (0.0, 1.0)
+        assert share.interval == pytest.approx((low, high), abs=5e-5)
+    assert (Share(right=0, count=5).interval[0], Share(right=5, count=5).interval[1]) == (0.0, 1.0)
+    assert Share(right=0, count=0).interval == (0.0, 1.0)
 
 
 def test_calibration_error_is_the_weighted_distance():
@@ -192,7 +347,7 @@ def test_calibration_error_is_the_weighted_distance():
 
 @pytest.mark.parametrize(("count", "median", "tenth", "calibration"), [
     (1, "too few", "too few", "too few"), (2, "yes", "too few", "too few"), (10, "yes", "yes", "too few"),
-    (15, "yes", "yes", "no"),
+    (19, "yes", "yes", "too few"), (20, "yes", "yes", "no"),
 ])  # fmt: skip
 def test_numbers_of_few_cases_meet_and_miss_nothing(count, median, tenth, calibration):
     marks = [answered("effect", "delay@m", "delay@m") for _ in range(count)]
@@ -220,7 +375,7 @@ def test_tables_say_what_must_be_met():
     score = scored(marks)
     rows = {row[0]: row for row in score_rows(score)}
     assert all(len(row) == len(HEADER) for row in rows.values())
-    assert rows["right effect, first place"][1:] == ["90.0 % (9)", "59.6 to 98.2 %", "10", "at least 92%", "no"]
+    assert rows["right effect, first place"][1:] == ["90.0 % (9)", "59.6 to 98.2 %", "10", "at least 95%", "no"]
     # One wrong family of ten would be one too many: all ten tell little.
     assert rows["right family"][5] == "too few"
     enough = {row[0]: row for row in score_rows(scored(3 * marks))}
@@ -301,6 +456,52 @@ def test_any_value_at_any_key_is_marked_or_told_by_its_key(whole):
 CAUSE = {"effect": "delay", "site": "m"}
 
 
+def put(directory, name, named="delay"):
+    """A sealed case, and the answer to it."""
+    folder = directory / "cases" / name
+    folder.mkdir(parents=True)
+    (folder / "model.toml").write_text(f"# {name}")
+    (folder / "log.mcap").write_bytes(b"")
+    seal_case(directory, name, {"kind": "effect", "effects": TRUTH["effects"]})
+    answer(directory, name, named)
+
+
+def answer(directory, name, named):
+    (directory / "results").mkdir(exist_ok=True)
+    cause = RESULT["causes"][0] | {"effect": named}
+    (directory / "results" / f"{name}.json").write_text(json.dumps(RESULT | {"causes": [cause]}))
+
+
+def test_answers_of_two_versions_are_held_against_each_other(tmp_path):
+    here, there = tmp_path / "here", tmp_path / "there"
+    for name in ("one", "two", "three"):
+        put(here, name)
+    shutil.copytree(here, there)
+    # Only the cases and the answers of the other campaign are read.
+    shutil.rmtree(there / "truth")
+    answer(there, "one", "lag")
+    (there / "results" / "two.json").unlink()
+    score = score_cases(here, against=there)
+    row = row_of(score["against"], "effect")
+    assert (score["against"]["pairs"], row["here"], row["there"], row["only_here"], row["p"]) == (2, 2, 1, 1, 1.0)
+    assert [(one["here"]["case"], one["there"]["named"]) for one in score["against"]["changed"]] == [
+        ("one", [["lag", "m"]])
+    ]
+    assert "against" not in json.loads((here / "score.json").read_text())
+
+
+def test_answers_to_other_cases_are_refused(tmp_path):
+    here, there = tmp_path / "here", tmp_path / "there"
+    put(here, "one")
+    put(there, "one")
+    (there / "cases" / "one" / "model.toml").write_text("# another")
+    with pytest.raises(SetupError, match=r"there/cases/one/model\.toml: isn't what was sealed"):
+        score_cases(here, against=there)
+    put(tmp_path / "else", "two")
+    with pytest.raises(SetupError, match="else/results: answers none of the cases that are answered here"):
+        score_cases(here, against=tmp_path / "else")
+
+
 @pytest.mark.parametrize(("key", "value", "named"), [
     ("causes", [CAUSE | {"probability": "0.9"}], r"causes\[0\]\.probability: found '0\.9'; must be a number"),
     ("causes", [CAUSE | {"probability": 1.5}], r"causes\[0\]\.probability: found 1\.5; must be less"),
@@ -311,15 +512,8 @@ CAUSE = {"effect": "delay", "site": "m"}
 ])  # fmt: skip
 def test_a_result_on_disk_is_refused_with_its_file_and_key(tmp_path, key, value, named):
     for name in ("one", "two"):
-        folder = tmp_path / "cases" / name
-        folder.mkdir(parents=True)
-        (folder / "model.toml").write_text("")
-        (folder / "log.mcap").write_bytes(b"")
-        seal_case(tmp_path, name, {"kind": "effect", "effects": TRUTH["effects"]})
-        (tmp_path / "results").mkdir(exist_ok=True)
-        (tmp_path / "results" / f"{name}.json").write_text(
-            json.dumps(RESULT | ({key: value} if name == "two" else {}))
-        )
+        put(tmp_path, name)
+    (tmp_path / "results" / "two.json").write_text(json.dumps(RESULT | {key: value}))
     with pytest.raises(
         SetupError, match=rf"results/two\.json: {named}.*; remove this result, and run the case again"
     ):
