@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.models.core.port_law import PortLaw
-from chladni.models.drives.known_motion import force_along_motion
+from chladni.models.integrator.known_motion import force_along_motion
 from chladni.models.drives.seal_friction import seal_friction_force
 from chladni.models.effects.hysteresis import bouc_wen
 

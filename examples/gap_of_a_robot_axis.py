@@ -17,7 +17,7 @@ from scipy.signal import butter, sosfiltfilt
 import chladni
 from chladni.apps.explained_model import explained_model
 from chladni.apps.gap_evidence import gap_evidence
-from chladni.models.drives.known_motion import force_along_motion
+from chladni.models.integrator.known_motion import force_along_motion
 from chladni.models.structures.structure_input import StructureInput
 from chladni.models.structures.structure_model import StructureModel
 from chladni.viewers.figures.gap_sheet import save_gap_sheet

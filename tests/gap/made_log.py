@@ -7,6 +7,7 @@ from scipy.signal import butter, sosfilt
 
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.integrator.integrator import Integrator
 from chladni.models.structures.structure import Body, Joint, Structure
 from chladni.models.structures.structure_input import StructureInput
@@ -14,6 +15,8 @@ from chladni.models.structures.structure_model import StructureModel
 from chladni.models.structures.structure_output import StructureOutput
 
 RATE_HZ = 1024.0
+#: Every effect.
+WORDS = tuple(CATALOGUE.values())
 
 
 def chain(masses: Sequence[float], stiffnesses: Sequence[float], dampings: Sequence[float], at: int = 0):

@@ -5,18 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.models.effects.wrong_unit import PREFIXES, is_apart, near, short
+
 Matrix = NDArray[np.float64]
-#: Factor between model and log beyond which no effect explains it; least correlation that says it's one signal.
-_APART, _ALIKE = 30.0, 0.5
-#: What prefixes, and units, are apart, as a factor and in words.
-_PREFIXES = ((1e3, "of a prefix such as mm for m or kN for N"), (1e6, "of a prefix such as um for m or MN for N"))
-_CONVERSIONS = (
-    *_PREFIXES,
-    (180 / np.pi, "between degrees and rad"),
-    (9.80665, "between g and m/s^2"),
-)
-#: A fitted factor that is so near to a conversion, over it, is one; a model's scale, only so near to it.
-_EXACTLY, _ROUGHLY = 0.02, 2.0
+#: Least correlation that says it's one signal.
+_ALIKE = 0.5
+#: A model's scale is only so near to a conversion, as a factor.
+_ROUGHLY = 2.0
 
 
 def scale_doubt(measured: Matrix, simulated: Matrix, output_names: Sequence[str]) -> str | None:
@@ -45,61 +40,10 @@ def scale_doubt(measured: Matrix, simulated: Matrix, output_names: Sequence[str]
         if abs(one @ other) > _ALIKE * float(np.linalg.norm(one) * np.linalg.norm(other))
     }
     worst = max(ratios, key=lambda name: abs(np.log(ratios[name])), default=None)
-    if worst is None or not _is_apart(ratios[worst]):
+    if worst is None or not is_apart(ratios[worst]):
         return None
-    like = (f"; about the factor {words}" for factor, words in _PREFIXES if _near(ratios[worst], factor, _ROUGHLY))
+    like = (f"; about the factor {words}" for factor, words in PREFIXES if near(ratios[worst], factor, _ROUGHLY))
     return (
-        f"At {worst} the model as it is gives {_short(ratios[worst])} times what was measured: "
+        f"At {worst} the model as it is gives {short(ratios[worst])} times what was measured: "
         f"check its channel and unit, and the inputs'{next(like, '')}."
     )
-
-
-def gain_doubt(site: str, gain: float) -> str | None:
-    """Give a sentence on a fitted gain that a wrong unit rather than a sensitivity has.
-
-    Examples
-    --------
-    >>> gain_doubt("tip", 1.3)
-    >>> print(gain_doubt("tip", -0.102))
-    A gain of -0.102 at tip is the factor between g and m/s^2: check the unit of its channel.
-    >>> print(gain_doubt("motor", 7.1e-4))
-    A gain of 0.00071 at motor is rather that of a wrong unit: check the unit of its channel.
-    """
-    if gain == 0.0:
-        return None
-    for factor, words in _CONVERSIONS:
-        if _near(abs(gain), factor, 1.0 + _EXACTLY):
-            return f"A gain of {gain:.3g} at {site} is the factor {words}: check the unit of its channel."
-    if not _is_apart(abs(gain)):
-        return None
-    return f"A gain of {_short(gain)} at {site} is rather that of a wrong unit: check the unit of its channel."
-
-
-def mass_doubt(site: str, added: float, modelled: float, unit: str) -> str | None:
-    """Give a sentence on an added mass that is many times what the model has there.
-
-    Examples
-    --------
-    >>> mass_doubt("carriage", 10.0, 5.0, "kg")
-    >>> print(mass_doubt("carriage", 101.2, 0.095, "kg"))
-    What is added at carriage is 1100 times the 0.095 kg that the model has there: check that number and its unit.
-    """
-    if not added > _APART * modelled > 0:
-        return None
-    return (
-        f"What is added at {site} is {_short(added / modelled)} times the {modelled:.3g} {unit} that the model has "
-        "there: check that number and its unit."
-    )
-
-
-def _is_apart(ratio: float) -> bool:
-    return not 1 / _APART < ratio < _APART
-
-
-def _near(ratio: float, factor: float, within: float) -> bool:
-    return any(1 / within < ratio / one < within for one in (factor, 1 / factor))
-
-
-def _short(value: float) -> str:
-    """Two digits, without an exponent where there need be none."""
-    return f"{float(f'{value:.2g}'):g}"

@@ -7,7 +7,7 @@ from chladni.gap.design.experiment import Change
 from chladni.gap.design.search import Search
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.tunable import Tunables
-from chladni.gap.records.diagnosis import Candidate
+from chladni.gap.records.diagnosis import PARAMETER, Candidate
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
@@ -130,14 +130,14 @@ def _spoken(candidate: Contestant) -> tuple[str, str]:
     named = candidate.hypothesis.named
     if not named:
         return "the model as it is", ""
-    if len(named) == 1 and named[0].effect != "parameter":
+    if len(named) == 1 and named[0].effect != PARAMETER:
         return named[0].effect.replace("_", " "), named[0].site
     words = [_whole(one) for one in named]
     return " with ".join(words), ""
 
 
 def _whole(one: Candidate) -> str:
-    if one.effect == "parameter":
+    if one.effect == PARAMETER:
         return f"another value of {one.site}"
     return f"{one.effect.replace('_', ' ')} at {one.site}"
 

@@ -184,7 +184,7 @@ def _stretch(
         kept = [one for one in windows if one[1] <= max(most, windows[0][1])]
         return _part(measurement, 0, kept[-1][1]), 0, tuple(kept)
     # What changes at a time of its own is seen in the whole log only.
-    timed = any(named.effect == "varying_stiffness" for one in candidates for named in one.hypothesis.named)
+    timed = any(effect.kind.clues.timed for one in candidates for effect in one.hypothesis.effects)
     count = measurement.samples if timed else min(most, measurement.samples)
     power = np.sum(measurement.outputs**2 / np.maximum(np.var(measurement.outputs, axis=1), 1e-300)[:, None], axis=0)
     begins = np.arange(0, measurement.samples - count + 1, count)

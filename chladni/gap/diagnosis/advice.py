@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from chladni.gap.comparison.scale_doubt import gain_doubt, mass_doubt, scale_doubt
+from chladni.gap.comparison.scale_doubt import scale_doubt
 from chladni.gap.design.next_measurement import next_measurement
 from chladni.gap.design.what_is_missing import level_missing, sensor_missing, what_is_missing
 from chladni.gap.diagnosis.causes import Causes
@@ -44,12 +44,8 @@ def _doubted_values(study: Study, causes: Causes) -> Iterator[str | None]:
     if causes.verdict != "effect":
         return
     for effect in causes.best.fit.effects:
-        if effect.effect == "gain_error":
-            yield gain_doubt(effect.site, effect.values["gain"])
-        if effect.effect == "added_mass":
-            numbers = [study.model.parameters.get(f"{effect.site}.{word}") for word in ("mass", "inertia")]
-            for modelled in filter(None, numbers):
-                yield mass_doubt(effect.site, effect.values["mass"], modelled.value, modelled.unit)
+        if effect.kind.clues.doubts is not None:
+            yield from effect.kind.clues.doubts(effect.site, effect.values, study.model.parameters)
 
 
 def measure_next(study: Study, causes: Causes, seed: int) -> str | None:

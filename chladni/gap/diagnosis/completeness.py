@@ -9,11 +9,6 @@ from scipy.special import expit
 from chladni.gap.explanation.hypothesis import Contestant
 
 Matrix = NDArray[np.float64]
-#: Words whose law has no details that a machine's could differ in: a factor, a shift of time, a line, a mass, an
-#: oscillator, a value.
-_EXACT = frozenset(
-    {"gain_error", "cross_axis", "time_offset", "delay", "tonal_disturbance", "added_mass", "extra_mode", "parameter"}
-)
 #: Share of the gap's RMS beyond the noise that a cause may leave at even odds, of laws with details and of those
 #: without; what it may leave over the noise's power without that being counted.
 _LEFT, _UNCOUNTED = (0.38, 0.16), 0.05
@@ -38,16 +33,23 @@ def completeness(tuned: Contestant, found: Contestant, floor: Matrix) -> float:
     floor
         ``[output]`` mean square of the noise, over that of its estimate.
     """
-    return completeness_of(tuned.held, found.held, [one.effect for one in found.hypothesis.named], floor)
+    effects, wide = found.hypothesis.effects, found.hypothesis.wide
+    exact = bool(effects or wide) and all(one.kind.clues.exact for one in effects)
+    return completeness_of(tuned.held, found.held, floor, exact=exact)
 
 
-def completeness_of(tuned: Matrix, found: Matrix, words: Sequence[str], floor: Matrix) -> float:
-    """Give the completeness of some words from ``[output]`` mean squares over noise, without and with them."""
-    exact = int(bool(words) and all(word in _EXACT for word in words))
+def completeness_of(tuned: Matrix, found: Matrix, floor: Matrix, *, exact: bool) -> float:
+    """Give the completeness of some words from ``[output]`` mean squares over noise, without and with them.
+
+    Parameters
+    ----------
+    exact
+        Whether none of their laws has details, see `Clues`. A wrong value has none.
+    """
     gap = _beyond(tuned / floor)
     left = _beyond(found / floor - _UNCOUNTED)
     share = left / gap if gap > 0 else float(left > 0)
-    return float(expit((1.0 - share / _LEFT[exact]) / _SHARPNESS))
+    return float(expit((1.0 - share / _LEFT[int(exact)]) / _SHARPNESS))
 
 
 def completeness_among(tuned: Contestant, found: Contestant, others: Sequence[Contestant], floor: Matrix) -> float:
@@ -60,11 +62,11 @@ def completeness_among(tuned: Contestant, found: Contestant, others: Sequence[Co
 
 
 def _has_more_modes(other: Contestant, found: Contestant) -> bool:
-    """Whether both are oscillators alone, one of them where the only one of the other is."""
+    """Whether both are one word alone that often comes in several, once where the only one of the other is."""
     effects, more = found.hypothesis.effects, other.hypothesis.effects
-    sites = {one.site for one in more}
-    alone = len(effects) == 1 and len(more) > 1 and {one.effect for one in (*effects, *more)} == {"extra_mode"}
-    return alone and effects[0].site in sites
+    if len(effects) != 1 or len(more) < 2 or not effects[0].kind.clues.several:
+        return False
+    return {one.effect for one in more} == {effects[0].effect} and effects[0].site in {one.site for one in more}
 
 
 def known_share(tuned: Matrix, floor: Matrix) -> float:

@@ -10,7 +10,7 @@ from chladni.gap.diagnosis.study import Study
 from chladni.gap.location.profile import profile_at
 from chladni.gap.location.recovered import Recovered, recovered
 from chladni.gap.plant.places import Place, Site
-from chladni.gap.records.diagnosis import Cause
+from chladni.gap.records.diagnosis import PARAMETER, Cause
 
 Matrix = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def _found(places: Sequence[Place], name: str) -> tuple[Place, Site] | None:
 
 def _port_name(cause: Cause) -> str:
     """Where a cause acts: a wrong ``elbow.stiffness`` at the elbow."""
-    return cause.site.rpartition(".")[0] if cause.effect == "parameter" else cause.site
+    return cause.site.rpartition(".")[0] if cause.effect == PARAMETER else cause.site
 
 
 def _believed(study: Study, causes: Causes, site: Site) -> Matrix:

@@ -45,7 +45,11 @@ def _more(
 
 def explains_the_rest(several: Contestant, more: Contestant) -> bool:
     """Whether one more effect leaves next to nothing of what several do."""
-    before = set(several.hypothesis.named)
-    added = [one.effect for one in more.hypothesis.named if one not in before]
+    before, named = set(several.hypothesis.named), more.hypothesis.named
+    added = [
+        one.kind.clues.exact for one, name in zip(more.hypothesis.effects, named, strict=False) if name not in before
+    ]
     floor = np.minimum(np.minimum(several.held, more.held), 1.0)
-    return completeness_of(several.held, more.held, added, floor) > COMPLETE
+    return (
+        completeness_of(several.held, more.held, floor, exact=not before.issuperset(named) and all(added)) > COMPLETE
+    )

@@ -16,16 +16,12 @@ from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.screen import Screened
 from chladni.gap.location.locate import Located, Location
 from chladni.gap.location.profile import profiled
+from chladni.models.effects.attached_effect import kind_of
 
 #: Words at sites that begin beside a first effect, steps that they are given, and those that go on to the end.
 _TRIED, _STEPS, _ENTERED = 48, 2, 4
-#: Numbers that make an effect larger, and what it begins with of them: screened alone it stood for both.
-_SIZES = frozenset(
-    {"gap", "force", "coulomb", "static", "cubic", "coefficient", "amplitude", "relative_change", "mass"}
-)
+#: What an effect begins with of the numbers that make it larger: screened alone it stood for both.
 _LITTLE = 0.1
-#: Words that differ in the sign of their number.
-_OPPOSITE = {"hardening_stiffness": "softening_stiffness", "softening_stiffness": "hardening_stiffness"}
 
 
 class Grown:
@@ -43,8 +39,8 @@ class Grown:
     @cached_property
     def _candidates(self) -> list[Screened]:
         study = self.study
-        found = screened(study.location, _everywhere(study.location), study.leave_out, study.own)
-        return [each for one in found for each in (one, *_turned(one)) if each.trial.effect not in study.leave_out]
+        found = screened(study.location, _everywhere(study.location), study.kinds)
+        return [each for one in found for each in (one, *_turned(one)) if study.takes_part(each.trial.effect)]
 
     def beside(self, lead: Contestant) -> list[Contestant]:
         """Enter the words that, beside a fit of one effect, explain most in their first steps."""
@@ -55,13 +51,13 @@ class Grown:
         return sound(study, study.contest.enter_all([_on_from(one) for one in begun[:_ENTERED]]))
 
     def _begun(self, lead: Contestant) -> Iterator[Hypothesis]:
-        study, fit = self.study, lead.fit
+        fit = lead.fit
         tried: set[tuple[str, str]] = set()
         # At the same site a second word would mend the details of the first one's law.
         taken = {one.site for one in fit.effects}
         for one in self._candidates:
             key = (one.trial.effect, one.trial.site.name)
-            effect = None if key in tried or key[1] in taken else effect_of(_little(one), study.own)
+            effect = None if key in tried or key[1] in taken else effect_of(_little(one))
             if effect is None:
                 continue
             tried.add(key)
@@ -72,14 +68,16 @@ class Grown:
 
 def _turned(one: Screened) -> list[Screened]:
     """Give a softening spring as a hardening one and back: alone it stood for what is left of both effects."""
-    other = _OPPOSITE.get(one.trial.effect)
-    if other is None or set(one.values) != {"cubic"}:
+    opposite = one.trial.kind.clues.opposite if one.trial.kind is not None else None
+    other = opposite(one.values) if opposite is not None else None
+    if other is None:
         return []
-    return [replace(one, trial=replace(one.trial, effect=other), values={"cubic": -one.values["cubic"]})]
+    return [replace(one, trial=replace(one.trial, kind=kind_of(other.effect)), values=other.values)]
 
 
 def _little(one: Screened) -> Screened:
-    values = {name: (_LITTLE if name in _SIZES else 1.0) * value for name, value in one.values.items()}
+    sizes = one.trial.kind.clues.sizes if one.trial.kind is not None else ()
+    values = {name: (_LITTLE if name in sizes else 1.0) * value for name, value in one.values.items()}
     return replace(one, values=values)
 
 

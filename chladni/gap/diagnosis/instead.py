@@ -148,7 +148,7 @@ def _is_sure(location: Location, gained: float, further: int) -> bool:
 def _loopless(location: Location, best: Contestant) -> str | None:
     """Give the joint of a believed loop where a function leaves less; None without."""
     effects = best.hypothesis.effects
-    if best.chi < _ASKED or len(effects) != 1 or effects[0].effect != "hysteresis":
+    if best.chi < _ASKED or len(effects) != 1 or not effects[0].kind.clues.is_loop:
         return None
     site, gap = effects[0].site, location.tuned.chi - 1.0
     share = _left_by_function(location, site)

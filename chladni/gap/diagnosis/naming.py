@@ -1,6 +1,6 @@
 """From contestants to named causes: groups, alternatives, probabilities, fitted numbers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.diagnosis import Candidate, Cause, FittedNumber, Ranked
 from chladni.gap.tuning.output_error import OutputErrorFit
+from chladni.models.effects.effect_kind import EffectKind
 
 #: Of a floor that shakes and of a lattice: neither is a contest of likelihoods.
 _SHAKEN, _LATTICE = 0.9, 0.92
@@ -21,19 +22,25 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
         return ()
     if causes.shaken is not None:
         shaken = causes.shaken
-        return (_plain("base_vibration", "ground", _SHAKEN, group=shaken.group, numbers=shaken.parameters),)
+        return (_plain(shaken.effect, "ground", _SHAKEN, group=shaken.group, numbers=shaken.parameters),)
     found: list[Cause] = []
     if causes.best is not causes.tuned:
         places = range(len(causes.best.hypothesis.named))
         found += [_cause(causes, place) for place in sorted(places, key=lambda place: _left_alone(causes, place))]
-    if causes.verdict == "effect":
-        taken = {(one.effect, one.site) for one in found}
-        found += [
-            _plain("quantization", name, _LATTICE, numbers=_step(lattice.step, _unit(study, name)))
-            for name, lattice in study.lattices.items()
-            if ("quantization", name) not in taken
-        ]
+    if causes.verdict == "effect" and study.stepping is not None:
+        found += _in_steps(study, study.stepping, {one.site for one in found if one.effect == study.stepping.name})
     return tuple(found)
+
+
+def _in_steps(study: Study, kind: EffectKind, taken: Collection[str]) -> list[Cause]:
+    (name,) = kind.required
+    return [
+        _plain(
+            kind.name, site, _LATTICE, numbers={name: FittedNumber(value=one.step, std=None, unit=_unit(study, site))}
+        )
+        for site, one in study.lattices.items()
+        if site not in taken
+    ]
 
 
 def ranking_of(causes: Causes, causes_said: Sequence[Cause]) -> tuple[Ranked, ...]:
@@ -154,10 +161,6 @@ def _plain(
         alternatives=(),
         parameters=numbers,
     )
-
-
-def _step(step: float, unit: str) -> dict[str, FittedNumber]:
-    return {"step": FittedNumber(value=step, std=None, unit=unit)}
 
 
 def _unit(study: Study, name: str) -> str:

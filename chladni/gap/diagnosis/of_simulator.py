@@ -13,13 +13,14 @@ from chladni.gap.diagnosis.simulator_findings import SimulatorFindings
 from chladni.gap.diagnosis.simulator_runs import SimulatorRuns
 from chladni.gap.diagnosis.simulator_search import SimulatorSearch, search
 from chladni.gap.records.diagnosis import (
+    PARAMETER,
     Diagnosis,
 )
 from chladni.gap.simulators.signal_model import SignalModel
 from chladni.gap.simulators.simulator import RefinableSimulator, Simulator
 from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
 from chladni.models.effects.attached_effect import attached
-from chladni.models.effects.catalogue import CATALOGUE
+from chladni.models.effects.catalogue import taking_part
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.signals.time_series import TimeSeries
 
@@ -73,9 +74,8 @@ def diagnose_simulator(
     measurement, remarks = measurement_of(SignalModel(simulator=simulator), recording, log=log)
     measurement = with_period(measurement)
     noise = estimate_noise(measurement)
-    kinds = [kind for kind in (*CATALOGUE.values(), *own_effects) if kind.name not in leave_out]
     runs = SimulatorRuns.of(simulator, measurement, noise)
-    found = search(runs, kinds, progress=progress or _silent)
+    found = search(runs, taking_part(leave_out, own_effects), progress=progress or _silent)
     # What is left in the end is an upper bound too, and where a linear fit took distortion for noise, the lower one.
     left = noise_of_residual(measurement.outputs - found.best.outputs, sample_rate_hz=measurement.sample_rate_hz)
     told = SimulatorFindings(
@@ -111,7 +111,7 @@ def explained_simulator(
             source=cause.source,
         )
         for cause in diagnosis.causes
-        if cause.effect != "parameter"
+        if cause.effect != PARAMETER
     ]
     values = {name: number.value for name, number in diagnosis.tuned_parameters.items()}
     return WrappedSimulator(simulator=simulator, values=values, effects=tuple(effects))

@@ -75,11 +75,11 @@ def _entered_beside(
         return [], []
     model, location, known = behind
     trials = _second_trials(study, location, kept, known)
-    singles = effect_hypotheses(trials, study.own, count=_SECOND)
+    singles = effect_hypotheses(trials, count=_SECOND)
     entered = study.contest.enter_all([_beside(found, kept, one, found.fit.z) for one in singles])
     good = sound(study, entered)
     if least_left(good) > ALONE:
-        linear = linear_hypotheses(model, location, trials, study.own, count=_LINEAR)
+        linear = linear_hypotheses(model, location, trials, count=_LINEAR)
         more = study.contest.enter_all([_beside(found, kept, one, one.start_z) for one in linear])
         entered, good = [*entered, *more], [*good, *sound(study, more)]
     return entered, good
@@ -115,7 +115,7 @@ def _second_trials(
 ) -> list[Screened]:
     """Screen the best places for a second effect, beside those that are kept."""
     count = min(max(_PLACES, len(near_places(location, _AS_GOOD))), _MOST_PLACES)
-    trials = screened(location, location.ranked[:count], study.leave_out, study.own, known)
+    trials = screened(location, location.ranked[:count], study.kinds, known)
     # At the same place a second word would mend the details of the first one's law.
     taken = _same_places(study, {one.site for one in kept})
     return [one for one in trials if one.trial.site.name not in taken]
@@ -137,7 +137,7 @@ def paired_causes(study: Study, best: Contestant) -> Entered:
     pairs = located_pairs(study.location)
     weighed = _weighed_pairs(study, best, pairs)
     forces = _two_forces(study.location, pairs)
-    both = [_of_pair(study, pair, forms) for pair, forms in weighed]
+    both = [_of_pair(pair, forms) for pair, forms in weighed]
     found = sound(study, study.contest.enter_all([one for each in both for one in each]))
     if not weighed or not is_lost_beside(weighed[0][0], min(best.chi, least_left(found))):
         return Entered(ranked=found, forces=forces)
@@ -158,7 +158,7 @@ def _weighed_pairs(study: Study, best: Contestant, pairs: Sequence[Located]) -> 
     location = study.location
     tell = len(location.problem.measured) > _EXPLAINED
     near = _near_pairs(location, pairs) if tell else list(pairs)
-    weighed = [(pair, forms_at(location, [pair], study.leave_out, study.own)) for pair in near]
+    weighed = [(pair, forms_at(location, [pair], study.kinds)) for pair in near]
     if not tell:
         most = _PAIR_GAIN * best.chi * location.problem.scale
         weighed = [one for one in weighed if promised(*one) < most]
@@ -215,12 +215,12 @@ def _behind(
     return model, locate(model, rest, floor, contest.run.tunables, found.fit.z), known
 
 
-def _of_pair(study: Study, pair: Located, weighed: Sequence[Form]) -> list[Hypothesis]:
+def _of_pair(pair: Located, weighed: Sequence[Form]) -> list[Hypothesis]:
     found = searched([pair], weighed)
     forms = []
     for place in pair.places:
         there = [one for one in found if one.trial.site.name in place.names]
-        forms.append(effect_hypotheses(there, study.own, count=_EACH))
+        forms.append(effect_hypotheses(there, count=_EACH))
     return [
         hypothesis_of((*first.effects, *second.effects), pair.profile.z) for first in forms[0] for second in forms[1]
     ]

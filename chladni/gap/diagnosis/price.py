@@ -16,8 +16,6 @@ WRONG, NAMED = 3.0, 6.0
 #: effect could mend a little. Where no force at one place could, or the first has no law that could differ, it
 #: needn't bring more than a first one.
 _ADDED, _ADDED_FOR_SURE = 100.0, 12.0
-#: Words of a sensor that are a number and no law: what they leave, something else causes.
-_NUMBERS = frozenset({"gain_error", "cross_axis", "time_offset"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +57,11 @@ def price_among(contestants: Sequence[Contestant], further: float) -> Price:
 
 
 def leaves_for_sure(one: Contestant) -> bool:
-    """Whether something acts beside a single effect for certain: it has no details, and leaves more than noise."""
+    """Whether something acts beside a single effect for certain: it leaves more than noise, and has no details.
+
+    It's a number of a sensor's and no law: what it leaves, something else causes.
+    """
     effects = one.hypothesis.effects
-    return len(effects) == 1 and effects[0].effect in _NUMBERS and one.most_left > ALONE
+    if len(effects) != 1 or one.most_left <= ALONE:
+        return False
+    return effects[0].kind.clues.exact and effects[0].kind.family == "sensor"

@@ -93,20 +93,20 @@ def single_causes(study: Study, progress: Step) -> Entered:
     """Enter every effect that the screen holds plausible, and parameters beyond their tolerance."""
     location, contest = study.location, study.contest
     places = plausible_places(location)
-    candidates = screened(location, places, study.leave_out, study.own)
+    candidates = screened(location, places, study.kinds)
     progress(0.3)
-    hypotheses = effect_hypotheses(candidates, study.own, count=_FITTED)
+    hypotheses = effect_hypotheses(candidates, count=_FITTED)
     wrong = wrong_parameters(location)
     entered = contest.enter_all([*hypotheses, *([wrong] if wrong else [])], lambda done: progress(0.3 + 0.5 * done))
     found = sound(study, entered)
     if least_left(found) > ALONE:
-        linear = linear_hypotheses(study.model, location, candidates, study.own)
+        linear = linear_hypotheses(study.model, location, candidates)
         found += sound(study, contest.enter_all(linear))
     if least_left(found) > ALONE:
-        others = _others(effect_hypotheses(candidates, study.own, count=_AGAIN), hypotheses)
+        others = _others(effect_hypotheses(candidates, count=_AGAIN), hypotheses)
         found += sound(study, contest.enter_all(others))
-    if is_lost(location, least_left(found)) and "coulomb_friction" not in study.leave_out:
-        found += sound(study, contest.enter_all(sticking_hypotheses(location)))
+    if is_lost(location, least_left(found)):
+        found += sound(study, contest.enter_all(sticking_hypotheses(location, study.kinds)))
     lost = is_lost(location, least_left(found))
     shots = followed(study, location.best, hypotheses) if lost else None
     found += [] if shots is None else sound(study, shots.ranked)
@@ -141,9 +141,9 @@ def _others(found: Sequence[Hypothesis], tried: Sequence[Hypothesis]) -> list[Hy
 
 
 def sibling_causes(study: Study, ranked: Sequence[Contestant]) -> list[Contestant]:
-    """Enter the other of Coulomb's and Stribeck's friction where one leads, alone or beside another effect."""
+    """Enter what contains an effect or is contained in it, where that one leads, alone or beside another effect."""
     others = siblings(ranked[0], study.contest.run) if ranked else []
-    allowed = [one for one in others if study.leave_out.isdisjoint(effect.effect for effect in one.effects)]
+    allowed = [one for one in others if all(study.takes_part(effect.effect) for effect in one.effects)]
     return sound(study, study.contest.enter_all(allowed))
 
 

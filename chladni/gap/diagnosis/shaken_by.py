@@ -31,12 +31,13 @@ _LEFT = {"joint": 0.15, "input": 0.2, "ground": 0.5}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShakenGround:
-    """The names of sites that can't be told from the ground, itself first, and what follows from its motion.
+    """The word, the names of sites that can't be told from the ground, itself first, and what its motion tells.
 
     `predicted` is ``[output, sample]``: each sensor by what the others tell of the floor. `parameters` are what all
     of them tell of its level and band.
     """
 
+    effect: str
     group: tuple[str, ...]
     predicted: Matrix
     parameters: Mapping[str, FittedNumber]
@@ -54,7 +55,8 @@ def shaken_by(study: Study, tuned: Contestant) -> ShakenGround | None:
     tuned
         The model without any cause.
     """
-    if "base_vibration" in study.leave_out or len(study.measurement.output_names) < 2:
+    kind = next((one for one in study.kinds if one.clues.of_force is not None and "ground" in one.sites), None)
+    if kind is None or len(study.measurement.output_names) < 2:
         return None
     first = study.location.ranked[0].profile.chi
     tied = [one for one in study.location.ranked if one.profile.chi < _TIED * first]
@@ -70,11 +72,13 @@ def shaken_by(study: Study, tuned: Contestant) -> ShakenGround | None:
         return None
     if any(_follows(study, one) for one in near_places(study.location, _TIED)):
         return None
-    names = ["ground", *(name for one in (ground, *tied) for name in one.places[0].names)]
+    site = _grounds(ground)[0]
+    names = [site.name, *(name for one in (ground, *tied) for name in one.places[0].names)]
     return ShakenGround(
+        effect=kind.name,
         group=tuple(dict.fromkeys(names)),
         predicted=predicted,
-        parameters=floor_motion(study.location.problem, _grounds(ground)[0], ground.profile.z),
+        parameters=floor_motion(study.location.problem, site, ground.profile.z, kind),
     )
 
 

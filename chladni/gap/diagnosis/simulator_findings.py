@@ -21,6 +21,7 @@ from chladni.gap.diagnosis.simulator_fit import HARD_BOUND, SimulatorFit
 from chladni.gap.diagnosis.simulator_runs import EFFECTIVE_SAMPLES
 from chladni.gap.diagnosis.simulator_search import SimulatorSearch
 from chladni.gap.records.diagnosis import (
+    PARAMETER,
     Candidate,
     Cause,
     Closing,
@@ -49,7 +50,6 @@ _CLOSE = 3.0
 _UNDETERMINED = 0.9
 _RESAMPLED = 500
 _LISTED = 20
-PARAMETER = "parameter"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,17 +152,17 @@ class SimulatorFindings:
         fits = [self.search.tuned, *(fit for fit in self.search.fits if len(fit.effects) <= most)]
         evidence = np.array([fit.log_evidence for fit in fits])
         odds = np.exp(evidence - evidence.max())
-        complete = [self.complete(fit, [word for word, _ in fit.names]) for fit in fits]
+        complete = [self.complete(fit) if fit.effects else 1.0 for fit in fits]
         return list(zip(fits, (odds / odds.sum() * np.array(complete)).tolist(), strict=True))
 
-    def complete(self, fit: SimulatorFit, words: list[str]) -> float:
-        """Probability that a hypothesis with these words is all of the cause; without words there is none."""
+    def complete(self, fit: SimulatorFit) -> float:
+        """Probability that the effects of a fit, or its values where it has none, are all of the cause."""
         search = self.search
-        if not words:
-            return 1.0
         lowest = np.min([one.powers for one in (search.tuned, search.loose, *search.fits)], axis=0)
         floor, tuned = np.minimum(lowest, 1.0), search.tuned.powers
-        return known_share(tuned, floor) * completeness_of(tuned, fit.powers, words, floor)
+        return known_share(tuned, floor) * completeness_of(
+            tuned, fit.powers, floor, exact=all(one.kind.clues.exact for one in fit.effects)
+        )
 
     def probability(self, effect: str, site: str) -> float:
         """Give the probability of all hypotheses with this cause together."""
@@ -176,7 +176,7 @@ class SimulatorFindings:
             numbers, share = self.parameters(found.loose), self.explained
             names = [found.runs.tunables.names[place] for place in moved]
             odds = float(1 / (1 + np.exp(found.best.log_evidence - found.loose.log_evidence)))
-            probability = odds * self.complete(found.loose, [PARAMETER])
+            probability = odds * self.complete(found.loose)
             # Of several values that move together no fit tells what each is worth.
             share = share if len(names) == 1 else None
             return tuple(_wrong_value(name, numbers[name], probability, share) for name in names)

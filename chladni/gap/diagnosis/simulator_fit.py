@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.simulator_runs import EFFECTIVE_SAMPLES, SimulatorRuns, log_likelihood, weights
 from chladni.gap.tuning.bounded_step import bounded_step
-from chladni.gap.tuning.effect_scale import EffectNumber, effect_numbers, usually_fitted
+from chladni.gap.tuning.effect_scale import EffectNumber, effect_numbers
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
@@ -96,7 +96,7 @@ def fitted(
     SimulatorFit or None
         None when the simulation diverges at the start.
     """
-    names = [(*usually_fitted(effect), *effect.kind.variant(effect.variant).parameters) for effect in effects]
+    names = [(*effect.usually_fitted, *effect.kind.variant(effect.variant).parameters) for effect in effects]
     search = _Search(runs=runs, effects=tuple(effects), numbers=effect_numbers(effects, names), z_count=z.size)
     x = np.concatenate([np.clip(z, -bound, bound), np.zeros(len(search.numbers))])
     ranges = [_range(effects[each.effect], each) for each in search.numbers]

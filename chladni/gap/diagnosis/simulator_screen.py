@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from chladni.gap.diagnosis.simulator_runs import EFFECTIVE_SAMPLES, SimulatorRuns, can_act, weights
 from chladni.gap.diagnosis.simulator_starts import SiteScales, starts
 from chladni.models.effects.attached_effect import AttachedEffect, attached
+from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
@@ -163,10 +164,11 @@ def _visible_force(
     base = runs.simulated(z, known)
     wanted = max(0.5 * float(np.sqrt(np.mean(missed**2))), 1.0)
     force = site.force
+    kind, resisting = next((one, one.clues.resisting) for one in CATALOGUE.values() if one.clues.resisting)
     for _ in range(_FORCE_RUNS):
-        values = {"force": force, "creep_speed": _CREEP * site.rate}
+        values = resisting(force, _CREEP * site.rate)
         try:
-            friction = attached("coulomb_friction", site.name, values, variant="regularised")
+            friction = attached(kind, site.name, values)
             change = runs.over_noise(runs.simulated(z, [*known, friction]) - base)
         except ModelError:
             force *= 0.1

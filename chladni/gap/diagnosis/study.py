@@ -1,6 +1,6 @@
 """One log beside one model, made ready: noise, training stretches, free runs, location."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,6 @@ from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.quiet_floor import quiet_floor
 from chladni.gap.explanation.contest import Contest, training_mask
 from chladni.gap.explanation.known_states import KnownStates
-from chladni.gap.explanation.lattice import Lattice, lattice_of
 from chladni.gap.location.locate import Located, Location, locate
 from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.free_run import FreeRun
@@ -21,7 +20,9 @@ from chladni.gap.plant.windows import short_windows, training_in_windows, window
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
+from chladni.models.effects.catalogue import taking_part
 from chladni.models.effects.effect_kind import EffectKind
+from chladni.models.effects.lattice import Lattice
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, ModelError
 from chladni.signals.sensor_quality import sensor_quality
@@ -54,8 +55,8 @@ class Study:
         Outputs whose samples stand on a lattice that is coarse beside their noise, by name.
     repeating
         Outputs that hold their samples, without standing on a lattice.
-    leave_out, own
-        Words that don't take part; the user's effects by name.
+    kinds
+        Effects that take part.
     """
 
     model: Model
@@ -65,8 +66,7 @@ class Study:
     windows: tuple[tuple[int, int], ...] | None
     lattices: Mapping[str, Lattice]
     repeating: tuple[str, ...]
-    leave_out: frozenset[str]
-    own: Mapping[str, EffectKind]
+    kinds: tuple[EffectKind, ...]
 
     @property
     def held(self) -> NDArray[np.bool_]:
@@ -77,6 +77,15 @@ class Study:
     def coarse(self) -> frozenset[str]:
         """Outputs whose steps are larger than their signal's RMS: what rounding takes follows the signal."""
         return _coarse(self.measurement, self.lattices)
+
+    @property
+    def stepping(self) -> EffectKind | None:
+        """The effect that samples themselves show by standing on a lattice."""
+        return _stepping(self.kinds)
+
+    def takes_part(self, word: str) -> bool:
+        """Whether an effect is one of those that are looked for."""
+        return any(kind.name == word for kind in self.kinds)
 
     @property
     def horizon_s(self) -> float | None:
@@ -99,7 +108,8 @@ def study_of(
     _require_within_reach(model, measurement)
     measurement = with_period(measurement)
     noise = floor_of(measurement)
-    lattices = {} if "quantization" in leave_out else _lattices(measurement, noise)
+    kinds = taking_part(leave_out, own.values())
+    lattices = _lattices(measurement, noise, _stepping(kinds))
     noise = _with_rounding(noise, model, measurement, lattices)
     location = locate(model, measurement, noise, Tunables.of(model))
     windows = None if _runs_free(model, location) else windows_for(model, measurement)
@@ -113,8 +123,7 @@ def study_of(
         windows=windows,
         lattices=lattices,
         repeating=_repeating(measurement),
-        leave_out=leave_out,
-        own=own,
+        kinds=kinds,
     )
 
 
@@ -177,8 +186,15 @@ def _runs_free(model: Model, location: Location) -> bool:
     return min(best.profile.chi, location.tuned.chi) < _FOLLOWS
 
 
-def _lattices(measurement: Measurement, noise: NoiseFloor) -> dict[str, Lattice]:
-    found = {}
+def _stepping(kinds: Iterable[EffectKind]) -> EffectKind | None:
+    return next((kind for kind in kinds if kind.clues.in_samples is not None), None)
+
+
+def _lattices(measurement: Measurement, noise: NoiseFloor, stepping: EffectKind | None) -> dict[str, Lattice]:
+    found: dict[str, Lattice] = {}
+    lattice_of = stepping.clues.in_samples if stepping is not None else None
+    if lattice_of is None:
+        return found
     for name, signal, rms in zip(measurement.output_names, measurement.outputs, noise.rms, strict=True):
         lattice = lattice_of(signal)
         # Steps far below the noise are those of any converter.

@@ -9,11 +9,12 @@ from scipy.ndimage import uniform_filter1d
 from chladni.gap.explanation.followed import followed
 from chladni.gap.explanation.hats import hats
 from chladni.gap.explanation.screen import Screen
-from chladni.gap.explanation.trial import Force, Trial
+from chladni.gap.explanation.trial import SiteTrial
 from chladni.gap.location.locate import Located, Location
 from chladni.gap.location.recovered import Recovered, recovered
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
+from chladni.models.effects.trial import Force, Trial
 
 Matrix = NDArray[np.float64]
 #: Points of a law of the way, and of one of the pace beside it; of a law of both along each; samples of a filter.
@@ -86,7 +87,6 @@ def _force(motion: Recovered, parts: list[Matrix]) -> Force:
     return Force.of(*(motion.spectrum(one) for one in parts))
 
 
-def _trial(site: Site, force: Force) -> Trial:
-    return Trial(
-        effect="any law", site=site, build=lambda _: force, values=lambda *_: {}, parameters=len(force.basis)
-    )
+def _trial(site: Site, force: Force) -> SiteTrial:
+    form = Trial(build=lambda _: force, values=lambda *_: {}, parameters=len(force.basis))
+    return SiteTrial(site=site, form=form)

@@ -1,25 +1,17 @@
 """Candidates: every effect of the catalogue at every plausible site, by the screen."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from chladni.gap.explanation.body_trials import body_trials
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.followed import followed
-from chladni.gap.explanation.input_trials import input_trials
-from chladni.gap.explanation.joint_trials import joint_trials
 from chladni.gap.explanation.known_effect import KnownEffect
-from chladni.gap.explanation.output_trials import output_trials
-from chladni.gap.explanation.own_trials import own_trials
-from chladni.gap.explanation.ripple_trials import ripple_at_input
 from chladni.gap.explanation.screen import Screen, Screened
-from chladni.gap.explanation.trial import Trial
+from chladni.gap.explanation.trial import trials_at
 from chladni.gap.location.locate import Located, Location, sites_at
-from chladni.gap.location.recovered import Recovered, recovered
-from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.places import Site
-from chladni.gap.records.measurement import Measurement
 from chladni.gap.side_by_side import side_by_side
 from chladni.models.effects.effect_kind import EffectKind
 
@@ -35,23 +27,20 @@ Form = tuple[Screened, Screen]
 def screened(
     location: Location,
     places: Iterable[Located],
-    leave_out: frozenset[str],
-    own: Mapping[str, EffectKind],
+    kinds: Sequence[EffectKind],
     known: KnownEffect | None = None,
 ) -> list[Screened]:
     """Weigh every effect at the sites of some places; the best of each form, by rising cost.
 
     Parameters
     ----------
-    leave_out
-        Words that don't take part.
-    own
-        The user's effects by name.
+    kinds
+        Effects that take part.
     known
         What was taken from the log before it was located, when another effect is known already.
     """
     places = list(places)
-    return searched(places, forms_at(location, places, leave_out, own, known))
+    return searched(places, forms_at(location, places, kinds, known))
 
 
 def searched(places: Sequence[Located], forms: Sequence[Form]) -> list[Screened]:
@@ -80,8 +69,7 @@ def promised(pair: Located, forms: Iterable[Form]) -> float:
 def forms_at(
     location: Location,
     places: Iterable[Located],
-    leave_out: frozenset[str],
-    own: Mapping[str, EffectKind],
+    kinds: Sequence[EffectKind],
     known: KnownEffect | None = None,
 ) -> list[Form]:
     """Give every form at the sites of some places at the best point of its grid, with the screen that weighed it."""
@@ -94,8 +82,7 @@ def forms_at(
         motion = recovered(problem, located.profile, site, others)
         motion = motion if known is None else known.along(motion, problem.measurement)
         screen = Screen(problem, located.profile, site, others=others)
-        trials = [*trials_at(problem, measurement, motion, band), *own_trials(problem, motion, site, own)]
-        return [(one, screen) for one in screen.run(one for one in trials if one.effect not in leave_out)]
+        return [(one, screen) for one in screen.run(trials_at(problem, measurement, motion, band, kinds))]
 
     sites = [(located, site, tuple(others)) for located in places for site, others in sites_at(located)]
     return [one for each in side_by_side(weighed, sites) for one in each]
@@ -118,26 +105,3 @@ def _worth_a_search(found: Sequence[Screened], plausible: set[Site]) -> set[int]
     for site in plausible:
         worth.update([place for place, one in enumerate(found) if one.trial.site == site][:_REFINED_EACH])
     return worth
-
-
-def trials_at(
-    problem: LinearProblem, measurement: Measurement, motion: Recovered, band_hz: tuple[float, float]
-) -> Iterator[Trial]:
-    """Give the trials of a motion's site.
-
-    Parameters
-    ----------
-    measurement
-        What sensors showed in all, even where the problem is of a part of it.
-    """
-    site = motion.site
-    compiled = problem.view(np.zeros(len(problem.tunables.names))).compiled
-    if site.kind == "joint":
-        yield from joint_trials(motion, compiled.ports[compiled.port_index(site.name, "joint")])
-    elif site.kind == "body":
-        yield from body_trials(motion, band_hz)
-    elif site.kind == "input":
-        yield from input_trials(motion)
-        yield from ripple_at_input(problem, motion, site)
-    elif site.kind == "output":
-        yield from output_trials(motion, measurement)

@@ -53,9 +53,9 @@ def _at(screen: Screen, found: _Followed) -> Screen:
 def _held(screen: Screen, start: Screened, z: Matrix) -> _Followed | None:
     """Give a trial with its best amplitudes at held parameters; None when these make no such effect."""
     here = HeldSite(screen.problem, z, screen.site, screen.others)
-    force = start.trial.build(start.shape)
+    force = start.trial.form.build(start.shape)
     amplitudes = here.amplitudes(force)
-    values = start.trial.values(start.shape, amplitudes)
+    values = start.trial.form.values(start.shape, amplitudes)
     if values is None or not np.all(np.isfinite(list(values.values()))):
         return None
     profile = here.with_force(force, amplitudes)

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.explanation.trial import Force
 from chladni.gap.location.profile import Elimination, Profile
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
+from chladni.models.effects.trial import Force
 
 Matrix = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]

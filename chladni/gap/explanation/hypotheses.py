@@ -1,11 +1,12 @@
 """From screened trials and wide parameters to hypotheses that are worth a fit."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.screen import Screened
 from chladni.gap.location.locate import Location, tuned_stepwise
@@ -13,46 +14,26 @@ from chladni.gap.location.profile import Profile
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.places import Place
 from chladni.gap.side_by_side import side_by_side
-from chladni.gap.tuning.effect_scale import usually_fitted
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.core.parameter import Parameter
 from chladni.models.effects.attached_effect import AttachedEffect, attached_if_possible
-from chladni.models.effects.effect_kind import EffectKind
+from chladni.models.effects.clues import FittedForm
 from chladni.signals.errors import ModelError
 
 Matrix = NDArray[np.float64]
 #: A parameter outside of this many sigmas is wrong, not uncertain.
 OUTSIDE = 3.0
-#: Numbers that shape a law without naming it: fitted only when that pays.
-_DETAILS: Mapping[str, tuple[str, ...]] = {
-    "coulomb_friction": ("offset", "creep_speed"),
-    "stribeck_friction": ("creep_speed", "presliding", "bristle_damping"),
-    "added_mass": ("damping_ratio",),
-    "hysteresis": ("shape",),
-    "lag": ("damping_ratio",),
-    "mounting_resonance": ("carried",),
-    "one_sided_stop": ("dissipation",),
-    "varying_stiffness": ("rise",),
-    "rate_limit": ("tracking_time",),
-    "tonal_disturbance": ("phase",),
-}
-#: Speeds over the joint's RMS speed at which a Stribeck curve begins its search: from one it may end as Coulomb's.
-_STRIBECK_SPEEDS = (0.2, 0.6)
 #: Misfit over another's up to which a screened form is as good, and how many of those are tried too.
 _TIED, _TIES = 1.02, 2
 #: How far one may be searched for outside its tolerance, in sigmas.
 _FAR = 15.0
 
 
-def effect_hypotheses(
-    screened: Sequence[Screened], own: Mapping[str, EffectKind], *, count: int, margin: float = 40.0
-) -> list[Hypothesis]:
+def effect_hypotheses(screened: Sequence[Screened], *, count: int, margin: float = 40.0) -> list[Hypothesis]:
     """Give the best screened trials as hypotheses.
 
     Parameters
     ----------
-    own
-        Effects of the user's by name; others are taken from the catalogue.
     count
         So many and a few that are as good as the last of them, of each effect and site at most two forms.
     margin
@@ -69,7 +50,7 @@ def effect_hypotheses(
             continue
         if len(found) >= count and (one.chi > _TIED * last or len(found) >= count + _TIES):
             break
-        effect = effect_of(one, own)
+        effect = effect_of(one)
         if effect is None:
             continue
         seen[key] = seen.get(key, 0) + 1
@@ -82,16 +63,17 @@ def hypothesis_of(
     effects: tuple[AttachedEffect, ...], z: Matrix, *, screened: float | None = None, initial: Matrix | None = None
 ) -> Hypothesis:
     """Give the hypothesis that these effects act."""
-    fitted = tuple(usually_fitted(effect) for effect in effects)
+    fitted = tuple(effect.usually_fitted for effect in effects)
     start = np.clip(z, -OUTSIDE, OUTSIDE)
     return Hypothesis(effects=effects, fitted=fitted, start_z=start, screened=screened, initial=initial)
 
 
-def effect_of(one: Screened, own: Mapping[str, EffectKind]) -> AttachedEffect | None:
+def effect_of(one: Screened) -> AttachedEffect | None:
     """Give the effect of a screened trial, its values held inside their possible ranges; None when it's none."""
     trial = one.trial
-    kind = own.get(trial.effect, trial.effect)
-    plain = attached_if_possible(kind, trial.site.name, one.values, variant=trial.variant, source=trial.source)
+    if trial.kind is None:
+        return None
+    plain = attached_if_possible(trial.kind, trial.site.name, one.values, variant=trial.variant, source=trial.source)
     if plain is None:
         return None
     values = {name: _inside(plain.parameters[name]) for name in plain.values}
@@ -99,10 +81,10 @@ def effect_of(one: Screened, own: Mapping[str, EffectKind]) -> AttachedEffect | 
 
 
 def siblings(found: Contestant, run: FreeRun) -> list[Hypothesis]:
-    """Give the other friction that begins where one ended, Stribeck's for Coulomb's and back: nested laws compete."""
+    """Give the effects that contain one of a fit or that it contains, begun where it ended: nested laws compete."""
     fit, hypotheses = found.fit, []
     for place, one in enumerate(fit.effects):
-        for other in _other_frictions(found, run, one):
+        for other in _nested(found, run, one):
             effects = (*fit.effects[:place], other, *fit.effects[place + 1 :])
             hypotheses.append(hypothesis_of(effects, fit.z, screened=found.hypothesis.screened, initial=fit.initial))
     return hypotheses
@@ -135,53 +117,35 @@ def _moved(effect: AttachedEffect, places: Sequence[Place]) -> Iterator[Attached
             yield replace(moved, values={**effect.values, "phase": phase - np.copysign(np.pi, phase)})
 
 
-def _other_frictions(found: Contestant, run: FreeRun, one: AttachedEffect) -> list[AttachedEffect]:
-    if one.effect == "stribeck_friction":
-        others = [_coulomb_beside(one)]
-    elif one.effect == "coulomb_friction":
-        others = _stribecks_beside(found, run, one)
-    else:
-        others = []
-    return [other for other in others if other is not None]
+def _nested(found: Contestant, run: FreeRun, one: AttachedEffect) -> list[AttachedEffect]:
+    nested = one.kind.clues.nested
+    if nested is None:
+        return []
 
+    def motion() -> tuple[Matrix, Matrix]:
+        there = run.motion(found.fit.z, found.fit.effects, site=one.site)
+        return there.displacement, there.velocity
 
-def _stribecks_beside(found: Contestant, run: FreeRun, one: AttachedEffect) -> list[AttachedEffect | None]:
+    fitted = FittedForm(
+        variant=one.variant,
+        values=one.values,
+        duration_s=run.measurement.duration_s,
+        band_hz=excited_band_hz(run.measurement),
+        motion=motion,
+    )
     try:
-        velocity = run.motion(found.fit.z, found.fit.effects, site=one.site).velocity
+        forms = list(nested(fitted))
     except ModelError:
         return []
-    speed = float(np.sqrt(np.mean(velocity**2)))
-    return [_stribeck_beside(one, share * speed) for share in _STRIBECK_SPEEDS]
-
-
-def _coulomb_beside(curve: AttachedEffect) -> AttachedEffect | None:
-    """Give the Coulomb friction of the same size and form as a Stribeck friction that slides."""
-    return attached_if_possible(
-        "coulomb_friction", curve.site, {"force": curve.values["coulomb"], **_bristles(curve)}, variant=curve.variant
-    )
-
-
-def _stribeck_beside(plain: AttachedEffect, speed: float) -> AttachedEffect | None:
-    """Give the Stribeck friction of the same size and form as a Coulomb friction, somewhat higher at rest."""
-    force = plain.values["force"]
-    return attached_if_possible(
-        "stribeck_friction",
-        plain.site,
-        {"coulomb": 0.9 * force, "static": 1.3 * force, "speed": speed, **_bristles(plain)},
-        variant=plain.variant,
-    )
-
-
-def _bristles(friction: AttachedEffect) -> dict[str, float]:
-    """Give how a friction begins to slide."""
-    return {name: friction.values[name] for name in ("presliding", "creep_speed") if name in friction.values}
+    others = [attached_if_possible(form.effect, one.site, form.values, variant=form.variant) for form in forms]
+    return [other for other in others if other is not None]
 
 
 def polished(coarse: Hypothesis, fit: OutputErrorFit) -> Hypothesis | None:
     """Give the hypothesis with the details of the laws free too, starting from a fit; None when there are none."""
     effects = fit.effects
     fitted = tuple(
-        (*usually_fitted(effect), *(name for name in _DETAILS.get(effect.effect, ()) if name in effect.values))
+        (*effect.usually_fitted, *(name for name in effect.kind.clues.details if name in effect.values))
         for effect in effects
     )
     if fitted == coarse.fitted or not effects:

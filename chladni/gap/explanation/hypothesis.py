@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.records.diagnosis import Candidate
+from chladni.gap.records.diagnosis import PARAMETER, Candidate
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.effects.attached_effect import AttachedEffect
 
@@ -44,7 +44,7 @@ class Hypothesis:
     def named(self) -> tuple[Candidate, ...]:
         """What it names as causes."""
         effects = [Candidate(effect=one.effect, site=one.site) for one in self.effects]
-        return (*effects, *(Candidate(effect="parameter", site=name) for name in self.wide))
+        return (*effects, *(Candidate(effect=PARAMETER, site=name) for name in self.wide))
 
     @property
     def freedom(self) -> int:

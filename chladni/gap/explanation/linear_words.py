@@ -18,7 +18,6 @@ from chladni.gap.tuning.effect_scale import effect_numbers, with_numbers
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
 from chladni.models.effects.attached_effect import AttachedEffect
-from chladni.models.effects.effect_kind import EffectKind
 from chladni.signals.errors import ModelError
 
 Matrix = NDArray[np.float64]
@@ -53,7 +52,7 @@ class LinearFit:
 
 
 def linear_hypotheses(
-    model: Model, location: Location, screened: Sequence[Screened], own: Mapping[str, EffectKind], *, count: int = 10
+    model: Model, location: Location, screened: Sequence[Screened], *, count: int = 10
 ) -> list[Hypothesis]:
     """Fit the linear effects of a screen together with the parameters; the best, by rising misfit.
 
@@ -65,15 +64,13 @@ def linear_hypotheses(
     ----------
     model
         Of the location's problem.
-    own
-        Effects of the user's by name.
     count
         Of screened forms that are fitted, at half a second each.
     """
     enough = _PLAUSIBLE * min((one.profile.chi for one in location.ranked), default=0.0)
     there = {site.name: one for one in location.ranked if one.profile.chi < enough for site in one.places[0].sites}
     worth = [one for one in screened if one.trial.site.name in there]
-    effects = [effect for one in worth if (effect := effect_of(one, own)) is not None and effect.kind.linear]
+    effects = [effect for one in worth if (effect := effect_of(one)) is not None and effect.kind.linear]
     found = [fitted_beside(model, location, effect, there[effect.site].profile.z) for effect in effects[:count]]
     ranked = sorted((one for one in found if one is not None), key=lambda one: one.chi)
     return [hypothesis_of((one.effect,), one.z, screened=one.chi) for one in ranked[:_ENTERED]]

@@ -9,11 +9,12 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
 from chladni.gap.explanation.held_site import HeldSite
-from chladni.gap.explanation.trial import Numbers, Shape, Trial
+from chladni.gap.explanation.trial import SiteTrial
 from chladni.gap.location.profile import Profile, bounded_minimum
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.gap.side_by_side import side_by_side
+from chladni.models.effects.trial import Numbers, Shape
 
 Matrix = NDArray[np.float64]
 #: Beyond this, whitened, a force is no force but a law that left the numbers; its square still is one.
@@ -38,7 +39,7 @@ class Screened:
         Where the parameters go.
     """
 
-    trial: Trial
+    trial: SiteTrial
     shape: Shape
     values: Numbers
     misfit: float
@@ -53,7 +54,9 @@ class Screened:
     @property
     def cost(self) -> float:
         """Negative log likelihood with prior and a penalty for each number (Schwarz 1978), but for constants."""
-        return self.misfit + float(self.z @ self.z) / 2 + 0.5 * self.trial.parameters * float(np.log(self.expected))
+        return (
+            self.misfit + float(self.z @ self.z) / 2 + 0.5 * self.trial.form.parameters * float(np.log(self.expected))
+        )
 
 
 class Screen:
@@ -93,11 +96,11 @@ class Screen:
         """Misfit and prior without any force."""
         return self._solved(np.zeros((0, self._held.rest.size)), self._held.rest)[1]
 
-    def run(self, trials: Iterable[Trial]) -> list[Screened]:
+    def run(self, trials: Iterable[SiteTrial]) -> list[Screened]:
         """Weigh trials on their grids; those whose amplitudes make no such effect are left out."""
 
-        def best(trial: Trial) -> Screened | None:
-            tried = (self.weigh(trial, shape) for shape in trial.grid)
+        def best(trial: SiteTrial) -> Screened | None:
+            tried = (self.weigh(trial, shape) for shape in trial.form.grid)
             return min((one for one in tried if one is not None), key=lambda one: one.cost, default=None)
 
         return [one for one in side_by_side(best, [*trials]) if one is not None]
@@ -121,15 +124,15 @@ class Screen:
         found = self.weigh(start.trial, tuple(np.asarray(best.x).tolist()))
         return found if found is not None and found.cost < start.cost else start
 
-    def weigh(self, trial: Trial, shape: Shape) -> Screened | None:
+    def weigh(self, trial: SiteTrial, shape: Shape) -> Screened | None:
         """Regress on one shape of a trial; None when no amplitudes make this effect."""
-        force = trial.build(shape)
+        force = trial.form.build(shape)
         basis, rest = self._held.printed(force.basis), self._held.unexplained(force)
         # A law that ran away along the recovered motion prints nothing that could be weighed.
         if not (np.all(np.abs(basis) < _RUNAWAY) and np.all(np.abs(rest) < _RUNAWAY)):
             return None
         amplitudes, misfit, z = self._solved(basis, rest)
-        values = trial.values(shape, amplitudes)
+        values = trial.form.values(shape, amplitudes)
         if values is None or not np.all(np.isfinite(list(values.values()))):
             return None
         expected = float(self.problem.scale)

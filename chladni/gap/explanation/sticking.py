@@ -1,6 +1,6 @@
 """A joint that mostly sticks: its way is too small for a law to be weighed along it, but its force is told."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from chladni.gap.location.locate import Located, Location
 from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.places import Site
 from chladni.models.effects.attached_effect import attached_if_possible
+from chladni.models.effects.effect_kind import EffectKind
+from chladni.models.effects.trial import Numbers
 
 #: Misfit over the best place's up to which a place is looked at, and most joints that are.
 _PLAUSIBLE, _MOST = 3.0, 3
@@ -18,13 +20,15 @@ _PLAUSIBLE, _MOST = 3.0, 3
 _SLIDING, _CREEP = 0.9, 0.15
 
 
-def sticking_hypotheses(location: Location) -> list[Hypothesis]:
-    """Give Coulomb friction at the joints where the cause may be, as large as most of the force that they pass on.
+def sticking_hypotheses(location: Location, kinds: Iterable[EffectKind]) -> list[Hypothesis]:
+    """Give friction at the joints where the cause may be, as large as most of the force that they pass on.
 
     Of a joint that sticks sensors tell the whole force, friction with spring and damper: what they miss of the way
     goes to the one as it comes from the other.
     """
-    found = [_sticking(location, located, site) for located, site in list(_joints(location))[:_MOST]]
+    joints = list(_joints(location))[:_MOST]
+    resisting = [(kind, kind.clues.resisting) for kind in kinds if kind.clues.resisting is not None]
+    found = [_sticking(location, *joint, *friction) for friction in resisting for joint in joints]
     return [one for one in found if one is not None]
 
 
@@ -35,15 +39,14 @@ def _joints(location: Location) -> Iterator[tuple[Located, Site]]:
             yield from ((located, site) for site in located.places[0].sites if site.kind == "joint")
 
 
-def _sticking(location: Location, located: Located, site: Site) -> Hypothesis | None:
+def _sticking(
+    location: Location, located: Located, site: Site, kind: EffectKind, resisting: Callable[[float, float], Numbers]
+) -> Hypothesis | None:
     problem = location.problem
     motion = recovered(problem, located.profile, site)
     compiled = problem.view(motion.z).compiled
     port = compiled.ports[compiled.port_index(site.name, "joint")]
     passed = motion.force + port.stiffness * motion.displacement + port.damping * motion.velocity
-    values = {
-        "force": float(np.quantile(np.abs(passed - np.median(passed)), _SLIDING)),
-        "creep_speed": _CREEP * float(np.std(motion.velocity)),
-    }
-    effect = attached_if_possible("coulomb_friction", site.name, values, variant="regularised")
+    force = float(np.quantile(np.abs(passed - np.median(passed)), _SLIDING))
+    effect = attached_if_possible(kind, site.name, resisting(force, _CREEP * float(np.std(motion.velocity))))
     return None if effect is None else hypothesis_of((effect,), located.profile.z)

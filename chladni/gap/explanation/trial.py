@@ -1,88 +1,87 @@
-"""Trials: effects with the force that they would give along a recovered motion, before any simulation."""
+"""Trials at a site: every effect that may act there, with the force that it would give along the recovered motion."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.gap.location.recovered import Recovered
+from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
-
-Matrix = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
-Numbers = Mapping[str, float]
-#: Logarithms of what enters an effect's law nonlinearly.
-Shape = tuple[float, ...]
+from chladni.gap.records.measurement import Measurement
+from chladni.models.effects.effect_kind import EffectKind
+from chladni.models.effects.law_trials import trials_of
+from chladni.models.effects.trial import Trial, TrialMotion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Force:
-    """Force of a law at a port, but for some amplitudes.
+class SiteTrial:
+    """One form of an effect at one site.
 
     Attributes
     ----------
-    fixed
-        ``[line]`` spectrum of the part that has no free amplitude, or None.
-    basis
-        ``[amplitude, line]`` spectra of the parts whose amplitudes are found by regression.
+    kind
+        The effect; None of a law that has no name.
+    site
+        Where.
+    form
+        The law along the motion there.
     """
 
-    fixed: Spectrum | None = None
-    basis: Spectrum
-
-    @classmethod
-    def of(cls, *parts: Spectrum) -> "Force":
-        """Give a force of free amplitudes."""
-        return cls(basis=np.stack(parts))
-
-    @classmethod
-    def known(cls, spectrum: Spectrum) -> "Force":
-        """Give a force without free amplitudes."""
-        return cls(fixed=spectrum, basis=np.zeros((0, spectrum.size), dtype=np.complex128))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
-    """One form of an effect at one site: a family of laws over a few numbers.
-
-    Attributes
-    ----------
-    effect, site, variant, source
-        As `chladni.attached` takes them; `site` with its kind.
-    build
-        ``build(shape)`` gives the force along the recovered motion; `shape` holds logarithms.
-    grid
-        Shapes to begin with: one that is empty when nothing enters nonlinearly.
-    values
-        ``values(shape, amplitudes)`` gives the effect's parameters, or None where they make no such effect.
-    parameters
-        How many numbers the effect has in all: what its freedom costs.
-    """
-
-    effect: str
+    kind: EffectKind | None = None
     site: Site
-    variant: str | None = None
-    source: str | None = None
-    build: Callable[[Shape], Force]
-    grid: Sequence[Shape] = field(default=((),))
-    values: Callable[[Shape, Matrix], Numbers | None]
-    parameters: int
+    form: Trial
+
+    @property
+    def effect(self) -> str:
+        """The word."""
+        return self.kind.name if self.kind is not None else ""
+
+    @property
+    def variant(self) -> str | None:
+        """Form of the law."""
+        return self.form.variant
+
+    @property
+    def source(self) -> str | None:
+        """Name of another output that the effect listens to."""
+        return self.form.source
 
 
-def logarithms(*axes: Sequence[float]) -> tuple[Shape, ...]:
-    """Give every combination of positive numbers, as logarithms.
+def trials_at(
+    problem: LinearProblem,
+    measurement: Measurement,
+    motion: Recovered,
+    band_hz: tuple[float, float],
+    kinds: Iterable[EffectKind],
+) -> Iterator[SiteTrial]:
+    """Give the trials of a motion's site.
 
-    Examples
-    --------
-    >>> logarithms((1.0,), (1.0, 1.0))
-    ((0.0, 0.0), (0.0, 0.0))
+    Parameters
+    ----------
+    measurement
+        What sensors showed in all, even where the problem is of a part of it.
+    band_hz
+        Where the excitation has power.
+    kinds
+        Effects that take part.
     """
-    shapes: list[Shape] = [()]
-    for axis in axes:
-        shapes = [(*shape, float(np.log(value))) for shape in shapes for value in axis]
-    return tuple(shapes)
-
-
-def numbers(shape: Shape) -> list[float]:
-    """Give the positive numbers of a shape."""
-    return [float(np.exp(one)) for one in shape]
+    site = motion.site
+    known = TrialMotion(
+        name=site.name,
+        kind=site.kind,
+        compiled=problem.view(np.zeros(len(problem.tunables.names))).compiled,
+        force=motion.force,
+        displacement=motion.displacement,
+        velocity=motion.velocity,
+        sample_rate_hz=motion.lines.sample_rate_hz,
+        frequency_hz=motion.lines.frequency_hz,
+        believed=motion.believed,
+        spectrum=motion.spectrum,
+        band_hz=band_hz,
+        outputs=dict(zip(measurement.output_names, measurement.outputs, strict=True)),
+        position_at=lambda port: motion.position_at(problem, port),
+    )
+    for kind in kinds:
+        if site.kind in kind.sites:
+            yield from (SiteTrial(kind=kind, site=site, form=form) for form in trials_of(kind, known))

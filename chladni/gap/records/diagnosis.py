@@ -39,6 +39,10 @@ class Correlation(Value):
         self._freeze()
 
 
+#: In place of an effect's word: a value of the model's that is wrong.
+PARAMETER = "parameter"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
     """An effect at a site.

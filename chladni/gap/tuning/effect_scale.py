@@ -70,7 +70,7 @@ def effect_numbers(
         When a name is no parameter of its effect.
     """
     if fitted is None:
-        fitted = [usually_fitted(effect) for effect in effects]
+        fitted = [effect.usually_fitted for effect in effects]
     if len(fitted) != len(effects):
         raise ModelError(f"names to fit are given for {len(fitted)} effects, there are {len(effects)}")
     return tuple(
@@ -78,12 +78,6 @@ def effect_numbers(
         for place, (effect, names) in enumerate(zip(effects, fitted, strict=True))
         for name in dict.fromkeys(names)
     )
-
-
-def usually_fitted(effect: AttachedEffect) -> tuple[str, ...]:
-    """Parameters that an effect can't do without; a choice such as the side of a stop isn't one to fit."""
-    names = (*effect.kind.required, *effect.kind.variant(effect.variant).fitted)
-    return tuple(name for name in names if effect.parameters[name].role == "construction")
 
 
 def with_numbers(

@@ -54,7 +54,7 @@ def mr_damper_of(
 
 def _equivalent(law: PortLaw, amplitude: float, omega: float) -> float:
     # Imported here: it brings the compiler of laws, which other dampers have no use for.
-    from chladni.models.drives.known_motion import force_along_motion
+    from chladni.models.integrator.known_motion import force_along_motion
 
     t = np.linspace(0.0, PERIODS * 2 * pi / omega, PERIODS * SAMPLES + 1)
     x, v = amplitude * np.sin(omega * t), amplitude * omega * np.cos(omega * t)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.models.drives.known_motion import force_along_motion
 from chladni.models.drives.mr_coefficients import MrCoefficients
 from chladni.models.drives.mr_fit_layout import MrLayout, layout_of
 from chladni.models.drives.mr_record import MrRecord
+from chladni.models.integrator.known_motion import force_along_motion
 from chladni.signals.errors import EstimateError
 
 Matrix = NDArray[np.float64]

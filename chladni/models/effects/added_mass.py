@@ -1,10 +1,18 @@
 """Added mass: a body that is heavier than modelled."""
 
+from collections.abc import Iterator
+
+import numpy as np
+
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
+from chladni.models.effects.extra_mode import STIFF_MOUNT, oscillator, pull
 from chladni.models.effects.extra_mode import attach as attach_oscillator
 from chladni.models.effects.linear_feedback import ground_acceleration, rate, velocity, with_feedback
+from chladni.models.effects.trial import Trial, TrialMotion, logarithms, numbers, proportional
+from chladni.models.effects.wrong_unit import APART, short
 
 
 def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
@@ -13,6 +21,42 @@ def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel
     # What the ground's shaking does is no part of a motion that is measured from the ground.
     acceleration = rate(compiled, velocity(compiled, port), site.name) + ground_acceleration(compiled, port)
     return with_feedback(compiled, port, acceleration.scaled(-values["mass"]))[0]
+
+
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    acceleration = motion.s * motion.spectrum(motion.velocity)
+    yield proportional(-acceleration, "mass")
+    # A mount bends a little below its resonance; above the excitation it's a mass, whatever holds it.
+    stiff_hz = STIFF_MOUNT * motion.band_hz[1]
+    yield Trial(
+        variant="mounted", build=lambda shape: pull(motion, acceleration, shape),
+        grid=logarithms((stiff_hz * np.array([1.1, 2.0, 4.0])).tolist(), (0.05,)),
+        values=lambda shape, a: oscillator(shape, a) if numbers(shape)[0] > stiff_hz else None, parameters=3,
+    )  # fmt: skip
+
+
+def _doubts(site: str, values: Values, modelled: Parameters) -> Iterator[str]:
+    for number in filter(None, (modelled.get(f"{site}.{word}") for word in ("mass", "inertia"))):
+        doubt = mass_doubt(site, values["mass"], number.value, number.unit)
+        if doubt is not None:
+            yield doubt
+
+
+def mass_doubt(site: str, added: float, modelled: float, unit: str) -> str | None:
+    """Give a sentence on an added mass that is many times what the model has there.
+
+    Examples
+    --------
+    >>> mass_doubt("carriage", 10.0, 5.0, "kg")
+    >>> print(mass_doubt("carriage", 101.2, 0.095, "kg"))
+    What is added at carriage is 1100 times the 0.095 kg that the model has there: check that number and its unit.
+    """
+    if not added > APART * modelled > 0:
+        return None
+    return (
+        f"What is added at {site} is {short(added / modelled)} times the {modelled:.3g} {unit} that the model has "
+        "there: check that number and its unit."
+    )
 
 
 ADDED_MASS = EffectKind(
@@ -26,6 +70,7 @@ ADDED_MASS = EffectKind(
     # Less mass than modelled is a wrong parameter, not something unmodelled: the bound is zero.
     neutral={"mass": 0.0},
     linear=True,
+    clues=Clues(trials=_trials, details=("damping_ratio",), sizes=("mass",), exact=True, doubts=_doubts),
     variants=(
         Variant(name="rigid", attach=attach, formula="f = -mass a"),
         Variant(

@@ -69,6 +69,12 @@ class AttachedEffect:
         """The values with their units and ranges."""
         return self.kind.parameters_of(self.variant).with_values(self.values)
 
+    @property
+    def usually_fitted(self) -> tuple[str, ...]:
+        """Parameters that it can't do without; a choice such as the side of a stop isn't one to fit."""
+        names = (*self.kind.required, *self.kind.variant(self.variant).fitted)
+        return tuple(name for name in names if self.parameters[name].role == "construction")
+
     def attach(self, compiled: CompiledModel, *, in_loop: bool = False) -> CompiledModel:
         """Give the model with the effect in it.
 
@@ -150,12 +156,18 @@ def attached(
     >>> friction.values["offset"], friction.variant
     (0.0, 'regularised')
     """
-    if isinstance(effect, str):
-        if effect not in CATALOGUE:
-            raise ModelError(f"no effect {effect!r}; {nearest(effect, CATALOGUE, 'effects')}")
-        effect = CATALOGUE[effect]
-    name = effect.variant(variant).name
-    return AttachedEffect(kind=effect, site=site, values=dict(values), variant=name, source=source)
+    kind = kind_of(effect)
+    name = kind.variant(variant).name
+    return AttachedEffect(kind=kind, site=site, values=dict(values), variant=name, source=source)
+
+
+def kind_of(effect: str | EffectKind) -> EffectKind:
+    """Give the record of a word, or the one that was given; `ModelError` that names the nearest word."""
+    if not isinstance(effect, str):
+        return effect
+    if effect not in CATALOGUE:
+        raise ModelError(f"no effect {effect!r}; {nearest(effect, CATALOGUE, 'effects')}")
+    return CATALOGUE[effect]
 
 
 def attached_if_possible(

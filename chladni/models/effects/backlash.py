@@ -1,11 +1,16 @@
 """Backlash: the joint's spring acts only outside a dead zone."""
 
+from collections.abc import Iterator
 from typing import Any
+
+import numpy as np
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.models.effects.trial import Trial, TrialMotion, rms, shaped
 from chladni.signals.errors import ModelError
 
 
@@ -38,6 +43,22 @@ def _numbers(values: Values, port: Port) -> tuple[float, ...]:
     return port.stiffness, values["gap"] / 2, port.damping
 
 
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    stiffness, d = motion.port.stiffness, motion.displacement
+    if stiffness <= 0:
+        return
+    # From hardly any play to one that the motion barely crosses.
+    gaps = 2 * rms(d) * np.geomspace(5e-4, 2.0, 24)
+    yield shaped(
+        lambda gap: motion.spectrum(-stiffness * np.clip(d, -gap / 2, gap / 2)), gaps.tolist(), "gap"
+    )  # fmt: skip
+
+
+def _is_degenerate(fitted: FittedForm) -> bool:
+    """Whether the motion never crosses the play."""
+    return fitted.values["gap"] > 2.0 * float(np.max(np.abs(fitted.motion()[0])))
+
+
 BACKLASH = EffectKind(
     name="backlash",
     family="stiffness",
@@ -52,6 +73,7 @@ BACKLASH = EffectKind(
         )
     ),
     neutral={"gap": 0.0},
+    clues=Clues(trials=_trials, is_degenerate=_is_degenerate, sizes=("gap",)),
     variants=(
         Variant(
             name="spring",

@@ -1,11 +1,17 @@
 """Base vibration: the floor shakes, and no channel of the log tells."""
 
+import numpy as np
+from numpy.typing import NDArray
+
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.effects.band_noise import BandNoise
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.generated_signal import with_generated
 from chladni.models.effects.linear_feedback import with_feedback
+
+Matrix = NDArray[np.float64]
 
 
 def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
@@ -27,6 +33,36 @@ def _check(values: Values) -> str:
     if values["seed"] != int(values["seed"]):
         return f"seed = {values['seed']:g} must be a whole number"
     return ""
+
+
+#: Share of the power that is left out at either end of a band: tails there are the estimate's, not the floor's.
+_TAIL = 0.05
+
+
+def _of_force(acceleration: Matrix, sample_rate_hz: float) -> Values:
+    low_hz, high_hz = flat_band(acceleration, sample_rate_hz)
+    return {"level": float(np.sqrt(np.mean(acceleration**2))), "band": high_hz, "band_start": low_hz}
+
+
+def flat_band(signal: Matrix, sample_rate_hz: float) -> tuple[float, float]:
+    """Give the ends in Hz of the flat band between whose 5th and 95th percentile 90 % of a signal's power lies.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> lines = np.zeros(501)
+    >>> lines[100:201] = 1.0
+    >>> low_hz, high_hz = flat_band(np.fft.irfft(lines), 1000.0)
+    >>> f"{low_hz:.0f} to {high_hz:.0f} Hz"
+    '100 to 200 Hz'
+    """
+    power = np.abs(np.fft.rfft(signal)) ** 2
+    # A line stands for the frequencies around it.
+    edges_hz = (np.arange(power.size + 1) - 0.5) * sample_rate_hz / signal.size
+    summed = np.concatenate([[0.0], np.cumsum(power)]) / np.sum(power)
+    low_hz, high_hz = np.interp([_TAIL, 1.0 - _TAIL], summed, edges_hz)
+    beyond = (high_hz - low_hz) * _TAIL / (1.0 - 2.0 * _TAIL)
+    return float(max(low_hz - beyond, 0.0)), float(min(high_hz + beyond, sample_rate_hz / 2.0))
 
 
 BASE_VIBRATION = EffectKind(
@@ -57,6 +93,7 @@ BASE_VIBRATION = EffectKind(
     optional=("band_start", "seed"),
     neutral={"level": 0.0},
     check=_check,
+    clues=Clues(of_force=_of_force),
     variants=(
         Variant(name="flat", attach=attach, formula="a_ground = level sqrt(2/N) sum_k cos(2 pi f_k t + phase_k)"),
     ),

@@ -1,6 +1,6 @@
 """All words of the vocabulary of unmodelled effects."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from types import MappingProxyType
 
 from chladni.models.effects.ac_coupling import AC_COUPLING
@@ -70,3 +70,9 @@ FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         for family in dict.fromkeys(kind.family for kind in _KINDS)
     }
 )
+
+
+def taking_part(leave_out: Collection[str], own: Iterable[EffectKind]) -> tuple[EffectKind, ...]:
+    """Give all words and effects of one's own, which stand in place of a word of their name, but for some."""
+    every = {**CATALOGUE, **{kind.name: kind for kind in own}}
+    return tuple(kind for name, kind in every.items() if name not in leave_out)

@@ -1,8 +1,26 @@
 """Clipping: the sensor's range ends."""
 
+from collections.abc import Iterator
+
+import numpy as np
+
 from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Variant
-from chladni.models.effects.saturation import CLIPPED, KNEE, ROUNDED
+from chladni.models.effects.saturation import CLIPPED, KNEE, ROUNDED, rounded_limit
+from chladni.models.effects.trial import Trial, TrialMotion, shaped
+
+
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    y = motion.displacement
+    # A sensor that clips shows its limit itself: nothing is far beyond where its samples pile up.
+    shares = (0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999)
+    limits = np.quantile(np.abs(motion.outputs[motion.name]), shares).tolist()
+    inside = [limit for limit in limits if 0 < limit < float(np.max(np.abs(y)))]
+    if inside:
+        yield shaped(lambda value: motion.spectrum(np.clip(y, -value, value) - y), inside, "limit")
+        yield rounded_limit(motion, inside)
+
 
 CLIPPING = EffectKind(
     name="clipping",
@@ -18,6 +36,7 @@ CLIPPING = EffectKind(
         )
     ),
     neutral={"limit": 1e18},
+    clues=Clues(trials=_trials),
     # The range of a sensor and the limit of an actuator cut a signal in the same way: one law, two words.
     variants=(
         Variant(

@@ -1,7 +1,10 @@
 """Cross axis: a sensor that also feels another measured direction."""
 
+from collections.abc import Iterator
+
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.linear_feedback import (
     displacement,
@@ -11,6 +14,7 @@ from chladni.models.effects.linear_feedback import (
     with_output,
 )
 from chladni.models.effects.signal_path import free_port, is_in_loop, output_row
+from chladni.models.effects.trial import Force, Spectrum, Trial, TrialMotion
 from chladni.signals.errors import ModelError
 
 
@@ -35,6 +39,20 @@ def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel
     return with_displacement(compiled, port, displacement(compiled, port) + added)
 
 
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    units = {one.name: one.unit for one in motion.compiled.outputs}
+    for name, samples in motion.outputs.items():
+        if name != motion.name and units[name] == units[motion.name]:
+            yield _trial(name, motion.spectrum(samples))
+
+
+def _trial(source: str, spectrum: Spectrum) -> Trial:
+    return Trial(
+        source=source, build=lambda _: Force.of(spectrum), values=lambda _, a: {"coefficient": float(a[0])},
+        parameters=1,
+    )  # fmt: skip
+
+
 CROSS_AXIS = EffectKind(
     name="cross_axis",
     family="sensor",
@@ -51,5 +69,6 @@ CROSS_AXIS = EffectKind(
     neutral={"coefficient": 0.0},
     linear=True,
     needs_source=True,
+    clues=Clues(trials=_trials, sizes=("coefficient",), exact=True),
     variants=(Variant(name="share", attach=attach, formula="y_recorded = y + coefficient y_from"),),
 )  # fmt: skip

@@ -1,5 +1,6 @@
 """Dead zone: no force under a threshold, as behind a valve whose spool overlaps."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,9 @@ from numpy.typing import NDArray
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import ShapedSignal
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.models.effects.trial import Trial, TrialMotion, shaped
 
 Matrix = NDArray[np.float64]
 
@@ -28,6 +31,14 @@ def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
     return (values["width"],)
 
 
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    if motion.is_still:
+        return
+    u = motion.displacement
+    widths = (float(np.sqrt(np.mean(u**2))) * np.geomspace(0.01, 1.5, 18)).tolist()
+    yield shaped(lambda value: motion.spectrum(-np.clip(u, -value, value)), widths, "width")
+
+
 DEAD_ZONE = EffectKind(
     name="dead_zone",
     family="actuator",
@@ -42,6 +53,7 @@ DEAD_ZONE = EffectKind(
         )
     ),
     neutral={"width": 0.0},
+    clues=Clues(trials=_trials),
     variants=(
         Variant(
             name="overlap",

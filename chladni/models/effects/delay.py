@@ -1,11 +1,16 @@
 """Delay: dead time between a command and its force."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+
+import numpy as np
 
 from chladni.models.core.compiled_model import CompiledModel, DelayLine
 from chladni.models.core.parameter import Parameter, Parameters
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.signal_path import free_port, input_row, takes_own_samples
+from chladni.models.effects.trial import Trial, TrialMotion, shaped
 
 
 def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
@@ -23,6 +28,14 @@ def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel
     return replace(compiled, delays=(*compiled.delays, DelayLine(port=port, delay_s=delay_s)))
 
 
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    if motion.is_still:
+        return
+    u, s = motion.spectrum(motion.displacement), motion.s
+    times = (np.geomspace(0.05, 100.0, 24) / motion.sample_rate_hz).tolist()
+    yield shaped(lambda value: u * np.expm1(-s * value), times, "delay")
+
+
 DELAY = EffectKind(
     name="delay",
     family="actuator",
@@ -33,5 +46,6 @@ DELAY = EffectKind(
     ),
     neutral={"delay": 0.0},
     linear=True,
+    clues=Clues(trials=_trials, exact=True),
     variants=(Variant(name="dead_time", attach=attach, formula="u_acts(t) = u(t - delay)"),),
 )

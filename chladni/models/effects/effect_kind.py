@@ -7,6 +7,7 @@ from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port, PortKind
 from chladni.models.core.simulation import Simulation
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.wording import nearest
 from chladni.signals.errors import ModelError
 
@@ -109,11 +110,13 @@ class EffectKind:
         ``check(values)`` says what is wrong between the values, or gives an empty text.
     flags
         Says where a simulation left the law's validity, or None when the law is valid everywhere.
+    clues
+        What a diagnosis must know of it.
 
     Raises
     ------
     ModelError
-        When there's no site or no variant, or a name in `optional` or `neutral` is no parameter.
+        When there's no site or no variant, or a name in `optional`, `neutral` or `clues` is no parameter.
     """
 
     name: str
@@ -128,6 +131,7 @@ class EffectKind:
     needs_source: bool = False
     check: Callable[[Values], str] | None = None
     flags: Flags | None = None
+    clues: Clues = field(default_factory=Clues)
 
     def __post_init__(self) -> None:
         if not self.sites or not self.variants:
@@ -139,6 +143,10 @@ class EffectKind:
                 known.require(name)
         for name in (*self.optional, *self.neutral):
             self.parameters.require(name)
+        every = {name for variant in self.variants for name in self.parameters_of(variant.name)}
+        for name in (*self.clues.details, *self.clues.sizes):
+            if name not in every:
+                raise ModelError(f"effect {self.name!r}: its clues name {name!r}, which no variant has")
 
     @property
     def required(self) -> tuple[str, ...]:

@@ -1,11 +1,16 @@
 """Hardening stiffness: a spring that gets stiffer with displacement (Duffing's)."""
 
+from collections.abc import Iterator
 from typing import Any
+
+import numpy as np
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.clues import Clues, Relative
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.models.effects.trial import Force, Trial, TrialMotion, positive, proportional
 
 
 def cubic(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -36,6 +41,26 @@ def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
     return (values["cubic"],)
 
 
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    d = motion.displacement
+    yield proportional(motion.spectrum(d**3), "cubic")
+    yield Trial(
+        variant="progressive", build=lambda _: Force.of(motion.spectrum(d**3), motion.spectrum(d**5)),
+        values=lambda _, a: positive(a, cubic=a[0], range=np.sqrt(a[0] / a[1])) if min(a) > 0 else None,
+        parameters=2,
+    )  # fmt: skip
+    yield Trial(
+        variant="asymmetric", build=lambda _: Force.of(motion.spectrum(d**3), motion.spectrum(d**2)),
+        values=lambda _, a: positive(a, cubic=a[0], quadratic=a[1]), parameters=2,
+    )  # fmt: skip
+
+
+def _softening(values: Values) -> Relative | None:
+    if set(values) != {"cubic"}:
+        return None
+    return Relative(effect="softening_stiffness", values={"cubic": -values["cubic"]})
+
+
 HARDENING_STIFFNESS = EffectKind(
     name="hardening_stiffness",
     family="stiffness",
@@ -45,6 +70,7 @@ HARDENING_STIFFNESS = EffectKind(
         (Parameter(name="cubic", value=1e9, unit="N/m^3", low=0.0, high=1e14, minimum=0.0, maximum=1e20),)
     ),
     neutral={"cubic": 0.0},
+    clues=Clues(trials=_trials, sizes=("cubic",), opposite=_softening),
     variants=(
         Variant(name="cubic", attach=LawAtPort(law=cubic, numbers=_numbers), formula="F = cubic d^3", odd=True),
         Variant(

@@ -1,11 +1,30 @@
 """Hysteresis: a force that remembers which way it came (Bouc-Wen), and one that forgets with time."""
 
+from collections.abc import Iterator
 from typing import Any
+
+import numpy as np
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
+from chladni.models.core.port_law import LawFunction, PortLaw
 from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.models.effects.trial import (
+    Force,
+    Matrix,
+    Numbers,
+    Shape,
+    Spectrum,
+    Trial,
+    TrialMotion,
+    logarithms,
+    numbers,
+    positive,
+    rms,
+)
+from chladni.models.integrator.known_motion import force_along_motion
 
 
 def bouc_wen(_d: float, s: float, _t: float, parameters: Any, state: Any, rates: Any) -> float:
@@ -48,6 +67,79 @@ def _creeping_numbers(values: Values, _port: Port) -> tuple[float, ...]:
     return values["force"], values["yield"], values["shape"], values["slip_speed"], values["loop"]
 
 
+#: Most steps between two samples along a known motion.
+_STEPS = 16
+#: Yields over the way's RMS below which there's no loop to be seen, without and with creep.
+_LEAST_YIELD, _LEAST_CREEPING = 0.05, 0.01
+#: Of the usual way and pace of a joint: a yield below is friction's presliding.
+_FRICTION = 0.12
+
+
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    yield _plain_trial(motion)
+    yield _creeping_trial(motion)
+
+
+def _plain_trial(motion: TrialMotion) -> Trial:
+    reach = rms(motion.displacement)
+
+    def build(shape: Shape) -> Force:
+        bend, power = _bounded(shape)
+        return Force.of(_along(bouc_wen, (1.0, bend, power), bend, motion))
+
+    def values(shape: Shape, a: Matrix) -> Numbers | None:
+        bend, power = _bounded(shape)
+        return positive(a, force=a[0], shape=power, **{"yield": bend})
+
+    def _bounded(shape: Shape) -> tuple[float, float]:
+        bend, power = numbers(shape)
+        return max(bend, _LEAST_YIELD * reach), max(power, 1.0)
+
+    return Trial(
+        build=build, grid=logarithms((0.1 * reach, 0.3 * reach, 0.7 * reach, 1.5 * reach), (1.0, 2.0)),
+        values=values, parameters=3,
+    )  # fmt: skip
+
+
+def _creeping_trial(motion: TrialMotion) -> Trial:
+    """Hysteresis behind a dashpot: loops over velocity, as those of fluid dampers and rubber."""
+    reach, speed, fastest = rms(motion.displacement), rms(motion.velocity), float(np.max(np.abs(motion.velocity)))
+
+    def build(shape: Shape) -> Force:
+        bend, slip = max(numbers(shape)[0], _LEAST_CREEPING * reach), numbers(shape)[1]
+        return Force.of(_along(creeping, (1.0, bend, 1.0, slip, 0.5), bend, motion))
+
+    def values(shape: Shape, a: Matrix) -> Numbers | None:
+        bend, slip = max(numbers(shape)[0], _LEAST_CREEPING * reach), numbers(shape)[1]
+        # An element that the motion never makes yield is a spring and a dashpot in series.
+        return positive(a, force=a[0], slip_speed=slip, **{"yield": bend}) if slip < fastest else None
+
+    return Trial(
+        variant="creeping", build=build,
+        grid=logarithms((0.02 * reach, 0.06 * reach, 0.2 * reach), (0.1 * speed, 0.3 * speed)),
+        values=values, parameters=4,
+    )  # fmt: skip
+
+
+def _along(law: LawFunction, parameters: tuple[float, ...], bend: float, motion: TrialMotion) -> Spectrum:
+    """Spectrum of a law with a state that turns round within a way of about `bend`."""
+    port_law = PortLaw(port=0, function=law, parameters=parameters, state=(0.0,))
+    # Steps of more than 2.8 bends run away; where the motion is that fast the law slides anyway.
+    furthest = float(np.max(np.abs(motion.velocity))) / motion.sample_rate_hz
+    steps = int(np.clip(np.ceil(0.7 * furthest / bend), 4, _STEPS))
+    return motion.spectrum(
+        force_along_motion(port_law, motion.displacement, motion.velocity, motion.time_s, substeps=steps)
+    )
+
+
+def _is_degenerate(fitted: FittedForm) -> bool:
+    """Whether a loop has closed after a small part of the way, as friction does, or never yields, as a spring."""
+    d, s = fitted.motion()
+    usual, pace, values = float(np.std(d)), float(np.sqrt(np.mean(s**2))), fitted.values
+    stiff = values["yield"] < _FRICTION * usual and values.get("slip_speed", 0.0) < _FRICTION * pace
+    return stiff or values["yield"] > 2.0 * float(np.max(np.abs(d)))
+
+
 HYSTERESIS = EffectKind(
     name="hysteresis",
     family="friction",
@@ -73,6 +165,9 @@ HYSTERESIS = EffectKind(
     ),
     optional=("shape",),
     neutral={"force": 0.0},
+    clues=Clues(
+        trials=_trials, is_degenerate=_is_degenerate, details=("shape",), sizes=("force",), is_loop=True
+    ),
     variants=(
         Variant(
             name="bouc_wen",

@@ -1,10 +1,16 @@
 """Lag: an actuator of limited bandwidth."""
 
+from collections.abc import Iterator
+
+import numpy as np
+
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.effects.attaching import pass_through
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.linear_filter import first_order, second_order
+from chladni.models.effects.trial import Force, Shape, Trial, TrialMotion, logarithms, numbers, shaped
 
 
 def attach_first_order(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
@@ -22,6 +28,24 @@ def attach_second_order(compiled: CompiledModel, site: Site, values: Values) -> 
     return pass_through(compiled, site, second_order(1 / values["time_constant"], values["damping_ratio"]))
 
 
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    if motion.is_still:
+        return
+    u, s = motion.spectrum(motion.displacement), motion.s
+    times = (np.geomspace(0.05, 100.0, 24) / motion.sample_rate_hz).tolist()
+
+    def second(shape: Shape) -> Force:
+        time_s, damping = numbers(shape)
+        return Force.known(u * (1 / (time_s**2 * s**2 + 2 * damping * time_s * s + 1) - 1))
+
+    yield shaped(lambda value: u * (1 / (value * s + 1) - 1), times, "time_constant", "first_order")
+    yield Trial(
+        variant="second_order", build=second, grid=logarithms(times, (0.5, 0.9)),
+        values=lambda shape, _: {"time_constant": numbers(shape)[0], "damping_ratio": numbers(shape)[1]},
+        parameters=2,
+    )  # fmt: skip
+
+
 LAG = EffectKind(
     name="lag",
     family="actuator",
@@ -37,6 +61,7 @@ LAG = EffectKind(
     ),
     neutral={"time_constant": 0.0},
     linear=True,
+    clues=Clues(trials=_trials, details=("damping_ratio",)),
     variants=(
         Variant(name="first_order", attach=attach_first_order, formula="u_acts/u = 1/(time_constant p + 1)"),
         Variant(

@@ -1,11 +1,26 @@
 """A one-sided stop: a contact that acts beyond one displacement: end stop, rub, crack that opens and closes."""
 
+from collections.abc import Iterator
 from typing import Any
+
+import numpy as np
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.models.effects.trial import (
+    Force,
+    Matrix,
+    Numbers,
+    Shape,
+    Trial,
+    TrialMotion,
+    logarithms,
+    numbers,
+    positive,
+)
 
 
 def stop(d: float, s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -49,6 +64,44 @@ _DEPTH = Parameter(
     meaning="penetration at which the contact's secant stiffness is `stiffness`",
 )  # fmt: skip
 
+
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    for side in (1.0, -1.0):
+        yield _trial(motion, side, "spring", 1.0)
+        yield _trial(motion, side, "hertz_damper", 1.5)
+
+
+def _trial(motion: TrialMotion, side: float, variant: str, power: float) -> Trial:
+    d, s = side * motion.displacement, side * motion.velocity
+    # How much of the way to the furthest point is free, so that a search can't leave the motion.
+    low, high = float(np.quantile(d, 0.3)), float(np.max(d))
+    depth = 0.1 * (high - low)
+
+    def clearance(shape: Shape) -> float:
+        return high - (high - low) * min(numbers(shape)[0], 1.0)
+
+    def build(shape: Shape) -> Force:
+        pressed = side * np.maximum(d - clearance(shape), 0.0) ** power
+        return Force.of(*(motion.spectrum(one) for one in ([pressed] if power == 1.0 else [pressed, pressed * s])))
+
+    def values(shape: Shape, a: Matrix) -> Numbers | None:
+        if power == 1.0:
+            return positive(a, stiffness=a[0], clearance=clearance(shape), side=side)
+        stiffness, loss = a[0] * np.sqrt(depth), max(a[1] / a[0], 0.0) if a[0] > 0 else 0.0
+        return positive(a, stiffness=stiffness, clearance=clearance(shape), side=side, depth=depth, dissipation=loss)
+
+    return Trial(
+        variant=variant, build=build, grid=logarithms((0.08, 0.2, 0.35, 0.5, 0.7, 0.9)), values=values,
+        parameters=2 if power == 1.0 else 3,
+    )  # fmt: skip
+
+
+def _is_degenerate(fitted: FittedForm) -> bool:
+    """Whether the stop is never reached, or never left."""
+    touching = float(np.mean(fitted.values["side"] * fitted.motion()[0] > fitted.values["clearance"]))
+    return not 1e-4 < touching < 0.7
+
+
 ONE_SIDED_STOP = EffectKind(
     name="one_sided_stop",
     family="stiffness",
@@ -74,6 +127,7 @@ ONE_SIDED_STOP = EffectKind(
     # A stop that is never reached is none either, but how far is never depends on the motion.
     neutral={"stiffness": 0.0},
     check=_check,
+    clues=Clues(trials=_trials, is_degenerate=_is_degenerate, details=("dissipation",)),
     variants=(
         Variant(
             name="spring",

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import ShapedSignal
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.models.effects.lattice import lattice_of
 
 Matrix = NDArray[np.float64]
 
@@ -56,6 +58,7 @@ QUANTIZATION = EffectKind(
         )
     ),
     neutral={"step": 0.0},
+    clues=Clues(in_samples=lattice_of),
     variants=(
         Variant(
             name="rounded",

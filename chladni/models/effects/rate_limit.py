@@ -1,5 +1,6 @@
 """Rate limit: a force that changes no faster than the actuator can."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,9 @@ from numpy.typing import NDArray
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import ShapedSignal
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.models.effects.trial import Trial, TrialMotion, shaped
 from chladni.models.integrator.machine_code import machine_code
 
 Matrix = NDArray[np.float64]
@@ -44,6 +47,15 @@ def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
     return values["rate"], values["tracking_time"]
 
 
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    if motion.is_still:
+        return
+    u, sample_rate_hz = motion.displacement, motion.sample_rate_hz
+    fastest = float(np.max(np.abs(np.diff(u)))) * sample_rate_hz
+    rates = (fastest * np.geomspace(0.002, 0.95, 24)).tolist()
+    yield shaped(lambda value: motion.spectrum(limited_samples(u, sample_rate_hz, value, 0.0) - u), rates, "rate")
+
+
 RATE_LIMIT = EffectKind(
     name="rate_limit",
     family="actuator",
@@ -61,6 +73,7 @@ RATE_LIMIT = EffectKind(
     # How the limit is computed, not how the actuator is built.
     optional=("tracking_time",),
     neutral={"rate": 1e18},
+    clues=Clues(trials=_trials, details=("tracking_time",)),
     variants=(
         Variant(
             name="slew",

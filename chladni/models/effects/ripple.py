@@ -1,15 +1,21 @@
 """Ripple: a force periodic in position: cogging of a motor, mesh of a gear."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from math import cos, pi, sin
 from typing import Any
+
+import numpy as np
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.signal_path import last_port
+from chladni.models.effects.trial import Force, Matrix, Numbers, Shape, Trial, TrialMotion, logarithms, numbers
 from chladni.signals.errors import ModelError
 
 
@@ -63,6 +69,48 @@ class _AtJointOrActuator:
         return self.law(compiled, replace(site, kind="actuation"), values)
 
 
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    """Give the trials with one harmonic and with two; of an input, where it acts at a place that moves."""
+    if motion.kind == "joint":
+        yield from _along(motion, motion.displacement)
+    elif last_port(motion.compiled, motion.name, "actuation") is not None:
+        yield from _along(motion, motion.position_at(motion.compiled.port_index(motion.name, "actuation")))
+
+
+def _along(motion: TrialMotion, position: Matrix) -> Iterator[Trial]:
+    span = float(np.quantile(position, 0.98) - np.quantile(position, 0.02)) or 1.0
+
+    def build(shape: Shape, *, orders: tuple[float, ...]) -> Force:
+        angle = 2 * np.pi * position / numbers(shape)[0]
+        return Force.of(*(motion.spectrum(wave(order * angle)) for order in orders for wave in (np.sin, np.cos)))
+
+    def first(shape: Shape, a: Matrix) -> Numbers:
+        phase = float(np.arctan2(a[1], a[0]))
+        return {"amplitude": float(np.hypot(a[0], a[1])), "period": numbers(shape)[0], "phase": phase}
+
+    def both(shape: Shape, a: Matrix) -> Numbers | None:
+        found = first(shape, a)
+        # Turned by twice the phase, since the law counts its second harmonic from where the first begins.
+        second = complex(a[2], a[3]) * np.exp(-2j * found["phase"])
+        if abs(second) >= found["amplitude"]:
+            return None
+        share = second / found["amplitude"]
+        return {**found, "second_sine": float(share.real), "second_cosine": float(share.imag)}
+
+    grid = logarithms(np.geomspace(0.03 * span, span, 32).tolist())
+    yield Trial(
+        variant="sine", build=partial(build, orders=(1.0,)), grid=grid, values=first, parameters=3,
+    )  # fmt: skip
+    yield Trial(
+        variant="harmonics", build=partial(build, orders=(1.0, 2.0)), grid=grid, values=both, parameters=5,
+    )  # fmt: skip
+
+
+def _is_degenerate(fitted: FittedForm) -> bool:
+    """Whether the motion goes through fewer than two periods: then it's a spring that bends."""
+    return 2.0 * fitted.values["period"] > float(np.ptp(fitted.motion()[0]))
+
+
 RIPPLE = EffectKind(
     name="ripple",
     family="actuator",
@@ -79,6 +127,7 @@ RIPPLE = EffectKind(
     ),
     optional=("phase",),
     neutral={"amplitude": 0.0},
+    clues=Clues(trials=_trials, is_degenerate=_is_degenerate, sizes=("amplitude",)),
     variants=(
         Variant(
             name="sine",

@@ -1,5 +1,6 @@
 """Saturation: an actuator whose force is limited."""
 
+from collections.abc import Iterator, Sequence
 from math import exp, log1p, tanh
 from typing import Any
 
@@ -9,7 +10,9 @@ from numpy.typing import NDArray
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import ShapedSignal
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.models.effects.trial import Force, Shape, Trial, TrialMotion, logarithms, numbers, shaped
 
 Matrix = NDArray[np.float64]
 #: Wider ones would bend the line at rest, which is a gain.
@@ -67,6 +70,42 @@ def _rounded_numbers(values: Values, _port: Port) -> tuple[float, ...]:
 CLIPPED = ShapedSignal(shape=clipped_samples, law=clipped, numbers=_numbers)
 ROUNDED = ShapedSignal(shape=rounded_samples, law=rounded, numbers=_rounded_numbers)
 
+#: Widths of a limit's corners over the limit that are tried.
+_KNEES = (0.08, 0.25)
+
+
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    u = motion.displacement
+    size = float(np.max(np.abs(u)))
+    shares = (0.3, 0.5, 0.65, 0.75, 0.83, 0.89, 0.93, 0.96, 0.98, 0.99, 0.997)
+    # By how often it's reached, and by size: steps stand at few levels.
+    limits = [*np.quantile(np.abs(u), shares).tolist(), *(size * np.array([0.1, 0.3, 0.6, 0.9])).tolist()]
+    limits = sorted({limit for limit in limits if 0 < limit < size})
+    if not limits:
+        return
+    yield shaped(lambda value: motion.spectrum(np.clip(u, -value, value) - u), limits, "limit", "clipped")
+    yield shaped(lambda value: motion.spectrum(value * np.tanh(u / value) - u), limits, "limit", "smooth")
+    yield rounded_limit(motion, limits)
+
+
+def rounded_limit(motion: TrialMotion, limits: Sequence[float]) -> Trial:
+    """Give the trial of the variant `rounded`, with no free amplitude: an actuator's, or the end of a range."""
+    signal, rate = motion.displacement, motion.sample_rate_hz
+
+    def ends(shape: Shape) -> tuple[float, float]:
+        limit, knee = numbers(shape)
+        return limit, min(knee, KNEE.maximum)
+
+    def build(shape: Shape) -> Force:
+        return Force.known(motion.spectrum(rounded_samples(signal, rate, *ends(shape)) - signal))
+
+    return Trial(
+        variant="rounded", build=build, grid=logarithms(limits, _KNEES),
+        values=lambda shape, _: dict(zip(("limit", "knee"), ends(shape), strict=True)),
+        parameters=2,
+    )  # fmt: skip
+
+
 SATURATION = EffectKind(
     name="saturation",
     family="actuator",
@@ -77,6 +116,7 @@ SATURATION = EffectKind(
     ),
     # No finite limit is none, but this one no force reaches.
     neutral={"limit": 1e18},
+    clues=Clues(trials=_trials),
     variants=(
         Variant(
             name="clipped",

@@ -1,5 +1,6 @@
 """Softening stiffness: a spring that gets weaker with displacement, up to where it would give way."""
 
+from collections.abc import Iterator
 from math import sqrt
 from typing import Any
 
@@ -9,7 +10,21 @@ from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.core.simulation import Simulation
 from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.clues import Clues, Relative
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.models.effects.trial import (
+    Force,
+    Matrix,
+    Numbers,
+    Shape,
+    Trial,
+    TrialMotion,
+    logarithms,
+    numbers,
+    positive,
+    proportional,
+    rms,
+)
 from chladni.signals.errors import ModelError
 
 # Finite, because laws take finite numbers only.
@@ -74,6 +89,32 @@ def _flags(port: Port, values: Values, simulation: Simulation) -> tuple[str, ...
     return (sentence,)
 
 
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    stiffness, d, reach = motion.port.stiffness, motion.displacement, rms(motion.displacement)
+    if stiffness <= 0:
+        return
+    yield proportional(motion.spectrum(d**3), "cubic", sign=-1.0)
+
+    def build(shape: Shape) -> Force:
+        return Force.of(motion.spectrum(-d * (1.0 - 1.0 / np.sqrt(1.0 + (d / numbers(shape)[0]) ** 2))))
+
+    def values(shape: Shape, a: Matrix) -> Numbers | None:
+        lost = min(float(a[0]) / stiffness, 1.0)
+        return positive(a, cubic=-0.5 * lost * stiffness / numbers(shape)[0] ** 2, lost=lost)
+
+    # From a spring that yields at once to one that only begins to.
+    yield Trial(
+        variant="yielding", build=build, grid=logarithms((reach * np.geomspace(0.01, 10.0, 7)).tolist()),
+        values=values, parameters=2,
+    )  # fmt: skip
+
+
+def _hardening(values: Values) -> Relative | None:
+    if set(values) != {"cubic"}:
+        return None
+    return Relative(effect="hardening_stiffness", values={"cubic": -values["cubic"]})
+
+
 SOFTENING_STIFFNESS = EffectKind(
     name="softening_stiffness",
     family="stiffness",
@@ -84,6 +125,7 @@ SOFTENING_STIFFNESS = EffectKind(
     ),
     neutral={"cubic": 0.0},
     flags=_flags,
+    clues=Clues(trials=_trials, sizes=("cubic",), opposite=_hardening),
     variants=(
         Variant(
             name="cubic",

@@ -1,13 +1,18 @@
 """Stribeck friction: it sticks with more force than it slides with."""
 
+from collections.abc import Iterator
 from math import exp, tanh
 from typing import Any
+
+import numpy as np
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.clues import Clues, FittedForm, Relative
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
-from chladni.models.effects.friction_parameters import CREEP_SPEED, PRESLIDING
+from chladni.models.effects.friction_parameters import CREEP_SPEED, PRESLIDING, holds_like_a_loop, slides_from
+from chladni.models.effects.trial import Force, Matrix, Numbers, Shape, Trial, TrialMotion, logarithms, numbers, rms
 
 
 def regularised(_d: float, s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -50,6 +55,45 @@ def _check(values: Values) -> str:
     return ""
 
 
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    s, speed = motion.velocity, rms(motion.velocity)
+
+    def build(shape: Shape) -> Force:
+        creep, at = numbers(shape)
+        unit = np.tanh(s / creep)
+        return Force.of(motion.spectrum(unit), motion.spectrum(unit * np.exp(-((s / at) ** 2))))
+
+    def values(shape: Shape, amplitudes: Matrix) -> Numbers | None:
+        # Less friction at rest than in motion is no Stribeck curve.
+        if amplitudes[0] <= 0 or amplitudes[1] <= 0:
+            return None
+        creep, at = numbers(shape)
+        coulomb, more = float(amplitudes[0]), float(amplitudes[1])
+        return {"coulomb": coulomb, "static": coulomb + more, "speed": at, "creep_speed": creep}
+
+    yield Trial(
+        variant="regularised", build=build,
+        grid=logarithms((0.003 * speed, 0.03 * speed), (0.05 * speed, 0.15 * speed, 0.4 * speed, 1.0 * speed)),
+        values=values, parameters=4,
+    )  # fmt: skip
+
+
+def _is_degenerate(fitted: FittedForm) -> bool:
+    return _is_coulomb(fitted.values, fitted.motion()[1]) or holds_like_a_loop(fitted)
+
+
+def _is_coulomb(values: Values, s: Matrix) -> bool:
+    """Whether the drop from static to sliding friction is hardly there, or over before anything slides."""
+    speed = float(np.sqrt(np.mean(s**2)))
+    return values["static"] < 1.05 * values["coulomb"] or not 0.01 * speed < values["speed"] < 5.0 * speed
+
+
+def _coulombs(fitted: FittedForm) -> Iterator[Relative]:
+    """Give the Coulomb friction of the same size and form."""
+    values = {"force": fitted.values["coulomb"], **slides_from(fitted)}
+    yield Relative(effect="coulomb_friction", values=values, variant=fitted.variant)
+
+
 STRIBECK_FRICTION = EffectKind(
     name="stribeck_friction",
     family="friction",
@@ -74,6 +118,13 @@ STRIBECK_FRICTION = EffectKind(
     neutral={"coulomb": 0.0, "static": 0.0},
     # Otherwise the curve would rise with speed: that is viscous damping, which the joint has already.
     check=_check,
+    clues=Clues(
+        trials=_trials,
+        is_degenerate=_is_degenerate,
+        details=("creep_speed", "presliding", "bristle_damping"),
+        sizes=("coulomb", "static"),
+        nested=_coulombs,
+    ),
     variants=(
         Variant(
             name="regularised",

@@ -1,5 +1,6 @@
 """A tonal disturbance: a steady tone that is not in the log: unbalance, mains hum."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import pi, sin
 from typing import Any
@@ -11,8 +12,11 @@ from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import LawAtPort, SampleShape
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.signal_path import is_in_loop, with_samples_mapped
+from chladni.models.effects.tones import strongest_tones
+from chladni.models.effects.trial import Force, Shape, Trial, TrialMotion, logarithms, numbers
 
 Matrix = NDArray[np.float64]
 
@@ -46,6 +50,26 @@ class _AtBodyOrOutput:
         return with_samples_mapped(compiled, site, SampleShape(shape=with_tone, numbers=numbers))
 
 
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    """Give sines at the strongest lines of the force."""
+    tones = strongest_tones(motion.force, motion.sample_rate_hz)
+    if not tones:
+        return
+
+    def build(shape: Shape) -> Force:
+        angle = 2 * np.pi * numbers(shape)[0] * motion.time_s
+        return Force.of(motion.spectrum(np.sin(angle)), motion.spectrum(np.cos(angle)))
+
+    yield Trial(
+        build=build, grid=logarithms(tones),
+        values=lambda shape, a: {
+            "frequency": numbers(shape)[0], "amplitude": float(np.hypot(a[0], a[1])),
+            "phase": float(np.arctan2(a[1], a[0])),
+        },
+        parameters=3,
+    )  # fmt: skip
+
+
 TONAL_DISTURBANCE = EffectKind(
     name="tonal_disturbance",
     family="disturbance",
@@ -66,6 +90,7 @@ TONAL_DISTURBANCE = EffectKind(
     ),
     optional=("phase",),
     neutral={"amplitude": 0.0},
+    clues=Clues(trials=_trials, details=("phase",), sizes=("amplitude",), exact=True),
     variants=(
         Variant(
             name="sine",

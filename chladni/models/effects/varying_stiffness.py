@@ -1,11 +1,16 @@
 """Varying stiffness: the joint's spring changes during the log."""
 
+from collections.abc import Iterator
 from typing import Any
+
+import numpy as np
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.models.effects.trial import Force, Matrix, Numbers, Shape, Trial, TrialMotion, logarithms, numbers
 from chladni.signals.errors import ModelError
 
 
@@ -39,6 +44,56 @@ def _step_numbers(values: Values, port: Port) -> tuple[float, ...]:
     return (*_drift_numbers(values, port), values["rise"])
 
 
+#: Standard deviation over reach of a jump that is at 2 % of a log; instants at which a change is looked at.
+_JUMP, _INSTANTS = 0.14, 1000
+
+
+def share_risen(t: Matrix, time: float, rise: float) -> Matrix:
+    """Give ``[sample]`` which share of a step's change is there at times t."""
+    u = np.clip((t - time) / rise + 0.5, 0.0, 1.0)
+    return np.asarray(u**3 * (10.0 + u * (6.0 * u - 15.0)), dtype=np.float64)
+
+
+def _trials(motion: TrialMotion) -> Iterator[Trial]:
+    stiffness, d, t = motion.port.stiffness, motion.displacement, motion.time_s
+    if stiffness <= 0:
+        return
+    length = float(t[-1])
+
+    def change(shape: Shape, amplitudes: Matrix) -> Numbers | None:
+        relative = float(amplitudes[0]) / stiffness
+        return {"relative_change": relative, "time": numbers(shape)[0]} if relative > -0.95 else None
+
+    yield Trial(
+        variant="drift",
+        build=lambda shape: Force.of(motion.spectrum(d * np.minimum(t / numbers(shape)[0], 1.0))),
+        grid=logarithms((0.4 * length, length)), values=change, parameters=2,
+    )  # fmt: skip
+    # From a jump to a change that takes half of the log.
+    rises = (0.01 * length, 0.15 * length, 0.5 * length)
+
+    yield Trial(
+        variant="step",
+        build=lambda shape: Force.of(motion.spectrum(d * share_risen(t, *numbers(shape)))),
+        grid=logarithms(np.linspace(0.1 * length, 0.9 * length, 9).tolist(), rises),
+        values=lambda shape, a: _with_rise(change(shape, a), shape), parameters=3,
+    )  # fmt: skip
+
+
+def _with_rise(values: Numbers | None, shape: Shape) -> Numbers | None:
+    return None if values is None else {**values, "rise": numbers(shape)[1]}
+
+
+def _is_degenerate(fitted: FittedForm) -> bool:
+    """Whether a log doesn't see the change: what is over at once, or never comes, is a stiffness."""
+    values = fitted.values
+    if fitted.variant != "step":
+        return not values["time"] > 0.1 * fitted.duration_s
+    # A slow one may be seen though its middle lies outside of the log.
+    share = share_risen(np.linspace(0.0, fitted.duration_s, _INSTANTS), values["time"], values["rise"])
+    return not float(np.std(share)) > _JUMP * float(np.ptp(share))
+
+
 VARYING_STIFFNESS = EffectKind(
     name="varying_stiffness",
     family="stiffness",
@@ -57,6 +112,9 @@ VARYING_STIFFNESS = EffectKind(
         )
     ),
     neutral={"relative_change": 0.0},
+    clues=Clues(
+        trials=_trials, is_degenerate=_is_degenerate, details=("rise",), sizes=("relative_change",), timed=True
+    ),
     variants=(
         Variant(
             name="drift",

@@ -65,7 +65,7 @@ def loop_charts(model: Model) -> tuple[Chart, ...]:
 def _loop(compiled: CompiledModel, amplitude: float, omega: float) -> tuple[Matrix, Matrix, Matrix]:
     """Displacement, velocity and force of one closed period; of every law at the joint."""
     # numba takes a moment to import; a page that shows no loop doesn't need it.
-    from chladni.models.drives.known_motion import force_along_motion
+    from chladni.models.integrator.known_motion import force_along_motion
 
     times_s = np.linspace(0.0, _PERIODS * 2.0 * pi / omega, _PERIODS * _SAMPLES + 1)
     x, v = amplitude * np.sin(omega * times_s), amplitude * omega * np.cos(omega * times_s)

@@ -9,7 +9,7 @@ import pytest
 
 import chladni
 from chladni.apps.diagnose import diagnose_gap
-from chladni.gap.comparison.scale_doubt import gain_doubt, mass_doubt, scale_doubt
+from chladni.gap.comparison.scale_doubt import scale_doubt
 from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.models.effects.catalogue import CATALOGUE
 from tests.gap.arm import arm, measured
@@ -42,28 +42,6 @@ def test_what_is_about_a_prefix_is_told_as_one(factor: float, words: str) -> Non
     found = scale_doubt(SIGNALS, factor * SIGNALS, ["a", "b"])
     assert found is not None
     assert f"; about the factor of a prefix such as {words}" in found
-
-
-@pytest.mark.parametrize("gain", [1.0, 0.5, -1.0, 9.0, 11.0, 0.0, 29.0])
-def test_a_sensitivity_may_be_off(gain: float) -> None:
-    assert gain_doubt("tip", gain) is None
-
-
-@pytest.mark.parametrize(
-    ("gain", "words"),
-    [(9.80665, "between g and m/s^2"), (np.pi / 180, "between degrees and rad"), (-1e-3, "mm for m"),
-     (7.1e-4, "rather that of a wrong unit"), (40.0, "rather that of a wrong unit")],
-)  # fmt: skip
-def test_a_gain_that_only_a_unit_has_is_doubted(gain: float, words: str) -> None:
-    found = gain_doubt("tip", gain)
-    assert found is not None
-    assert words in found
-    assert "at tip" in found
-
-
-def test_an_added_mass_is_doubted_where_it_is_many_times_the_body_s() -> None:
-    assert mass_doubt("carriage", 50.0, 2.0, "kg") is None
-    assert "1100 times the 0.095 kg" in str(mass_doubt("carriage", 101.0, 0.095, "kg"))
 
 
 @pytest.mark.slow

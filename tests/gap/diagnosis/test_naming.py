@@ -41,7 +41,7 @@ def weighed_causes(ranked: tuple[Contestant, ...], probabilities: tuple[float, .
 def test_the_cause_that_alone_leaves_least_comes_first(lag: float, mount: float, first: str) -> None:
     ranked = (contestant(1.0, MOUNT, LAG), contestant(lag, LAG), contestant(mount, MOUNT))
     causes = weighed_causes(ranked, (0.9, 0.05, 0.05))
-    named = causes_named(SimpleNamespace(lattices={}), causes)
+    named = causes_named(SimpleNamespace(stepping=None), causes)
     assert named[0].effect == first
     assert len(named) == 2
 
@@ -57,7 +57,7 @@ def test_a_word_at_sites_that_look_the_same_is_as_probable_as_all_of_them_togeth
     )
     ranked = (*(replace(one, log_evidence=-10.0) for one in ranked[:3]), replace(ranked[3], log_evidence=-90.0))
     causes = weighed_causes(ranked, (0.4, 0.35, 0.15, 0.05))
-    (named,) = causes_named(SimpleNamespace(lattices={}), causes)
+    (named,) = causes_named(SimpleNamespace(stepping=None), causes)
     assert named.group == ("elbow", "shaker")
     assert named.probability == pytest.approx(0.75)
     rows = {(one.effect, one.site): one.probability for one in ranking_of(causes, (named,))}
@@ -69,6 +69,6 @@ def test_a_word_that_is_best_as_half_of_a_pair_says_beside_what() -> None:
     # By falling evidence: the mount's best fit is the pair's, the lag's is its own.
     ranked = (contestant(1.0, LAG), contestant(1.0, MOUNT, LAG), contestant(9.0, MOUNT))
     causes = weighed_causes(ranked, (0.9, 0.05, 0.05))
-    rows = {one.effect: one for one in ranking_of(causes, causes_named(SimpleNamespace(lattices={}), causes))}
+    rows = {one.effect: one for one in ranking_of(causes, causes_named(SimpleNamespace(stepping=None), causes))}
     assert rows["lag"].beside == ()
     assert [(one.effect, one.site) for one in rows["mounting_resonance"].beside] == [("lag", "shaker")]

@@ -8,7 +8,7 @@ import chladni
 from chladni.gap.diagnosis.search import sibling_causes, twin_causes
 from chladni.gap.diagnosis.study import study_of
 from chladni.gap.explanation.hypotheses import hypothesis_of
-from chladni.models.effects.catalogue import CATALOGUE
+from chladni.models.effects.catalogue import CATALOGUE, taking_part
 from tests.gap.arm import arm, measured
 from tests.gap.made_log import band_noise, chain
 from tests.gap.made_log import measured as made
@@ -40,7 +40,7 @@ def test_a_stribeck_curve_hands_on_to_the_coulomb_friction_that_it_ends_at() -> 
     (plain,) = sibling_causes(study, [stribeck])
     assert plain.hypothesis.named[0].effect == "coulomb_friction"
     assert plain.fit.effects[0].values["force"] == pytest.approx(5.0, rel=0.02)
-    without = replace(study, leave_out=frozenset({"coulomb_friction"}))
+    without = replace(study, kinds=taking_part({"coulomb_friction"}, ()))
     assert sibling_causes(without, [stribeck]) == []
 
 

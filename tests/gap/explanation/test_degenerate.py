@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from chladni.gap.explanation.body_trials import STIFF_MOUNT
 from chladni.gap.explanation.degenerate import is_degenerate
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.plant.free_run import FreeRun
 from chladni.models.effects.attached_effect import AttachedEffect, attached
+from chladni.models.effects.extra_mode import STIFF_MOUNT
 from tests.gap.arm import arm, measured
 
 

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from chladni.gap.explanation.floor_motion import flat_band, floor_motion
+from chladni.gap.explanation.floor_motion import floor_motion
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import all_lines
 from chladni.gap.plant.tunable import Tunables
 from chladni.models.effects.attached_effect import attached
+from chladni.models.effects.base_vibration import BASE_VIBRATION, flat_band
 from tests.gap.made_log import RATE_HZ, band_noise, measured, three_bodies
 
 LEVEL, LOW_HZ, HIGH_HZ = 5.0, 20.0, 150.0
@@ -19,7 +20,9 @@ def test_level_and_band_are_those_of_the_floor() -> None:
     log, noise = measured(three_bodies().with_effects((floor,)), band_noise(6000, rms=150.0), noise=0.01)
     nominal = three_bodies()
     problem = LinearProblem(nominal, log, noise, Tunables.of(nominal), all_lines(log.samples, RATE_HZ))
-    found = floor_motion(problem, Site(name="ground", kind="ground"), np.zeros(len(problem.tunables.names)))
+    found = floor_motion(
+        problem, Site(name="ground", kind="ground"), np.zeros(len(problem.tunables.names)), BASE_VIBRATION
+    )
     # The record's ends ring, and where the sensors' noise hides the floor it's held back.
     assert found["level"].value == pytest.approx(LEVEL, rel=0.1)
     assert found["band"].value == pytest.approx(HIGH_HZ, rel=0.1)

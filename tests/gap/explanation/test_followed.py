@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.followed import followed
 from chladni.gap.explanation.held_site import HeldSite
-from chladni.gap.explanation.joint_trials import joint_trials
 from chladni.gap.explanation.screen import Screen
+from chladni.gap.explanation.trial import trials_at
 from chladni.gap.location.profile import profiled
 from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.linear_problem import LinearProblem
@@ -16,6 +17,7 @@ from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import all_lines
 from chladni.gap.plant.tunable import Tunables
 from chladni.models.effects.attached_effect import attached
+from chladni.models.effects.hardening_stiffness import HARDENING_STIFFNESS
 from tests.gap.made_log import RATE_HZ, band_noise, chain, measured
 
 SAMPLES = 6000
@@ -35,25 +37,21 @@ def screen():
     problem = LinearProblem(MODEL, log, floor, tunables, all_lines(SAMPLES, RATE_HZ))
     place = profiled(problem, (JOINT,), np.zeros(off.size))
     motion = recovered(problem, place, JOINT)
-    compiled = problem.view(place.z).compiled
-    (trial,) = (
-        one
-        for one in joint_trials(motion, compiled.ports[compiled.port_index("j1", "joint")])
-        if (one.effect, one.variant) == ("hardening_stiffness", None)
-    )
+    trials = trials_at(problem, log, motion, excited_band_hz(log), [HARDENING_STIFFNESS])
+    (trial,) = (one for one in trials if one.variant is None)
     return Screen(problem, place, JOINT), trial
 
 
 def kept(at, start, z):
     """What is left of a promise at given parameters."""
     held = HeldSite(at.problem, z, JOINT)
-    force = start.trial.build(start.shape)
+    force = start.trial.form.build(start.shape)
     return held.with_force(force, held.amplitudes(force)).misfit
 
 
 def test_a_promise_that_no_parameters_keep_is_followed_to_those_that_do(screen) -> None:
     at, trial = screen
-    start = at.weigh(trial, trial.grid[0])
+    start = at.weigh(trial, trial.form.grid[0])
     assert kept(at, start, start.z) > 1.8 * start.misfit
     found, _ = followed(at, start)
     assert found.misfit < 1.05 * start.misfit
@@ -62,13 +60,13 @@ def test_a_promise_that_no_parameters_keep_is_followed_to_those_that_do(screen) 
 
 def test_the_misfit_is_that_of_its_own_parameters(screen) -> None:
     at, trial = screen
-    found, there = followed(at, at.weigh(trial, trial.grid[0]))
+    found, there = followed(at, at.weigh(trial, trial.form.grid[0]))
     np.testing.assert_allclose(there.z, found.z)
     assert found.misfit == pytest.approx(kept(at, found, found.z))
 
 
 def test_what_makes_no_such_effect_is_none(screen) -> None:
     at, trial = screen
-    start = at.weigh(trial, trial.grid[0])
-    never = replace(start, trial=replace(trial, values=lambda *_: None))
+    start = at.weigh(trial, trial.form.grid[0])
+    never = replace(start, trial=replace(trial, form=replace(trial.form, values=lambda *_: None)))
     assert followed(at, never) is None

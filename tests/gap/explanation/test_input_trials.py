@@ -9,7 +9,7 @@ from chladni.gap.explanation.candidates import screened
 from chladni.gap.explanation.hypotheses import effect_hypotheses
 from chladni.gap.location.locate import locate
 from chladni.gap.plant.tunable import Tunables
-from tests.gap.made_log import band_noise, measured, three_bodies
+from tests.gap.made_log import WORDS, band_noise, measured, three_bodies
 
 
 def test_a_limit_whose_knee_is_neither_sharp_nor_a_tanh_is_a_rounded_saturation():
@@ -19,7 +19,7 @@ def test_a_limit_whose_knee_is_neither_sharp_nor_a_tanh_is_a_rounded_saturation(
     log, floor = measured(model, acts, noise=0.005)
     log = replace(log, inputs=command)
     location = locate(model, log, floor, Tunables.of(model))
-    forms = [one for one in screened(location, location.ranked, frozenset(), {}) if one.trial.site.name == "hammer"]
+    forms = [one for one in screened(location, location.ranked, WORDS) if one.trial.site.name == "hammer"]
     best = forms[0]
     assert (best.trial.effect, best.trial.variant) == ("saturation", "rounded")
     assert best.values["limit"] == pytest.approx(limit, rel=0.05)
@@ -27,6 +27,6 @@ def test_a_limit_whose_knee_is_neither_sharp_nor_a_tanh_is_a_rounded_saturation(
     others = [one.chi for one in forms if one.trial.effect == "saturation" and one.trial.variant != "rounded"]
     assert len(others) == 2
     assert best.chi < 0.1 * min(others)
-    (first, *_) = effect_hypotheses(forms, {}, count=1)
+    (first, *_) = effect_hypotheses(forms, count=1)
     assert first.effects[0].values.keys() == {"limit", "knee"}
     assert "knee" in first.fitted[0]

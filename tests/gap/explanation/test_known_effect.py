@@ -12,7 +12,7 @@ from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.windows import training_in_windows
 from chladni.models.effects.attached_effect import attached
 from chladni.models.integrator.integrator import Integrator
-from tests.gap.made_log import RATE_HZ, band_noise, measured, three_bodies
+from tests.gap.made_log import RATE_HZ, WORDS, band_noise, measured, three_bodies
 
 SAMPLES = 6000
 STOP = attached("hardening_stiffness", "j1", {"cubic": 4e12})
@@ -70,9 +70,9 @@ def test_a_sensor_s_mount_is_found_behind_a_spring(made) -> None:
     known = KnownEffect.of(contest.run, first.fit, first.fit.effects)
     location = locate(three_bodies(), known.without(log), floor, contest.run.tunables, first.fit.z)
     (place,) = [one for one in location.ranked if "a0" in one.places[0].names]
-    found = [one for one in screened(location, [place], frozenset(), {}, known) if one.trial.site.name == "a0"]
+    found = [one for one in screened(location, [place], WORDS, known) if one.trial.site.name == "a0"]
     assert found[0].trial.effect == "mounting_resonance"
     assert found[0].values["frequency"] == pytest.approx(140.0, rel=0.02)
     # Along the linear model's share of the motion the same law explains far less.
-    blind = [one for one in screened(location, [place], frozenset(), {}) if one.trial.effect == "mounting_resonance"]
+    blind = [one for one in screened(location, [place], WORDS) if one.trial.effect == "mounting_resonance"]
     assert found[0].misfit < 0.5 * blind[0].misfit

@@ -11,6 +11,7 @@ from chladni.gap.location.locate import locate
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
 from tests.gap.arm import all_but, arm, measured, with_outputs
+from tests.gap.made_log import WORDS
 
 #: As heavy as what they sit on, and more: resonances move far.
 LOADS = [
@@ -34,10 +35,10 @@ def test_a_heavy_load_is_found_where_the_screen_loses_it(
 ) -> None:
     log = loaded(word, site, values, outputs)
     location = locate(arm(), log, estimate_noise(log), Tunables.of(arm()))
-    candidates = screened(location, location.ranked, frozenset(), {})
+    candidates = screened(location, location.ranked, WORDS)
     own = [one for one in candidates if (one.trial.effect, one.trial.site.name) == (word, site)]
     assert min(one.chi for one in own) > 100.0
-    found = linear_hypotheses(arm(), location, candidates, {})
+    found = linear_hypotheses(arm(), location, candidates)
     best = next(one for one in found if one.effects[0].effect == word)
     assert best.screened == pytest.approx(1.0, abs=0.1)
     assert best.effects[0].site == site

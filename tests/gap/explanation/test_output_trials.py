@@ -9,7 +9,7 @@ from chladni.gap.explanation.candidates import screened
 from chladni.gap.explanation.hypotheses import effect_hypotheses
 from chladni.gap.location.locate import locate
 from chladni.gap.plant.tunable import Tunables
-from tests.gap.made_log import band_noise, measured, three_bodies
+from tests.gap.made_log import WORDS, band_noise, measured, three_bodies
 
 
 @pytest.mark.slow
@@ -24,7 +24,7 @@ def test_a_range_whose_end_is_round_is_told_though_the_floor_took_it_for_noise()
     # What nobody can predict with a line counts as noise, as long as nothing else is known.
     thought = floor.raised(np.array([lost, 0.0]))
     location = locate(model, log, thought, Tunables.of(model))
-    forms = screened(location, location.ranked, frozenset(), {})
+    forms = screened(location, location.ranked, WORDS)
     best = forms[0]
     assert (best.trial.effect, best.trial.variant, best.trial.site.name) == ("clipping", "rounded", "a0")
     assert best.values["limit"] == pytest.approx(ends, rel=0.05)
@@ -32,6 +32,6 @@ def test_a_range_whose_end_is_round_is_told_though_the_floor_took_it_for_noise()
     assert best.misfit < others[None]
     # It explains nearly all of that noise: a line and a Gaussian floor leave as much as there was.
     assert best.chi < 0.6 * location.tuned.chi
-    (first, *_) = effect_hypotheses(forms, {}, count=1)
+    (first, *_) = effect_hypotheses(forms, count=1)
     assert first.effects[0].values.keys() == {"limit", "knee"}
     assert "knee" in first.fitted[0]

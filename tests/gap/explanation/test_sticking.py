@@ -25,7 +25,7 @@ def test_sliding_force_is_found_however_much_of_it_sticks(force: float) -> None:
     )
     log, _ = measured(rubbing, band_noise(6000), noise=0.005)
     study = study_of(three_bodies(), log, leave_out=frozenset(), own={})
-    (sticking,) = sticking_hypotheses(study.location)
+    (sticking,) = sticking_hypotheses(study.location, study.kinds)
     entered = study.contest.enter(sticking)
     assert entered is not None
     found = detailed(study, entered)

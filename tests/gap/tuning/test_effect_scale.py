@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from chladni.gap.tuning.effect_scale import effect_numbers, usually_fitted, with_numbers
+from chladni.gap.tuning.effect_scale import effect_numbers, with_numbers
 from chladni.models.effects.attached_effect import attached
 from chladni.signals.errors import ModelError
 
@@ -40,15 +40,15 @@ def test_bounds_are_what_is_possible():
 
 
 def test_a_choice_is_not_fitted():
-    assert usually_fitted(STOP) == ("stiffness", "clearance")
-    assert usually_fitted(FRICTION) == ("force",)
+    assert STOP.usually_fitted == ("stiffness", "clearance")
+    assert FRICTION.usually_fitted == ("force",)
 
 
 def test_what_makes_a_form_of_a_law_is_fitted_with_it():
     values = {"force": 1.0, "yield": 1e-4}
-    assert usually_fitted(attached("hysteresis", "j", values)) == ("force", "yield")
+    assert attached("hysteresis", "j", values).usually_fitted == ("force", "yield")
     creeping = attached("hysteresis", "j", values, variant="creeping")
-    assert usually_fitted(creeping) == ("force", "yield", "slip_speed", "loop")
+    assert creeping.usually_fitted == ("force", "yield", "slip_speed", "loop")
 
 
 def test_a_name_that_is_given_twice_is_one_number():

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from chladni.io.log import open_log
-from chladni.models.drives.known_motion import force_along_motion
 from chladni.models.drives.mr_coefficients import MrAsymmetry, MrCoefficients
 from chladni.models.drives.mr_damper_fit import fit_mr_damper, mr_error, mr_force
 from chladni.models.drives.mr_fit_layout import layout_of
 from chladni.models.drives.mr_record import MrRecord, mr_record
 from chladni.models.drives.mr_shipped import MEASURED_DAMPER, MEASURED_DAMPER_ASYMMETRIC
+from chladni.models.integrator.known_motion import force_along_motion
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries

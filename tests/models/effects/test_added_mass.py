@@ -4,6 +4,7 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
+from chladni.models.effects.added_mass import mass_doubt
 from chladni.models.effects.attached_effect import attached
 from chladni.models.structures.structure_input import StructureInput
 from chladni.signals.errors import ModelError
@@ -60,3 +61,8 @@ def test_two_masses_add_up() -> None:
 def test_less_mass_is_no_added_mass() -> None:
     with pytest.raises(ModelError, match=r"added_mass at 'mass': mass: -0.1 kg is not possible; give a value from 0"):
         attached("added_mass", "mass", {"mass": -0.1})
+
+
+def test_an_added_mass_is_doubted_where_it_is_many_times_the_body_s() -> None:
+    assert mass_doubt("carriage", 50.0, 2.0, "kg") is None
+    assert "1100 times the 0.095 kg" in str(mass_doubt("carriage", 101.0, 0.095, "kg"))

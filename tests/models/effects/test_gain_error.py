@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from chladni.models.effects.attached_effect import attached
+from chladni.models.effects.gain_error import gain_doubt
 from chladni.models.structures.structure_input import StructureInput
 from tests.models.effects.small_models import one_body, with_loop
 from tests.models.structures.made_models import tree
@@ -47,3 +48,20 @@ def test_behind_clipping_it_acts_on_samples() -> None:
     for _, action in louder.output_maps:
         samples = action(samples, 100.0)
     np.testing.assert_allclose(samples, [3.0, 6.0, -6.0])
+
+
+@pytest.mark.parametrize("gain", [1.0, 0.5, -1.0, 9.0, 11.0, 0.0, 29.0])
+def test_a_sensitivity_may_be_off(gain: float) -> None:
+    assert gain_doubt("tip", gain) is None
+
+
+@pytest.mark.parametrize(
+    ("gain", "words"),
+    [(9.80665, "between g and m/s^2"), (np.pi / 180, "between degrees and rad"), (-1e-3, "mm for m"),
+     (7.1e-4, "rather that of a wrong unit"), (40.0, "rather that of a wrong unit")],
+)  # fmt: skip
+def test_a_gain_that_only_a_unit_has_is_doubted(gain: float, words: str) -> None:
+    found = gain_doubt("tip", gain)
+    assert found is not None
+    assert words in found
+    assert "at tip" in found

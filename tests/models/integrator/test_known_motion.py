@@ -3,8 +3,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chladni.models.core.port_law import PortLaw
-from chladni.models.drives.known_motion import force_along_motion
 from chladni.models.drives.mr_shipped import MEASURED_DAMPER_ASYMMETRIC
+from chladni.models.integrator.known_motion import force_along_motion
 from chladni.signals.errors import ModelError
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from chladni.gap.explanation.resonances import resonances
 from chladni.gap.plant.record_lines import all_lines
+from chladni.models.effects.resonances import resonances
 
 RATE_HZ, SAMPLES = 500.0, 6000
 FREQUENCY_HZ, DAMPING = 10.07, 0.008

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.gap.explanation.tones import strongest_tones
+from chladni.models.effects.tones import strongest_tones
 
 
 def test_a_tone_in_noise_is_found() -> None:

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from chladni.gap.explanation.bristles import bristles_along
 from chladni.models.core.port_law import PortLaw
-from chladni.models.drives.known_motion import force_along_motion
+from chladni.models.effects.bristles import bristles_along
 from chladni.models.effects.coulomb_friction import bristle
+from chladni.models.integrator.known_motion import force_along_motion
 
 RATE_HZ = 500.0
 

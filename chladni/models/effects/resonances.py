@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.gap.explanation.trial import Shape, Spectrum
+from chladni.models.effects.trial import Shape, Spectrum
 
 Matrix = NDArray[np.float64]
 #: Damping ratios that are believed, lines that are enough, and steps.

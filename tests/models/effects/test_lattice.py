@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.gap.explanation.lattice import lattice_of
+from chladni.models.effects.lattice import lattice_of
 
 RNG = np.random.default_rng(1)
 SMOOTH = RNG.standard_normal(8000)
