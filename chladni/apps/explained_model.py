@@ -2,12 +2,10 @@
 
 from collections.abc import Sequence
 
-from chladni.gap.records.diagnosis import Cause, Diagnosis
+from chladni.gap.records.diagnosis import PARAMETER, Cause, Diagnosis
 from chladni.models.core.model import Effect, Model
 from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.effect_kind import EffectKind
-
-PARAMETER = "parameter"
 
 
 def explained_model(model: Model, found: Diagnosis, *, own_effects: Sequence[EffectKind] = ()) -> Model:

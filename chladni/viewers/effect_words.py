@@ -2,46 +2,14 @@
 
 from collections.abc import Mapping
 
-from chladni.gap.records.diagnosis import Cause, FittedNumber
+from chladni.gap.records.diagnosis import PARAMETER, Cause, FittedNumber
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.viewers.engineering import engineering
 
-PARAMETER = "parameter"
 # A sigma so many times the value tells nothing of it. What can't be negative is fitted by its logarithm: a sigma of
 # its own size is a factor of e. What has a sign may well be known to be near zero, beside other numbers of its law.
 WIDE_POSITIVE, WIDE_SIGNED = 1.0, 100.0
 NOT_DETERMINED = "not determined"
-
-# With an article where the field uses one.
-_SPOKEN: Mapping[str, str] = {
-    "coulomb_friction": "Coulomb friction",
-    "stribeck_friction": "Stribeck friction",
-    "quadratic_damping": "quadratic damping",
-    "hardening_stiffness": "hardening stiffness",
-    "softening_stiffness": "softening stiffness",
-    "backlash": "backlash",
-    "one_sided_stop": "a one-sided stop",
-    "hysteresis": "hysteresis",
-    "extra_mode": "an extra mode",
-    "added_mass": "added mass",
-    "varying_stiffness": "varying stiffness",
-    "delay": "a delay",
-    "lag": "a lag",
-    "saturation": "saturation",
-    "dead_zone": "a dead zone",
-    "rate_limit": "a rate limit",
-    "ripple": "ripple",
-    "gain_error": "a gain error",
-    "cross_axis": "cross-axis sensitivity",
-    "mounting_resonance": "a mounting resonance",
-    "ac_coupling": "AC coupling",
-    "time_offset": "a time offset",
-    "clipping": "clipping",
-    "quantization": "quantization",
-    "base_vibration": "base vibration",
-    "tonal_disturbance": "a tonal disturbance",
-    PARAMETER: "a wrong value",
-}
 
 
 def effect_name(effect: str) -> str:
@@ -52,7 +20,9 @@ def effect_name(effect: str) -> str:
     >>> effect_name("coulomb_friction"), effect_name("extra_mode"), effect_name("magnetic_brake")
     ('Coulomb friction', 'an extra mode', 'magnetic brake')
     """
-    return _SPOKEN.get(effect, effect.replace("_", " "))
+    if effect == PARAMETER:
+        return "a wrong value"
+    return CATALOGUE[effect].spoken if effect in CATALOGUE else effect.replace("_", " ")
 
 
 def effect_heading(effect: str) -> str:

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 
-from chladni.gap.records.diagnosis import Cause, Closing, Diagnosis, FittedNumber
+from chladni.gap.records.diagnosis import PARAMETER, Cause, Closing, Diagnosis, FittedNumber
 from chladni.gap.records.log_use import LogUse
-from chladni.viewers.effect_words import PARAMETER, cause_phrase, effect_at, effect_heading
+from chladni.viewers.effect_words import cause_phrase, effect_at, effect_heading
 from chladni.viewers.engineering import chance, engineering, percent
 
 # Above the first one says "most likely", above the second "probably", else "perhaps".

@@ -5,6 +5,7 @@ from dataclasses import replace
 from math import inf
 
 from chladni.gap.records.diagnosis import Cause, Diagnosis, DistortionShare, FittedNumber, Ranked, Where
+from chladni.models.effects.catalogue import CATALOGUE
 from chladni.viewers.effect_words import NOT_DETERMINED, cause_heading, effect_heading, printed_number
 from chladni.viewers.engineering import SURE, chance, engineering, percent, signed_percent, span
 
@@ -14,8 +15,6 @@ Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 RANKED = 5
 # A parameter that moved by less than its own sigma, and by less than this, didn't move.
 MOVED = 1e-3
-# Their numbers are read off signals and not fitted: that no spread is known doesn't mean that they were held.
-_READ = frozenset({"base_vibration", "quantization"})
 # What has a chance of less than this is printed as one that has none.
 UNLIKELY = 1.0 - SURE
 # Noise of less than this share of a gap needs no digits.
@@ -203,8 +202,14 @@ def _share(share: float | None) -> str:
 
 
 def _value(cause: Cause, name: str, number: FittedNumber) -> str:
-    held = number.std is None and cause.effect not in _READ
+    held = number.std is None and not _is_read(cause)
     return printed_number(cause, name) + (" (held)" if held else "")
+
+
+def _is_read(cause: Cause) -> bool:
+    """Whether a cause's numbers are read off signals and not fitted: that no spread is known says nothing then."""
+    kind = CATALOGUE.get(cause.effect)
+    return kind is not None and (kind.clues.in_samples is not None or kind.clues.of_force is not None)
 
 
 def _nominal(number: FittedNumber) -> str:

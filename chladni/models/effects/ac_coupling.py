@@ -64,6 +64,7 @@ def _two_stages(shape: Shape, _: Matrix) -> Numbers | None:
 
 AC_COUPLING = EffectKind(
     name="ac_coupling",
+    said="AC coupling",
     family="sensor",
     meaning="high-pass in the amplifier or the sensor",
     sites=("output",),

@@ -76,6 +76,7 @@ def _resisting(force: float, speed: float) -> Values:
 
 COULOMB_FRICTION = EffectKind(
     name="coulomb_friction",
+    said="Coulomb friction",
     family="friction",
     meaning="dry friction of one size, whatever the speed",
     sites=("joint",),

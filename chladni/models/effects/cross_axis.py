@@ -55,6 +55,7 @@ def _trial(source: str, spectrum: Spectrum) -> Trial:
 
 CROSS_AXIS = EffectKind(
     name="cross_axis",
+    said="cross-axis sensitivity",
     family="sensor",
     meaning="the sensor also feels another measured direction",
     sites=("output",),

@@ -41,6 +41,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
 
 DEAD_ZONE = EffectKind(
     name="dead_zone",
+    said="a dead zone",
     family="actuator",
     meaning="no force under a threshold: valve overlap",
     sites=("input",),

@@ -38,6 +38,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
 
 DELAY = EffectKind(
     name="delay",
+    said="a delay",
     family="actuator",
     meaning="dead time between command and force",
     sites=("input",),

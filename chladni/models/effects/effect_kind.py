@@ -88,6 +88,8 @@ class EffectKind:
     ----------
     name
         The word, such as ``coulomb_friction``.
+    said
+        As one says it, with an article where the field uses one; the word without underscores when empty.
     family
         ``friction``, ``stiffness``, ``damping``, ``attachment``, ``actuator``, ``sensor`` or ``disturbance``.
     meaning
@@ -131,6 +133,7 @@ class EffectKind:
     needs_source: bool = False
     check: Callable[[Values], str] | None = None
     flags: Flags | None = None
+    said: str = ""
     clues: Clues = field(default_factory=Clues)
 
     def __post_init__(self) -> None:
@@ -152,6 +155,11 @@ class EffectKind:
     def required(self) -> tuple[str, ...]:
         """Names of the parameters that must be given."""
         return tuple(name for name in self.parameters if name not in self.optional)
+
+    @property
+    def spoken(self) -> str:
+        """The word as one says it."""
+        return self.said or self.name.replace("_", " ")
 
     def variant(self, name: str | None = None) -> Variant:
         """Give the named variant, or the default; `ModelError` that names the nearest when it's missing."""

@@ -103,6 +103,7 @@ def _is_degenerate(fitted: FittedForm) -> bool:
 
 EXTRA_MODE = EffectKind(
     name="extra_mode",
+    said="an extra mode",
     family="attachment",
     meaning="an oscillator attached to the body: cable, panel, tool, payload",
     sites=("body",),

@@ -55,6 +55,7 @@ def gain_doubt(site: str, gain: float) -> str | None:
 
 GAIN_ERROR = EffectKind(
     name="gain_error",
+    said="a gain error",
     family="sensor",
     meaning="sensitivity that differs from the calibration, sign included",
     sites=("input", "output"),

@@ -48,6 +48,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
 
 LAG = EffectKind(
     name="lag",
+    said="a lag",
     family="actuator",
     meaning="limited bandwidth of an actuator",
     sites=("input",),

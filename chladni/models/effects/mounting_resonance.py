@@ -47,6 +47,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
 
 MOUNTING_RESONANCE = EffectKind(
     name="mounting_resonance",
+    said="a mounting resonance",
     family="sensor",
     meaning="the sensor rides on a soft mount: second-order low-pass with a peak",
     sites=("output",),

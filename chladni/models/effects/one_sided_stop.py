@@ -104,6 +104,7 @@ def _is_degenerate(fitted: FittedForm) -> bool:
 
 ONE_SIDED_STOP = EffectKind(
     name="one_sided_stop",
+    said="a one-sided stop",
     family="stiffness",
     meaning="a contact beyond one displacement: end stop, rub, open crack",
     sites=("joint",),

@@ -58,6 +58,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
 
 RATE_LIMIT = EffectKind(
     name="rate_limit",
+    said="a rate limit",
     family="actuator",
     meaning="the force changes no faster than the actuator can",
     sites=("input",),

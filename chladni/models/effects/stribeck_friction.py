@@ -96,6 +96,7 @@ def _coulombs(fitted: FittedForm) -> Iterator[Relative]:
 
 STRIBECK_FRICTION = EffectKind(
     name="stribeck_friction",
+    said="Stribeck friction",
     family="friction",
     meaning="dry friction that is larger at rest than in motion",
     sites=("joint",),

@@ -41,6 +41,7 @@ def _trial(motion: TrialMotion, sign: float) -> Trial:
 
 TIME_OFFSET = EffectKind(
     name="time_offset",
+    said="a time offset",
     family="sensor",
     meaning="this channel's clock is late or early",
     sites=("output",),

@@ -72,6 +72,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
 
 TONAL_DISTURBANCE = EffectKind(
     name="tonal_disturbance",
+    said="a tonal disturbance",
     family="disturbance",
     meaning="a steady tone that is not in the log: unbalance, mains hum",
     sites=("body", "output"),
