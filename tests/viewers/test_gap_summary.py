@@ -6,7 +6,6 @@ import pytest
 
 from chladni.gap.records.diagnosis import AnyLaw, Candidate, Cause, FittedNumber, PairShare
 from chladni.models.effects.catalogue import CATALOGUE
-from chladni.viewers import effect_words
 from chladni.viewers import gap_tables as tables
 from chladni.viewers.effect_words import cause_law, cause_phrase, effect_at, effect_heading, effect_name
 from chladni.viewers.engineering import engineering, percent
@@ -43,8 +42,6 @@ def test_every_word_of_the_catalogue_has_words_for_people(effect: str) -> None:
     assert effect_name(effect)
     assert "_" not in effect_name(effect)
     assert effect_at(effect, "x").endswith(" x")
-    # A new word must not go without its article.
-    assert effect in effect_words._SPOKEN
     assert not effect_heading(effect).startswith(("a ", "an "))
 
 
