@@ -63,7 +63,7 @@ def effect_of(text: str, model: "Model") -> "Effect":
 def _units(effect: str, site: str, variant: str | None, model: "Model") -> dict[str, str]:
     """Units of an effect's parameters at a site; none for words and sites that will be refused anyway."""
     from chladni.models.effects.catalogue import CATALOGUE
-    from chladni.models.files.site_units import compiled_site_units
+    from chladni.models.files.site_units import compiled_site_units, known_site, units_at
 
     kind = CATALOGUE.get(effect)
     if kind is None:
@@ -73,9 +73,10 @@ def _units(effect: str, site: str, variant: str | None, model: "Model") -> dict[
     if model.kind == "scheme":
         # At a block an effect may sit before it or behind it, with another unit each.
         units = {terminal.name: units[terminal.name] for terminal in compiled.inputs}
-    if site not in units:
+    there = units_at(site, units) if known_site(site, units) else None
+    if there is None:
         return {}
-    return {one.name: units[site].of(one.unit) for one in kind.parameters_of(kind.variant(variant).name).values()}
+    return {one.name: there.of(one.unit) for one in kind.parameters_of(kind.variant(variant).name).values()}
 
 
 def _pair(text: str, flag: str) -> tuple[str, str]:

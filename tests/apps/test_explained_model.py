@@ -42,7 +42,15 @@ def test_tuned_values_and_effects_go_into_the_file_and_come_back(tmp_path: Path)
 
 
 #: Where each kind of site is in the model of the tests.
-SITES = {"joint": "elbow", "body": "wrist", "input": "shaker", "output": "acc_wrist", "ground": "ground"}
+SITES = {
+    "joint": "elbow",
+    "body": "wrist",
+    "input": "shaker",
+    "output": "acc_wrist",
+    "ground": "ground",
+    "pair": "column~wrist",
+    "output_pair": "acc_column~acc_wrist",
+}
 
 
 @pytest.mark.parametrize("word", CATALOGUE)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-PortKind = Literal["joint", "body", "ground", "input", "actuation", "output"]
+PortKind = Literal["joint", "body", "ground", "input", "actuation", "output", "pair", "output_pair"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,14 +46,17 @@ class Port:
                    the input acts
     ``output``     the output, after      0                      adds to the output (and to what feeds it back)
                    what acts before
+    ``pair``       second body minus      its rate               resists, as at a joint: `first~second`, where the
+                   first                                         first may be ``ground``
     ============== ====================== ====================== ===============================================
 
-    For a rotating joint read angle, angular velocity and torque.
+    For a rotating joint read angle, angular velocity and torque. Two outputs (``output_pair``) are a site without a
+    port.
 
     Attributes
     ----------
     name
-        The site: name of the joint, body, input or output; ``ground``.
+        The site: name of the joint, body, input or output; ``ground``; ``arm~hand`` of a pair.
     stiffness, damping
         Of a joint's linear spring and damper, SI; 0 elsewhere. Laws that replace the spring (backlash) need them.
     unit

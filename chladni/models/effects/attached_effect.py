@@ -9,6 +9,7 @@ from chladni.models.core.port import Port, PortKind
 from chladni.models.core.simulation import Simulation
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.effects.effect_kind import EffectKind, Site
+from chladni.models.effects.pair import pair_of, pairs_of
 from chladni.models.effects.signal_path import last_port
 from chladni.models.effects.wording import nearest, spoken
 from chladni.signals.errors import ModelError
@@ -188,6 +189,8 @@ def attached_if_possible(
 def _sites(compiled: CompiledModel, kind: PortKind) -> list[str]:
     """Names of all sites of one kind; inputs and outputs need no port to be one."""
     names = [port.name for port in compiled.ports if port.kind == kind]
+    if kind in ("pair", "output_pair"):
+        return pairs_of(compiled, kind)
     # Inputs and outputs outside of loops have no port until an effect needs one.
     terminals = {"input": compiled.inputs, "output": compiled.outputs}.get(kind, ())
     return list(dict.fromkeys([*(terminal.name for terminal in terminals), *names]))
@@ -196,11 +199,11 @@ def _sites(compiled: CompiledModel, kind: PortKind) -> list[str]:
 def _kind_of_site(compiled: CompiledModel, name: str, effect: EffectKind) -> PortKind:
     # Names are unique over bodies, joints, inputs and outputs, so the first kind that has it is the one.
     for kind in effect.sites:
-        if name in _sites(compiled, kind):
+        if name in _sites(compiled, kind) or pair_of(compiled, name, kind) is not None:
             return kind
     possible = [site for kind in effect.sites for site in _sites(compiled, kind)]
     elsewhere: list[PortKind] = [
-        kind for kind in ("joint", "body", "ground", "input", "output") if name in _sites(compiled, kind)
+        kind for kind in ("joint", "body", "ground", "input", "output", "pair") if name in _sites(compiled, kind)
     ]
     where = f"{effect.name} acts at {spoken(effect.sites)}"
     if elsewhere:

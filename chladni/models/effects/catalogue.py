@@ -5,9 +5,11 @@ from types import MappingProxyType
 
 from chladni.models.effects.ac_coupling import AC_COUPLING
 from chladni.models.effects.added_mass import ADDED_MASS
+from chladni.models.effects.anti_alias import ANTI_ALIAS
 from chladni.models.effects.backlash import BACKLASH
 from chladni.models.effects.base_vibration import BASE_VIBRATION
 from chladni.models.effects.clipping import CLIPPING
+from chladni.models.effects.clock_drift import CLOCK_DRIFT
 from chladni.models.effects.coulomb_friction import COULOMB_FRICTION
 from chladni.models.effects.cross_axis import CROSS_AXIS
 from chladni.models.effects.dead_zone import DEAD_ZONE
@@ -15,10 +17,15 @@ from chladni.models.effects.delay import DELAY
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.models.effects.extra_mode import EXTRA_MODE
 from chladni.models.effects.gain_error import GAIN_ERROR
+from chladni.models.effects.geometric import GEOMETRIC
+from chladni.models.effects.gyroscopic import GYROSCOPIC
 from chladni.models.effects.hardening_stiffness import HARDENING_STIFFNESS
+from chladni.models.effects.harmonics import HARMONICS
 from chladni.models.effects.hysteresis import HYSTERESIS
 from chladni.models.effects.lag import LAG
+from chladni.models.effects.missing_link import MISSING_LINK
 from chladni.models.effects.mounting_resonance import MOUNTING_RESONANCE
+from chladni.models.effects.offset import OFFSET
 from chladni.models.effects.one_sided_stop import ONE_SIDED_STOP
 from chladni.models.effects.quadratic_damping import QUADRATIC_DAMPING
 from chladni.models.effects.quantization import QUANTIZATION
@@ -27,8 +34,10 @@ from chladni.models.effects.ripple import RIPPLE
 from chladni.models.effects.saturation import SATURATION
 from chladni.models.effects.softening_stiffness import SOFTENING_STIFFNESS
 from chladni.models.effects.stribeck_friction import STRIBECK_FRICTION
+from chladni.models.effects.swapped_channels import SWAPPED_CHANNELS
 from chladni.models.effects.time_offset import TIME_OFFSET
 from chladni.models.effects.tonal_disturbance import TONAL_DISTURBANCE
+from chladni.models.effects.unbalance import UNBALANCE
 from chladni.models.effects.varying_stiffness import VARYING_STIFFNESS
 
 _KINDS = (
@@ -58,6 +67,15 @@ _KINDS = (
     QUANTIZATION,
     BASE_VIBRATION,
     TONAL_DISTURBANCE,
+    MISSING_LINK,
+    GYROSCOPIC,
+    GEOMETRIC,
+    ANTI_ALIAS,
+    CLOCK_DRIFT,
+    SWAPPED_CHANNELS,
+    OFFSET,
+    HARMONICS,
+    UNBALANCE,
 )
 
 #: Every effect by its word.

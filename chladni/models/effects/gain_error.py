@@ -33,11 +33,13 @@ def _doubts(site: str, values: Values, _modelled: Parameters) -> Iterator[str]:
 
 
 def gain_doubt(site: str, gain: float) -> str | None:
-    """Give a sentence on a gain that a wrong unit rather than a sensitivity has.
+    """Give a sentence on a gain that a wrong sign or unit rather than a sensitivity has.
 
     Examples
     --------
     >>> gain_doubt("tip", 1.3)
+    >>> print(gain_doubt("tip", -1.004))
+    A gain of -1 at tip is a reversed sign: check which way its channel counts.
     >>> print(gain_doubt("tip", -0.102))
     A gain of -0.102 at tip is the factor between g and m/s^2: check the unit of its channel.
     >>> print(gain_doubt("motor", 7.1e-4))
@@ -45,6 +47,8 @@ def gain_doubt(site: str, gain: float) -> str | None:
     """
     if gain == 0.0:
         return None
+    if near(-gain, 1.0, 1.0 + EXACTLY):
+        return f"A gain of -1 at {site} is a reversed sign: check which way its channel counts."
     for factor, words in CONVERSIONS:
         if near(abs(gain), factor, 1.0 + EXACTLY):
             return f"A gain of {gain:.3g} at {site} is the factor {words}: check the unit of its channel."

@@ -18,6 +18,8 @@ _SPOKEN: dict[PortKind, str] = {
     "input": "an input",
     "actuation": "the place of an input",
     "output": "an output",
+    "pair": "a pair of bodies such as ground~arm",
+    "output_pair": "a pair of outputs such as left~right",
 }
 
 

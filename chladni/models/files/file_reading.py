@@ -10,7 +10,7 @@ from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.effects.wording import nearest
 from chladni.models.files.quantity import is_finite, number
-from chladni.models.files.site_units import SiteUnits
+from chladni.models.files.site_units import SiteUnits, known_site, units_at
 from chladni.signals.errors import ModelError
 from chladni.signals.wording import shown
 
@@ -132,7 +132,7 @@ class FileReading:
     def _effect(self, place: int, table: Content, sites: Mapping[str, SiteUnits | None]) -> Effect | None:
         loc: Loc = ("effect", place)
         word, site, variant = (self.text(table, key) for key in ("effect", "site", "variant"))
-        if site is not None and site not in sites:
+        if site is not None and not known_site(site, sites):
             self.mistakes.add((*loc, "site"), f"no site {site!r:.60}; {nearest(site, list(sites), 'sites')}")
             site = None
         if word is not None and word not in CATALOGUE:
@@ -145,7 +145,7 @@ class FileReading:
         chosen = self.tried((*loc, "variant"), lambda: kind.variant(variant).name)
         if chosen is None:
             return None
-        units = None if site is None else sites[site]
+        units = None if site is None else units_at(site, sites)
         values, source = self._effect_values(loc, table.get("parameters"), kind.parameters_of(chosen), units)
         if site is None or values is None:
             return None

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.effects.pair import TILDE
 
 _SYMBOL = re.compile(r"[A-Za-z]+")
 
@@ -45,6 +46,26 @@ class SiteUnits:
         inertia = "kg m^2" if self.displacement == "rad" else "kg"
         meant = {"N": force, "m": self.displacement, "kg": inertia}
         return _SYMBOL.sub(lambda symbol: meant.get(symbol[0], symbol[0]), unit)
+
+
+def known_site(site: str, sites: Mapping[str, SiteUnits | None]) -> bool:
+    """Whether a site is one of the model's, or a pair of two.
+
+    Examples
+    --------
+    >>> known_site("arm~hand", {"arm": None, "hand": None}), known_site("arm~foot", {"arm": None, "hand": None})
+    (True, False)
+    """
+    first, tilde, second = site.partition(TILDE)
+    return site in sites or (bool(tilde) and first in sites and second in sites)
+
+
+def units_at(site: str, sites: Mapping[str, SiteUnits | None]) -> SiteUnits | None:
+    """Give the units at a known site; of a pair those of its second, which both have but for the ground."""
+    if site in sites:
+        return sites[site]
+    first, _, second = site.partition(TILDE)
+    return sites[first if second == "ground" else second]
 
 
 def compiled_site_units(compiled: CompiledModel) -> Mapping[str, SiteUnits]:

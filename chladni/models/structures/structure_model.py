@@ -14,6 +14,7 @@ from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import Simulation
 from chladni.models.core.stability import growing_poles
+from chladni.models.effects.pair import TILDE
 from chladni.models.structures.closed_loop import close_loop, limit_port
 from chladni.models.structures.controller import Controller
 from chladni.models.structures.motion_modes import motion_modes, ordered_poles
@@ -206,7 +207,10 @@ class StructureModel:
         return compiled
 
     def _stage(self, effect: Effect) -> Stage:
-        # Names are unique over all parts, so a bare name tells the stage.
+        # Names are unique over all parts, so a bare name tells the stage. Two outputs that a recorder exchanged are
+        # what they were to a controller: the last stage.
+        if effect.site.partition(TILDE)[2] in {one.name for one in self.outputs}:
+            return "input"
         if effect.site in {one.name for one in self.outputs}:
             return "output"
         if effect.site in {one.name for one in self.inputs} | {one.name for one in self.controllers}:

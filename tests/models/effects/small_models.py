@@ -6,12 +6,24 @@ import numpy as np
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Port, Terminal
+from chladni.models.structures.structure import Body, Joint, Structure
+from chladni.models.structures.structure_input import StructureInput
+from chladni.models.structures.structure_model import StructureModel
+from chladni.models.structures.structure_output import StructureOutput
 
 MASS, STIFFNESS, DAMPING = 2.0, 800.0, 4.0
 JOINT, BODY, INPUT = "spring", "mass", "motor"
 OUTPUTS = ("acc", "speed", "place")
 #: Site of each kind of port.
-SITES = {"joint": JOINT, "body": BODY, "ground": "ground", "input": INPUT, "output": "acc"}
+SITES = {
+    "joint": JOINT,
+    "body": BODY,
+    "ground": "ground",
+    "input": INPUT,
+    "output": "acc",
+    "pair": "ground~mass",
+    "output_pair": "acc~speed",
+}
 
 
 def one_body(mass: float = MASS, stiffness: float = STIFFNESS, damping: float = DAMPING) -> CompiledModel:
@@ -78,3 +90,20 @@ def with_loop(plant: CompiledModel, gain: float = 300.0) -> CompiledModel:
         inputs=(Terminal(name="reference", unit="m"),),
         ports=(*plant.ports, Port(name=INPUT, kind="input")),
     )
+
+
+def two_bodies() -> CompiledModel:
+    """The same body, and another one on a spring of its own that nothing else holds."""
+    measures = {"acc": "acceleration", "speed": "velocity", "place": "displacement"}
+    return StructureModel(
+        name="two",
+        structure=Structure(
+            bodies=(Body(name=BODY, mass=MASS), Body(name="other", mass=MASS)),
+            joints=(
+                Joint(name=JOINT, between=("ground", BODY), stiffness=STIFFNESS, damping=DAMPING),
+                Joint(name="second", between=("ground", "other"), stiffness=STIFFNESS, damping=DAMPING),
+            ),
+        ),
+        inputs=(StructureInput(name=INPUT, at=BODY),),
+        outputs=tuple(StructureOutput(name=name, measures=what, at=BODY) for name, what in measures.items()),
+    ).compile()

@@ -18,9 +18,11 @@ from chladni.models.effects.attached_effect import AttachedEffect, attached
 from chladni.models.effects.catalogue import CATALOGUE, FAMILIES
 from chladni.models.effects.effect_kind import EffectKind
 from tests.models.effects import own_effect
-from tests.models.effects.small_models import SITES, one_body, with_loop
+from tests.models.effects.small_models import SITES, one_body, two_bodies, with_loop
 
 KINDS = (*CATALOGUE.values(), own_effect.CUBIC_DAMPING)
+#: The ground has no velocity that could push.
+BETWEEN_BODIES = [CATALOGUE["gyroscopic"]]
 VARIANTS = [pytest.param(kind, one.name, id=f"{kind.name}-{one.name}") for kind in KINDS for one in kind.variants]
 ODD = [
     pytest.param(kind, one.name, id=f"{kind.name}-{one.name}") for kind in KINDS for one in kind.variants if one.odd
@@ -40,14 +42,22 @@ def _made(
 ) -> AttachedEffect:
     numbers = {**kind.parameters.numbers(), **(values or {})}
     source = "speed" if kind.needs_source else None
-    return attached(kind, SITES[site], numbers, variant=variant, source=source)
+    return attached(kind, _place(kind, site), numbers, variant=variant, source=source)
+
+
+def _place(kind: EffectKind, site: PortKind) -> str:
+    return "mass~other" if kind in BETWEEN_BODIES else SITES[site]
+
+
+def _plant(kind: EffectKind) -> CompiledModel:
+    return two_bodies() if kind in BETWEEN_BODIES else one_body()
 
 
 def _laws(kind: EffectKind, variant: str, values: Mapping[str, float] | None = None) -> list[PortLaw]:
     """Laws at every kind of site, inside a loop where a signal can be in one."""
     laws = []
     for site in kind.sites:
-        plant = with_loop(one_body()) if site == "input" else one_body()
+        plant = with_loop(_plant(kind)) if site == "input" else _plant(kind)
         laws += _made(kind, variant, site, values).attach(plant, in_loop=site == "output").laws
     return laws
 
@@ -62,15 +72,17 @@ def test_families_are_those_of_the_vocabulary() -> None:
         "friction": {"coulomb_friction", "stribeck_friction", "hysteresis"},
         "stiffness": {
             "hardening_stiffness", "softening_stiffness", "one_sided_stop", "backlash", "varying_stiffness",
+            "geometric",
         },
         "damping": {"quadratic_damping"},
         "attachment": {"extra_mode", "added_mass"},
-        "actuator": {"delay", "lag", "saturation", "dead_zone", "rate_limit", "ripple"},
+        "actuator": {"delay", "lag", "saturation", "dead_zone", "rate_limit", "ripple", "harmonics"},
         "sensor": {
             "gain_error", "cross_axis", "mounting_resonance", "ac_coupling", "time_offset", "clipping",
-            "quantization",
+            "quantization", "anti_alias", "clock_drift", "swapped_channels", "offset",
         },
-        "disturbance": {"base_vibration", "tonal_disturbance"},
+        "disturbance": {"base_vibration", "tonal_disturbance", "unbalance"},
+        "topology": {"missing_link", "gyroscopic"},
     }  # fmt: skip
 
 
@@ -103,6 +115,15 @@ def test_families_are_those_of_the_vocabulary() -> None:
         ("quantization", {"output"}, {"step"}),
         ("base_vibration", {"ground"}, {"level", "band"}),
         ("tonal_disturbance", {"body", "output"}, {"frequency", "amplitude"}),
+        ("missing_link", {"pair"}, {"stiffness", "damping"}),
+        ("gyroscopic", {"pair"}, {"coefficient"}),
+        ("geometric", {"joint"}, {"stiffness", "length"}),
+        ("anti_alias", {"output", "input"}, {"corner", "order"}),
+        ("clock_drift", {"output"}, {"ppm", "offset"}),
+        ("swapped_channels", {"output_pair"}, set()),
+        ("offset", {"output"}, {"value"}),
+        ("harmonics", {"input"}, {"second", "third"}),
+        ("unbalance", {"body"}, {"moment", "frequency"}),
     ],
 )
 def test_words_sites_and_parameters_are_those_of_the_vocabulary(
@@ -116,8 +137,8 @@ def test_words_sites_and_parameters_are_those_of_the_vocabulary(
     assert set(kind.required) <= parameters
 
 
-def test_the_catalogue_has_26_words() -> None:
-    assert len(CATALOGUE) == 26
+def test_the_catalogue_has_35_words() -> None:
+    assert len(CATALOGUE) == 35
 
 
 @pytest.mark.parametrize(("kind", "variant"), VARIANTS)
@@ -135,7 +156,7 @@ def test_bounds_are_finite_and_hold_the_usual_range(kind: EffectKind, variant: s
 
 @pytest.mark.parametrize(("kind", "variant", "site"), PLACES)
 def test_attaches_at_every_kind_of_site_and_changes_the_model(kind: EffectKind, variant: str, site: PortKind) -> None:
-    before = one_body()
+    before = _plant(kind)
     after = _made(kind, variant, site).attach(before)
     assert after.outputs == before.outputs
     assert after.inputs == before.inputs
@@ -149,18 +170,19 @@ def test_attaches_in_a_loop_as_part_of_it(kind: EffectKind, variant: str, site: 
         before = with_loop(one_body())
         after = _made(kind, variant, site).attach(before)
     else:
-        before = one_body()
+        before = _plant(kind)
         after = with_loop(_made(kind, variant, site).attach(before, in_loop=site == "output"))
         before = with_loop(before)
     assert not after.input_maps
-    assert not after.output_maps
+    # A recorder's clock is none of the controller's business.
+    assert not after.output_maps or kind.name == "clock_drift"
     assert after.input_delays_s == before.input_delays_s
     assert _fingerprint(after) != _fingerprint(before)
 
 
 @pytest.mark.parametrize(("kind", "variant", "site"), PLACES)
 def test_without_strength_nothing_changes(kind: EffectKind, variant: str, site: PortKind) -> None:
-    before = one_body()
+    before = _plant(kind)
     after = _made(kind, variant, site, kind.neutral).attach(before)
     wanted = before.frequency_response(FREQUENCY_HZ)
     # A mount at 1e9 Hz is the stiffest there is: the phase it leaves at 20 Hz is 2e-9.
@@ -220,8 +242,8 @@ def test_effects_and_what_they_attach_survive_a_process_boundary(
     effect = _made(kind, variant, site)
     again = pickle.loads(pickle.dumps(effect))  # noqa: S301 - our own bytes
     assert again.values == effect.values
-    assert _fingerprint(again.attach(one_body())) == _fingerprint(effect.attach(one_body()))
-    pickle.dumps(effect.attach(one_body()))
+    assert _fingerprint(again.attach(_plant(kind))) == _fingerprint(effect.attach(_plant(kind)))
+    pickle.dumps(effect.attach(_plant(kind)))
 
 
 def test_the_user_page_has_every_word_parameter_and_variant() -> None:

@@ -50,14 +50,15 @@ def test_behind_clipping_it_acts_on_samples() -> None:
     np.testing.assert_allclose(samples, [3.0, 6.0, -6.0])
 
 
-@pytest.mark.parametrize("gain", [1.0, 0.5, -1.0, 9.0, 11.0, 0.0, 29.0])
+@pytest.mark.parametrize("gain", [1.0, 0.5, -0.9, 9.0, 11.0, 0.0, 29.0])
 def test_a_sensitivity_may_be_off(gain: float) -> None:
     assert gain_doubt("tip", gain) is None
 
 
 @pytest.mark.parametrize(
     ("gain", "words"),
-    [(9.80665, "between g and m/s^2"), (np.pi / 180, "between degrees and rad"), (-1e-3, "mm for m"),
+    [(9.80665, "between g and m/s^2"), (1 / 9.8, "between g and m/s^2"), (-1.01, "a reversed sign"),
+     (np.pi / 180, "between degrees and rad"), (-1e-3, "mm for m"),
      (7.1e-4, "rather that of a wrong unit"), (40.0, "rather that of a wrong unit")],
 )  # fmt: skip
 def test_a_gain_that_only_a_unit_has_is_doubted(gain: float, words: str) -> None:

@@ -304,3 +304,29 @@ def test_the_measured_damper_has_no_states(shared_data: Path) -> None:
 def test_friction_of_the_vocabulary_reads_in_the_joint_s_unit(tmp_path: Path) -> None:
     model = structure(tmp_path).with_effects([attached("ripple", "motor", {"amplitude": 0.5, "period": 0.01})])
     assert_round_trip(model, tmp_path)
+
+
+LINK = """
+[[effect]]
+effect = "missing_link"
+site = "ground~wrist"
+parameters = { stiffness = "20 kN/m", damping = 5.0 }
+
+[[effect]]
+effect = "swapped_channels"
+site = "acc_wrist~bend"
+"""
+
+
+def test_a_pair_is_a_site(tmp_path: Path) -> None:
+    model = structure(tmp_path, STRUCTURE + LINK)
+    link, swap = model.effects[-2:]
+    assert (link.site, link.values) == ("ground~wrist", {"stiffness": 2e4, "damping": 5.0})
+    assert swap.site == "acc_wrist~bend"
+    assert_round_trip(model, tmp_path)
+
+
+@pytest.mark.parametrize("site", ["ground~wirst", "wrist~", "wrist~shoe"])
+def test_a_pair_of_what_there_is_not_is_told(tmp_path: Path, site: str) -> None:
+    with pytest.raises(ModelError, match=f"no site '{site}'"):
+        structure(tmp_path, STRUCTURE + LINK.replace("ground~wrist", site))
