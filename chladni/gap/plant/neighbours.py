@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from chladni.gap.plant.kept import Kept
 from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.effects.pair import with_pairs
 
 Matrix = NDArray[np.float64]
 #: Of a tunable's sigma: small against curvature, large against rounding of equations.
@@ -53,7 +54,7 @@ class Neighbours:
 
     def at(self, z: Matrix) -> CompiledModel:
         """Give the equations at ``z [parameter]``, in units of their tolerance."""
-        return self._at.get(z.tobytes(), lambda: self._set(z).compile())
+        return self._at.get(z.tobytes(), lambda: with_pairs(self._set(z).compile()))
 
     def changed(self, z: Matrix) -> tuple[CompiledModel, ...]:
         """``[parameter]``: equations with each parameter `STEP` further than at z."""
@@ -65,4 +66,4 @@ class Neighbours:
     def _steps(self, z: Matrix) -> tuple[CompiledModel, ...]:
         # From the model at z each takes one new number.
         base, there = self._set(z), self._tunables.values(z + STEP)
-        return tuple(base.with_values({name: there[name]}).compile() for name in self._tunables.names)
+        return tuple(with_pairs(base.with_values({name: there[name]}).compile()) for name in self._tunables.names)

@@ -50,9 +50,8 @@ def sites_of(compiled: CompiledModel, outputs: Sequence[str]) -> tuple[Site, ...
     outputs
         Names of the measured ones: an error of a sensor that isn't in the log shows nowhere.
     """
-    ports = [
-        Site(name=port.name, kind=port.kind) for port in compiled.ports if port.kind in ("joint", "body", "ground")
-    ]
+    kinds = ("joint", "body", "ground", "pair")
+    ports = [Site(name=port.name, kind=port.kind) for port in compiled.ports if port.kind in kinds]
     loops = {port.name for port in compiled.ports if port.kind == "input" and not port.name.endswith(".limit")}
     names = dict.fromkeys([*(terminal.name for terminal in compiled.inputs), *sorted(loops)])
     inputs = [Site(name=name, kind="input") for name in names]

@@ -88,3 +88,22 @@ def _require_alike(name: str, bodies: Sequence[Port]) -> None:
     if len(units) > 1:
         told = " and ".join(f"{port.name} in {port.displacement_unit}" for port in bodies)
         raise ModelError(f"{name!r}: {told} move in unlike ways; only two that both turn, or both don't, are a pair")
+
+
+def with_pairs(compiled: CompiledModel) -> CompiledModel:
+    """Give the model with a port for every two bodies, or ground and body, that could be linked and aren't."""
+    joints = [place for place, port in enumerate(compiled.ports) if port.kind == "joint"]
+    units = {port.name: port.displacement_unit for port in compiled.ports if port.kind == "body"}
+    for name in pairs_of(compiled, "pair"):
+        if len({units[one] for one in name.split(TILDE) if one in units}) > 1:
+            continue
+        linked, place = with_pair_port(compiled, name)
+        if not any(_moves_alike(linked, place, joint) for joint in joints):
+            compiled = linked
+    return compiled
+
+
+def _moves_alike(compiled: CompiledModel, place: int, other: int) -> bool:
+    """Whether the displacement at a port is that at another one, or its opposite."""
+    ways = (compiled.displacement_state, compiled.displacement_column)
+    return any(all(np.array_equal(way[place], sign * way[other]) for way in ways) for sign in (1.0, -1.0))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.models.effects.attached_effect import attached
-from chladni.models.effects.pair import pairs_of, with_pair_port
+from chladni.models.effects.pair import pairs_of, with_pair_port, with_pairs
 from chladni.models.structures.structure import Body, Joint
 from chladni.signals.errors import ModelError
 from tests.models.effects.small_models import one_body
@@ -82,3 +82,11 @@ def test_what_turns_and_what_slides_are_no_pair() -> None:
     mixed = replace(tree(), structure=replace(structure, bodies=(*structure.bodies, wheel), joints=joints))
     with pytest.raises(ModelError, match="left in m and wheel in rad move in unlike ways"):
         mixed.with_effects((attached("missing_link", "left~wheel", LINK),)).compile()
+
+
+def test_what_a_joint_links_is_no_pair_to_look_at() -> None:
+    ports = with_pairs(tree().compile()).ports
+    assert [port.name for port in ports if port.kind == "pair"] == ["ground~left", "ground~right"]
+    assert [port.name for port in with_pairs(loose().compile()).ports if port.kind == "pair"] == [
+        "ground~left", "ground~right", "left~right",
+    ]  # fmt: skip
