@@ -27,7 +27,7 @@ def _no_trials(_motion: object) -> tuple[()]:
 GYROSCOPIC = EffectKind(
     name="gyroscopic",
     said="gyroscopic coupling",
-    family="topology",
+    family="coupling",
     meaning="a rotor couples two directions: each is pushed by the other one's velocity",
     sites=("pair",),
     parameters=Parameters(

@@ -43,7 +43,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
 MISSING_LINK = EffectKind(
     name="missing_link",
     said="a missing link",
-    family="topology",
+    family="coupling",
     meaning="a spring and damper between two bodies, or a body and the ground, that the model has no joint for",
     sites=("pair",),
     parameters=Parameters(

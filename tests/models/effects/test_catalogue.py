@@ -82,7 +82,7 @@ def test_families_are_those_of_the_vocabulary() -> None:
             "quantization", "anti_alias", "clock_drift", "swapped_channels", "offset",
         },
         "disturbance": {"base_vibration", "tonal_disturbance", "unbalance"},
-        "topology": {"missing_link", "gyroscopic"},
+        "coupling": {"missing_link", "gyroscopic"},
     }  # fmt: skip
 
 
