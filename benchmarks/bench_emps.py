@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, sosfiltfilt
 
@@ -28,6 +27,7 @@ from chladni.models.files.model_file import load_model
 from chladni.models.integrator.simulate import simulate
 from chladni.models.structures.structure_input import StructureInput
 from chladni.models.structures.structure_model import StructureModel
+from chladni.signals.arrays import Real
 from chladni.signals.time_series import TimeSeries
 
 POSITION, FORCE, COMMAND, PULSES = (
@@ -72,7 +72,7 @@ def equation_error(series: TimeSeries, *, coulomb: bool = True) -> EquationError
     rate = series.sample_rate_hz
     low_pass = butter(4, BAND_HZ, fs=rate, output="sos")
 
-    def limited(samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    def limited(samples: Real) -> Real:
         return np.asarray(sosfiltfilt(low_pass, samples, padlen=int(rate / 2)))
 
     time_s, position, force = series.times_s(), series.values[series.index(POSITION)], series.index(FORCE)

@@ -11,14 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.port_law import PortLaw
 from chladni.models.integrator.known_motion import force_along_motion
 from chladni.models.drives.seal_friction import seal_friction_force
 from chladni.models.effects.hysteresis import bouc_wen
+from chladni.signals.arrays import Mask, Real, Whole
 
-Matrix = NDArray[np.float64]
 PRESSURES_BAR = (1, 4, 7)
 YIELDS_M = np.geomspace(5e-5, 2e-3, 25)
 SMOOTHING = 3
@@ -30,14 +29,14 @@ class Log:
     """One pressure: ``[sample]`` of time, position, velocity, pressure, force, and the stroke each belongs to."""
 
     bar: int
-    t: Matrix
-    x: Matrix
-    v: Matrix
-    p: Matrix
-    f: Matrix
-    stroke: NDArray[np.int64]
+    t: Real
+    x: Real
+    v: Real
+    p: Real
+    f: Real
+    stroke: Whole
 
-    def loop(self, yield_m: float) -> Matrix:
+    def loop(self, yield_m: float) -> Real:
         """Bristle of unit force along the motion."""
         law = PortLaw(port=0, function=bouc_wen, parameters=(1.0, yield_m, 1.0), state=(0.0,))
         return force_along_motion(law, self.x, self.v, self.t)
@@ -73,7 +72,7 @@ def read(path: Path, bar: int) -> Log:
     return Log(bar=bar, t=t, x=x, v=v, p=p, f=f, stroke=np.cumsum(np.diff(direction, prepend=direction[0]) != 0))
 
 
-def moving_mean(column: Matrix) -> Matrix:
+def moving_mean(column: Real) -> Real:
     return np.convolve(np.pad(column, SMOOTHING // 2, "edge"), np.full(SMOOTHING, 1 / SMOOTHING), "valid")
 
 
@@ -87,7 +86,7 @@ class Fit:
     error: float
 
 
-def mid_stroke(log: Log, sign: int) -> NDArray[np.bool_]:
+def mid_stroke(log: Log, sign: int) -> Mask:
     return (log.x > STROKE_M[0]) & (log.x < STROKE_M[1]) & (sign * log.v > 3e-3)
 
 
@@ -110,11 +109,11 @@ def identify(log: Log, area: float, part: slice) -> Fit:
     return min(fits, key=lambda fit: fit.error)
 
 
-def friction_of(log: Log, fit: Fit, area: float) -> Matrix:
+def friction_of(log: Log, fit: Fit, area: float) -> Real:
     return log.f - area * log.p - fit.offset
 
 
-def stroke_levels(log: Log, friction: Matrix) -> Matrix:
+def stroke_levels(log: Log, friction: Real) -> Real:
     """Half the difference of the mean friction of each stroke and the one after it, mid-stroke."""
     inside = (log.x > STROKE_M[0]) & (log.x < STROKE_M[1])
     numbers = [stroke for stroke in np.unique(log.stroke) if np.count_nonzero(inside & (log.stroke == stroke)) > 50]
@@ -122,7 +121,7 @@ def stroke_levels(log: Log, friction: Matrix) -> Matrix:
     return np.abs(np.diff(means)) / 2
 
 
-def place_levels(log: Log, friction: Matrix) -> Matrix:
+def place_levels(log: Log, friction: Real) -> Real:
     """Half the difference of both directions in ten parts of the stroke."""
     edges = np.linspace(*STROKE_M, 11)
     halves = []
@@ -178,7 +177,7 @@ def held_out_pressures(logs: list[Log], fits: list[Fit], area: float) -> None:
         report(f"{log.bar} | {level:.2f}, {fits[left].level:.2f}", friction_of(log, fits[left], area), level * loop)
 
 
-def report(bar: int | str, friction: Matrix, predicted: Matrix) -> None:
+def report(bar: int | str, friction: Real, predicted: Real) -> None:
     error, alone = np.sqrt(np.mean((friction - predicted) ** 2)), np.sqrt(np.mean(friction**2))
     print(f"| {bar} | {error:.2f} | {100 * error / alone:.0f} % | {alone:.2f} |")
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 from mcap.writer import CompressionType, Writer
-from numpy.typing import NDArray
+
+from chladni.signals.arrays import Real, Whole
 
 START_NS = 1_700_000_000_000_000_000
 OWN_STAMPS = b"""std_msgs/Header header
@@ -24,9 +25,6 @@ uint32 nanosec
 # Tone at a fifth of the rate: many lines from 0 Hz even in short segments, and not on a line of a power of two.
 TONE = 0.2
 NOISE = 0.1
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,11 +53,11 @@ class History:
     rate_hz: float
     breaks: int
     longest_s: float | None
-    values: Floats
-    log_ns: Ints
-    own_ns: Ints | None = None
-    channels: Ints | None = None
-    sequence: Ints | None = None
+    values: Real
+    log_ns: Whole
+    own_ns: Whole | None = None
+    channels: Whole | None = None
+    sequence: Whole | None = None
     tone_hz: float = field(default=0.0)
 
     def write(self, path: Path) -> None:
@@ -86,13 +84,13 @@ def encoded(value: float, own_ns: int | None) -> bytes:
     return b"\0\1\0\0" + struct.pack("<iII4s", seconds, nanoseconds, 2, b"f\0\0\0") + struct.pack("<d", value)
 
 
-def sampled(times_s: Floats, rate_hz: float, rng: np.random.Generator) -> Floats:
+def sampled(times_s: Real, rate_hz: float, rng: np.random.Generator) -> Real:
     """A tone in noise at the true times of the samples."""
     tone = np.sin(2 * np.pi * TONE * rate_hz * times_s + rng.uniform(0, 2 * np.pi))
     return tone + NOISE * rng.standard_normal(times_s.size)
 
 
-def ns(times_s: Floats) -> Ints:
+def ns(times_s: Real) -> Whole:
     """Whole nanoseconds of seconds, to the microsecond, as most clocks tell them."""
     return np.rint(times_s * 1e6).astype(np.int64) * 1000
 
@@ -130,12 +128,12 @@ class Made:
         return best / self.rate_hz
 
 
-def restarted(made: Made, start_s: float = 0.0) -> Floats:
+def restarted(made: Made, start_s: float = 0.0) -> Real:
     """Stamps of a clock that starts anew with every stretch."""
     return start_s + made.times - made.times[made.first][made.stretch]
 
 
-def stepped(made: Made, steps_s: Floats) -> Floats:
+def stepped(made: Made, steps_s: Real) -> Real:
     """Stamps of a clock that is set by so much before each stretch, the first one too."""
     return made.times + np.cumsum(steps_s)[made.stretch]
 
@@ -158,11 +156,11 @@ def history(
     what: str,
     made: Made,
     *,
-    log_s: Floats,
-    own_s: Floats | None = None,
+    log_s: Real,
+    own_s: Real | None = None,
     breaks: int = 0,
     longest_s: float | None = None,
-    order: Ints | None = None,
+    order: Whole | None = None,
     **rest: object,
 ) -> History:
     """Put a made signal and its stamps together, without what was lost and in the order of arrival."""
@@ -237,7 +235,7 @@ def set_both_ways() -> Iterator[History]:
         yield history(what, made, log_s=log_s, own_s=own_s, breaks=len(stretches) - 1)
 
 
-def ticked(times_s: Floats, tick_s: float) -> Floats:
+def ticked(times_s: Real, tick_s: float) -> Real:
     """What a clock tells that ticks."""
     return np.floor(times_s / tick_s + 1e-6) * tick_s
 

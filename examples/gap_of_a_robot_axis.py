@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, sosfiltfilt
 
@@ -20,6 +19,7 @@ from chladni.apps.gap_evidence import gap_evidence
 from chladni.models.integrator.known_motion import force_along_motion
 from chladni.models.structures.structure_input import StructureInput
 from chladni.models.structures.structure_model import StructureModel
+from chladni.signals.arrays import Real
 from chladni.viewers.figures.gap_sheet import save_gap_sheet
 from chladni.viewers.gap_summary import summary
 
@@ -28,16 +28,14 @@ COMMAND, PULSES = "/command.position[0]", "/pulses.effort[0]"
 #: Of the measured force; its noise lies above.
 BAND_HZ = 50.0
 
-Signal = NDArray[np.float64]
 
-
-def velocity_and_acceleration(series: chladni.TimeSeries) -> tuple[Signal, Signal]:
+def velocity_and_acceleration(series: chladni.TimeSeries) -> tuple[Real, Real]:
     """Derivatives of the measured position, by a spline of degree 5."""
     spline = make_interp_spline(series.times_s(), series.values[series.index(POSITION)], k=5)
     return spline.derivative(1)(series.times_s()), spline.derivative(2)(series.times_s())
 
 
-def low_passed(signal: Signal, rate_hz: float) -> Signal:
+def low_passed(signal: Real, rate_hz: float) -> Real:
     """Without phase, but for the first and last half second."""
     passed = sosfiltfilt(butter(4, BAND_HZ, fs=rate_hz, output="sos"), signal)
     return np.asarray(passed[int(rate_hz / 2) : -int(rate_hz / 2)])

@@ -16,14 +16,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from numpy.typing import NDArray
 
 import chladni
 from chladni.apps.level_location import LevelLocation, locate_from_levels
 from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.records.measurement import Measurement
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 LEVELS = (1, 3, 5, 7)
 FORCE = "/shaker.wrench.force.z"
 SENSORS = {name: f"/{name}.accel.linear.z" for name in ("excitation", "wing_rail", "payload_rail")}
@@ -116,7 +115,7 @@ def draw_outside(found: LevelLocation, axes) -> None:
     axes.grid(alpha=0.3)
 
 
-def spectrum(one: Measurement, signal: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+def spectrum(one: Measurement, signal: Real) -> tuple[Real, Real, Real]:
     """RMS a line of what repeats and of what doesn't, over some lines at a time."""
     samples = int(one.period_samples or signal.size)
     periods = signal[: signal.size // samples * samples].reshape(-1, samples)[one.transient_periods :]

@@ -5,7 +5,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import spectrogram
 
 from chladni.gap.records.diagnosis import (
@@ -32,6 +31,7 @@ from chladni.models.effects.attached_effect import attached
 from chladni.models.files.model_file import load_model
 from chladni.models.integrator.simulate import simulate
 from chladni.models.structures.structure_model import StructureModel
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 
@@ -74,7 +74,6 @@ measures = "acceleration"
 at = "wrist"
 channel = "/wrist.accel.linear.x"
 """
-Matrix = NDArray[np.float64]
 
 
 def write_arm_model(folder: Path) -> Path:
@@ -117,7 +116,7 @@ def rubbing_run() -> Simulation:
 
 
 @cache
-def measured() -> Matrix:
+def measured() -> Real:
     """``[output, sample]`` of the arm that rubs, with 1 % of noise."""
     outputs = rubbing_run().outputs.values
     noise = np.random.default_rng(1).standard_normal(outputs.shape)
@@ -132,12 +131,12 @@ def log_series() -> TimeSeries:
     return replace(run.outputs, values=values, channels=(*run.inputs.channels, *run.outputs.channels))
 
 
-def pooled(error: Matrix) -> float:
+def pooled(error: Real) -> float:
     """RMS over RMS of the measured, outputs scaled by theirs."""
     return float(np.sqrt(np.mean(np.mean(error**2, axis=1) / np.mean(measured() ** 2, axis=1))))
 
 
-def gap_map(error: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+def gap_map(error: Real) -> tuple[Real, Real, Real]:
     scaled = error / measured().std(axis=1, keepdims=True)
     frequency, time, density = spectrogram(scaled, fs=RATE_HZ, nperseg=256, noverlap=128)
     return time, frequency, np.asarray(density.mean(axis=0).T)

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.channel import AXES, Channel
 from chladni.signals.coherence import Coherence
 from chladni.signals.cross_spectra import CrossSpectra
@@ -77,9 +77,9 @@ def reals(shape: tuple[int, ...], elements: st.SearchStrategy[float] = amplitude
 
 
 @st.composite
-def complexes(draw: st.DrawFn, shape: tuple[int, ...]) -> NDArray[np.complex128]:
+def complexes(draw: st.DrawFn, shape: tuple[int, ...]) -> Complex:
     """Complex128 arrays of a shape."""
-    array: NDArray[np.complex128] = draw(reals(shape)) + 1j * draw(reals(shape))
+    array: Complex = draw(reals(shape)) + 1j * draw(reals(shape))
     return array
 
 
@@ -104,11 +104,9 @@ def time_series(
 
 
 @st.composite
-def frequency_axes(draw: st.DrawFn, *, max_lines: int = 9) -> NDArray[np.float64]:
+def frequency_axes(draw: st.DrawFn, *, max_lines: int = 9) -> Real:
     """Evenly spaced axes from 0 Hz."""
-    axis: NDArray[np.float64] = np.arange(float(draw(st.integers(1, max_lines)))) * draw(
-        st.sampled_from((0.25, 1.0, 12.5))
-    )
+    axis: Real = np.arange(float(draw(st.integers(1, max_lines)))) * draw(st.sampled_from((0.25, 1.0, 12.5)))
     return axis
 
 
@@ -127,10 +125,10 @@ def provenances(draw: st.DrawFn) -> Provenance:
 
 
 @st.composite
-def hermitian_densities(draw: st.DrawFn, count: int, lines: int) -> NDArray[np.complex128]:
+def hermitian_densities(draw: st.DrawFn, count: int, lines: int) -> Complex:
     """``[channel, channel, frequency]``, Hermitian and positive semidefinite: sums of conj(x) x^T."""
     spectra = draw(complexes((draw(st.integers(1, count + 2)), count, lines)))
-    density: NDArray[np.complex128] = np.einsum("sif,sjf->ijf", spectra.conj(), spectra)
+    density: Complex = np.einsum("sif,sjf->ijf", spectra.conj(), spectra)
     return density
 
 
@@ -289,7 +287,7 @@ def stabilisation_diagrams(draw: st.DrawFn, modes: int) -> StabilisationDiagram:
 
 
 @st.composite
-def shape_arrays(draw: st.DrawFn, modes: int, columns: int) -> NDArray[np.complex128]:
+def shape_arrays(draw: st.DrawFn, modes: int, columns: int) -> Complex:
     """``[mode, channel]`` complex shapes whose largest component is exactly 1."""
     part = reals((modes, columns), st.floats(-1.0, 1.0, width=32))
     raw = draw(part) + 1j * draw(part)

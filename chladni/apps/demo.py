@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.apps.analyse import analyse
 from chladni.apps.demo_log import (
@@ -23,6 +22,7 @@ from chladni.io.atomic import atomic_write
 from chladni.io.folder import made_folder
 from chladni.io.log import open_log
 from chladni.io.mcap.writer import write_mcap
+from chladni.signals.arrays import Real
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.study import Study
@@ -186,12 +186,12 @@ def _tops(made: DemoLog) -> list[_Top]:
     ]
 
 
-def _local_maxima(level: NDArray[np.float64]) -> list[int]:
+def _local_maxima(level: Real) -> list[int]:
     rising = np.diff(level) > 0
     return (1 + np.flatnonzero(rising[:-1] & ~rising[1:])).tolist()
 
 
-def _prominence(level: NDArray[np.float64], line: int) -> float:
+def _prominence(level: Real, line: int) -> float:
     """How far one goes down from a peak, to the side that goes down less, before it goes up to somewhere higher.
 
     `scipy.signal` knows the same, but takes a second to import, and nothing else in the tour needs it.

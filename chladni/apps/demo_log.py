@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.structures.robot_arm import robot_arm
 from chladni.models.structures.structure import NaturalModes, Structure
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 
@@ -46,7 +46,7 @@ class DemoLog:
         """Name of the force channel."""
         return force_channel().name
 
-    def accelerance(self, body: str, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def accelerance(self, body: str, frequency_hz: Real) -> Complex:
         """Exact acceleration of a body over the force, ``[frequency]`` in (m/s^2)/N."""
         row, column = self.structure.body_index(body), self.structure.body_index(SHAKEN)
         return np.asarray(self.structure.accelerance(frequency_hz)[row, column], dtype=np.complex128)
@@ -96,7 +96,7 @@ def setup_text(structure: Structure) -> str:
     return "\n".join(['format = "chladni.setup/1"\n', *points, *tables, f"[[line]]\npoints = [{names}]\n"])
 
 
-def _series(channel: Channel, values: NDArray[np.float64]) -> TimeSeries:
+def _series(channel: Channel, values: Real) -> TimeSeries:
     valid = np.ones((1, values.size), dtype=bool)
     if channel.point == LOST_SENSOR and channel.role == "response":
         valid[0, round(LOST_FROM_S * SAMPLE_RATE_HZ) : round(LOST_TO_S * SAMPLE_RATE_HZ)] = False
@@ -109,7 +109,7 @@ def _series(channel: Channel, values: NDArray[np.float64]) -> TimeSeries:
     )
 
 
-def _band_limited_noise(rng: np.random.Generator, samples: int) -> NDArray[np.float64]:
+def _band_limited_noise(rng: np.random.Generator, samples: int) -> Real:
     frequency_hz = np.fft.rfftfreq(samples, 1 / SAMPLE_RATE_HZ)
     inside = (frequency_hz >= FORCE_BAND_HZ[0]) & (frequency_hz <= FORCE_BAND_HZ[1])
     lines = rng.standard_normal(frequency_hz.size) + 1j * rng.standard_normal(frequency_hz.size)

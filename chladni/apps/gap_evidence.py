@@ -3,16 +3,14 @@
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.apps.spectra import psd
 from chladni.gap.records.diagnosis import Diagnosis, GapSignals
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
 from chladni.viewers.gap_evidence import GapEvidence, GapSpectra
-
-Matrix = NDArray[np.float64]
 
 # Cycles of the gap's typical frequency that can be told apart in a picture, and the fewest samples that make one.
 CYCLES, FEWEST_SAMPLES = 12.0, 60
@@ -68,7 +66,7 @@ def spectra_of(signals: GapSignals) -> GapSpectra | None:
     )
 
 
-def _noise(signals: GapSignals, frequency_hz: Matrix) -> Matrix:
+def _noise(signals: GapSignals, frequency_hz: Real) -> Real:
     """``[output, line]``: the estimated noise at the lines of the other spectra."""
     lines_hz = np.linspace(0.0, signals.sample_rate_hz / 2, signals.noise_density.shape[1])
     return np.array([np.interp(frequency_hz, lines_hz, row) for row in signals.noise_density])

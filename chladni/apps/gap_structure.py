@@ -4,16 +4,15 @@ from collections.abc import Sequence
 from math import nan
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.records.diagnosis import Where
 from chladni.models.core.model import Model
 from chladni.models.structures.structure import GROUND, Joint, Structure
 from chladni.models.structures.structure_model import StructureModel
+from chladni.signals.arrays import Real
 from chladni.viewers.structure_sketch import StructureSketch
 
-Matrix = NDArray[np.float64]
-Places = dict[str, Matrix]
+Places = dict[str, Real]
 
 # How far the ground is from a body that hangs on it, over the size of the structure.
 TO_GROUND = 0.35
@@ -60,7 +59,7 @@ def _body_places(structure: Structure) -> Places:
     return {body.name: np.array(body.position, dtype=np.float64) for body in bodies}
 
 
-def _ends(joint: Joint, places: Places, size: float) -> Matrix:
+def _ends(joint: Joint, places: Places, size: float) -> Real:
     moving = next(end for end in joint.between if end != GROUND)
     below = places[moving] - TO_GROUND * size * np.array([0.0, 0.0, 1.0])
     return np.array([places.get(end, below) for end in joint.between])
@@ -78,5 +77,5 @@ def _signal_places(at: dict[str, str], places: Places, joints: Places, size: flo
     return found
 
 
-def _shares(names: Sequence[str], shares: dict[str, float]) -> Matrix:
+def _shares(names: Sequence[str], shares: dict[str, float]) -> Real:
     return np.array([shares.get(name, nan) for name in names], dtype=np.float64)

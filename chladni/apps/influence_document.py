@@ -3,9 +3,9 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.reading import InfluenceTable
+from chladni.signals.arrays import Real
 
 FORMAT = "chladni.influence/1"
 
@@ -25,5 +25,5 @@ def influence_document(table: InfluenceTable) -> dict[str, Any]:
     }
 
 
-def _known(numbers: NDArray[np.float64]) -> list[float | None]:
+def _known(numbers: Real) -> list[float | None]:
     return [float(number) if np.isfinite(number) else None for number in numbers]

@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.apps.spectra import frf, psd
 from chladni.models.core.reading import Chart, Curve, Quantity
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import rms
@@ -20,8 +20,6 @@ MOST_POINTS = 3000
 SEGMENTS = 4
 FEWEST_SAMPLES = 64
 MEASURED, SIMULATED = "measured", "simulated"
-
-Floats = NDArray[np.float64]
 
 
 def comparison_charts(
@@ -160,12 +158,12 @@ def _joined(measured: TimeSeries, simulated: TimeSeries, *, first: TimeSeries | 
     )
 
 
-def _thinned(label: str, x: Floats, y: Floats) -> Curve:
+def _thinned(label: str, x: Real, y: Real) -> Curve:
     shown, _ = thin(np.asarray(y, dtype=np.float64), limit=MOST_POINTS)
     return Curve(label=label, x=x[shown], y=np.asarray(y[shown], dtype=np.float64))
 
 
-def _line(label: str, frequency_hz: Floats, values: Floats, known: NDArray[np.bool_] | None = None) -> Curve:
+def _line(label: str, frequency_hz: Real, values: Real, known: Mask | None = None) -> Curve:
     """Leave out the line at 0 Hz, what isn't known, and zeros, which a logarithmic axis can't show."""
     shown = np.where((values > 0) & (True if known is None else known), values, np.nan)
     return _thinned(label, frequency_hz[1:], shown[1:])

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +88,7 @@ class Watched:
             self._moments[channel.name] = _with_moments(self._moments.get(channel.name, (0, 0.0, 0.0)), row)
 
 
-def _with_moments(known: tuple[int, float, float], row: NDArray[np.floating[Any]]) -> tuple[int, float, float]:
+def _with_moments(known: tuple[int, float, float], row: NDArray[np.floating]) -> tuple[int, float, float]:
     """Add samples to a count, a mean and a sum of squared deviations (Chan, Golub & LeVeque 1983, eq. 2.1)."""
     finite = row[np.isfinite(row)].astype(np.float64, copy=False)
     if not finite.size:

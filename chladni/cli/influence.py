@@ -13,10 +13,8 @@ from chladni.cli.places import require_places
 from chladni.cli.settings import with_settings
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from chladni.models.core.reading import InfluenceTable
+    from chladni.signals.arrays import Real
 
 IN_ROW, IN_COLUMN = "*", "†"
 # Coefficients are printed with three decimals; below this they read as zero.
@@ -127,7 +125,7 @@ def _parts(heads: list[str], name_width: int, width: int) -> list[range]:
     return [range(first, last) for first, last in pairwise([*ends, len(heads)])]
 
 
-def _rows(names: list[str], coefficients: "NDArray[np.float64]") -> list[list[str]]:
+def _rows(names: list[str], coefficients: "Real") -> list[list[str]]:
     from chladni.models.analysis.influence import strongest
 
     marked = strongest(coefficients)

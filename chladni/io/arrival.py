@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.mcap.message_batch import MessageBatch
+from chladni.signals.arrays import Mask, Whole
 from chladni.signals.stray_stamps import find_strays
 
 #: Percentile of the steps forward that is the longest usual one, and the step over one lost message in its units.
@@ -34,10 +35,10 @@ class Arrivals:
         ``[message]``, rises with the place in the file; None when the messages are in that order anyway.
     """
 
-    log_ns: NDArray[np.int64]
+    log_ns: Whole
     sequence: NDArray[np.uint32]
     channel: NDArray[np.uint16] | None = None
-    position: NDArray[np.int64] | None = None
+    position: Whole | None = None
 
     @classmethod
     def of(cls, batch: MessageBatch, stretch: int | None) -> "Arrivals":
@@ -68,7 +69,7 @@ class Arrivals:
             position=np.concatenate(positions) if positions else None,
         )
 
-    def kept(self, keep: NDArray[np.bool_] | NDArray[np.int64]) -> "Arrivals":
+    def kept(self, keep: Mask | Whole) -> "Arrivals":
         """Give some of them, or all in another order."""
         return replace(
             self,
@@ -87,7 +88,7 @@ def numbered(batches: Iterable[MessageBatch]) -> Iterator[tuple[int, MessageBatc
         yield stretch, batch
 
 
-def arrival_order(stamps_ns: NDArray[np.int64], arrivals: Arrivals) -> NDArray[np.int64] | None:
+def arrival_order(stamps_ns: Whole, arrivals: Arrivals) -> Whole | None:
     """Find the order in which messages came, which may not be the one in which they are stored.
 
     MCAP lets messages be stored in any order; but log times that run back in the file may also come from a clock
@@ -118,7 +119,7 @@ def arrival_order(stamps_ns: NDArray[np.int64], arrivals: Arrivals) -> NDArray[n
     return stored
 
 
-def stored_late(order: NDArray[np.int64], arrivals: Arrivals) -> int:
+def stored_late(order: Whole, arrivals: Arrivals) -> int:
     """How many messages are stored behind one that came after them, given the order in which they came."""
     rank = np.argsort(order if arrivals.position is None else arrivals.position[order], kind="stable")
     return int(np.count_nonzero(rank < np.maximum.accumulate(rank)))
@@ -130,7 +131,7 @@ def _by_channel(arrivals: Arrivals) -> Iterable[Arrivals]:
     return [arrivals.kept(arrivals.channel == one) for one in np.unique(arrivals.channel)]
 
 
-def _rises(times: NDArray[np.int64]) -> bool:
+def _rises(times: Whole) -> bool:
     return bool(np.all(times[1:] >= times[:-1]))
 
 
@@ -151,7 +152,7 @@ def _stored_out_of_order(arrivals: Arrivals) -> bool:
     return _fit_end_to_end(arrivals.log_ns) or _evener_by_time(arrivals.log_ns, arrivals.log_ns[order])
 
 
-def _by_time(arrivals: Arrivals) -> NDArray[np.int64]:
+def _by_time(arrivals: Arrivals) -> Whole:
     """Order of the log times; where these are the same the publisher's counter tells."""
     return np.lexsort((arrivals.sequence, arrivals.log_ns))
 
@@ -161,7 +162,7 @@ def _repeats(sequence: NDArray[np.uint32]) -> int:
     return int(np.count_nonzero(sequence[1:] <= sequence[:-1]))
 
 
-def _fit_end_to_end(log_ns: NDArray[np.int64]) -> bool:
+def _fit_end_to_end(log_ns: Whole) -> bool:
     """Whether parts of the file, each without a leap, follow each other in another order with a step like theirs."""
     steps = np.diff(log_ns)
     forward = steps[steps >= 0]
@@ -180,12 +181,12 @@ def _fit_end_to_end(log_ns: NDArray[np.int64]) -> bool:
     return bool(np.all(fit | pause))
 
 
-def _evener_by_time(stored_ns: NDArray[np.int64], rising_ns: NDArray[np.int64]) -> bool:
+def _evener_by_time(stored_ns: Whole, rising_ns: Whole) -> bool:
     steps = np.diff(stored_ns)
     return _even(np.diff(rising_ns)) > _EVENLY_SORTED and _even(steps[steps >= 0]) < _EVENLY_STORED
 
 
-def _even(steps: NDArray[np.int64]) -> float:
+def _even(steps: Whole) -> float:
     """Share of steps that are even."""
     if not steps.size:
         return 0.0

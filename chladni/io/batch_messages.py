@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from chladni.io.decoding.columns import Decoded, StringValue
 from chladni.io.decoding.schema import FieldInfo
 from chladni.io.known_schemas import message_type
+from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.errors import LogError
 
 #: Time between samples that is believed: a gigahertz to a sample a day.
@@ -87,10 +88,10 @@ class Expanded:
         ``[message]``, True where the message contradicts itself or the layout.
     """
 
-    values: NDArray[np.floating[Any]]
-    counts: NDArray[np.int64]
-    periods_s: NDArray[np.float64]
-    bad: NDArray[np.bool_]
+    values: NDArray[np.floating]
+    counts: Whole
+    periods_s: Real
+    bad: Mask
 
 
 # --- recognising -------------------------------------------------------------------------------------------------
@@ -208,7 +209,7 @@ def expand(layout: BatchLayout, decoded: Decoded, names: tuple[str, ...], wanted
     return Expanded(values=_scaled(layout, decoded, values, counts), counts=counts, periods_s=periods_s, bad=bad)
 
 
-def _periods_s(layout: BatchLayout, decoded: Decoded) -> NDArray[np.float64]:
+def _periods_s(layout: BatchLayout, decoded: Decoded) -> Real:
     if isinstance(layout.period, str):
         raw = decoded.columns[layout.period].numbers.astype(np.float64) * layout.period_unit
     else:
@@ -218,7 +219,7 @@ def _periods_s(layout: BatchLayout, decoded: Decoded) -> NDArray[np.float64]:
     return np.divide(1.0, raw, out=np.zeros_like(raw), where=raw > 1 / LONGEST_S)
 
 
-def _renamed(layout: BatchLayout, decoded: Decoded, names: tuple[str, ...]) -> NDArray[np.bool_]:
+def _renamed(layout: BatchLayout, decoded: Decoded, names: tuple[str, ...]) -> Mask:
     if not isinstance(layout.names, str):
         return np.zeros(len(decoded.bad), np.bool_)
     strings = decoded.columns[layout.names].strings
@@ -227,8 +228,8 @@ def _renamed(layout: BatchLayout, decoded: Decoded, names: tuple[str, ...]) -> N
 
 
 def _split(
-    layout: BatchLayout, decoded: Decoded, width: int, wanted: Sequence[int], bad: NDArray[np.bool_]
-) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    layout: BatchLayout, decoded: Decoded, width: int, wanted: Sequence[int], bad: Mask
+) -> tuple[NDArray[Any], Whole]:
     """One array holds all columns; -1 as count where its length doesn't divide by their number."""
     column = decoded.columns[layout.samples[0]]
     flat, elements = column.per_message()
@@ -251,7 +252,7 @@ def _split(
     return _stacked(rows, flat, int(usable.sum())), counts
 
 
-def _said_counts(layout: BatchLayout, decoded: Decoded, room: NDArray[np.int64]) -> NDArray[np.int64]:
+def _said_counts(layout: BatchLayout, decoded: Decoded, room: Whole) -> Whole:
     """Samples of each message as it says itself, all there's room for when it says nothing; -1 where it lies."""
     if layout.count is None:
         return room
@@ -264,8 +265,8 @@ def _stacked(rows: list[NDArray[Any]], like: NDArray[Any], samples: int) -> NDAr
 
 
 def _side_by_side(
-    layout: BatchLayout, decoded: Decoded, wanted: Sequence[int], bad: NDArray[np.bool_]
-) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    layout: BatchLayout, decoded: Decoded, wanted: Sequence[int], bad: Mask
+) -> tuple[NDArray[Any], Whole]:
     """An array for each column; -1 as count where they differ in length or are shorter than the message says."""
     every = [decoded.columns[leaf].per_message() for leaf in layout.samples]
     lengths = np.stack([elements for _, elements in every])
@@ -280,9 +281,7 @@ def _side_by_side(
     return _stacked(rows, every[0][0], within.size), counts
 
 
-def _scaled(
-    layout: BatchLayout, decoded: Decoded, values: NDArray[Any], counts: NDArray[np.int64]
-) -> NDArray[np.floating[Any]]:
+def _scaled(layout: BatchLayout, decoded: Decoded, values: NDArray[Any], counts: Whole) -> NDArray[np.floating]:
     """Floating point, scaled; single precision stays single, since a log of it is half the size in memory."""
     floating = values if values.dtype in (np.float32, np.float64) else values.astype(np.float64)
     if isinstance(layout.scale, str):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.clock_steps import ClockSteps
 from chladni.signals.time_base import TimeBase
 from chladni.signals.time_series import NS_PER_S
@@ -37,7 +38,7 @@ class StreamClock:
     number: int
     steps: ClockSteps
     messages: int
-    chosen: NDArray[np.int64] | None = None
+    chosen: Whole | None = None
 
     def eras(self) -> NDArray[np.int32]:
         """``[message]`` in the order of the file, how often the clock had been set before."""
@@ -65,16 +66,16 @@ class Stamped:
     """
 
     key: Key
-    stamps_ns: NDArray[np.int64]
+    stamps_ns: Whole
     base: TimeBase
-    chosen: NDArray[np.int64] | None = None
+    chosen: Whole | None = None
 
     @property
-    def arrived_ns(self) -> NDArray[np.int64]:
+    def arrived_ns(self) -> Whole:
         """Stamps in the order of arrival."""
         return self.stamps_ns if self.chosen is None else self.stamps_ns[self.chosen]
 
-    def extents(self) -> NDArray[np.int64]:
+    def extents(self) -> Whole:
         """``[2, stretch]`` earliest and latest stamp between two steps of the clock."""
         starts = np.append(0, self.base.clock.message)
         return np.stack((np.minimum.reduceat(self.arrived_ns, starts), np.maximum.reduceat(self.arrived_ns, starts)))
@@ -132,7 +133,7 @@ def _period_ns(base: TimeBase) -> float:
     return NS_PER_S / base.rate_hz if base.rate_hz > 0 else 0.0
 
 
-def _common_shift(members: Sequence[Stamped]) -> NDArray[np.int64]:
+def _common_shift(members: Sequence[Stamped]) -> Whole:
     """``[step]`` what to add to all stamps after each step: time runs on, and phases are kept as well as they can be.
 
     At least two periods lie between the samples of every stream, so that one of its grid is left out.
@@ -152,13 +153,13 @@ def _common_shift(members: Sequence[Stamped]) -> NDArray[np.int64]:
     return shifts[1:]
 
 
-def _phases(stamped: Stamped, origin_ns: int) -> NDArray[np.float64]:
+def _phases(stamped: Stamped, origin_ns: int) -> Real:
     """``[stretch]`` phase of a stream's stamps, in periods, against that of the first stretch."""
     period_ns = _period_ns(stamped.base)
     turns = (stamped.arrived_ns - origin_ns) / period_ns
     starts = np.append(0, stamped.base.clock.message)
     phases = np.angle(np.add.reduceat(np.exp(2j * np.pi * turns), starts)) / (2 * np.pi)
-    relative: NDArray[np.float64] = phases - phases[0]
+    relative: Real = phases - phases[0]
     return relative
 
 

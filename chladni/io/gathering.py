@@ -14,6 +14,7 @@ from chladni.io.publishers import at_once, count_by_stamps, evenly_in_turn, told
 from chladni.io.repeats import digests_of
 from chladni.io.stream import Piece, Stream
 from chladni.io.untimed import SLACK_NS, untimed
+from chladni.signals.arrays import Whole
 from chladni.signals.clock_steps import LEAP_NS, ClockSteps
 from chladni.signals.time_base import TimeBase
 
@@ -72,16 +73,16 @@ class Gathering:
     """
 
     stream: Stream
-    stamps_ns: list[NDArray[np.int64]] = field(default_factory=list)
-    counts: list[NDArray[np.int64]] = field(default_factory=list)
-    values: list[NDArray[np.floating[Any]]] = field(default_factory=list)
+    stamps_ns: list[Whole] = field(default_factory=list)
+    counts: list[Whole] = field(default_factory=list)
+    values: list[NDArray[np.floating]] = field(default_factory=list)
     arrivals: list[Arrivals] = field(default_factory=list)
     digests: list[NDArray[np.uint64]] = field(default_factory=list)
     eras: list[NDArray[np.int32]] = field(default_factory=list)
     period_s: float = 0.0
     dtype: np.dtype[Any] = field(default_factory=lambda: np.dtype(np.float32))
     untimed: int = 0
-    chosen: NDArray[np.int64] | None = None
+    chosen: Whole | None = None
 
     def add(self, piece: Piece, *, with_values: bool) -> None:
         """Append a piece."""
@@ -139,7 +140,7 @@ class Gathering:
             stored_late=late,
         )
 
-    def _placed(self, stamps_ns: NDArray[np.int64], stated: StatedRate | None, clock: ClockSteps | None) -> Placement:
+    def _placed(self, stamps_ns: Whole, stated: StatedRate | None, clock: ClockSteps | None) -> Placement:
         counts = _concatenated(self.counts) if self.stream.layout is not None else None
         digests = self.digests
         if not digests and self.values and self.stamps_alike:
@@ -164,7 +165,7 @@ class Gathering:
             logged_ns=np.concatenate([one.log_ns for one in self.arrivals]) if own_clock and self.arrivals else None,
         )
 
-    def _in_order(self, stamps_ns: NDArray[np.int64]) -> bool:
+    def _in_order(self, stamps_ns: Whole) -> bool:
         """Whether all stamps are times, and rise in the file: mostly they do, and little has to be looked at."""
         if self.stream.publisher is not None or len(self.stream.topic.decoders) > 1 or stamps_ns.size < 2:
             return False
@@ -173,15 +174,13 @@ class Gathering:
         return bool(together and np.all(stamps_ns[1:] >= stamps_ns[:-1]))
 
 
-def _published_by(publisher: int, stamps_ns: NDArray[np.int64]) -> NDArray[np.int64]:
+def _published_by(publisher: int, stamps_ns: Whole) -> Whole:
     """Messages of one publisher of those that their stamps tell apart; none where there's no such."""
     apart = told_apart(stamps_ns)
     return apart[publisher - 1] if publisher <= len(apart) else np.zeros(0, np.int64)
 
 
-def _of_one_publisher(
-    placement: Placement, stamps_ns: NDArray[np.int64], channel: NDArray[np.uint16] | None = None
-) -> Placement:
+def _of_one_publisher(placement: Placement, stamps_ns: Whole, channel: NDArray[np.uint16] | None = None) -> Placement:
     """Take the grid away where several publish at once, since their samples are no single signal."""
     several = _publishers(placement, stamps_ns, channel)
     if len(several) < 2:
@@ -201,9 +200,7 @@ def _of_one_publisher(
     )
 
 
-def _publishers(
-    placement: Placement, stamps_ns: NDArray[np.int64], channel: NDArray[np.uint16] | None
-) -> tuple[str, ...]:
+def _publishers(placement: Placement, stamps_ns: Whole, channel: NDArray[np.uint16] | None) -> tuple[str, ...]:
     """What tells the publishers of a stream apart, in a path; empty where there's one."""
     if channel is not None and at_once(stamps_ns, channel) and not evenly_in_turn(stamps_ns, channel):
         return tuple(f"@channel=={number}" for number in np.unique(channel).tolist())
@@ -214,7 +211,7 @@ def _publishers(
     return tuple(f"@publisher=={number}" for number in range(1, count + 1))
 
 
-def _set_before(time_ns: NDArray[np.int64], eras: NDArray[np.int32]) -> ClockSteps:
+def _set_before(time_ns: Whole, eras: NDArray[np.int32]) -> ClockSteps:
     """Steps of a clock whose stamps run on already."""
     message = np.flatnonzero(np.diff(eras)) + 1
     return ClockSteps(
@@ -317,5 +314,5 @@ def windowed(
             yield index, inside
 
 
-def _concatenated(parts: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+def _concatenated(parts: list[Whole]) -> Whole:
     return np.concatenate(parts) if parts else np.zeros(0, np.int64)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from chladni.io.grid_buffer import GridBuffer
 from chladni.io.shared_grid import Group
+from chladni.signals.arrays import Mask, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 
@@ -33,8 +34,8 @@ class PlacedPiece:
     """
 
     rows: tuple[int, ...]
-    index: NDArray[np.int64]
-    values: NDArray[np.floating[Any]]
+    index: Whole
+    values: NDArray[np.floating]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,7 +75,7 @@ class BlockGrid:
         """Size of a block in memory."""
         return max(1, self.block_samples * len(self.channels) * self.dtype.itemsize)
 
-    def parts(self, lowest: NDArray[np.int64], highest: NDArray[np.int64]) -> Iterator["BlockGrid"]:
+    def parts(self, lowest: Whole, highest: Whole) -> Iterator["BlockGrid"]:
         """Cut the stretch so that the blocks being filled at a time fit into memory, though pieces come in any order.
 
         A log that is stored in the order of time is one part. One that isn't is read once for each part.
@@ -105,7 +106,7 @@ class BlockGrid:
         keep = (piece.index >= self.first) & (piece.index < self.last)
         return piece if keep.all() else replace(piece, index=piece.index[keep], values=piece.values[:, keep])
 
-    def cut(self, index: NDArray[np.int64]) -> Iterator[tuple[int, slice | NDArray[np.bool_]]]:
+    def cut(self, index: Whole) -> Iterator[tuple[int, slice | Mask]]:
         """Give the blocks that samples of the stretch fall into, and which samples fall into each."""
         numbers = (index - self.first) // self.block_samples
         if not numbers.size:
@@ -120,13 +121,13 @@ class BlockGrid:
             yield from ((int(number), numbers == number) for number in np.unique(numbers))
 
 
-def complete(lowest: NDArray[np.int64], last: int) -> NDArray[np.int64]:
+def complete(lowest: Whole, last: int) -> Whole:
     """For each piece the grid index below which no later piece has a sample, from the lowest index of each."""
     following = np.append(lowest[1:], last)
     return np.minimum.accumulate(following[::-1])[::-1]
 
 
-def blocks_of(grid: BlockGrid, pieces: Iterable[PlacedPiece], below: NDArray[np.int64]) -> Iterator[TimeSeries]:
+def blocks_of(grid: BlockGrid, pieces: Iterable[PlacedPiece], below: Whole) -> Iterator[TimeSeries]:
     """Lay pieces onto the grid and give each block as soon as nothing more can fall into it.
 
     Parameters

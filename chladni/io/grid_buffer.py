@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.shared_grid import Group
+from chladni.signals.arrays import Whole
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 
@@ -73,7 +74,7 @@ class GridBuffer:
         self._reached = [0] * len(channels)
         self._finite = True
 
-    def put(self, rows: Sequence[int], index: NDArray[np.int64], values: NDArray[np.floating[Any]]) -> None:
+    def put(self, rows: Sequence[int], index: Whole, values: NDArray[np.floating]) -> None:
         """Lay samples onto the grid; those outside the stretch are left out.
 
         Parameters
@@ -128,7 +129,7 @@ class GridBuffer:
             self._finite = False
 
 
-def _memory(rows: int, samples: int, dtype: np.dtype[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def _memory(rows: int, samples: int, dtype: np.dtype[np.floating[Any]]) -> NDArray[np.floating]:
     """Memory for ``[row, sample]`` that is taken as it's written to, so that pieces can go as their samples come.
 
     A huge page is faster, but many rows of a short record: the first samples would take them all.
@@ -148,12 +149,12 @@ def _memory(rows: int, samples: int, dtype: np.dtype[np.floating[Any]]) -> NDArr
     return np.frombuffer(pages, dtype).reshape(rows, samples)
 
 
-def _surely_finite(values: NDArray[np.floating[Any]]) -> bool:
+def _surely_finite(values: NDArray[np.floating]) -> bool:
     """Whether all are finite; False also when they only may not be."""
     # What isn't finite stays in a sum, which needs no memory, and brings into the cache what is copied next.
     with np.errstate(over="ignore", invalid="ignore"):
         return bool(np.isfinite(values.sum()))
 
 
-def _contiguous(places: NDArray[np.int64]) -> bool:
+def _contiguous(places: Whole) -> bool:
     return bool(np.all(np.diff(places) == 1))

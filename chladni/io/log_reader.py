@@ -6,7 +6,6 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.clocks import Key, Stamped, StreamClock
 from chladni.io.gathering import Gathering, LostMessages, gather, place_all, running_on, windowed
@@ -17,6 +16,7 @@ from chladni.io.placement import Placement, StatedRate, lowest_index
 from chladni.io.repeats import digests_of
 from chladni.io.shared_grid import ALIGNED, Group, group_placements
 from chladni.io.stream import Piece, Stream, read_pieces
+from chladni.signals.arrays import Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
 from chladni.signals.grid_index import NOWHERE
@@ -400,7 +400,7 @@ def _sized(pieces: Iterable[tuple[int, Piece]], sizes: list[tuple[int, int]]) ->
 
 def _extents(
     sizes: Sequence[tuple[int, int]], member_of: Sequence[int | None], placements: Sequence[Placement]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[Whole, Whole]:
     """Lowest and highest grid index of each piece, in the order of the file."""
     starts = [0] * len(placements)
     extents = []

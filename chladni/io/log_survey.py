@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.catalog import Catalog
 from chladni.io.clocks import clocks_of
@@ -17,6 +16,7 @@ from chladni.io.mcap.container import McapContainer
 from chladni.io.placement import Placement, StatedRate
 from chladni.io.sample_monitor import STRETCH_VALUES, Faults, SampleMonitor, clipped_samples, judge_samples
 from chladni.io.stream import read_pieces
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.time_base import TimeBase
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
@@ -159,7 +159,7 @@ def _end_ns(series: TimeSeries) -> int:
     return series.start_time_ns + round(series.duration_s * NS_PER_S)
 
 
-def _judged(series: TimeSeries, faults: Faults, offset_s: float) -> NDArray[np.int64]:
+def _judged(series: TimeSeries, faults: Faults, offset_s: float) -> Whole:
     """Judge the samples in stretches, and count those of each channel that are missing."""
     lost = np.zeros(len(series.channels), np.int64)
     length = max(1, STRETCH_VALUES // max(1, len(series.channels)))
@@ -169,7 +169,7 @@ def _judged(series: TimeSeries, faults: Faults, offset_s: float) -> NDArray[np.i
             valid = series.valid[:, first : first + length]
             values = np.where(valid, values, np.nan)
 
-        def seconds(places: NDArray[np.int64], first: int = first) -> NDArray[np.float64]:
+        def seconds(places: Whole, first: int = first) -> Real:
             return offset_s + (first + places) / series.sample_rate_hz
 
         lost += judge_samples(series.channels, values, faults, seconds)
@@ -177,7 +177,7 @@ def _judged(series: TimeSeries, faults: Faults, offset_s: float) -> NDArray[np.i
 
 
 def _file_channels(
-    series: TimeSeries, base: TimeBase | None, kind: str, lost: NDArray[np.int64], faults: Faults, offset_s: float
+    series: TimeSeries, base: TimeBase | None, kind: str, lost: Whole, faults: Faults, offset_s: float
 ) -> list[ChannelInfo]:
     clock = base or _stated_rate(series)
     reason = "the file's own times" if base else f"samples follow one another at {series.sample_rate_hz:.9g} Hz"
@@ -197,11 +197,11 @@ def _file_channels(
     ]
 
 
-def _beyond_gaps(series: TimeSeries) -> NDArray[np.int64]:
+def _beyond_gaps(series: TimeSeries) -> Whole:
     """Samples of each channel that are missing where another channel has one."""
     if series.valid is None:
         return np.zeros(len(series.channels), np.int64)
-    beyond: NDArray[np.int64] = np.count_nonzero(~series.valid & series.valid.any(axis=0), axis=1)
+    beyond: Whole = np.count_nonzero(~series.valid & series.valid.any(axis=0), axis=1)
     return beyond
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from chladni.io.repeats import repeats_of
 from chladni.io.stream import Stream
+from chladni.signals.arrays import Whole
 from chladni.signals.clock_steps import ClockSteps
 from chladni.signals.grid_index import NOWHERE
 from chladni.signals.time_base import TimeBase, fit_batch_time_base, fit_time_base
@@ -55,9 +56,9 @@ class Placement:
 
     stream: Stream
     time_base: TimeBase
-    index: NDArray[np.int64]
-    counts: NDArray[np.int64] | None
-    taken: NDArray[np.int64] | None = None
+    index: Whole
+    counts: Whole | None
+    taken: Whole | None = None
     first_ns: int | None = None
     end_ns: int | None = None
     untimed: int = 0
@@ -90,7 +91,7 @@ class Placement:
         """How many numbers its channels hold together."""
         return self.time_base.samples * len(self.stream.sources)
 
-    def samples_index(self, part: slice) -> NDArray[np.int64]:
+    def samples_index(self, part: slice) -> Whole:
         """Grid index of every sample of some messages, message after message; `NOWHERE` for those left out."""
         index = self.index[part]
         if self.counts is None:
@@ -109,7 +110,7 @@ class Placement:
         return replace(self, index=self.index + samples) if samples else self
 
 
-def lowest_index(index: NDArray[np.int64], otherwise: int) -> int:
+def lowest_index(index: Whole, otherwise: int) -> int:
     """Lowest grid index of messages that have a place on the grid."""
     lowest = int(index.min(initial=-NOWHERE))
     if lowest < NOWHERE // 2:
@@ -140,15 +141,15 @@ class StatedRate:
 
 def place_stream(
     stream: Stream,
-    stamps_ns: NDArray[np.int64],
-    counts: NDArray[np.int64] | None,
+    stamps_ns: Whole,
+    counts: Whole | None,
     period_s: float,
     *,
-    chosen: NDArray[np.int64] | None = None,
+    chosen: Whole | None = None,
     digests: NDArray[np.uint64] | None = None,
     stated: StatedRate | None = None,
     clock: ClockSteps | None = None,
-    logged_ns: NDArray[np.int64] | None = None,
+    logged_ns: Whole | None = None,
 ) -> Placement:
     """Fit the time base of a stream and give each message its place.
 
@@ -194,7 +195,7 @@ def place_stream(
     )
 
 
-def without_grid(base: TimeBase, stamps_ns: NDArray[np.int64], advice: str) -> TimeBase:
+def without_grid(base: TimeBase, stamps_ns: Whole, advice: str) -> TimeBase:
     """Give the time base of messages that have no grid, and the reason in place of its advice."""
     span_s = float(np.ptp(stamps_ns)) / NS_PER_S
     return replace(
@@ -209,9 +210,7 @@ def without_grid(base: TimeBase, stamps_ns: NDArray[np.int64], advice: str) -> T
     )
 
 
-def _in_file(
-    numbers: NDArray[np.int64], chosen: NDArray[np.int64], messages: int, *, otherwise: int
-) -> NDArray[np.int64]:
+def _in_file(numbers: Whole, chosen: Whole, messages: int, *, otherwise: int) -> Whole:
     """Bring what belongs to the chosen messages into the order of the file."""
     spread = np.full(messages, otherwise, np.int64)
     spread[chosen] = numbers
@@ -220,8 +219,8 @@ def _in_file(
 
 def _placed(
     stream: Stream,
-    stamps_ns: NDArray[np.int64],
-    counts: NDArray[np.int64] | None,
+    stamps_ns: Whole,
+    counts: Whole | None,
     period_s: float,
     digests: NDArray[np.uint64] | None,
     *,
@@ -256,9 +255,9 @@ class _Seen:
 
     stated: StatedRate | None
     clock: ClockSteps | None
-    logged_ns: NDArray[np.int64] | None
+    logged_ns: Whole | None
 
-    def kept(self, kept: NDArray[np.int64]) -> "_Seen":
+    def kept(self, kept: Whole) -> "_Seen":
         """Give the same for some of the messages."""
         clock, logged_ns = self.clock, self.logged_ns
         return replace(
@@ -267,22 +266,20 @@ class _Seen:
             logged_ns=None if logged_ns is None else logged_ns[kept],
         )
 
-    def fit(self, stamps_ns: NDArray[np.int64]) -> TimeBase:
+    def fit(self, stamps_ns: Whole) -> TimeBase:
         """Fit to messages of one sample each."""
         fit = partial(fit_time_base, stamps_ns, clock=self.clock, logged_ns=self.logged_ns)
         base = fit()
         return base if self.stated is None or not self.stated.settles(base) else fit(nominal_rate_hz=self.stated.hz)
 
-    def fit_batches(self, stamps_ns: NDArray[np.int64], counts: NDArray[np.int64], period_s: float) -> TimeBase:
+    def fit_batches(self, stamps_ns: Whole, counts: Whole, period_s: float) -> TimeBase:
         """Fit to messages of many samples each."""
         fit = partial(fit_batch_time_base, stamps_ns, counts, clock=self.clock, logged_ns=self.logged_ns)
         base = fit(nominal_rate_hz=1 / period_s if period_s > 0 else None)
         return base if self.stated is None or not self.stated.settles(base) else fit(nominal_rate_hz=self.stated.hz)
 
 
-def _fit_messages(
-    stamps_ns: NDArray[np.int64], digests: NDArray[np.uint64] | None, seen: _Seen
-) -> tuple[NDArray[np.int64] | None, TimeBase]:
+def _fit_messages(stamps_ns: Whole, digests: NDArray[np.uint64] | None, seen: _Seen) -> tuple[Whole | None, TimeBase]:
     """Fit, and say which message each one repeats, itself if none; None when none repeats another."""
     repeats = None if digests is None else repeats_of(stamps_ns, digests)
     if repeats is None:
@@ -298,7 +295,7 @@ def _fit_messages(
     return repeats.twin, replace(base, samples=base.samples + again, duplicates=base.duplicates + again)
 
 
-def _span_ns(stamps_ns: NDArray[np.int64], counts: NDArray[np.int64] | None, base: TimeBase) -> tuple[int, int]:
+def _span_ns(stamps_ns: Whole, counts: Whole | None, base: TimeBase) -> tuple[int, int]:
     """First stamp, and the end of the last sample, at least its stamp; strays say nothing of either."""
     time_ns = base.clock.run_on(stamps_ns)
     if base.strays.size:
@@ -310,9 +307,7 @@ def _span_ns(stamps_ns: NDArray[np.int64], counts: NDArray[np.int64] | None, bas
     return int(stamps_ns[0]), int((time_ns + np.rint(counts * period_ns).astype(np.int64)).max())
 
 
-def _taken(
-    stamps_ns: NDArray[np.int64], index: NDArray[np.int64], counts: NDArray[np.int64] | None
-) -> NDArray[np.int64] | None:
+def _taken(stamps_ns: Whole, index: Whole, counts: Whole | None) -> Whole | None:
     """Samples at the start of each message whose grid place an earlier message has; None when there are none."""
     if np.all(index[1:] - index[:-1] >= (1 if counts is None else counts[:-1])):
         return None

@@ -1,11 +1,12 @@
 """Who publishes on a topic: one source, perhaps through several MCAP channels, or several at once."""
 
 from itertools import pairwise
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.clock_count import SHORT
 from chladni.signals.clock_verdict import JITTERED
 
@@ -19,7 +20,7 @@ _SIGMAS: Final = 2.56
 _TIMER: Final = 0.01
 
 
-def at_once(times_ns: NDArray[np.int64], source: NDArray[np.integer]) -> bool:
+def at_once(times_ns: Whole, source: NDArray[np.integer]) -> bool:
     """Tell whether messages with different labels come from publishers that send at the same time.
 
     One source may send through several MCAP channels in turn. Then a message of one channel stands in the place of
@@ -51,7 +52,7 @@ def at_once(times_ns: NDArray[np.int64], source: NDArray[np.integer]) -> bool:
     return crossed and not in_place and _overlap(times_ns, source)
 
 
-def evenly_in_turn(times_ns: NDArray[np.int64], source: NDArray[np.integer]) -> bool:
+def evenly_in_turn(times_ns: Whole, source: NDArray[np.integer]) -> bool:
     """Tell whether messages of several MCAP channels lie as evenly together as those of each do.
 
     Then they are one source: two that know nothing of each other hardly send half a period apart. Were they two, each
@@ -79,11 +80,11 @@ def evenly_in_turn(times_ns: NDArray[np.int64], source: NDArray[np.integer]) -> 
     return True
 
 
-def _of_each(times_ns: NDArray[np.int64], source: NDArray[np.integer]) -> list[NDArray[np.int64]]:
+def _of_each(times_ns: Whole, source: NDArray[np.integer]) -> list[Whole]:
     return [times_ns[source == label] for label in np.unique(source)]
 
 
-def _overlap(times_ns: NDArray[np.int64], source: NDArray[np.integer]) -> bool:
+def _overlap(times_ns: Whole, source: NDArray[np.integer]) -> bool:
     """Whether messages of some label come between those of another."""
     ends = sorted((int(one[0]), int(one[-1])) for one in _of_each(times_ns, source))
     return any(after[0] < before[1] for before, after in pairwise(ends))
@@ -103,7 +104,7 @@ _MOST: Final = 0.9
 _SLICE, _SLICES = 512, 3
 
 
-def count_by_stamps(times_ns: NDArray[np.int64], *, in_bursts: bool) -> int:
+def count_by_stamps(times_ns: Whole, *, in_bursts: bool) -> int:
     """Count publishers that only the stamps tell apart: each keeps a period, all together keep none.
 
     Parameters
@@ -129,7 +130,7 @@ def count_by_stamps(times_ns: NDArray[np.int64], *, in_bursts: bool) -> int:
     return min(found, default=1)
 
 
-def told_apart(times_ns: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def told_apart(times_ns: Whole) -> list[Whole]:
     """Give the messages of each publisher that only the stamps tell apart, where these do so without doubt.
 
     Parameters
@@ -155,7 +156,7 @@ def told_apart(times_ns: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return [order[chain] for chain in chains] if sure else []
 
 
-def chains_of(times_ns: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def chains_of(times_ns: Whole) -> list[Whole]:
     """Find the publishers whose rising stamps are interleaved.
 
     Returns
@@ -163,7 +164,7 @@ def chains_of(times_ns: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     list of int64 arrays
         Indices of the messages of each, in the order of their first; empty when the stamps don't tell them apart.
     """
-    rest, found = np.arange(times_ns.size), list[NDArray[np.int64]]()
+    rest, found = np.arange(times_ns.size), list[Whole]()
     while rest.size >= SHORT and len(found) <= _MOST_PUBLISHERS:
         chains = _chains(times_ns[rest])
         if not chains:
@@ -176,7 +177,7 @@ def chains_of(times_ns: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return found if several and together and _clearly_apart(times_ns, found) else []
 
 
-def _regular(times_ns: NDArray[np.int64]) -> bool:
+def _regular(times_ns: Whole) -> bool:
     """Whether stamps show one clock: hardly any scatter, or no more than their own resolution explains."""
     steps = np.diff(times_ns)
     if steps.size < SHORT:
@@ -185,7 +186,7 @@ def _regular(times_ns: NDArray[np.int64]) -> bool:
     return bool(high - low <= max(JITTERED * middle, int(np.gcd.reduce(steps))))
 
 
-def _chains(times_ns: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def _chains(times_ns: Whole) -> list[Whole]:
     """Messages that follow each other by the shortest period that any publisher keeps, each publisher's by itself."""
     for period_ns in _common_steps(times_ns):
         before = np.full(times_ns.size, -1)
@@ -202,9 +203,7 @@ def _chains(times_ns: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return []
 
 
-def _link(
-    times_ns: NDArray[np.int64], before: NDArray[np.int64], ends: NDArray[np.bool_], step_ns: float, off_ns: float
-) -> None:
+def _link(times_ns: Whole, before: Whole, ends: Mask, step_ns: float, off_ns: float) -> None:
     """Put into `before` the message one step before each, where both are the nearest to where the other puts them."""
     starts = np.flatnonzero(before < 0)
     last = np.flatnonzero(ends)
@@ -215,19 +214,19 @@ def _link(
     ends[last[linked]] = False
 
 
-def _nearest(rising: NDArray[np.int64], wanted: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
+def _nearest(rising: Whole, wanted: NDArray[np.floating]) -> Whole:
     """Index of the entry nearest to each wanted number."""
     after = np.clip(np.searchsorted(rising, wanted), 0, rising.size - 1)
     before = np.maximum(after - 1, 0)
     return np.where(np.abs(wanted - rising[before]) < np.abs(wanted - rising[after]), before, after)
 
 
-def _mostly_there(times_ns: NDArray[np.int64], period_ns: float) -> bool:
+def _mostly_there(times_ns: Whole, period_ns: float) -> bool:
     """Whether a chain lacks few of the messages that the period asks for."""
     return (times_ns.size - 1) * period_ns > _MOST * float(times_ns[-1] - times_ns[0])
 
 
-def _common_steps(times_ns: NDArray[np.int64]) -> list[float]:
+def _common_steps(times_ns: Whole) -> list[float]:
     """Times that often lie between two of a few messages one after another, the shortest first."""
     some = times_ns[:_SLICE]
     steps = np.sort(np.concatenate([some[lag:] - some[:-lag] for lag in range(1, 2 * _MOST_PUBLISHERS + 1)]))
@@ -246,7 +245,7 @@ def _common_steps(times_ns: NDArray[np.int64]) -> list[float]:
     return sorted(found)
 
 
-def _clearly_apart(times_ns: NDArray[np.int64], chains: list[NDArray[np.int64]]) -> bool:
+def _clearly_apart(times_ns: Whole, chains: list[Whole]) -> bool:
     """Whether publishers send at once, and each keeps its own period far better than all together keep one."""
     if max(int(chain[0]) for chain in chains) > min(int(chain[-1]) for chain in chains):
         return False
@@ -254,18 +253,18 @@ def _clearly_apart(times_ns: NDArray[np.int64], chains: list[NDArray[np.int64]])
     return all(together >= _CLEARLY * _spread(_single_steps(np.diff(times_ns[chain]))) for chain in chains)
 
 
-def _single_steps(steps: NDArray[np.int64], period_ns: float | None = None) -> NDArray[np.float64]:
+def _single_steps(steps: Whole, period_ns: float | None = None) -> Real:
     """Divide the steps over lost messages among them; the period is the median step where it isn't given."""
     periods = np.rint(steps / max(1.0, float(np.median(steps)) if period_ns is None else period_ns))
-    single: NDArray[np.float64] = steps / np.maximum(1, periods)
+    single: Real = steps / np.maximum(1, periods)
     return single
 
 
-def _spread(steps: NDArray[np.int64] | NDArray[np.float64]) -> float:
+def _spread(steps: Whole | Real) -> float:
     low, high = np.percentile(steps, [10, 90])
     return float(high - low)
 
 
-def _one_rate(times_ns: NDArray[np.int64], chains: list[NDArray[np.int64]]) -> bool:
+def _one_rate(times_ns: Whole, chains: list[Whole]) -> bool:
     periods = [float(np.median(np.diff(times_ns[chain]))) for chain in chains]
     return bool(periods) and max(periods) < _IN_PLACE * min(periods)

@@ -1,11 +1,11 @@
 """Messages that were sent or stored twice, told from samples that share the stamp of a coarse clock."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Whole
 from chladni.signals.stamp_order import untangle
 
 
@@ -21,11 +21,11 @@ class Repeats:
         Whether others have the stamp of an earlier message, but samples of their own.
     """
 
-    twin: NDArray[np.int64]
+    twin: Whole
     differ: bool
 
 
-def repeats_of(stamps_ns: NDArray[np.int64], digests: NDArray[np.uint64]) -> Repeats | None:
+def repeats_of(stamps_ns: Whole, digests: NDArray[np.uint64]) -> Repeats | None:
     """Tell messages that were sent or stored twice from samples stamped by a coarse clock; None for no such."""
     tangled = untangle(stamps_ns)
     order = np.arange(stamps_ns.size) if tangled.order is None else tangled.order
@@ -39,7 +39,7 @@ def repeats_of(stamps_ns: NDArray[np.int64], digests: NDArray[np.uint64]) -> Rep
     return Repeats(twin=twin, differ=bool(np.any(same & ~alike)))
 
 
-def digests_of(values: NDArray[np.floating[Any]]) -> NDArray[np.uint64]:
+def digests_of(values: NDArray[np.floating]) -> NDArray[np.uint64]:
     """Give ``[sample]`` numbers that are equal where all channels of ``[channel, sample]`` are."""
     bits = values.view(np.uint32 if values.dtype == np.float32 else np.uint64)
     digests = np.zeros(values.shape[1], np.uint64)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from chladni.io.gathering import Gathering
 from chladni.io.repeats import digests_of
 from chladni.io.stream import Piece
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.sensor_quality import SensorFault, sensor_quality
 from chladni.signals.stamp_order import arrival_order, untangle
@@ -43,7 +44,7 @@ class SampleMonitor:
     gathering: Gathering
     start_ns: int
     samples: int = 0
-    missing: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    missing: Whole = field(default_factory=lambda: np.zeros(0, np.int64))
     faults: Faults = field(default_factory=dict)
     _waiting: list[Piece] = field(default_factory=list)
     _waiting_values: int = 0
@@ -65,7 +66,7 @@ class SampleMonitor:
         pieces, values = self._waiting, _in_order(self._waiting)
         self._waiting, self._waiting_values = [], 0
 
-        def seconds(places: NDArray[np.int64]) -> NDArray[np.float64]:
+        def seconds(places: Whole) -> Real:
             return np.asarray((_stamps_of(pieces, places) - self.start_ns) / NS_PER_S)
 
         missing = judge_samples(self.gathering.stream.channels, values, self.faults, seconds)
@@ -79,16 +80,16 @@ class SampleMonitor:
 
 def judge_samples(
     channels: Sequence[Channel],
-    values: NDArray[np.floating[Any]],
+    values: NDArray[np.floating],
     faults: Faults,
-    seconds: Callable[[NDArray[np.int64]], NDArray[np.float64]],
-) -> NDArray[np.int64]:
+    seconds: Callable[[Whole], Real],
+) -> Whole:
     """Add what the samples ``[channel, sample]`` of one stretch show to `faults`; count those that are no numbers.
 
     `seconds` gives the times, from the log's start, of samples that are counted from the stretch's first.
     """
     nan = np.isnan(values)
-    missing: NDArray[np.int64] = np.count_nonzero(nan, axis=1)
+    missing: Whole = np.count_nonzero(nan, axis=1)
     series = TimeSeries(
         values=values,
         # Rules look at neighbouring samples; where they lie in time is looked up for what is found.
@@ -117,7 +118,7 @@ def clipped_samples(faults: Faults, channel: str) -> int:
     return 0 if fault is None else fault.count
 
 
-def _stamps_of(pieces: list[Piece], places: NDArray[np.int64]) -> NDArray[np.int64]:
+def _stamps_of(pieces: list[Piece], places: Whole) -> Whole:
     """Stamps of samples that are counted in the order of time, on a clock that runs on where it was set."""
     tangled = untangle(np.concatenate([piece.stamps_ns for piece in pieces]))
     if pieces[0].counts is None:
@@ -129,7 +130,7 @@ def _stamps_of(pieces: list[Piece], places: NDArray[np.int64]) -> NDArray[np.int
     return np.asarray(tangled.time_ns[message] + np.rint(later * pieces[0].period_s * NS_PER_S).astype(np.int64))
 
 
-def _in_order(pieces: list[Piece]) -> NDArray[np.floating[Any]]:
+def _in_order(pieces: list[Piece]) -> NDArray[np.floating]:
     """Samples in the order of their stamps: a late message between two others would look like a spike."""
     values = np.concatenate([piece.values for piece in pieces], axis=1)
     stamps = np.concatenate([piece.stamps_ns for piece in pieces])

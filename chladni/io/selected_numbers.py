@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from chladni.io.decoding.columns import Column, Decoded, Strings
 from chladni.io.field_selector import ElementChoice, FieldFilter, FieldSelector
 from chladni.io.message_path import Operator
+from chladni.signals.arrays import Mask, Whole
 from chladni.signals.wording import shown
 
 _COMPARISONS: Mapping[Operator, Callable[[Any, Any], Any]] = {
@@ -23,7 +24,7 @@ _COMPARISONS: Mapping[Operator, Callable[[Any, Any], Any]] = {
 }
 
 
-def kept_messages(decoded: Decoded, filters: Sequence[FieldFilter]) -> NDArray[np.bool_]:
+def kept_messages(decoded: Decoded, filters: Sequence[FieldFilter]) -> Mask:
     """Messages that were decoded and pass every filter.
 
     Returns
@@ -56,11 +57,11 @@ class Selected:
     """
 
     values: NDArray[Any]
-    present: NDArray[np.bool_] | None = None
+    present: Mask | None = None
     lost: Mapping[str, int] = field(default_factory=dict)
 
 
-def select(decoded: Decoded, selector: FieldSelector, wanted: NDArray[np.bool_]) -> Selected:
+def select(decoded: Decoded, selector: FieldSelector, wanted: Mask) -> Selected:
     """Take one number out of each message.
 
     Parameters
@@ -87,11 +88,9 @@ def select(decoded: Decoded, selector: FieldSelector, wanted: NDArray[np.bool_])
     return Selected(values=values, present=present, lost=lost)
 
 
-def _chosen(
-    decoded: Decoded, elements: Sequence[ElementChoice], wanted: NDArray[np.bool_]
-) -> tuple[list[NDArray[np.int64]], dict[str, int]]:
+def _chosen(decoded: Decoded, elements: Sequence[ElementChoice], wanted: Mask) -> tuple[list[Whole], dict[str, int]]:
     """Index in each list of each message, -1 where none is meant; and the messages where several are, by reason."""
-    chosen: list[NDArray[np.int64]] = []
+    chosen: list[Whole] = []
     lost: dict[str, int] = {}
     for choice in elements:
         if isinstance(choice, int):
@@ -105,7 +104,7 @@ def _chosen(
 
 
 def element_names(
-    decoded: Decoded, selector: FieldSelector, wanted: NDArray[np.bool_]
+    decoded: Decoded, selector: FieldSelector, wanted: Mask
 ) -> tuple[list[str | None], NDArray[np.integer]]:
     """What messages call the element at the selector's last index.
 
@@ -126,7 +125,7 @@ def element_names(
     return [*names, None], codes[np.where(present & wanted, place, -1)]
 
 
-def _elements(column: Column, chosen: Sequence[NDArray[np.int64]]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+def _elements(column: Column, chosen: Sequence[Whole]) -> tuple[NDArray[Any], Mask]:
     numbers = column.numbers
     if column.counts is None and len(chosen) == 1:
         index = chosen[0]
@@ -139,9 +138,7 @@ def _elements(column: Column, chosen: Sequence[NDArray[np.int64]]) -> tuple[NDAr
     return (flat[place] if flat.size else np.zeros(len(place))), present
 
 
-def _places(
-    lengths: Sequence[NDArray[np.int64]], chosen: Sequence[NDArray[np.int64]]
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _places(lengths: Sequence[Whole], chosen: Sequence[Whole]) -> tuple[Whole, Mask]:
     """Number of the element that is chosen in each message, among all of its level; 0 where there's none."""
     place = np.arange(len(lengths[0]) if lengths else 0)
     present = np.ones(len(place), np.bool_)
@@ -156,9 +153,9 @@ def _places(
 def _positions(
     decoded: Decoded,
     filters: Sequence[FieldFilter],
-    above: Sequence[NDArray[np.int64]],
-    wanted: NDArray[np.bool_],
-) -> tuple[NDArray[np.int64], int]:
+    above: Sequence[Whole],
+    wanted: Mask,
+) -> tuple[Whole, int]:
     """Index of the element that passes all filters in each message's list, -1 where none does, or several do.
 
     Also how many wanted messages have several.
@@ -176,14 +173,12 @@ def _positions(
 class _Masks:
     """Which elements of one list of each message pass a filter: ``[element]``, with their message and index."""
 
-    owner: NDArray[np.int64]
-    within: NDArray[np.int64]
-    passes: NDArray[np.bool_]
+    owner: Whole
+    within: Whole
+    passes: Mask
 
 
-def _element_masks(
-    decoded: Decoded, one: FieldFilter, above: Sequence[NDArray[np.int64]], wanted: NDArray[np.bool_]
-) -> _Masks:
+def _element_masks(decoded: Decoded, one: FieldFilter, above: Sequence[Whole], wanted: Mask) -> _Masks:
     column = decoded.columns[one.leaf]
     place, present = list_places(column, above, len(wanted))
     present = present & wanted
@@ -204,9 +199,7 @@ def _element_masks(
     return _ragged(flat, np.cumsum(length) - length, length, place, present)
 
 
-def list_places(
-    column: Column, above: Sequence[NDArray[np.int64]], messages: int
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def list_places(column: Column, above: Sequence[Whole], messages: int) -> tuple[Whole, Mask]:
     """Number of each message's list among all lists that lie in the elements chosen so far."""
     if above:
         return _places(column.lengths[: len(above)], above)
@@ -214,11 +207,11 @@ def list_places(
 
 
 def _ragged(
-    flat: NDArray[np.bool_],
-    starts: NDArray[np.int64],
-    sizes: NDArray[np.int64],
+    flat: Mask,
+    starts: Whole,
+    sizes: Whole,
     lists: NDArray[np.integer],
-    present: NDArray[np.bool_],
+    present: Mask,
 ) -> _Masks:
     """Lay out what belongs to the list of each message; nothing where it isn't present."""
     if not sizes.size:

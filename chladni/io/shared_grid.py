@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.placement import Placement
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.grid_index import NOWHERE
 from chladni.signals.time_base import TimeBase
 from chladni.signals.time_series import NS_PER_S
@@ -195,7 +195,7 @@ def _moved_onto(group: Group, placement: Placement) -> tuple[Group, Placement] |
     return together, moved
 
 
-def _common_times(ours: TimeBase, theirs: TimeBase) -> NDArray[np.int64]:
+def _common_times(ours: TimeBase, theirs: TimeBase) -> Whole:
     """Times at which two clocks are compared: where both run, or everywhere when they don't overlap."""
     times = np.union1d(ours.knots_ns, theirs.knots_ns)
     low = max(ours.knots_ns[0], theirs.knots_ns[0])
@@ -204,10 +204,10 @@ def _common_times(ours: TimeBase, theirs: TimeBase) -> NDArray[np.int64]:
     return inside if inside.size else times
 
 
-def _index_at(base: TimeBase, times_ns: NDArray[np.int64]) -> NDArray[np.float64]:
+def _index_at(base: TimeBase, times_ns: Whole) -> Real:
     reference = base.knots_ns[0]
     near = np.clip(times_ns, reference, base.knots_ns[-1])
-    index: NDArray[np.float64] = np.interp(
+    index: Real = np.interp(
         (near - reference).astype(np.float64), (base.knots_ns - reference).astype(np.float64), base.knots_index
     )
     index += (times_ns - near) * (base.rate_hz / NS_PER_S)

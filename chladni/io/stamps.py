@@ -12,6 +12,7 @@ from chladni.io.decoding.schema import FieldInfo
 from chladni.io.known_schemas import message_type
 from chladni.io.mcap.message_batch import MessageBatch
 from chladni.io.untimed import untimed
+from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.errors import LogError
 from chladni.signals.stray_stamps import find_strays
 
@@ -118,7 +119,7 @@ def _seconds_and_nanoseconds(leaves: dict[str, FieldInfo], name: str) -> tuple[s
     return (seconds[0], rest[0]) if seconds and rest else None
 
 
-def own_stamps_ns(own: OwnStamp, decoded: Decoded) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def own_stamps_ns(own: OwnStamp, decoded: Decoded) -> tuple[Whole, Mask]:
     """Read the messages' own stamps.
 
     Returns
@@ -136,13 +137,13 @@ def own_stamps_ns(own: OwnStamp, decoded: Decoded) -> tuple[NDArray[np.int64], N
     return np.where(usable, stamps_ns, 0), usable & ~decoded.bad
 
 
-def plausible(stamps_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
+def plausible(stamps_ns: Whole) -> Mask:
     """Which stamps can be times at all; a damaged message may claim anything."""
-    possible: NDArray[np.bool_] = (stamps_ns >= 0) & (stamps_ns < LATEST_NS)
+    possible: Mask = (stamps_ns >= 0) & (stamps_ns < LATEST_NS)
     return possible
 
 
-def _to_ns(raw: NDArray[np.generic], unit_ns: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _to_ns(raw: NDArray[np.generic], unit_ns: int) -> tuple[Whole, Mask]:
     if unit_ns == 1 and raw.dtype == np.int64:
         # What decoders give for a stamp of type time: nothing to convert, and most logs have it.
         return raw.astype(np.int64, copy=False), np.ones(raw.size, np.bool_)
@@ -159,7 +160,7 @@ def _to_ns(raw: NDArray[np.generic], unit_ns: int) -> tuple[NDArray[np.int64], N
 # --- choosing ----------------------------------------------------------------------------------------------------
 
 
-Times = tuple[NDArray[np.int64], NDArray[np.int64]]
+Times = tuple[Whole, Whole]
 """``[message]`` stamps and log times of some messages."""
 
 
@@ -186,7 +187,7 @@ class TopicHead:
         stamps, _ = self._chosen(choice)
         return int(stamps.min(initial=LATEST_NS)) + choice.shift_ns
 
-    def lags_ns(self, choice: StampChoice) -> NDArray[np.int64]:
+    def lags_ns(self, choice: StampChoice) -> Whole:
         """Time from each message's sample to its log time."""
         stamps, logged = self._chosen(choice)
         return logged - stamps - choice.shift_ns
@@ -226,7 +227,7 @@ def head_of(batches: Sequence[MessageBatch], own: OwnStamp | None, decoded: Sequ
     return TopicHead(messages=len(logged), own=own, times=times)
 
 
-def _timed(stamps_ns: NDArray[np.int64], logged_ns: NDArray[np.int64], by_ns: NDArray[np.int64] | None) -> Times:
+def _timed(stamps_ns: Whole, logged_ns: Whole, by_ns: Whole | None) -> Times:
     """Leave out the stamps that are no times, and those that contradict the count of the messages around."""
     away = untimed(stamps_ns, by_ns)
     if away is not None:
@@ -235,7 +236,7 @@ def _timed(stamps_ns: NDArray[np.int64], logged_ns: NDArray[np.int64], by_ns: ND
     return np.delete(stamps_ns, strays), np.delete(logged_ns, strays)
 
 
-def _unit_ns(numbers: NDArray[np.float64], log_ns: NDArray[np.int64]) -> int | None:
+def _unit_ns(numbers: Real, log_ns: Whole) -> int | None:
     """Find the unit of bare numbers: by their size if they count from 1970, else by how fast they run."""
     finite = numbers[np.isfinite(numbers)]
     if not finite.size:
@@ -305,7 +306,7 @@ def _publish_trouble(head: TopicHead) -> str | None:
     return _standstill(head.times["publish"][0], "publish time")
 
 
-def _standstill(stamps_ns: NDArray[np.int64], name: str) -> str | None:
+def _standstill(stamps_ns: Whole, name: str) -> str | None:
     """Say what is wrong with stamps that don't move, or None."""
     if not stamps_ns.any():
         return f"{name} stands still at zero"

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from chladni.io.mcap.message_batch import MessageBatch
 from chladni.io.selected_numbers import kept_messages, select
 from chladni.io.stamps import LATEST_NS, StampChoice, own_stamps_ns, plausible
 from chladni.io.topic import Topic
+from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import NS_PER_S
 
@@ -50,10 +51,10 @@ class Piece:
         ``[message]``, how often the clock had been set before, where that is known and `stamps_ns` run on; else None.
     """
 
-    stamps_ns: NDArray[np.int64]
-    counts: NDArray[np.int64] | None
+    stamps_ns: Whole
+    counts: Whole | None
     period_s: float
-    values: NDArray[np.floating[Any]]
+    values: NDArray[np.floating]
     lost: Mapping[str, int]
     arrivals: Arrivals
     untimed: int = 0
@@ -74,7 +75,7 @@ class Piece:
             keep &= self.stamps_ns < end_ns
         return self.kept(keep)
 
-    def kept(self, keep: NDArray[np.bool_]) -> "Piece":
+    def kept(self, keep: Mask) -> "Piece":
         """Give some of the messages."""
         if keep.all():
             return self
@@ -184,7 +185,7 @@ class Stream:
             arrivals=Arrivals.joined([]),
         )
 
-    def _stamps_ns(self, batch: MessageBatch, decoded: Decoded) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def _stamps_ns(self, batch: MessageBatch, decoded: Decoded) -> tuple[Whole, Mask]:
         if self.choice.own is not None:
             stamps_ns, usable = own_stamps_ns(self.choice.own, decoded)
             stamps_ns = stamps_ns + self.choice.shift_ns
@@ -196,8 +197,8 @@ class Stream:
     def _single_samples(
         self,
         decoded: Decoded,
-        stamps_ns: NDArray[np.int64],
-        keep: NDArray[np.bool_],
+        stamps_ns: Whole,
+        keep: Mask,
         lost: dict[str, int],
         arrivals: Arrivals,
     ) -> Piece:
@@ -222,8 +223,8 @@ class Stream:
     def _blocks(
         self,
         decoded: Decoded,
-        stamps_ns: NDArray[np.int64],
-        usable: NDArray[np.bool_],
+        stamps_ns: Whole,
+        usable: Mask,
         lost: dict[str, int],
         arrivals: Arrivals,
         *,
@@ -255,25 +256,23 @@ class Stream:
         )
         return piece.kept(plausible(piece.stamps_ns))
 
-    def _first_ns(
-        self, stamps_ns: NDArray[np.int64], counts: NDArray[np.int64], periods_s: NDArray[np.float64]
-    ) -> NDArray[np.int64]:
+    def _first_ns(self, stamps_ns: Whole, counts: Whole, periods_s: Real) -> Whole:
         if self.layout is None or self.layout.stamp == "first":
             return stamps_ns
         return stamps_ns - _span_ns(counts, periods_s)
 
 
-def _span_ns(counts: NDArray[np.int64], periods_s: NDArray[np.float64] | float) -> NDArray[np.int64]:
+def _span_ns(counts: Whole, periods_s: Real | float) -> Whole:
     """From the first sample of each message to its last one."""
     # A period is what the message claims; a length of centuries mustn't overflow.
     span_ns = np.minimum((counts - 1) * (periods_s * NS_PER_S), LATEST_NS)
-    whole: NDArray[np.int64] = np.rint(span_ns).astype(np.int64)
+    whole: Whole = np.rint(span_ns).astype(np.int64)
     return whole
 
 
 def _column(
-    decoded: Decoded, source: ChannelSource, wanted: NDArray[np.bool_], lost: dict[str, int]
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.bool_] | None]:
+    decoded: Decoded, source: ChannelSource, wanted: Mask, lost: dict[str, int]
+) -> tuple[NDArray[np.floating], Mask | None]:
     """Floating point and SI; single precision stays single unless a factor calls for more."""
     if source.selector is None:
         raise AssertionError("a channel of single samples has a selector")

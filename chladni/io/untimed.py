@@ -4,8 +4,8 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Whole
 from chladni.signals.clock_steps import LEAP_NS
 
 #: A message may be logged this much later than its sample, beside what the others show.
@@ -16,7 +16,7 @@ _STRETCH = 3
 _SAMPLE = 50_000
 
 
-def untimed(stamps_ns: NDArray[np.int64], log_ns: NDArray[np.int64] | None) -> NDArray[np.bool_] | None:
+def untimed(stamps_ns: Whole, log_ns: Whole | None) -> Mask | None:
     """Find the stamps that are no time, by the other stamps of the topic and by the log time.
 
     Such a stamp lies farther from where most stamps are than the whole log lasts; it isn't there by the log time
@@ -63,16 +63,14 @@ def untimed(stamps_ns: NDArray[np.int64], log_ns: NDArray[np.int64] | None) -> N
     return away if away.any() and not away.all() else None
 
 
-def _lasts_ns(log_ns: NDArray[np.int64]) -> int:
+def _lasts_ns(log_ns: Whole) -> int:
     """How long a log lasts, log times that are no times left out."""
     low, high = int(log_ns.min()), int(log_ns.max())
     bounds = _where_most_are(log_ns, None, LEAP_NS) if high - low > LEAP_NS else None
     return high - low if bounds is None else bounds[1] - bounds[0]
 
 
-def _where_most_are(
-    stamps_ns: NDArray[np.int64], log_ns: NDArray[np.int64] | None, far_ns: int
-) -> tuple[int, int] | None:
+def _where_most_are(stamps_ns: Whole, log_ns: Whole | None, far_ns: int) -> tuple[int, int] | None:
     """Ends of the stretch of time, without a pause longer than `far_ns`, in which most different stamps lie.
 
     Of two with as many the one nearer to the log time; None when there is no stretch with half of them.
@@ -86,13 +84,13 @@ def _where_most_are(
     return (int(best[0]), int(best[-1])) if 2 * best.size >= some.size else None
 
 
-def _stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _stretches(mask: Mask) -> list[tuple[int, int]]:
     """Where enough messages in a row are marked."""
     edges = np.flatnonzero(np.diff(mask, prepend=False, append=False)).reshape(-1, 2)
     return [(first, end) for first, end in edges[np.diff(edges)[:, 0] >= _STRETCH].tolist()]
 
 
-def _runs_on(stamps_ns: NDArray[np.int64], far_ns: int) -> bool:
+def _runs_on(stamps_ns: Whole, far_ns: int) -> bool:
     steps = np.diff(stamps_ns)
     moves = np.count_nonzero(steps) > steps.size / 2
     return bool(moves and steps.min() >= 0 and stamps_ns[-1] - stamps_ns[0] <= far_ns)

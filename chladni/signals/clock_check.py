@@ -4,15 +4,13 @@ from math import ceil, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.grid_index import grid_index
 from chladni.signals.time_series import NS_PER_S
 
 if TYPE_CHECKING:
     from chladni.signals.time_base import TimeBase
-
-Ints = NDArray[np.int64]
 
 #: Root mean squares of jitter that a stamp may be off its grid point; of a Gaussian, two in a billion are further.
 JITTERS = 6.0
@@ -29,7 +27,7 @@ _PIECES = 64
 _SAMPLE = 50_000
 
 
-def grid_agrees(base: "TimeBase", time_ns: Ints, sizes: Ints) -> bool:
+def grid_agrees(base: "TimeBase", time_ns: Whole, sizes: Whole) -> bool:
     """Whether the grid of a time base tells the time of the stamps that were placed on it.
 
     With T the period and `off` the stamps minus the times of their grid points, all of these must hold:
@@ -64,7 +62,7 @@ def grid_agrees(base: "TimeBase", time_ns: Ints, sizes: Ints) -> bool:
     return far <= HELD_UP * off_ns.size and not drifts and _one_rate(stamp_ns, off_ns, _PIECE * together)
 
 
-def _indices(base: "TimeBase", time_ns: Ints, sizes: Ints) -> tuple[Ints, Ints]:
+def _indices(base: "TimeBase", time_ns: Whole, sizes: Whole) -> tuple[Whole, Whole]:
     """Messages to look at, and their grid indices."""
     # A running median needs all neighbours; without one, each message tells its index alone.
     every = max(1, time_ns.size // _SAMPLE) if base.smoothing == 1 else 1
@@ -87,7 +85,7 @@ def _indices(base: "TimeBase", time_ns: Ints, sizes: Ints) -> tuple[Ints, Ints]:
     return chosen, index
 
 
-def _one_rate(stamp_ns: NDArray[np.float64], off_ns: NDArray[np.float64], least: int) -> bool:
+def _one_rate(stamp_ns: Real, off_ns: Real, least: int) -> bool:
     pieces = min(_PIECES, stamp_ns.size // least)
     if pieces < 2:
         return True

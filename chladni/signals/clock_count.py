@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Whole
 from chladni.signals.clock_fit import Clock, fit_clock
 from chladni.signals.coarse_stamps import count_by_ticks, count_ticks, few_ticks, phase_period, stamp_quantum
 from chladni.signals.sample_count import SAMPLE, Count, count_by_order, count_by_phase, count_even, order_fano
@@ -54,7 +54,7 @@ class Counted:
     item_size: float
     period_ns: float
     in_order: bool
-    burst_starts: NDArray[np.int64] | None = None
+    burst_starts: Whole | None = None
     quantum_ns: float = 0.0
     period_std_ns: float = 0.0
     proven: bool = True
@@ -139,7 +139,7 @@ def count_stated(tangled: Untangled, period_ns: float) -> tuple[Counted, Clock]:
     return counted, clock
 
 
-def count_batches(tangled: Untangled, sizes: NDArray[np.int64], nominal_hz: float | None) -> Counted:
+def count_batches(tangled: Untangled, sizes: Whole, nominal_hz: float | None) -> Counted:
     """Count the samples of batches with `sizes` samples each, stamped at their first."""
     steps, cuts = tangled.steps, tangled.clock.message
     intervals = steps / sizes[:-1]
@@ -210,12 +210,12 @@ def _count_bursts(tangled: Untangled, mean_ns: float, quantum_ns: float) -> Iter
         yield Counted(count=count, item_size=size, period_ns=period_ns, in_order=True, burst_starts=starts)
 
 
-def _equally_shared(steps: NDArray[np.int64]) -> bool:
+def _equally_shared(steps: Whole) -> bool:
     """Whether every stamp but the first and the last ones is that of as many messages, two at least."""
     alike = np.diff(np.flatnonzero(steps))
     return alike.size > 0 and bool(alike.min() == alike.max() > 1)
 
 
-def _mostly_filled(steps: NDArray[np.int64], period_ns: float) -> bool:
+def _mostly_filled(steps: Whole, period_ns: float) -> bool:
     # A topic that is published on change skips most points of its grid.
     return int(np.count_nonzero(steps < 1.5 * period_ns)) >= 0.5 * steps.size

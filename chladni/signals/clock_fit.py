@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from chladni.signals.sample_count import WINDOW, Count, Floats, Ints, robust_std
+from chladni.signals.arrays import Mask, Real, Whole
+from chladni.signals.sample_count import WINDOW, Count, robust_std
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,11 +30,11 @@ class Clock:
 
     period_ns: float
     period_std_ns: float
-    starts_ns: Floats
-    shift: Ints
-    residual_ns: Floats
+    starts_ns: Real
+    shift: Whole
+    residual_ns: Real
 
-    def on_grid(self, starts_ns: Floats) -> Self:
+    def on_grid(self, starts_ns: Real) -> Self:
         """Give the same clock with stretches that start elsewhere."""
         # Stretches share one grid to the nearest index; what is left of a period stays as an error of the placing.
         shift = np.rint((starts_ns - starts_ns[0]) / self.period_ns).astype(np.int64)
@@ -59,8 +59,8 @@ class Wander:
 
     jitter_ns: float
     span_ns: float
-    line_ns: Floats
-    pieces: Ints
+    line_ns: Real
+    pieces: Whole
 
 
 def fit_clock(count: Count, period_ns: float) -> Clock | None:
@@ -86,7 +86,7 @@ def fit_clock(count: Count, period_ns: float) -> Clock | None:
     ).on_grid(starts)
 
 
-def cut_by_one(count: Count, clock: Clock) -> Floats:
+def cut_by_one(count: Count, clock: Clock) -> Real:
     """Say how far to move the stretches so that one sample is left out where the clock was set, and grids agree.
 
     Parameters
@@ -105,7 +105,7 @@ def cut_by_one(count: Count, clock: Clock) -> Floats:
     first = np.minimum.reduceat(count.firsts + within, era)
     end = np.maximum.reduceat(count.ends + within, era)
     index = np.append(0, np.cumsum(end[:-1] + 1 - first[1:]))
-    by_ns: Floats = clock.starts_ns[0] + index * clock.period_ns - clock.starts_ns[era]
+    by_ns: Real = clock.starts_ns[0] + index * clock.period_ns - clock.starts_ns[era]
     return by_ns
 
 
@@ -129,7 +129,7 @@ def measure_wander(count: Count, clock: Clock) -> Wander:
     )
 
 
-def _fit_stretches(count: Count, kept: NDArray[np.bool_] | None, period_ns: float) -> tuple[float, Floats, Floats]:
+def _fit_stretches(count: Count, kept: Mask | None, period_ns: float) -> tuple[float, Real, Real]:
     # About each stretch's own mean and the slope guessed, so that large numbers cost no digits. In place, because
     # memory that is new costs several times what the arithmetic does.
     run = count.index.astype(np.float64)
@@ -145,13 +145,13 @@ def _fit_stretches(count: Count, kept: NDArray[np.bool_] | None, period_ns: floa
     return period_ns + correction, mean_time - correction * mean_index, rise
 
 
-def _stretch_means(values: Floats, kept: NDArray[np.bool_] | None, stretch: Ints) -> Floats:
+def _stretch_means(values: Real, kept: Mask | None, stretch: Whole) -> Real:
     if kept is None:
         return np.bincount(stretch, values) / np.bincount(stretch)
     return np.bincount(stretch, kept * values) / np.bincount(stretch, kept)
 
 
-def _slope_std(count: Count, residual: Floats) -> float:
+def _slope_std(count: Count, residual: Real) -> float:
     stretches = int(count.stretch[-1]) + 1
     # Each stretch takes one degree of freedom for its start, the slope takes one more.
     run = count.index.astype(np.float64)

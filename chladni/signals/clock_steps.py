@@ -8,9 +8,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.value import Value, require_shape
-
-Ints = NDArray[np.int64]
 
 #: A step forward that nobody waits for: eleven days, in a log of seconds to hours. Clocks that start in 1970 do it.
 LEAP_NS = 1_000_000_000_000_000
@@ -33,7 +32,7 @@ _LAG = 32
 _SAMPLE = 50_000
 
 
-def _none() -> Ints:
+def _none() -> Whole:
     return np.empty(0, dtype=np.int64)
 
 
@@ -53,10 +52,10 @@ class ClockSteps(Value):
         across.
     """
 
-    message: Ints = field(default_factory=_none)
-    before_ns: Ints = field(default_factory=_none)
-    after_ns: Ints = field(default_factory=_none)
-    shift_ns: Ints = field(default_factory=_none)
+    message: Whole = field(default_factory=_none)
+    before_ns: Whole = field(default_factory=_none)
+    after_ns: Whole = field(default_factory=_none)
+    shift_ns: Whole = field(default_factory=_none)
 
     def __post_init__(self) -> None:
         for name in ("before_ns", "after_ns", "shift_ns"):
@@ -69,33 +68,33 @@ class ClockSteps(Value):
         return int(self.message.size)
 
     @property
-    def sizes_s(self) -> NDArray[np.float64]:
+    def sizes_s(self) -> Real:
         """``[step]`` seconds by which the clock was off the next message; negative when it was set back."""
         return np.asarray(self.after_ns - self.before_ns, dtype=np.float64) * 1e-9
 
-    def run_on(self, stamps_ns: Ints, *, first: int = 0) -> Ints:
+    def run_on(self, stamps_ns: Whole, *, first: int = 0) -> Whole:
         """Undo the steps in the stamps of the messages from number `first` on, in the order of arrival."""
         if not self.count:
             return stamps_ns
         cuts = np.clip(self.message - first, 0, stamps_ns.size)
         lengths = np.diff(cuts, prepend=0, append=stamps_ns.size)
-        time_ns: Ints = stamps_ns + np.repeat(np.append(0, self.shift_ns), lengths)
+        time_ns: Whole = stamps_ns + np.repeat(np.append(0, self.shift_ns), lengths)
         return time_ns
 
     def eras(self, messages: int) -> NDArray[np.int32]:
         """Count the steps before each of so many messages, in the order of arrival."""
         return np.repeat(np.arange(self.count + 1, dtype=np.int32), np.diff(self.message, prepend=0, append=messages))
 
-    def among(self, kept: Ints) -> Self:
+    def among(self, kept: Whole) -> Self:
         """Count the messages among some of them, whose numbers rise."""
         return replace(self, message=np.searchsorted(kept, self.message))
 
-    def moved(self, by_ns: Ints) -> Self:
+    def moved(self, by_ns: Whole) -> Self:
         """Add to the shift after each step."""
         return replace(self, shift_ns=self.shift_ns + by_ns)
 
 
-def find_clock_steps(stamps_ns: Ints, before: Ints | None = None, *, logged_ns: Ints | None = None) -> ClockSteps:
+def find_clock_steps(stamps_ns: Whole, before: Whole | None = None, *, logged_ns: Whole | None = None) -> ClockSteps:
     """Find where a clock was set back, leapt ahead by more than eleven days, or was set ahead as another clock tells.
 
     A message that goes back is *late* when the others go on from where they were: the run of messages behind ends in
@@ -141,7 +140,7 @@ def find_clock_steps(stamps_ns: Ints, before: Ints | None = None, *, logged_ns: 
     return _running_on(stamps_ns, message, round(2 * period_ns))
 
 
-def _set_ahead(stamps_ns: Ints, logged_ns: Ints, set_back: Ints, period_ns: float) -> Ints:
+def _set_ahead(stamps_ns: Whole, logged_ns: Whole, set_back: Whole, period_ns: float) -> Whole:
     """Messages before which the clock was set ahead, by the times at which they were logged."""
     steps, logged = np.diff(stamps_ns), np.diff(logged_ns)
     # A clock that was set itself tells nothing of another.
@@ -162,7 +161,7 @@ def _set_ahead(stamps_ns: Ints, logged_ns: Ints, set_back: Ints, period_ns: floa
     return np.array(found, dtype=np.int64)
 
 
-def _logged_sooner(stamps_ns: Ints, logged_ns: Ints, set_back: Ints, place: int, pace: float) -> bool:
+def _logged_sooner(stamps_ns: Whole, logged_ns: Whole, set_back: Whole, place: int, pace: float) -> bool:
     start = (
         int(set_back[np.searchsorted(set_back, place, "right") - 1]) if set_back.size and set_back[0] <= place else 0
     )
@@ -176,7 +175,7 @@ def _logged_sooner(stamps_ns: Ints, logged_ns: Ints, set_back: Ints, place: int,
     return float(np.median(lag[place - first :])) < float(lag[: place - first].min()) - 0.5 * step
 
 
-def sample_period(stamps_ns: Ints, before: Ints | None, back: Ints) -> float:
+def sample_period(stamps_ns: Whole, before: Whole | None, back: Whole) -> float:
     """Median over the log of the mean interval of samples, right for bursts; at least 1 ns.
 
     Parameters
@@ -203,7 +202,7 @@ def sample_period(stamps_ns: Ints, before: Ints | None, back: Ints) -> float:
     return max(1.0, float(np.median(np.abs(stamps_ns[chosen + lag] - stamps_ns[chosen]) / samples)))
 
 
-def _unclear(stamps_ns: Ints, back: Ints, period_ns: float) -> Ints:
+def _unclear(stamps_ns: Whole, back: Whole, period_ns: float) -> Whole:
     """Messages that go back, without those that surely are late: alone, before a leap to where the others are."""
     inside = back[(back > 0) & (back < stamps_ns.size - 1)]
     after = stamps_ns[inside + 1]
@@ -211,7 +210,7 @@ def _unclear(stamps_ns: Ints, back: Ints, period_ns: float) -> Ints:
     return np.setdiff1d(back, inside[late], assume_unique=True)
 
 
-def _set_at(stamps_ns: Ints, before: Ints, candidates: Ints, period_ns: float) -> Ints:
+def _set_at(stamps_ns: Whole, before: Whole, candidates: Whole, period_ns: float) -> Whole:
     if candidates.size > MAX_CANDIDATES:
         return _none()
     found: list[int] = []
@@ -223,7 +222,7 @@ def _set_at(stamps_ns: Ints, before: Ints, candidates: Ints, period_ns: float) -
     return np.array(found, dtype=np.int64)
 
 
-def _is_set(stamps_ns: Ints, before: Ints, start: int, place: int, period_ns: float) -> bool:
+def _is_set(stamps_ns: Whole, before: Whole, start: int, place: int, period_ns: float) -> bool:
     first, end = max(start, place - _LEVEL), min(stamps_ns.size, place + _LEVEL)
     if place - first < _FEWEST or end - place < _FEWEST:
         # Of the first messages of a log one may well have an old stamp; those after it are many.
@@ -243,7 +242,7 @@ def _is_set(stamps_ns: Ints, before: Ints, start: int, place: int, period_ns: fl
     return bool(level - level_later > 1.02 * period_ns + 3 * scatter)
 
 
-def _late(stamps_ns: Ints, start: int, place: int, first: int, period_ns: float) -> bool:
+def _late(stamps_ns: Whole, start: int, place: int, first: int, period_ns: float) -> bool:
     """Whether the messages from `place` on that are behind the others were held up."""
     reached_ns = int(stamps_ns[first:place].max())
     following = stamps_ns[place : place + _HELD_UP + 1]
@@ -257,7 +256,7 @@ def _late(stamps_ns: Ints, start: int, place: int, first: int, period_ns: float)
     return run.size <= _FEWEST or _fills_a_hole(run, stamps_ns[max(start, place - _EARLIER) : place], period_ns)
 
 
-def _fills_a_hole(run: Ints, known_ns: Ints, period_ns: float) -> bool:
+def _fills_a_hole(run: Whole, known_ns: Whole, period_ns: float) -> bool:
     """Whether messages that were held up together are those that are missing among the ones before.
 
     A clock that was set back tells times that were told before, or others that don't follow on a known one.
@@ -271,7 +270,7 @@ def _fills_a_hole(run: Ints, known_ns: Ints, period_ns: float) -> bool:
     return bool(max(low - earlier.max(), later.min() - high) < 2.5 * period_ns)
 
 
-def _running_on(stamps_ns: Ints, message: Ints, gap_ns: int) -> ClockSteps:
+def _running_on(stamps_ns: Whole, message: Whole, gap_ns: int) -> ClockSteps:
     """Shift each stretch so that its earliest stamp comes `gap_ns` after the latest one of the stretch before."""
     if not message.size:
         return ClockSteps()

@@ -5,8 +5,8 @@ from math import floor, inf, isfinite, log10, pi
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Whole
 from chladni.signals.clock_count import SHORT, Counted
 from chladni.signals.coarse_stamps import few_ticks, stamp_quantum
 from chladni.signals.wording import counted
@@ -70,7 +70,7 @@ def advice(base: "TimeBase", unless_hz: float = 0.0) -> str:
     return "; ".join(_remarks(base)) or SOUND
 
 
-def uneven(steps_ns: NDArray[np.int64]) -> str:
+def uneven(steps_ns: Whole) -> str:
     """Give the advice for stamps that are near a clock, but keep no rate that all of them would fit."""
     low_ms, high_ms = np.percentile(steps_ns, [5, 95]) * 1e-6
     return (
@@ -80,7 +80,7 @@ def uneven(steps_ns: NDArray[np.int64]) -> str:
     )
 
 
-def ticking(steps_ns: NDArray[np.int64]) -> str:
+def ticking(steps_ns: Whole) -> str:
     """Give the advice for stamps with ticks that don't tell how many samples were lost; empty for others."""
     mean_ns = float(steps_ns.mean())
     quantum_ns = stamp_quantum(steps_ns, mean_ns)
@@ -92,7 +92,7 @@ def ticking(steps_ns: NDArray[np.int64]) -> str:
     )
 
 
-def with_strays(base: "TimeBase", strays: NDArray[np.int64], kept: NDArray[np.int64]) -> "TimeBase":
+def with_strays(base: "TimeBase", strays: Whole, kept: Whole) -> "TimeBase":
     """Give the time base of the messages `kept` for all of them, of which `strays` are left out."""
     stamps = "stamp contradicts" if strays.size == 1 else "stamps contradict"
     told = f"{strays.size} {stamps} the count of samples around, left out"

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from math import floor, lgamma, log
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Whole
 from chladni.signals.clock_check import HELD_UP
 from chladni.signals.clock_fit import Clock, fit_clock
 from chladni.signals.sample_count import (
@@ -17,9 +17,6 @@ from chladni.signals.sample_count import (
     refined_period,
 )
 from chladni.signals.stamp_order import Untangled
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 # Stamps of doubles and of whole microseconds are off their tick by as much.
 _ROUNDING_NS = 1000.0
@@ -51,7 +48,7 @@ _SLACKS = (0.5, 0.1)
 _MANY = 2.0
 
 
-def stamp_quantum(steps: Ints, period_ns: float) -> float:
+def stamp_quantum(steps: Whole, period_ns: float) -> float:
     """Find the ticks of a clock: the largest step of which all others are multiples.
 
     Parameters
@@ -97,7 +94,7 @@ def _common(one: float, other: float) -> float:
     return other
 
 
-def few_ticks(steps: Ints, quantum_ns: float, period_ns: float) -> bool:
+def few_ticks(steps: Whole, quantum_ns: float, period_ns: float) -> bool:
     """Whether intervals are those of even samples, give or take a tick: else messages come in bursts."""
     return int(np.count_nonzero(steps > period_ns + 2.5 * quantum_ns)) <= 0.01 * steps.size
 
@@ -169,7 +166,7 @@ def count_ticks(tangled: Untangled, quantum_ns: float, period_ns: float) -> Tick
     return TickCount(count=count, hidden=hidden, proven=proven)
 
 
-def _proven(steps: Ints, count: Count, quantum_ns: float, width: float, hidden: int) -> bool:
+def _proven(steps: Whole, count: Count, quantum_ns: float, width: float, hidden: int) -> bool:
     """Whether uneven intervals are so even that ticks explain them rather than accidents; see `count_ticks`."""
     ticks = np.rint(steps / quantum_ns).astype(np.int64)
     usual = int(np.argmax(np.bincount(np.minimum(ticks, _MOST_SIZES))))
@@ -223,7 +220,7 @@ def count_by_ticks(tangled: Untangled, period_ns: float) -> Count:
 
 
 def _narrowed(
-    tangled: Untangled, count: Count, gaps: Ints, quantum_ns: float, period_ns: float, slack: float
+    tangled: Untangled, count: Count, gaps: Whole, quantum_ns: float, period_ns: float, slack: float
 ) -> Count | None:
     """Cut stretches until all are as narrow as a tick and `slack` of a period; None when no cuts make them so."""
     for _ in range(_ROUNDS):
@@ -242,12 +239,12 @@ def _narrowed(
     return None
 
 
-def _cut_at(tangled: Untangled, resumed: Ints) -> Count:
+def _cut_at(tangled: Untangled, resumed: Whole) -> Count:
     ones = np.ones_like(tangled.time_ns)
     return count_in_stretches(tangled.time_ns, ones, resumed, np.searchsorted(resumed, tangled.clock.message))
 
 
-def _wide(count: Count, clock: Clock, allowed_ns: float) -> Ints:
+def _wide(count: Count, clock: Clock, allowed_ns: float) -> Whole:
     """Stretches whose times over index don't fit into a strip, one message in two hundred left out.
 
     Short ones are let be: where they lie against the others is too uncertain to find a sample lost.
@@ -262,7 +259,7 @@ def _wide(count: Count, clock: Clock, allowed_ns: float) -> Ints:
     return np.flatnonzero((width > allowed_ns) & (np.diff(first) > 4 * _SURE))
 
 
-def _steps_up(count: Count, clock: Clock, stretches: Ints) -> Ints:
+def _steps_up(count: Count, clock: Clock, stretches: Whole) -> Whole:
     """Messages at which the middle of each stretch steps most."""
     first = np.searchsorted(count.stretch, np.arange(count.resumed.size + 1))
     found = []

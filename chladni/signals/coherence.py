@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.provenance import Provenance
 from chladni.signals.value import Value, require_frequency_axis, require_shape
@@ -33,9 +31,9 @@ class Coherence(Value):
         How it was made.
     """
 
-    frequency_hz: NDArray[np.float64]
-    values: NDArray[np.float64]
-    std: NDArray[np.float64]
+    frequency_hz: Real
+    values: Real
+    std: Real
     kind: Literal["ordinary", "multiple", "partial"]
     responses: tuple[Channel, ...]
     references: tuple[Channel, ...]

@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.channel import Channel
 from chladni.signals.peak import Peak
 from chladni.signals.value import Value, require_frequency_axis, require_shape
@@ -102,10 +100,10 @@ class DensityComparison(Value):
         Sentences of advice.
     """
 
-    frequency_hz: NDArray[np.float64]
-    change_db: NDArray[np.float64]
-    change_std_db: NDArray[np.float64]
-    significant: NDArray[np.bool_]
+    frequency_hz: Real
+    change_db: Real
+    change_std_db: Real
+    significant: Mask
     channels: tuple[Channel, ...]
     overall: tuple[LevelChange, ...]
     bands: tuple[LevelChange, ...]
@@ -147,11 +145,11 @@ class ResponseComparison(Value):
         Sentences of advice.
     """
 
-    frequency_hz: NDArray[np.float64]
-    change_db: NDArray[np.float64]
-    change_std_db: NDArray[np.float64]
-    phase_change_deg: NDArray[np.float64]
-    significant: NDArray[np.bool_]
+    frequency_hz: Real
+    change_db: Real
+    change_std_db: Real
+    phase_change_deg: Real
+    significant: Mask
     responses: tuple[Channel, ...]
     references: tuple[Channel, ...]
     peaks: tuple[PeakChange, ...]

@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel, find_channel, find_channels
 from chladni.signals.provenance import Provenance
 from chladni.signals.value import Value, require_frequency_axis, require_shape
@@ -34,11 +35,11 @@ class CrossSpectra(Value):
         How it was made.
     """
 
-    frequency_hz: NDArray[np.float64]
-    density: NDArray[np.complexfloating[Any, Any]]
+    frequency_hz: Real
+    density: NDArray[np.complexfloating]
     channels: tuple[Channel, ...]
     bandwidth_hz: float
-    noise_density: NDArray[np.complexfloating[Any, Any]] | None = None
+    noise_density: NDArray[np.complexfloating] | None = None
     provenance: Provenance
 
     def __post_init__(self) -> None:
@@ -78,11 +79,11 @@ class AutoSpectra(Value):
         See `CrossSpectra`.
     """
 
-    frequency_hz: NDArray[np.float64]
-    density: NDArray[np.float64]
+    frequency_hz: Real
+    density: Real
     channels: tuple[Channel, ...]
     bandwidth_hz: float
-    noise_density: NDArray[np.float64] | None = None
+    noise_density: Real | None = None
     provenance: Provenance
 
     def __post_init__(self) -> None:

@@ -1,11 +1,11 @@
 """Operating deflection shape: how the measured points move at one frequency."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.provenance import Provenance
 from chladni.signals.value import Value, require_shape
@@ -35,8 +35,8 @@ class DeflectionShape(Value):
     """
 
     frequency_hz: float
-    amplitude: NDArray[np.complexfloating[Any, Any]]
-    std: NDArray[np.float64]
+    amplitude: NDArray[np.complexfloating]
+    std: Real
     channels: tuple[Channel, ...]
     units: tuple[str, ...]
     reference: Channel

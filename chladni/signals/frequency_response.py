@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.channel import Channel, find_channel, find_channels
 from chladni.signals.provenance import Provenance
 from chladni.signals.units import quotient
@@ -36,11 +37,11 @@ class FrequencyResponse(Value):
         How it was made.
     """
 
-    frequency_hz: NDArray[np.float64]
-    values: NDArray[np.complexfloating[Any, Any]]
-    std: NDArray[np.float64]
-    coherence: NDArray[np.float64]
-    excited: NDArray[np.bool_]
+    frequency_hz: Real
+    values: NDArray[np.complexfloating]
+    std: Real
+    coherence: Real
+    excited: Mask
     responses: tuple[Channel, ...]
     references: tuple[Channel, ...]
     provenance: Provenance

@@ -3,9 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Ints = NDArray[np.int64]
+from chladni.signals.arrays import Real, Whole
 
 #: Index of samples that have no place on the grid.
 NOWHERE = -(1 << 62)
@@ -19,18 +18,18 @@ _BLOCK = 1 << 14
 
 
 def grid_index(
-    time_ns: Ints,
-    order: Ints,
+    time_ns: Whole,
+    order: Whole,
     *,
-    knots_ns: Ints,
-    knots_index: NDArray[np.float64],
+    knots_ns: Whole,
+    knots_index: Real,
     rate_hz: float,
     smoothing: int = 1,
-    resumed: Ints | None = None,
-    resumed_shift: Ints | None = None,
-    cut_order: Ints | None = None,
-    cuts: Ints | None = None,
-) -> Ints:
+    resumed: Whole | None = None,
+    resumed_shift: Whole | None = None,
+    cut_order: Whole | None = None,
+    cuts: Whole | None = None,
+) -> Whole:
     """Give the grid index of each item (message, or first sample of a batch).
 
     Parameters
@@ -48,7 +47,7 @@ def grid_index(
         sample where one is left out.
     """
     if resumed is not None and resumed_shift is not None and resumed.size:
-        counted: Ints = order + resumed_shift[np.searchsorted(resumed, order, side="right") - 1]
+        counted: Whole = order + resumed_shift[np.searchsorted(resumed, order, side="right") - 1]
         return counted
     knots = (knots_ns - knots_ns[0]).astype(np.float64)
     nearest = np.empty(time_ns.shape, np.int64)
@@ -73,7 +72,7 @@ def grid_index(
     return np.clip(nearest, low, high)
 
 
-def side_by_side(index: Ints, time_ns: Ints, cuts: Ints) -> Ints:
+def side_by_side(index: Whole, time_ns: Whole, cuts: Whole) -> Whole:
     """Part two samples on one point where the point beside is free: their order tells their places.
 
     One that moves is nearer to the other's point by its stamp, but the count of samples around says that it's the
@@ -104,19 +103,19 @@ def side_by_side(index: Ints, time_ns: Ints, cuts: Ints) -> Ints:
     first = np.concatenate((twice & np.concatenate((never, room[..., :-1]), axis=-1), never), axis=-1)
     second = np.concatenate((never, twice & np.concatenate((room[..., 1:], never), axis=-1)), axis=-1) & ~first
     alike = np.concatenate((np.diff(time_ns, axis=-1) == 0, never), axis=-1)
-    moved: Ints = np.where(first & alike, NOWHERE, index - first + (second & ~np.roll(alike, 1, axis=-1)))
+    moved: Whole = np.where(first & alike, NOWHERE, index - first + (second & ~np.roll(alike, 1, axis=-1)))
     return moved
 
 
-def _smoothed(nearest: Ints, order: Ints, smoothing: int) -> Ints:
+def _smoothed(nearest: Whole, order: Whole, smoothing: int) -> Whole:
     # Imported here because a log with sound stamps never needs it.
     from scipy.ndimage import median_filter
 
-    ahead: Ints = median_filter(nearest - order, size=smoothing, mode="nearest")
+    ahead: Whole = median_filter(nearest - order, size=smoothing, mode="nearest")
     return ahead + order
 
 
-def choose_smoothing(time_ns: Ints, clock: Callable[..., Ints], *, repeats: int) -> int:
+def choose_smoothing(time_ns: Whole, clock: Callable[..., Whole], *, repeats: int) -> int:
     """Give the smallest smoothing with which at most 0.1 % of the messages, true repeats apart, collide.
 
     Parameters

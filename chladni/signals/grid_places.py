@@ -6,8 +6,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.clock_count import Counted
 from chladni.signals.clock_fit import Clock
 from chladni.signals.grid_index import NOWHERE, choose_smoothing, grid_index, side_by_side
@@ -24,9 +24,7 @@ _AT_ONCE = 0.05
 _CROWD = 0.01
 
 
-def place_in_order(
-    base: "TimeBase", tangled: Untangled, sizes: NDArray[np.int64], counted: Counted, clock: Clock
-) -> "TimeBase":
+def place_in_order(base: "TimeBase", tangled: Untangled, sizes: Whole, counted: Counted, clock: Clock) -> "TimeBase":
     """Add the stretches and the gaps between them."""
     first = counted.count.resumed
     if counted.burst_starts is not None:
@@ -83,11 +81,11 @@ def place_by_phase(base: "TimeBase", tangled: Untangled) -> "TimeBase":
 
 
 def _parted_ends(
-    rising_ns: NDArray[np.int64],
-    after: NDArray[np.int64],
-    clock: Callable[..., NDArray[np.int64]],
-    cuts: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    rising_ns: Whole,
+    after: Whole,
+    clock: Callable[..., Whole],
+    cuts: Whole,
+) -> tuple[Whole, Whole]:
     """Grid indices of messages and of those before them, two on one point parted where there's room."""
     # With one more message on each side.
     beside = after[:, None] + np.arange(-2, 2)
@@ -102,10 +100,10 @@ def _parted_ends(
 def _with_gaps(
     base: "TimeBase",
     tangled: Untangled,
-    sizes: NDArray[np.int64],
-    message: NDArray[np.int64],
-    begin: NDArray[np.int64],
-    end: NDArray[np.int64],
+    sizes: Whole,
+    message: Whole,
+    begin: Whole,
+    end: Whole,
     last: int,
 ) -> "TimeBase":
     """Add gaps, breaks and the longest stretch between them.
@@ -141,17 +139,13 @@ def _cut_out(base: "TimeBase") -> int:
     return int((base.cuts[:, 1] - base.cuts[:, 0]).sum())
 
 
-def _points_lost(
-    base: "TimeBase", rising_ns: NDArray[np.int64], clock: Callable[..., NDArray[np.int64]], smoothing: int
-) -> int:
+def _points_lost(base: "TimeBase", rising_ns: Whole, clock: Callable[..., Whole], smoothing: int) -> int:
     """Grid points that no message has, beside those left out on purpose; negative with more messages than points."""
     end = np.arange(max(0, rising_ns.size - 4 * smoothing), rising_ns.size)
     return int(clock(rising_ns[end], end, smoothing=smoothing)[-1]) + 1 - rising_ns.size - _cut_out(base)
 
 
-def straight_pieces(
-    line_ns: NDArray[np.float64], index: NDArray[np.int64], pieces: NDArray[np.int64], first_ns: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def straight_pieces(line_ns: Real, index: Whole, pieces: Whole, first_ns: int) -> tuple[Whole, Real]:
     """Both ends of each straight piece of the clock, in rising order."""
     ends = np.append(pieces[1:], index.size) - 1
     both = np.unique(np.concatenate((pieces, ends)))

@@ -1,11 +1,11 @@
 """Frequency responses synthesised from modes, and how far they are from the measured ones."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.value import Value, require_frequency_axis, require_shape
 
 
@@ -32,14 +32,14 @@ class ModalFit(Value):
         ``[band]`` the same over all functions in each band.
     """
 
-    frequency_hz: NDArray[np.float64]
-    synthesised: NDArray[np.complexfloating[Any, Any]]
-    lower_residual: NDArray[np.complexfloating[Any, Any]]
-    upper_residual: NDArray[np.complexfloating[Any, Any]]
+    frequency_hz: Real
+    synthesised: NDArray[np.complexfloating]
+    lower_residual: NDArray[np.complexfloating]
+    upper_residual: NDArray[np.complexfloating]
     error: float
-    function_error: NDArray[np.float64]
-    bands_hz: NDArray[np.float64]
-    band_error: NDArray[np.float64]
+    function_error: Real
+    bands_hz: Real
+    band_error: Real
 
     def __post_init__(self) -> None:
         require_frequency_axis(self.frequency_hz)

@@ -1,11 +1,12 @@
 """Modal mass and modal A: what turns shapes into receptances."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Index, Real
 from chladni.signals.value import Value, require_shape
 
 
@@ -27,16 +28,16 @@ class ModalScale(Value):
 
     response: str
     reference: str
-    modal_a: NDArray[np.complexfloating[Any, Any]]
-    modal_mass: NDArray[np.float64]
-    modal_mass_std: NDArray[np.float64]
+    modal_a: NDArray[np.complexfloating]
+    modal_mass: Real
+    modal_mass_std: Real
 
     def __post_init__(self) -> None:
         for name in ("modal_mass", "modal_mass_std"):
             require_shape(name, getattr(self, name), self.modal_a.shape, "modes")
         self._freeze()
 
-    def select(self, rows: NDArray[np.intp]) -> Self:
+    def select(self, rows: Index) -> Self:
         """Give the scale of some modes, in the order asked for."""
         return replace(
             self,

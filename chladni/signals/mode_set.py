@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass, replace
 from math import pi
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Index, Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.machine_harmonic import MachineHarmonic
@@ -54,15 +55,15 @@ class ModeSet(Value):
         How they were made; notes are advice.
     """
 
-    frequency_hz: NDArray[np.float64]
-    frequency_std_hz: NDArray[np.float64]
-    damping_ratio: NDArray[np.float64]
-    damping_std: NDArray[np.float64]
-    shapes: NDArray[np.complexfloating[Any, Any]]
-    shape_std: NDArray[np.complexfloating[Any, Any]]
+    frequency_hz: Real
+    frequency_std_hz: Real
+    damping_ratio: Real
+    damping_std: Real
+    shapes: NDArray[np.complexfloating]
+    shape_std: NDArray[np.complexfloating]
     channels: tuple[Channel, ...]
     references: tuple[Channel, ...] = ()
-    participation: NDArray[np.complexfloating[Any, Any]] | None = None
+    participation: NDArray[np.complexfloating] | None = None
     scale: ModalScale | None = None
     spread: OrderSpread | None = None
     harmonics: tuple[MachineHarmonic, ...] = ()
@@ -87,12 +88,12 @@ class ModeSet(Value):
         self._freeze()
 
     @property
-    def poles(self) -> NDArray[np.complex128]:
+    def poles(self) -> Complex:
         """``[mode]`` -zeta omega + j omega sqrt(1 - zeta^2) in rad/s."""
         omega = 2 * pi * self.frequency_hz
         return -self.damping_ratio * omega + 1j * omega * np.sqrt(1 - self.damping_ratio**2)
 
-    def select(self, rows: NDArray[np.intp]) -> Self:
+    def select(self, rows: Index) -> Self:
         """Give some of the modes, by rising frequency; the fit stays that of all of them.
 
         Parameters

@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from chladni.signals.arrays import Real
 from chladni.signals.value import Value, require_shape
 
 
@@ -29,10 +27,10 @@ class ModeValidation(Value):
         Sentences for whoever must rely on the modes, the gravest first.
     """
 
-    auto_mac: NDArray[np.float64]
-    mpc: NDArray[np.float64]
-    mpd_deg: NDArray[np.float64]
-    mean_phase_deg: NDArray[np.float64]
+    auto_mac: Real
+    mpc: Real
+    mpd_deg: Real
+    mean_phase_deg: Real
     alike: tuple[tuple[int, int], ...]
     findings: tuple[str, ...]
 

@@ -1,11 +1,11 @@
 """Which numbers estimators can work with: those whose squares can be squared again."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.wording import counted
@@ -20,7 +20,7 @@ SMALLEST_OF_MODEL, LARGEST_OF_MODEL = 2.0**-340, 2.0**340
 Runs = Sequence[tuple[int, int]]
 
 
-def largest_magnitudes(values: NDArray[np.floating[Any]], runs: Runs | None = None) -> NDArray[np.float64]:
+def largest_magnitudes(values: NDArray[np.floating], runs: Runs | None = None) -> Real:
     """Give ``[channel]`` the largest magnitude of ``values[channel, sample]``; NaN and inf where one isn't finite.
 
     Parameters
@@ -39,7 +39,7 @@ def largest_magnitudes(values: NDArray[np.floating[Any]], runs: Runs | None = No
     return found
 
 
-def rms(values: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+def rms(values: NDArray[np.floating]) -> Real:
     """Give the root mean square of any finite numbers along the last axis, however large or small they are.
 
     They are divided by a power of two before they are squared, which costs no digit.
@@ -64,7 +64,7 @@ def out_of_range(largest: float) -> str | None:
 _REMEDY = 'leave the channel out, or scale it in a setup file, by `unit = "V"` and its sensitivity'
 
 
-def require_in_range(channels: Sequence[Channel], largest: NDArray[np.float64]) -> None:
+def require_in_range(channels: Sequence[Channel], largest: Real) -> None:
     """Raise `EstimateError` naming the channels whose ``largest[channel]`` magnitude no estimator can square."""
     faults = [
         f"channel {channel.name!r} {fault}"

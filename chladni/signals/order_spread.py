@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 from typing import Self
 
-import numpy as np
-from numpy.typing import NDArray
-
+from chladni.signals.arrays import Index, Real, Whole
 from chladni.signals.value import Value, require_shape
 
 
@@ -23,18 +21,18 @@ class OrderSpread(Value):
         ``[mode]`` the same of the damping ratio.
     """
 
-    orders: NDArray[np.int64]
-    frequency_hz: NDArray[np.float64]
-    frequency_std_hz: NDArray[np.float64]
-    damping_ratio: NDArray[np.float64]
-    damping_std: NDArray[np.float64]
+    orders: Whole
+    frequency_hz: Real
+    frequency_std_hz: Real
+    damping_ratio: Real
+    damping_std: Real
 
     def __post_init__(self) -> None:
         for name in ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std"):
             require_shape(name, getattr(self, name), self.orders.shape, "modes")
         self._freeze()
 
-    def select(self, rows: NDArray[np.intp]) -> Self:
+    def select(self, rows: Index) -> Self:
         """Give the spread of some modes, in the order asked for."""
         return type(self)(
             orders=self.orders[rows],

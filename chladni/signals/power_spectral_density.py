@@ -4,9 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-import numpy as np
-from numpy.typing import NDArray
-
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel, find_channels
 from chladni.signals.provenance import Provenance
 from chladni.signals.units import power_density_unit
@@ -34,9 +32,9 @@ class PowerSpectralDensity(Value):
         How it was made.
     """
 
-    frequency_hz: NDArray[np.float64]
-    values: NDArray[np.float64]
-    std: NDArray[np.float64]
+    frequency_hz: Real
+    values: Real
+    std: Real
     channels: tuple[Channel, ...]
     bandwidth_hz: float
     provenance: Provenance

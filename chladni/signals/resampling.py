@@ -11,16 +11,16 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
 from math import ceil, inf, isfinite, pi
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
-Floats = NDArray[np.float64]
 JoinMethod = Literal["auto", "hold", "band-limited"]
 
 #: Share of the lower Nyquist frequency up to which a resampled signal is true.
@@ -249,7 +249,7 @@ def _valid_s(series: TimeSeries, row: int) -> float:
     return count / series.sample_rate_hz
 
 
-def is_staircase(values: NDArray[np.floating[Any]]) -> bool:
+def is_staircase(values: NDArray[np.floating]) -> bool:
     """Whether samples stand still and then leap, as what is set now and then does, and no motion.
 
     Most samples must repeat the one before. A slow signal in coarse digits does so too, but steps from each level to
@@ -360,20 +360,20 @@ class _Kernel:
         """First and last position, in input samples, whose kernel lies inside."""
         return self.reach - 1.0, samples - self.reach - 1e-3
 
-    def weights(self, fraction: Floats) -> Floats:
+    def weights(self, fraction: Real) -> Real:
         """``[position, tap]`` weights of the samples floor(p) - reach + 1 ... floor(p) + reach at fraction of p."""
         offset = np.arange(1 - self.reach, self.reach + 1) - fraction[:, None]
         table, slope = _kernel_table(self.half, self.beta)
         scaled = np.abs(offset) * (self.narrowing * _TABLE_STEP)
         place = np.minimum(scaled.astype(np.int32), slope.size - 1)
-        weights: Floats = table[place] + slope[place] * (scaled - place)
+        weights: Real = table[place] + slope[place] * (scaled - place)
         # Beyond its last zero crossing the kernel is zero.
         weights *= self.narrowing * (scaled < slope.size)
         return weights
 
 
 @lru_cache(maxsize=4)
-def _kernel_table(half: int, beta: float) -> tuple[Floats, Floats]:
+def _kernel_table(half: int, beta: float) -> tuple[Real, Real]:
     """Values of the kernel at each table point, and the differences to the next."""
     position = np.arange(half * _TABLE_STEP + 1) / _TABLE_STEP
     window = np.i0(beta * np.sqrt(np.maximum(0.0, 1 - (position / half) ** 2))) / np.i0(beta)
@@ -398,7 +398,7 @@ def _worst_error(kernel: _Kernel) -> float:
 
 def _interpolated(
     series: TimeSeries, kernel: _Kernel, first: float, ratio: float, count: int
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.bool_]]:
+) -> tuple[NDArray[np.floating], Mask]:
     known = np.isfinite(series.values) if series.valid is None else series.valid & np.isfinite(series.values)
     reach = kernel.reach
     # Zeros beyond the ends keep the indexing simple; what they touch is marked.
@@ -419,9 +419,7 @@ def _interpolated(
     return values, valid
 
 
-def _blocks(
-    kernel: _Kernel, first: float, ratio: float, count: int
-) -> Iterator[tuple[slice, NDArray[np.int64], Floats]]:
+def _blocks(kernel: _Kernel, first: float, ratio: float, count: int) -> Iterator[tuple[slice, Whole, Real]]:
     """Give runs of output samples, with the input sample before each and its weights."""
     length = max(1, _BLOCK_WEIGHTS // (2 * kernel.reach))
     period = _period(ratio, count)
@@ -440,7 +438,7 @@ def _period(ratio: float, count: int) -> int:
     return near.denominator if repeats else 0
 
 
-def _split(position: Floats) -> tuple[NDArray[np.int64], Floats]:
+def _split(position: Real) -> tuple[Whole, Real]:
     # A billionth of a sample below a whole number is rounding.
     start = np.floor(position + 1e-9)
     return start.astype(np.int64), np.maximum(position - start, 0.0)

@@ -11,10 +11,9 @@ from typing import Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-ScalarT = TypeVar("ScalarT", bound=np.generic)
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from chladni.signals.arrays import Mask, Real, Whole
 
+ScalarT = TypeVar("ScalarT", bound=np.generic)
 #: Items whose mean is taken as one point of the clock's slow wander.
 WINDOW = 256
 #: Items that a clock is fitted to; of more, every n-th is as good.
@@ -54,20 +53,20 @@ class Count:
         0 to 1: how well the stamps agree with a grid of the period; 1 when counted by order.
     """
 
-    time: Floats
-    index: Ints
-    place: Ints
-    stretch: Ints
-    window: Ints
-    starts: Ints
-    sizes: Ints
-    resumed: Ints
-    firsts: Ints
-    ends: Ints
-    cuts: Ints
+    time: Real
+    index: Whole
+    place: Whole
+    stretch: Whole
+    window: Whole
+    starts: Whole
+    sizes: Whole
+    resumed: Whole
+    firsts: Whole
+    ends: Whole
+    cuts: Whole
     coherence: float = 1.0
 
-    def moved(self, by_ns: Floats) -> Self:
+    def moved(self, by_ns: Real) -> Self:
         """Give the items with the times of each ``[stretch]`` moved."""
         return replace(self, time=self.time + by_ns[self.stretch])
 
@@ -76,7 +75,7 @@ class Count:
         return np.repeat(per_cut, np.diff(self.cuts, prepend=0, append=self.resumed.size))
 
 
-def count_even(time_ns: Ints) -> Count:
+def count_even(time_ns: Whole) -> Count:
     """Count stamps whose steps are all alike: a few spread over the log tell what all of them tell.
 
     Parameters
@@ -100,7 +99,7 @@ def count_even(time_ns: Ints) -> Count:
     )
 
 
-def count_by_phase(time_ns: Ints, steps: Ints, period_ns: float, cuts: Ints) -> Count:
+def count_by_phase(time_ns: Whole, steps: Whole, period_ns: float, cuts: Whole) -> Count:
     """Give each stamp the index that its phase tells.
 
     Parameters
@@ -151,11 +150,11 @@ def count_by_phase(time_ns: Ints, steps: Ints, period_ns: float, cuts: Ints) -> 
 
 
 def count_by_order(
-    time_ns: Ints,
-    steps: Ints,
-    counts: Ints,
+    time_ns: Whole,
+    steps: Whole,
+    counts: Whole,
     period_ns: float,
-    cuts: Ints,
+    cuts: Whole,
     *,
     pause_ns: float | None = None,
     quantum_ns: float = 0.0,
@@ -188,7 +187,7 @@ def count_by_order(
     return count_in_stretches(time_ns, counts, resumed, cut_stretches)
 
 
-def count_in_stretches(time_ns: Ints, counts: Ints, resumed: Ints, cut_stretches: Ints) -> Count:
+def count_in_stretches(time_ns: Whole, counts: Whole, resumed: Whole, cut_stretches: Whole) -> Count:
     """Number samples in the order in which they came; what lies between the stretches is for a fit to find.
 
     Parameters
@@ -234,14 +233,14 @@ def order_fano(count: Count, period_ns: float) -> float:
     return spread**2 / (lag * interval**2)
 
 
-def robust_std(values: Floats) -> float:
+def robust_std(values: Real) -> float:
     """Scatter by the median absolute deviation, on at most 100 000 of the values; 0 of none."""
     part = values[:: max(1, values.size // SAMPLE)]
     return float(1.4826 * np.median(np.abs(part - np.median(part)))) if part.size else 0.0
 
 
 def refined_period(
-    time_ns: Ints, period_ns: float, reach: float, cuts: Ints, *, block: int, every: int = 1
+    time_ns: Whole, period_ns: float, reach: float, cuts: Whole, *, block: int, every: int = 1
 ) -> tuple[float, float]:
     """Find the period whose phases agree best over blocks of stamps, one every n periods, near the guess.
 
@@ -282,7 +281,7 @@ def refined_period(
     return period_ns / float(trial[best]), float(power[best]) / (starts.size * block)
 
 
-def _phasors(cycles: Floats) -> NDArray[np.complex64]:
+def _phasors(cycles: Real) -> NDArray[np.complex64]:
     """exp(2 pi j cycles); single precision, since of their sums only the nearest whole index is wanted."""
     angle = ((cycles - np.floor(cycles)) * (2 * np.pi)).astype(np.float32)
     phasors = np.empty(angle.shape, np.complex64)
@@ -291,7 +290,7 @@ def _phasors(cycles: Floats) -> NDArray[np.complex64]:
     return phasors
 
 
-def _phase_scatter(steps: Ints, period_ns: float) -> float:
+def _phase_scatter(steps: Whole, period_ns: float) -> float:
     """Robust scatter of intervals about whole periods, relative to the period."""
     turns = steps[:: max(1, steps.size // SAMPLE)] / period_ns
     # Over many periods the guess's own error would count as scatter.
@@ -299,7 +298,7 @@ def _phase_scatter(steps: Ints, period_ns: float) -> float:
     return robust_std(turns - np.rint(turns))
 
 
-def _resumed(gaps: NDArray[np.bool_], cuts: Ints) -> tuple[Ints, Ints]:
+def _resumed(gaps: Mask, cuts: Whole) -> tuple[Whole, Whole]:
     """First items of the stretches, and the numbers of those that begin at a cut."""
     if cuts.size:
         gaps[cuts - 1] = True
@@ -307,7 +306,7 @@ def _resumed(gaps: NDArray[np.bool_], cuts: Ints) -> tuple[Ints, Ints]:
     return resumed, np.searchsorted(resumed, cuts)
 
 
-def _chosen(items: int, resumed: Ints) -> tuple[Ints, Ints]:
+def _chosen(items: int, resumed: Whole) -> tuple[Whole, Whole]:
     """Items to fit, with both ends of each stretch, and the stretch of each."""
     every = -(-items // MAX_ITEMS)
     chosen = np.arange(0, items, every)
@@ -318,7 +317,7 @@ def _chosen(items: int, resumed: Ints) -> tuple[Ints, Ints]:
     return chosen, np.searchsorted(resumed, chosen, side="right") - 1
 
 
-def _windows(stretch: Ints) -> tuple[Ints, Ints]:
+def _windows(stretch: Whole) -> tuple[Whole, Whole]:
     """Cut each stretch into near-equal windows of about 256; number of the window of each item, and the starts."""
     first = np.flatnonzero(np.diff(stretch, prepend=-1))
     sizes = np.diff(first, append=stretch.size)

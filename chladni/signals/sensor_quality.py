@@ -5,20 +5,18 @@ pass: a plateau entered with a kink, a hold left with a leap, a leap there and b
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.unit_text import with_unit
 from chladni.signals.wording import counted
 
 FaultKind = Literal["clipped", "dead", "dropouts", "spikes", "not-a-number", "coarse"]
-Samples = NDArray[np.floating[Any]]
-Ints = NDArray[np.int64]
-
 # A range that is named is reached a little early by offset and gain of a real amplifier.
 _NEAR_OVERLOAD = 0.999
 _SHORTEST_PLATEAU = 3
@@ -86,15 +84,15 @@ class _Record:
     """Good samples of a channel, with what several rules need of them."""
 
     channel: Channel
-    samples: Samples
-    still: Ints
-    leaps: Ints
+    samples: NDArray[np.floating]
+    still: Whole
+    leaps: Whole
     typical_step: float
     smallest_step: float
     low: float
     high: float
 
-    def step(self, places: Ints) -> Samples:
+    def step(self, places: Whole) -> NDArray[np.floating]:
         """Magnitude of the steps from these samples to the next ones; 0 outside."""
         inside = np.clip(places, 0, self.samples.size - 2)
         steps = np.abs(self.samples[inside + 1] - self.samples[inside])
@@ -142,7 +140,7 @@ def sensor_quality(series: TimeSeries) -> tuple[SensorFault, ...]:
 
 
 def _channel_faults(
-    channel: Channel, values: Samples, valid: NDArray[np.bool_] | None, rate_hz: float
+    channel: Channel, values: NDArray[np.floating], valid: Mask | None, rate_hz: float
 ) -> list[SensorFault]:
     faults: list[SensorFault] = []
     if values.size and not (np.isfinite(values.min()) and np.isfinite(values.max())):
@@ -163,7 +161,7 @@ def _channel_faults(
     return [replace(one, first_s=one.first_s / rate_hz, last_s=one.last_s / rate_hz) for one in faults]
 
 
-def _faults_of(record: _Record, place: Ints | None) -> list[SensorFault]:
+def _faults_of(record: _Record, place: Whole | None) -> list[SensorFault]:
     """Apply the rules; `first_s` and `last_s` are indices until the caller knows better."""
     channel = record.channel
     if _is_dead(record) and not _beyond_range(record).size:
@@ -192,7 +190,7 @@ def _dead_told(record: _Record) -> tuple[str, str]:
 
 
 def _fault(
-    channel: Channel, kind: FaultKind, samples: Ints, told: tuple[str, str], place: Ints | None = None
+    channel: Channel, kind: FaultKind, samples: Whole, told: tuple[str, str], place: Whole | None = None
 ) -> list[SensorFault]:
     if not samples.size:
         return []
@@ -211,7 +209,7 @@ def _fault(
     ]
 
 
-def _record(channel: Channel, samples: Samples) -> _Record:
+def _record(channel: Channel, samples: NDArray[np.floating]) -> _Record:
     starts = np.unique(np.linspace(0, max(0, samples.size - _LEAP_BLOCK), 64).astype(np.int64))
     some = np.concatenate([np.abs(np.diff(samples[start : start + _LEAP_BLOCK])) for start in starts])
     moving = some[some > 0]
@@ -230,7 +228,7 @@ def _record(channel: Channel, samples: Samples) -> _Record:
     )
 
 
-def _scan(samples: Samples, *, floor: float) -> tuple[Ints, Ints]:
+def _scan(samples: NDArray[np.floating], *, floor: float) -> tuple[Whole, Whole]:
     """Find steps of zero, and leaps: steps above `floor` and far above the median of their block of 4096."""
     still, leaps = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for start in range(0, samples.size - 1, _LEAP_BLOCK):
@@ -261,7 +259,7 @@ def _is_coarse(record: _Record) -> bool:
     return 3 <= np.unique(record.samples).size <= 16
 
 
-def _clipped(record: _Record) -> tuple[Ints, tuple[str, str]]:
+def _clipped(record: _Record) -> tuple[Whole, tuple[str, str]]:
     """Give the samples beyond the range, and what to say of them."""
     unit = record.channel.unit
     there = _beyond_range(record)
@@ -275,7 +273,7 @@ def _clipped(record: _Record) -> tuple[Ints, tuple[str, str]]:
     return np.sort(np.concatenate([*ends.values()])), told
 
 
-def _beyond_range(record: _Record) -> Ints:
+def _beyond_range(record: _Record) -> Whole:
     """Samples at the end of the range that is named, if one is."""
     limit = _NEAR_OVERLOAD * (record.channel.overload or np.inf)
     if max(record.high, -record.low) < limit:
@@ -283,7 +281,7 @@ def _beyond_range(record: _Record) -> Ints:
     return np.flatnonzero(np.abs(record.samples) >= limit)
 
 
-def _plateaus(record: _Record, level: float) -> Ints:
+def _plateaus(record: _Record, level: float) -> Whole:
     """Give the samples at an end of the range if they're cut off there, else nothing."""
     there = np.flatnonzero(record.samples == level)
     starts, lengths = _runs(there)
@@ -306,26 +304,26 @@ def _plateaus(record: _Record, level: float) -> Ints:
     return there if cut_off else there[:0]
 
 
-def _by_chance(record: _Record, ends: Ints, lengths: Ints) -> bool:
+def _by_chance(record: _Record, ends: Whole, lengths: Whole) -> bool:
     """Whether one of these runs may be as long as it is because values repeat everywhere."""
     at_end = int(np.sum(lengths - 1))
     repeating = (record.still.size - at_end) / max(1, record.samples.size - ends.size)
     return bool(lengths.size * repeating ** (int(lengths.max()) - 1) > _CHANCE)
 
 
-def _one_way(samples: Samples) -> bool:
+def _one_way(samples: NDArray[np.floating]) -> bool:
     """Whether samples never rise or never fall, as after a step that something follows slowly."""
     steps = np.diff(samples)
     return bool(not np.any(steps > 0) or not np.any(steps < 0))
 
 
-def _rests(record: _Record, ends: Ints) -> bool:
+def _rests(record: _Record, ends: Whole) -> bool:
     # Away from the end of the range a signal that mostly stands still is a command or a state, not a vibration.
     at_end = int(np.count_nonzero(np.diff(ends) == 1))
     return record.still.size - at_end > 0.5 * (record.samples.size - ends.size)
 
 
-def _held(record: _Record) -> Ints:
+def _held(record: _Record) -> Whole:
     if record.still.size > 0.25 * record.samples.size:
         return record.still[:0]
     starts, lengths = _runs(record.still)
@@ -345,7 +343,7 @@ def _shortest_hold(record: _Record) -> int:
     return _SHORTEST_HOLD + int(np.count_nonzero(by_chance > _CHANCE_HELD))
 
 
-def _spikes(record: _Record) -> Ints:
+def _spikes(record: _Record) -> Whole:
     if record.channel.unit == "N" or record.channel.role == "reference" or record.leaps.size < 2:
         return record.leaps[:0]
     away, back = record.leaps[:-1], record.leaps[1:]
@@ -361,13 +359,13 @@ def _spikes(record: _Record) -> Ints:
     return _filled(away[chosen] + 1, (back - away)[chosen])
 
 
-def _runs(places: Ints) -> tuple[Ints, Ints]:
+def _runs(places: Whole) -> tuple[Whole, Whole]:
     """First of each run of consecutive whole numbers, and its length."""
     breaks = np.flatnonzero(np.diff(places, prepend=-2) != 1)
     return places[breaks], np.diff(breaks, append=places.size)
 
 
-def _filled(starts: Ints, lengths: Ints) -> Ints:
+def _filled(starts: Whole, lengths: Whole) -> Whole:
     if not starts.size:
         return starts
     return np.concatenate([np.arange(start, start + length) for start, length in zip(starts, lengths, strict=True)])

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from typing import Literal, Self, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Index, Real, Whole
 from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value, require_frequency_axis, require_shape
 
@@ -33,13 +33,13 @@ class StabilisationDiagram(Value):
         What the curves are.
     """
 
-    order: NDArray[np.int64]
-    frequency_hz: NDArray[np.float64]
-    damping_ratio: NDArray[np.float64]
-    status: NDArray[np.int64]
-    mode: NDArray[np.int64]
-    indicator_hz: NDArray[np.float64]
-    indicator: NDArray[np.float64]
+    order: Whole
+    frequency_hz: Real
+    damping_ratio: Real
+    status: Whole
+    mode: Whole
+    indicator_hz: Real
+    indicator: Real
     indicator_name: str
     indicator_unit: str
 
@@ -53,7 +53,7 @@ class StabilisationDiagram(Value):
         require_shape("indicator", self.indicator, (*curves, self.indicator_hz.size), "curves x lines")
         self._freeze()
 
-    def select(self, rows: NDArray[np.intp]) -> Self:
+    def select(self, rows: Index) -> Self:
         """Give the same poles with the numbers that some modes have when only those are kept, in the order given."""
         numbers = {int(row): number for number, row in enumerate(rows)}
         return replace(self, mode=np.array([numbers.get(int(row), -1) for row in self.mode], dtype=np.int64))

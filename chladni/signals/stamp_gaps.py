@@ -3,16 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.time_series import NS_PER_S
 
 #: Gaps that are listed one by one, the longest chosen; all are counted.
 MAX_GAPS = 1000
 #: A pause longer than this, and than all that was recorded, may as well be a clock that was set.
 LEAP_S = 60.0
-
-Spans = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,10 +29,10 @@ class Gaps:
 
     longest: tuple[tuple[float, float], ...]
     count: int
-    leaps: Spans
+    leaps: Real
 
 
-def list_gaps(spans_s: Spans, recorded_s: float) -> Gaps:
+def list_gaps(spans_s: Real, recorded_s: float) -> Gaps:
     """List gaps.
 
     Parameters
@@ -53,9 +51,7 @@ def list_gaps(spans_s: Spans, recorded_s: float) -> Gaps:
     )
 
 
-def spans_between(
-    stamps_ns: NDArray[np.int64], after: NDArray[np.int64], sizes: NDArray[np.int64], period_ns: float
-) -> Spans:
+def spans_between(stamps_ns: Whole, after: Whole, sizes: Whole, period_ns: float) -> Real:
     """Give ``[gap, 2]`` seconds from the first stamp: the last sample before, and the first one after.
 
     Parameters

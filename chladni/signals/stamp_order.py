@@ -6,6 +6,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Whole
 from chladni.signals.clock_steps import LEAP_NS, ClockSteps, find_clock_steps, sample_period
 from chladni.signals.errors import EstimateError
 
@@ -31,18 +32,18 @@ class Untangled:
         Messages with the stamp of another.
     """
 
-    time_ns: NDArray[np.int64]
-    steps: NDArray[np.int64]
-    order: NDArray[np.int64] | None
+    time_ns: Whole
+    steps: Whole
+    order: Whole | None
     clock: ClockSteps
     out_of_order: int
     duplicates: int
 
-    def within(self) -> NDArray[np.int64]:
+    def within(self) -> Whole:
         """Steps from message to message, without those across a step of the clock."""
         return np.delete(self.steps, self.clock.message - 1) if self.clock.count else self.steps
 
-    def moved(self, by_ns: NDArray[np.int64]) -> Self:
+    def moved(self, by_ns: Whole) -> Self:
         """Move the stretch after each step of the clock, by so much in all."""
         if not by_ns.any():
             return self
@@ -50,7 +51,7 @@ class Untangled:
         return replace(self, time_ns=time_ns, steps=np.diff(time_ns), clock=self.clock.moved(by_ns))
 
 
-def require_stamps(stamps_ns: NDArray[Any]) -> NDArray[np.int64]:
+def require_stamps(stamps_ns: NDArray[Any]) -> Whole:
     """Give the stamps as int64; `EstimateError` when they are no whole nanoseconds in one dimension."""
     if stamps_ns.ndim != 1 or stamps_ns.dtype.kind not in "iu":
         raise EstimateError(
@@ -62,11 +63,11 @@ def require_stamps(stamps_ns: NDArray[Any]) -> NDArray[np.int64]:
 
 
 def untangle(
-    stamps_ns: NDArray[np.int64],
-    before: NDArray[np.int64] | None = None,
+    stamps_ns: Whole,
+    before: Whole | None = None,
     *,
     known: ClockSteps | None = None,
-    logged_ns: NDArray[np.int64] | None = None,
+    logged_ns: Whole | None = None,
 ) -> Untangled:
     """Undo steps of the clock, sort what came late, and count both.
 
@@ -107,7 +108,7 @@ def untangle(
     )
 
 
-def arrival_order(stamps_ns: NDArray[np.int64]) -> NDArray[np.int64] | None:
+def arrival_order(stamps_ns: Whole) -> Whole | None:
     """Places of arrival in the order of time, steps of the clock undone; None when all came in order."""
     return untangle(stamps_ns).order if stamps_ns.size else None
 

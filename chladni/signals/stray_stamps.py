@@ -1,13 +1,11 @@
 """Stray stamps: those that contradict the count of the samples around them."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.clock_check import JITTERS
 from chladni.signals.clock_count import SHORT
 from chladni.signals.sample_count import SAMPLE, robust_std
-
-Ints = NDArray[np.int64]
 
 # Stray stamps in a row; three that run on together may be a clock that was set.
 _MOST = 2
@@ -15,7 +13,7 @@ _MOST = 2
 _UNEVEN = 0.25
 
 
-def find_strays(stamps_ns: Ints, sizes: Ints | None = None) -> Ints:
+def find_strays(stamps_ns: Whole, sizes: Whole | None = None) -> Whole:
     """Find messages whose stamps contradict the count of samples around them.
 
     A message that is late leaves no hole where it came, and fills one where its stamp says. A stray one is neither:
@@ -66,9 +64,7 @@ def find_strays(stamps_ns: Ints, sizes: Ints | None = None) -> Ints:
     return found[~_fill_a_hole(time, counts, found)] if found.size else none
 
 
-def _leave_a_place(
-    time: NDArray[np.float64], counts: Ints, starts: Ints, run: int, reach: float
-) -> NDArray[np.bool_]:
+def _leave_a_place(time: Real, counts: Whole, starts: Whole, run: int, reach: float) -> Mask:
     """Whether the messages around each run leave exactly its place empty, and none of it lies near there.
 
     At an end of the log there's room for any run, if the others go on as evenly as ever.
@@ -92,7 +88,7 @@ def _leave_a_place(
     floor = np.where(starts == 0, -np.inf, time[before])[:, None]
     ceiling = np.where(starts + run > last, np.inf, time[after])[:, None]
     outside = ((stamps < floor) | (stamps > ceiling)) & (np.abs(stamps - own) > reach)
-    told: NDArray[np.bool_] = fits & outside.all(axis=1)
+    told: Mask = fits & outside.all(axis=1)
     if told.any():
         # What came earlier or later may lie there.
         rising = np.sort(time)
@@ -102,7 +98,7 @@ def _leave_a_place(
     return told
 
 
-def _fill_a_hole(time: NDArray[np.float64], counts: Ints, found: Ints) -> NDArray[np.bool_]:
+def _fill_a_hole(time: Real, counts: Whole, found: Whole) -> Mask:
     """Whether the others leave a free place where a stamp says, next to one of them: a late message follows on."""
     order = np.argsort(time, kind="stable")
     rank = np.empty_like(order)
@@ -111,5 +107,5 @@ def _fill_a_hole(time: NDArray[np.float64], counts: Ints, found: Ints) -> NDArra
     before, after = (order[np.clip(rank[found] + step, 0, order.size - 1)] for step in (-1, 1))
     behind, ahead = time[found] - time[before] - counts[before], time[after] - time[found] - counts[found]
     half, nearest = 0.5 * counts[found], np.minimum(behind, ahead)
-    free: NDArray[np.bool_] = inside & (behind + ahead > -half) & (np.abs(nearest) < half)
+    free: Mask = inside & (behind + ahead > -half) & (np.abs(nearest) < half)
     return free

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.clock_check import grid_agrees
 from chladni.signals.clock_count import Counted, count_batches, count_messages, count_stated
 from chladni.signals.clock_fit import Clock, cut_by_one, fit_clock, measure_wander
@@ -33,7 +34,7 @@ from chladni.signals.value import Value, require_shape
 Verdict = Literal["regular", "jittered", "coarse", "bursts", "irregular", "still", "short", "stated"]
 
 
-def _none() -> NDArray[np.int64]:
+def _none() -> Whole:
     return np.empty(0, dtype=np.int64)
 
 
@@ -115,18 +116,18 @@ class TimeBase(Value):
     gap_count: int = 0
     missing: int = 0
     clock: ClockSteps = field(default_factory=ClockSteps)
-    breaks_s: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    breaks_s: Real = field(default_factory=lambda: np.empty((0, 2)))
     longest_stretch_s: float = 0.0
     duplicates: int = 0
     out_of_order: int = 0
     burst_size: int = 1
-    knots_ns: NDArray[np.int64]
-    knots_index: NDArray[np.float64]
+    knots_ns: Whole
+    knots_index: Real
     smoothing: int = 1
-    resumed: NDArray[np.int64] = field(default_factory=_none)
-    resumed_shift: NDArray[np.int64] = field(default_factory=_none)
-    cuts: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
-    strays: NDArray[np.int64] = field(default_factory=_none)
+    resumed: Whole = field(default_factory=_none)
+    resumed_shift: Whole = field(default_factory=_none)
+    cuts: Whole = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
+    strays: Whole = field(default_factory=_none)
 
     def __post_init__(self) -> None:
         require_shape("knots_index", self.knots_index, self.knots_ns.shape, "knots_ns")
@@ -153,7 +154,7 @@ def fit_time_base(
     *,
     nominal_rate_hz: float | None = None,
     clock: ClockSteps | None = None,
-    logged_ns: NDArray[np.int64] | None = None,
+    logged_ns: Whole | None = None,
 ) -> TimeBase:
     """Fit rate and start to message stamps, ignoring jitter, ticks, gaps, disorder, steps of the clock and bursts.
 
@@ -197,7 +198,7 @@ def fit_batch_time_base(
     *,
     nominal_rate_hz: float | None = None,
     clock: ClockSteps | None = None,
-    logged_ns: NDArray[np.int64] | None = None,
+    logged_ns: Whole | None = None,
 ) -> TimeBase:
     """Fit the sample rate to batch messages.
 
@@ -227,11 +228,11 @@ def _require_rate(rate_hz: float | None) -> None:
 
 
 def _fit(
-    stamps: NDArray[np.int64],
-    counts: NDArray[np.int64] | None,
+    stamps: Whole,
+    counts: Whole | None,
     nominal_hz: float | None,
     known: ClockSteps | None,
-    logged_ns: NDArray[np.int64] | None,
+    logged_ns: Whole | None,
 ) -> TimeBase:
     strays = find_strays(stamps, counts)
     if known is not None:
@@ -253,11 +254,11 @@ def _fit(
 
 
 def _fit_all(
-    stamps: NDArray[np.int64],
-    counts: NDArray[np.int64] | None,
+    stamps: Whole,
+    counts: Whole | None,
     nominal_hz: float | None,
     known: ClockSteps | None,
-    logged_ns: NDArray[np.int64] | None,
+    logged_ns: Whole | None,
 ) -> TimeBase:
     samples = stamps.size if counts is None else int(counts.sum())
     if stamps.size < 2:
@@ -286,7 +287,7 @@ def _fit_all(
 
 def _best(
     tangled: Untangled,
-    sizes: NDArray[np.int64],
+    sizes: Whole,
     ways: Iterator[Counted],
     nominal_hz: float | None,
     *,
@@ -304,7 +305,7 @@ def _best(
 
 
 def _on_grid(
-    tangled: Untangled, sizes: NDArray[np.int64], counted: Counted, nominal_hz: float | None, *, settled: bool
+    tangled: Untangled, sizes: Whole, counted: Counted, nominal_hz: float | None, *, settled: bool
 ) -> TimeBase | None:
     """Fit a grid to what was counted; None when there is none, or it tells another time than the stamps."""
     clock = fit_clock(counted.count, counted.period_ns)
@@ -382,12 +383,12 @@ def _measured(tangled: Untangled, counted: Counted, clock: Clock) -> TimeBase:
     )
 
 
-def _stands_still(steps: NDArray[np.int64]) -> bool:
+def _stands_still(steps: Whole) -> bool:
     # A few values for hundreds of messages are a stamp that was set now and then, not a clock.
     return int(np.count_nonzero(steps)) < max(1, steps.size // 200)
 
 
-def _short(stamps: NDArray[np.int64], samples: int, nominal_hz: float | None) -> TimeBase:
+def _short(stamps: Whole, samples: int, nominal_hz: float | None) -> TimeBase:
     known = nominal_hz is not None and samples > 0
     return TimeBase(
         rate_hz=nominal_hz if known and nominal_hz else 0.0,
@@ -401,7 +402,7 @@ def _short(stamps: NDArray[np.int64], samples: int, nominal_hz: float | None) ->
     )
 
 
-def _still(stamps: NDArray[np.int64], samples: int) -> TimeBase:
+def _still(stamps: Whole, samples: int) -> TimeBase:
     return TimeBase(
         rate_hz=0.0,
         rate_std_hz=inf,

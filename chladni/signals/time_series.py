@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.channel import Channel, find_channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value, require_shape
@@ -58,11 +59,11 @@ class TimeSeries(Value):
     0.5
     """
 
-    values: NDArray[np.floating[Any]]
+    values: NDArray[np.floating]
     sample_rate_hz: float
     channels: tuple[Channel, ...]
     start_time_ns: int = 0
-    valid: NDArray[np.bool_] | None = field(default=None)
+    valid: Mask | None = field(default=None)
 
     def __post_init__(self) -> None:
         if not is_sample_rate(self.sample_rate_hz):
@@ -101,12 +102,12 @@ class TimeSeries(Value):
         """Number of samples over the rate."""
         return self.samples / self.sample_rate_hz
 
-    def times_s(self) -> NDArray[np.float64]:
+    def times_s(self) -> Real:
         """Seconds of each sample since the first, computed from the index so that no error adds up."""
-        times: NDArray[np.float64] = np.arange(self.samples) / self.sample_rate_hz
+        times: Real = np.arange(self.samples) / self.sample_rate_hz
         return times
 
-    def times_ns(self) -> NDArray[np.int64]:
+    def times_ns(self) -> Whole:
         """Nanoseconds of each sample since the Unix epoch."""
         offsets = np.rint(self.times_s() * NS_PER_S).astype(np.int64)
         return offsets + np.int64(self.start_time_ns)

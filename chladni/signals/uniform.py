@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.grid_index import NOWHERE, grid_index, side_by_side
@@ -15,7 +16,7 @@ from chladni.signals.stamp_order import require_stamps
 from chladni.signals.time_base import TimeBase
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
-_Clock = Callable[[NDArray[np.int64], NDArray[np.int64]], NDArray[np.int64]]
+_Clock = Callable[[Whole, Whole], Whole]
 # Messages that wait for late ones before them.
 _HELD = 64
 
@@ -70,9 +71,7 @@ def place(
     return series
 
 
-def message_index(
-    stamps_ns: NDArray[Any], time_base: TimeBase, *, counts: NDArray[Any] | None = None
-) -> NDArray[np.int64]:
+def message_index(stamps_ns: NDArray[Any], time_base: TimeBase, *, counts: NDArray[Any] | None = None) -> Whole:
     """Give each message's grid index (of its first sample), in the order of arrival, index 0 at `start_ns`.
 
     Parameters
@@ -101,7 +100,7 @@ def message_index(
     return _rising_index(time_ns, clock, sizes)
 
 
-def _rising_index(time_ns: NDArray[np.int64], clock: _Clock, sizes: NDArray[np.int64] | None) -> NDArray[np.int64]:
+def _rising_index(time_ns: Whole, clock: _Clock, sizes: Whole | None) -> Whole:
     # The usual log needs no sorting, which takes as long as all the rest.
     if np.all(time_ns[1:] >= time_ns[:-1]):
         return clock(time_ns, _samples_before(sizes, time_ns.size))
@@ -111,8 +110,8 @@ def _rising_index(time_ns: NDArray[np.int64], clock: _Clock, sizes: NDArray[np.i
     return index
 
 
-def _samples_before(sizes: NDArray[np.int64] | None, messages: int) -> NDArray[np.int64]:
-    before: NDArray[np.int64] = np.arange(messages) if sizes is None else np.cumsum(sizes) - sizes
+def _samples_before(sizes: Whole | None, messages: int) -> Whole:
+    before: Whole = np.arange(messages) if sizes is None else np.cumsum(sizes) - sizes
     return before
 
 
@@ -199,7 +198,7 @@ class Placer:
         self._behind = _Messages(time_ns[placed], sizes[placed], self._behind.values)
         return block
 
-    def _filled(self, index: NDArray[np.int64], values: NDArray[Any]) -> TimeSeries | None:
+    def _filled(self, index: Whole, values: NDArray[Any]) -> TimeSeries | None:
         # The first sample seen opens the grid; later ones that belong before it come too late.
         first = int(index[0]) if self._next is None else self._next
         reached = np.maximum.accumulate(np.concatenate(([first - 1], index)))
@@ -230,8 +229,8 @@ class Placer:
 class _Messages:
     """Messages with their times (steps of the clock undone), samples of each, and the samples."""
 
-    time_ns: NDArray[np.int64]
-    sizes: NDArray[np.int64]
+    time_ns: Whole
+    sizes: Whole
     values: NDArray[Any]
 
     @classmethod
@@ -264,11 +263,11 @@ class _Messages:
         )
 
 
-def _expanded(first: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+def _expanded(first: Whole, sizes: Whole) -> Whole:
     """Give first, first + 1, ... for each message, as many as it has samples."""
     if first.size == sizes.sum():
         return first
-    run: NDArray[np.int64] = np.repeat(first - (np.cumsum(sizes) - sizes), sizes) + np.arange(sizes.sum())
+    run: Whole = np.repeat(first - (np.cumsum(sizes) - sizes), sizes) + np.arange(sizes.sum())
     return run
 
 
@@ -291,7 +290,7 @@ def _clock(base: TimeBase) -> _Clock:
     if base.smoothing > 1 or base.resumed.size:
         return indexed
 
-    def clock(time_ns: NDArray[np.int64], order: NDArray[np.int64]) -> NDArray[np.int64]:
+    def clock(time_ns: Whole, order: Whole) -> Whole:
         return side_by_side(indexed(time_ns, order), time_ns, base.cuts)
 
     return clock

@@ -7,6 +7,7 @@ from typing import Any, NoReturn, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 
 ScalarT = TypeVar("ScalarT", bound=np.generic)
@@ -56,7 +57,7 @@ def require_shape(name: str, array: NDArray[Any], expected: tuple[int, ...], axe
         raise EstimateError(f"{name} has shape {array.shape}, but {axes} asks for {expected}")
 
 
-def require_frequency_axis(frequency_hz: NDArray[np.float64]) -> None:
+def require_frequency_axis(frequency_hz: Real) -> None:
     """Raise `EstimateError` unless the axis is one-dimensional, finite and strictly rising."""
     if frequency_hz.ndim != 1 or not np.all(np.isfinite(frequency_hz)) or np.any(np.diff(frequency_hz) <= 0):
         raise EstimateError("frequency_hz must be one-dimensional, finite and strictly rising")

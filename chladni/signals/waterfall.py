@@ -1,11 +1,11 @@
 """Spectra over time."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.provenance import Provenance
@@ -34,9 +34,9 @@ class Waterfall(Value):
         How it was made.
     """
 
-    time_s: NDArray[np.float64]
-    frequency_hz: NDArray[np.float64]
-    values: NDArray[np.floating[Any]]
+    time_s: Real
+    frequency_hz: Real
+    values: NDArray[np.floating]
     channels: tuple[Channel, ...]
     start_time_ns: int
     bandwidth_hz: float

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Generic, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import EstimateError, SetupError
@@ -186,7 +187,7 @@ class SpectraAccumulator(Generic[SpectraT]):
         )
         return result
 
-    def _take(self, values: NDArray[np.floating[Any]], executor: Executor) -> None:
+    def _take(self, values: NDArray[np.floating], executor: Executor) -> None:
         # Segments go to the average in batches of a fixed number, counted from the start of the run: so sums are
         # grouped in the same way however the blocks are cut, and the result is the same to the last bit.
         batch = self._segments_together()
@@ -206,7 +207,7 @@ class SpectraAccumulator(Generic[SpectraT]):
                 values = values[:, step:]
         self._held.append(values)
 
-    def _average_batch(self, values: NDArray[np.floating[Any]], executor: Executor | None) -> None:
+    def _average_batch(self, values: NDArray[np.floating], executor: Executor | None) -> None:
         self.average.add(segment_spectra(values, self.segmentation, self._window, executor), executor)
         count = self.segmentation.count(values.shape[1])
         self.count.add(self._position, count)
@@ -311,12 +312,12 @@ class AutoSpectraAccumulator(SpectraAccumulator[AutoSpectra]):
     products = POWERS
 
 
-def line_frequencies_hz(samples: int, sample_rate_hz: float) -> NDArray[np.float64]:
+def line_frequencies_hz(samples: int, sample_rate_hz: float) -> Real:
     """Give the frequencies of a real transform's lines, each computed from its number so that no error adds up."""
     return np.asarray(np.arange(samples // 2 + 1) * sample_rate_hz / samples, dtype=np.float64)
 
 
-def one_sided_weights(samples: int) -> NDArray[np.float64]:
+def one_sided_weights(samples: int) -> Real:
     """Give ``[frequency]`` 2 where a line has a negative twin; 1 at 0 and at an even length's last line."""
     weights = np.full(samples // 2 + 1, 2.0)
     weights[0] = 1.0
@@ -338,7 +339,7 @@ def _decay(averaging: SegmentAveraging, time_constant_s: float | None, hop_s: fl
     return exp(-hop_s / time_constant_s)
 
 
-def require_finite(block: TimeSeries, runs: Sequence[tuple[int, int]]) -> NDArray[np.float64]:
+def require_finite(block: TimeSeries, runs: Sequence[tuple[int, int]]) -> Real:
     """Give ``[channel]`` largest magnitudes within the runs.
 
     Raises

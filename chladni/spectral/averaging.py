@@ -8,6 +8,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Real
 from chladni.spectral.segment_spectra import run_all
 
 # Lines handled together, so that a product still sits in the cache when it's added to the sum.
@@ -19,7 +20,7 @@ SQUARED_TOGETHER = 4
 class SegmentAverage(Protocol):
     """What is kept of the segments seen so far."""
 
-    def add(self, spectra: NDArray[np.complex128], executor: Executor | None = None) -> None:
+    def add(self, spectra: Complex, executor: Executor | None = None) -> None:
         """Take in ``[frequency, segment, channel]`` spectra, in time order."""
 
     def merge(self, later: Self) -> None:
@@ -38,13 +39,13 @@ class _Sum(ABC):
     They are real products of [Re X_1, Im X_1, Re X_2, ...], whose parts are sorted out once at the end.
     """
 
-    def __init__(self, products: NDArray[np.float64], decay: float) -> None:
+    def __init__(self, products: Real, decay: float) -> None:
         self.decay = decay
         self.segments = 0
         self.weight = 0.0
         self.products = products
 
-    def add(self, spectra: NDArray[np.complex128], executor: Executor | None = None) -> None:
+    def add(self, spectra: Complex, executor: Executor | None = None) -> None:
         """See `SegmentAverage`."""
         count = spectra.shape[1]
         weights = self.decay ** np.arange(count - 1, -1, -1)
@@ -90,7 +91,7 @@ class _Sum(ABC):
             self.products *= fading
 
     @abstractmethod
-    def _of(self, parts: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _of(self, parts: Real) -> Real:
         """Products of ``[line, segment, part]``, summed over segments."""
 
     @abstractmethod
@@ -107,11 +108,11 @@ class WeightedSum(_Sum):
     def __init__(self, lines: int, channels: int, decay: float = 1.0) -> None:
         super().__init__(np.zeros((lines, 2 * channels, 2 * channels)), decay)
 
-    def _of(self, parts: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _of(self, parts: Real) -> Real:
         # NumPy sees a matrix times its own transpose and calls the symmetric product.
         return np.asarray(np.matmul(parts.transpose(0, 2, 1), parts), dtype=np.float64)
 
-    def _density(self) -> NDArray[np.complex128]:
+    def _density(self) -> Complex:
         # conj(a + jb)(c + jd) = (ac + bd) + j(ad - bc)
         products = self.products.transpose(1, 2, 0)
         density = np.empty((products.shape[0] // 2, products.shape[1] // 2, products.shape[2]), dtype=np.complex128)
@@ -126,7 +127,7 @@ class WeightedPowers(_Sum):
     def __init__(self, lines: int, channels: int, decay: float = 1.0) -> None:
         super().__init__(np.zeros((lines, 2 * channels)), decay)
 
-    def _of(self, parts: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _of(self, parts: Real) -> Real:
         # The same product of BLAS as for the pairs, of a few channels each: a sum of squares would be summed in
         # another order, and be slower.
         lines, segments, count = parts.shape
@@ -139,7 +140,7 @@ class WeightedPowers(_Sum):
                 powers[:, some] = squares.diagonal(axis1=2, axis2=3).reshape(lines, -1)
         return powers
 
-    def _density(self) -> NDArray[np.float64]:
+    def _density(self) -> Real:
         return np.ascontiguousarray((self.products[:, 0::2] + self.products[:, 1::2]).T)
 
 
@@ -149,7 +150,7 @@ class _Hold(ABC):
     def __init__(self, held: NDArray[Any]) -> None:
         self.held = held
 
-    def add(self, spectra: NDArray[np.complex128], executor: Executor | None = None) -> None:
+    def add(self, spectra: Complex, executor: Executor | None = None) -> None:
         """See `SegmentAverage`."""
 
         def hold(first: int) -> None:
@@ -179,7 +180,7 @@ class _Hold(ABC):
         np.copyto(held, candidate, where=np.abs(candidate) > np.abs(held))
 
     @abstractmethod
-    def _of(self, segment: NDArray[np.complex128]) -> NDArray[Any]:
+    def _of(self, segment: Complex) -> NDArray[Any]:
         """Products of the spectra of one segment, ``[line, channel]``."""
 
 
@@ -189,7 +190,7 @@ class PeakHold(_Hold):
     def __init__(self, lines: int, channels: int) -> None:
         super().__init__(np.zeros((lines, channels, channels), dtype=np.complex128))
 
-    def _of(self, segment: NDArray[np.complex128]) -> NDArray[Any]:
+    def _of(self, segment: Complex) -> NDArray[Any]:
         return np.asarray(segment.conj()[:, :, np.newaxis] * segment[:, np.newaxis, :])
 
 
@@ -199,5 +200,5 @@ class PowerHold(_Hold):
     def __init__(self, lines: int, channels: int) -> None:
         super().__init__(np.zeros((lines, channels)))
 
-    def _of(self, segment: NDArray[np.complex128]) -> NDArray[Any]:
+    def _of(self, segment: Complex) -> NDArray[Any]:
         return np.asarray((segment.conj() * segment).real)

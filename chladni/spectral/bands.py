@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -32,10 +32,10 @@ class BandLevels(Value):
         How it was made.
     """
 
-    low_hz: NDArray[np.float64]
-    high_hz: NDArray[np.float64]
-    rms: NDArray[np.float64]
-    std: NDArray[np.float64]
+    low_hz: Real
+    high_hz: Real
+    rms: Real
+    std: Real
     channels: tuple[Channel, ...]
     provenance: Provenance
 
@@ -119,7 +119,7 @@ def total_rms(density: PowerSpectralDensity) -> BandLevels:
     return band_rms(density, bands_hz=[(float(cells[0]), float(cells[-1]))])
 
 
-def _spacings(frequency_hz: NDArray[np.float64]) -> NDArray[np.float64]:
+def _spacings(frequency_hz: Real) -> Real:
     """Width in Hz by which each line's density counts: the spacing of the lines, at both ends too."""
     if frequency_hz.size < 2:
         raise EstimateError("one line is no spectrum; a band needs two lines or more")
@@ -127,7 +127,7 @@ def _spacings(frequency_hz: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray((np.append(steps, steps[-1]) + np.append(steps[0], steps)) / 2, dtype=np.float64)
 
 
-def _cell_edges(frequency_hz: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cell_edges(frequency_hz: Real) -> Real:
     """Edges of the cells over which the power of each line is spread."""
     spacing_hz = _spacings(frequency_hz)
     middles = (frequency_hz[1:] + frequency_hz[:-1]) / 2
@@ -137,18 +137,18 @@ def _cell_edges(frequency_hz: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([[low], middles, [frequency_hz[-1]]])
 
 
-def _tail(frequency_hz: NDArray[np.float64]) -> float:
+def _tail(frequency_hz: Real) -> float:
     """How far above its last line a spectrum of odd length still reaches."""
     return float(0.5 * (frequency_hz[-1] - frequency_hz[-2]) * (1 + 1e-9))
 
 
-def _shares(cells: NDArray[np.float64], edges: NDArray[np.float64]) -> NDArray[np.float64]:
+def _shares(cells: Real, edges: Real) -> Real:
     """``[band, line]``: share of each line's cell that lies in each band."""
     inside = np.minimum(edges[:, 1:], cells[1:]) - np.maximum(edges[:, :1], cells[:-1])
     return np.asarray(np.clip(inside, 0.0, None) / np.diff(cells), dtype=np.float64)
 
 
-def _uncovered_note(bands: NDArray[np.float64], cells: NDArray[np.float64]) -> tuple[str, ...]:
+def _uncovered_note(bands: Real, cells: Real) -> tuple[str, ...]:
     if not bands.size:
         return ()
     named = ", ".join(f"{low:g}-{high:g} Hz" for low, high in bands[:3])

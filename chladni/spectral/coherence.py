@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.coherence import Coherence
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.spectral.channel_choice import choose_channels
@@ -114,7 +114,7 @@ def partial_coherence(
     )
 
 
-def share(part: NDArray[np.float64], whole: NDArray[np.float64]) -> NDArray[np.float64]:
+def share(part: Real, whole: Real) -> Real:
     """Give part/whole within 0 to 1; 0 where the whole is 0. Rounding may lift a part above its whole."""
     ratio = np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
     return np.asarray(np.clip(ratio, 0.0, 1.0), dtype=np.float64)

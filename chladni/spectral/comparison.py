@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.special
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.channel import Channel
 from chladni.signals.comparison import DensityComparison, LevelChange, PeakChange, ResponseComparison
 from chladni.signals.errors import EstimateError
@@ -26,9 +26,6 @@ MOVED_SIGMAS = 3.5
 # Peaks looked at on each side, and how many of the highest are told: one of these may be among the lower ones there.
 PEAKS_A_CHANNEL = 30
 PEAKS_TOLD = 10
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def compare_densities(
@@ -146,7 +143,7 @@ def compare_responses(
     )
 
 
-def _ratio_surprise(before: Floats, before_std: Floats, after: Floats, after_std: Floats) -> Floats:
+def _ratio_surprise(before: Real, before_std: Real, after: Real, after_std: Real) -> Real:
     """Chance of a ratio at least as far from 1, on either side, if nothing changed; 1 where that can't be told."""
     usable = (before > 0) & (after > 0) & (before_std > 0) & (after_std > 0)
     usable &= np.isfinite(before_std) & np.isfinite(after_std)
@@ -161,7 +158,7 @@ def _ratio_surprise(before: Floats, before_std: Floats, after: Floats, after_std
     return np.where(usable, np.minimum(2 * np.minimum(below, above), 1.0), 1.0)
 
 
-def _difference_surprise(before: FrequencyResponse, after: FrequencyResponse) -> Floats:
+def _difference_surprise(before: FrequencyResponse, after: FrequencyResponse) -> Real:
     variance = before.std**2 + after.std**2
     distance = np.abs(after.values - before.values) ** 2
     statistic = np.divide(distance, 2 * variance, out=np.zeros(distance.shape), where=(variance > 0) & (distance > 0))
@@ -172,7 +169,7 @@ def _difference_surprise(before: FrequencyResponse, after: FrequencyResponse) ->
     return np.asarray((1 + 2 * statistic / freedom) ** (-freedom / 2), dtype=np.float64)
 
 
-def _discoveries(surprise: Floats, share: float) -> Mask:
+def _discoveries(surprise: Real, share: float) -> Mask:
     """Benjamini & Hochberg (1995): reject the k smallest p-values, k the largest with p_(k) <= k q / m."""
     ranked = np.sort(surprise, axis=None)
     passed = np.flatnonzero(ranked <= share * np.arange(1, ranked.size + 1) / ranked.size)
@@ -246,7 +243,7 @@ def _response_peaks(before: FrequencyResponse, after: FrequencyResponse, signifi
     return tuple(changes)
 
 
-def _fates(old: Sequence[Peak], new: Sequence[Peak], frequency_hz: Floats, significant: Mask) -> list[PeakChange]:
+def _fates(old: Sequence[Peak], new: Sequence[Peak], frequency_hz: Real, significant: Mask) -> list[PeakChange]:
     """Pair peaks, the nearest first; those without a partner count only where their lines changed."""
     reach_hz = SAME_PEAK_LINES * float(np.median(np.diff(frequency_hz)))
     # The nearest pair first: a greedy choice, but peaks further apart than their shifts can't be mixed up by it.
@@ -311,7 +308,7 @@ def _functions(response: FrequencyResponse, answers: Sequence[str], sources: Seq
     )
 
 
-def _require_same_lines(before_hz: Floats, after_hz: Floats) -> None:
+def _require_same_lines(before_hz: Real, after_hz: Real) -> None:
     if before_hz.shape == after_hz.shape and np.allclose(before_hz, after_hz, rtol=1e-6, atol=0):
         return
     described = [f"{hz.size} lines to {hz[-1]:g} Hz" for hz in (before_hz, after_hz)]

@@ -3,13 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Mask, Real
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.spectral.power_spectral_density import auto_densities
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 # Power below this share of the strongest lines is below what a 16-bit chain can tell from its own errors.
 DYNAMIC_RANGE = 1e-6
@@ -62,7 +59,7 @@ def excited_lines(spectra: CrossSpectra, references: Sequence[str], *, hammer_ra
     return np.array([_above_step(power, line, fewest) for power, line in zip(powers, mask, strict=True)])
 
 
-def repeated_density(spectra: CrossSpectra) -> NDArray[np.complex128]:
+def repeated_density(spectra: CrossSpectra) -> Complex:
     """Give what repeats: for periodic excitation the products of the mean period, else the averaged density itself.
 
     The average of M periods holds (M - 1)/M of the scatter between them more than the mean period does.
@@ -82,7 +79,7 @@ def excitation_notes(excited: Mask, references: Sequence[str]) -> tuple[str, ...
     )
 
 
-def _stands_out(power: Floats, scatter: Floats, periods: int) -> Mask:
+def _stands_out(power: Real, scatter: Real, periods: int) -> Mask:
     # F(2, d) has the closed survival function (1 + 2 x / d)^(-d/2).
     freedom = 2 * (periods - 1)
     chance = 0.1 / power.shape[-1]
@@ -90,7 +87,7 @@ def _stands_out(power: Floats, scatter: Floats, periods: int) -> Mask:
     return np.asarray(periods * power > quantile * scatter)
 
 
-def _above_step(power: Floats, mask: Mask, fewest: float) -> Mask:
+def _above_step(power: Real, mask: Mask, fewest: float) -> Mask:
     ranked = np.sort(power[mask])[::-1]
     first = int(np.ceil(fewest)) - 1
     if ranked.size < first + 2:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
 
@@ -18,8 +18,6 @@ TRIGGER_SHARE = 0.1
 NOISE_SIGMAS = 10.0
 # A rounded crest rises above its highest samples by far less than this share of the peak; a clipped one lost more.
 CLIPPED_SHARE = 0.03
-
-Samples = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,14 +42,14 @@ class Pulses:
         Bumps above the noise that stay below the level.
     """
 
-    force: Samples
+    force: Real
     unit: str
     sign: float
     noise: float
     level: float
-    starts: NDArray[np.int64]
-    peaks: NDArray[np.int64]
-    widths: NDArray[np.int64]
+    starts: Whole
+    peaks: Whole
+    widths: Whole
     ignored: int
 
 
@@ -93,7 +91,7 @@ def find_pulses(series: TimeSeries, channel: str, *, level: float | None) -> Pul
     )
 
 
-def _groups(force: Samples, threshold: float, apart: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _groups(force: Real, threshold: float, apart: int) -> tuple[Whole, Whole]:
     """First sample above the threshold, and highest sample, of each group of samples less than `apart` apart."""
     above = np.flatnonzero(force > threshold)
     if not above.size:
@@ -105,7 +103,7 @@ def _groups(force: Samples, threshold: float, apart: int) -> tuple[NDArray[np.in
     return starts, peaks
 
 
-def typical_peak(force: Samples, peaks: NDArray[np.int64]) -> float:
+def typical_peak(force: Real, peaks: Whole) -> float:
     """Typical peak: median of the stronger half, so that neither bumps below nor one overload above shift it."""
     if not peaks.size:
         return 0.0
@@ -114,7 +112,7 @@ def typical_peak(force: Samples, peaks: NDArray[np.int64]) -> float:
     return float(np.median(heights[heights.size // 2 :]))
 
 
-def _width(force: Samples, peak: int) -> int:
+def _width(force: Real, peak: int) -> int:
     """Samples around the peak that stay above half of it."""
     half = force[peak] / 2
     below = np.flatnonzero(force[peak:] < half)
@@ -124,7 +122,7 @@ def _width(force: Samples, peak: int) -> int:
     return after + before - 1
 
 
-def is_clipped(x: Samples, peak: int) -> bool:
+def is_clipped(x: Real, peak: int) -> bool:
     """Whether the crest is cut flat: three samples or more at one height while both flanks point well above it."""
     height = x[peak]
     below = np.flatnonzero(np.abs(x - height) > 1e-9 * abs(height))

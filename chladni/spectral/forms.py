@@ -1,11 +1,12 @@
 """Accelerance, mobility and receptance: one frequency response in three forms."""
 
 from dataclasses import replace
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
@@ -95,7 +96,7 @@ def _motion_order(channel: Channel) -> int:
     return MOTION_ORDER[channel.unit]
 
 
-def _power_of_j_omega(frequency_hz: NDArray[np.float64], power: int) -> NDArray[np.complexfloating[Any, Any]]:
+def _power_of_j_omega(frequency_hz: Real, power: int) -> NDArray[np.complexfloating]:
     """(j 2 pi f)^power, NaN where that would divide by zero."""
     j_omega = 2j * np.pi * frequency_hz
     if power >= 0:

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Mask, Real
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
@@ -19,8 +19,6 @@ from chladni.spectral.uncertainty import periodic_response_std, response_std
 
 Estimator = Literal["H1", "H2", "Hv"]
 ESTIMATORS = ("H1", "H2", "Hv")
-
-Complex = NDArray[np.complex128]
 
 
 def frequency_response(
@@ -122,11 +120,11 @@ def _h2_square(density: Complex, references: list[int], responses: list[int]) ->
     return np.asarray(np.where(solvable, answer, np.nan), dtype=np.complex128)
 
 
-def _hv(density: Complex, chosen: ChannelChoice, solvable: NDArray[np.bool_]) -> Complex:
+def _hv(density: Complex, chosen: ChannelChoice, solvable: Mask) -> Complex:
     return np.stack([_hv_response(density, chosen.references, row, solvable) for row in chosen.responses])
 
 
-def _hv_response(density: Complex, references: list[int], response: int, solvable: NDArray[np.bool_]) -> Complex:
+def _hv_response(density: Complex, references: list[int], response: int, solvable: Mask) -> Complex:
     rows = [*references, response]
     matrix = density[np.ix_(rows, rows)].transpose(2, 0, 1)
     power = np.einsum("fii->fi", matrix).real
@@ -142,16 +140,14 @@ def _hv_response(density: Complex, references: list[int], response: int, solvabl
     return np.asarray(np.where(usable, values.T, np.nan), dtype=np.complex128)
 
 
-def _coherence(spectra: CrossSpectra, chosen: ChannelChoice) -> NDArray[np.float64]:
+def _coherence(spectra: CrossSpectra, chosen: ChannelChoice) -> Real:
     # Of the whole density, scatter included: coherence tells how much of the measured power is explained.
     density = np.asarray(spectra.density, dtype=np.complex128)
     solution = solve_lines(density, chosen.references, chosen.responses)
     return share(solution.explained, auto_densities(density)[chosen.responses])
 
 
-def _std(
-    spectra: CrossSpectra, chosen: ChannelChoice, solution: LineSolution, values: Complex
-) -> NDArray[np.float64]:
+def _std(spectra: CrossSpectra, chosen: ChannelChoice, solution: LineSolution, values: Complex) -> Real:
     if spectra.noise_density is not None and len(chosen.references) == 1:
         std = periodic_response_std(spectra, solution.values[:, 0], chosen.references[0], chosen.responses)
         return np.where(np.isfinite(values), std[:, np.newaxis], np.inf)
@@ -171,7 +167,7 @@ def _std(
 
 
 def _solvability_notes(
-    excited: NDArray[np.bool_], solution: LineSolution, names: list[str], spectra: CrossSpectra
+    excited: Mask, solution: LineSolution, names: list[str], spectra: CrossSpectra
 ) -> tuple[str, ...]:
     count = int(np.count_nonzero(excited & ~solution.solvable))
     if count == 0:

@@ -2,8 +2,8 @@
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import require_in_range
@@ -36,8 +36,6 @@ __all__ = [
     "impact_cross_spectra",
     "is_impact_test",
 ]
-
-Samples = NDArray[np.float64]
 
 
 def is_impact_test(series: TimeSeries, channel: str) -> bool:
@@ -226,7 +224,7 @@ def _why_none(impacts: Impacts) -> str:
     return f" ({reasons})"
 
 
-def _record_length(starts: NDArray[np.int64], before: int, samples: int) -> int:
+def _record_length(starts: Whole, before: int, samples: int) -> int:
     """Longest record that fits between hits; hits that follow each other unusually fast are judged, not obeyed."""
     spaces = np.diff(np.append(starts, samples + before))
     # The shortest space would obey one hasty double swing, the usual one may be a sample longer than the next.
@@ -247,7 +245,7 @@ def _advice(pulses: Pulses, double_hit_share: float, accepted: int) -> tuple[str
     return tuple(notes)
 
 
-def _record(series: TimeSeries, impacts: Impacts, hit: Hit, length: int) -> Samples:
+def _record(series: TimeSeries, impacts: Impacts, hit: Hit, length: int) -> Real:
     """Samples of one hit, each channel freed of its offset."""
     first = round(hit.time_s * series.sample_rate_hz) - round(impacts.pretrigger_s * series.sample_rate_hz)
     silent = max(-first, 0)
@@ -261,7 +259,7 @@ def _record(series: TimeSeries, impacts: Impacts, hit: Hit, length: int) -> Samp
     return np.pad(record - offset[:, np.newaxis], ((0, 0), (silent, 0)))
 
 
-def _windows(series: TimeSeries, impacts: Impacts, length: int, *, force_window: bool, decay_per_s: float) -> Samples:
+def _windows(series: TimeSeries, impacts: Impacts, length: int, *, force_window: bool, decay_per_s: float) -> Real:
     since_trigger_s = np.arange(length) / series.sample_rate_hz - impacts.pretrigger_s
     # From the record's first sample on, without a bend at the trigger: only so is it a pure shift of all poles.
     exponential = np.exp(-decay_per_s * np.arange(length) / series.sample_rate_hz)

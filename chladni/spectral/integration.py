@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.time_series import TimeSeries
@@ -18,8 +19,7 @@ from chladni.signals.value import Value
 # influence has fallen under 1.5 %; the tests confirm it.
 EDGE_PERIODS = 3.0
 
-Samples = NDArray[np.float64]
-Gain = Callable[[Samples], NDArray[np.complexfloating[Any, Any]]]
+Gain = Callable[[Real], NDArray[np.complexfloating]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -84,7 +84,7 @@ def integrate(series: TimeSeries, *, low_hz: float, times: int = 1) -> Converted
         )
     edge_s = EDGE_PERIODS / low_hz
 
-    def gain(frequency_hz: Samples) -> NDArray[np.complexfloating[Any, Any]]:
+    def gain(frequency_hz: Real) -> NDArray[np.complexfloating]:
         passed = _raised_cosine((frequency_hz - low_hz / 2) / (low_hz / 2))
         return passed / (2j * np.pi * np.where(frequency_hz == 0, 1.0, frequency_hz)) ** times
 
@@ -130,7 +130,7 @@ def differentiate(series: TimeSeries, *, high_hz: float | None = None, times: in
         raise EstimateError(f"high_hz is {high_hz} Hz; it must lie between 0 and half the rate, {nyquist_hz:g} Hz")
     edge_s = EDGE_PERIODS / (nyquist_hz - high_hz)
 
-    def gain(frequency_hz: Samples) -> NDArray[np.complexfloating[Any, Any]]:
+    def gain(frequency_hz: Real) -> NDArray[np.complexfloating]:
         passed = _raised_cosine((nyquist_hz - frequency_hz) / (nyquist_hz - high_hz))
         return passed * (2j * np.pi * frequency_hz) ** times
 
@@ -178,7 +178,7 @@ def _scaled_density(density: PowerSpectralDensity, *, low_hz: float, times: int)
 
 def _converted(
     series: TimeSeries,
-    values: Samples,
+    values: Real,
     *,
     times: int,
     band_hz: tuple[float, float],
@@ -195,7 +195,7 @@ def _converted(
     return ConvertedMotion(series=result, band_hz=band_hz, edge_s=edge_s, notes=notes)
 
 
-def _each_run(series: TimeSeries, *, edge_s: float, run: Callable[[Samples], Samples]) -> Samples:
+def _each_run(series: TimeSeries, *, edge_s: float, run: Callable[[Real], Real]) -> Real:
     """Apply `run` to every unbroken run of valid samples that is longer than its two edges; NaN elsewhere."""
     shortest = int(np.ceil(2 * edge_s * series.sample_rate_hz))
     result = np.full(series.values.shape, np.nan)
@@ -213,17 +213,15 @@ def _each_run(series: TimeSeries, *, edge_s: float, run: Callable[[Samples], Sam
     return result
 
 
-def _detrended(x: Samples) -> Samples:
+def _detrended(x: Real) -> Real:
     # With the time counted from the middle, slope and mean are independent.
     at = np.linspace(-1.0, 1.0, x.size)
     slope = (at @ x) / (at @ at)
-    line: Samples = x - x.mean() - slope * at
+    line: Real = x - x.mean() - slope * at
     return line
 
 
-def _filtered(
-    x: Samples, series: TimeSeries, edge_s: float, gain: Gain, reflection: Literal["even", "odd"]
-) -> Samples:
+def _filtered(x: Real, series: TimeSeries, edge_s: float, gain: Gain, reflection: Literal["even", "odd"]) -> Real:
     """Multiply the spectrum of a run by `gain`, the run mirrored at its ends so that it doesn't begin with a step."""
     # A record can't be mirrored further than it's long.
     margin = min(x.size - 1, int(np.ceil(edge_s * series.sample_rate_hz)))
@@ -234,13 +232,13 @@ def _filtered(
     padded[padded.size - margin :] *= fade[::-1]
     length = scipy.fft.next_fast_len(padded.size, real=True)
     spectrum = scipy.fft.rfft(padded, length) * gain(scipy.fft.rfftfreq(length, 1 / series.sample_rate_hz))
-    filtered: Samples = scipy.fft.irfft(spectrum, length)[margin : margin + x.size]
+    filtered: Real = scipy.fft.irfft(spectrum, length)[margin : margin + x.size]
     return filtered
 
 
-def _raised_cosine(position: Samples) -> Samples:
+def _raised_cosine(position: Real) -> Real:
     """0 below 0, 1 above 1, smooth between."""
-    rising: Samples = (1 - np.cos(np.pi * np.clip(position, 0.0, 1.0))) / 2
+    rising: Real = (1 - np.cos(np.pi * np.clip(position, 0.0, 1.0))) / 2
     return rising
 
 

@@ -4,8 +4,8 @@ from functools import lru_cache
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.errors import SetupError
 from chladni.spectral.windows import window_samples
 
@@ -14,7 +14,7 @@ SAMPLES = 512
 STEPS = 64
 
 
-def named_window(name: str) -> NDArray[np.float64]:
+def named_window(name: str) -> Real:
     """Sample the window that a provenance names, such as ``hann`` or ``kaiser 8.6``; boxcar when it names none.
 
     Examples
@@ -32,7 +32,7 @@ def named_window(name: str) -> NDArray[np.float64]:
         return np.ones(SAMPLES)
 
 
-def leakage(window: NDArray[np.float64], offset: NDArray[np.float64]) -> NDArray[np.float64]:
+def leakage(window: Real, offset: Real) -> Real:
     """Power that a line shows of a tone `offset` lines away, 1 for a tone on the line.
 
     Offsets are rounded to a 64th of a line. Further away than half the window's samples the power stays at what it is
@@ -48,7 +48,7 @@ def leakage(window: NDArray[np.float64], offset: NDArray[np.float64]) -> NDArray
     return np.asarray(fine[np.minimum(at, STEPS * (window.size - 1) // 2)], dtype=np.float64)
 
 
-def line_correlation(window: NDArray[np.float64]) -> float:
+def line_correlation(window: Real) -> float:
     """Sum of the squared correlations of a line with all lines, for noise: 1 for boxcar, 35/18 for Hann.
 
     Notes
@@ -65,7 +65,7 @@ def line_correlation(window: NDArray[np.float64]) -> float:
 
 
 @lru_cache(maxsize=8)
-def _fine_spectrum(window: bytes) -> NDArray[np.float64]:
+def _fine_spectrum(window: bytes) -> Real:
     """Power of a window's spectrum at every 64th of a line; kept, since one is asked for again for every peak."""
     samples = np.frombuffer(window)
     fine = np.abs(scipy.fft.rfft(samples, STEPS * samples.size)) ** 2 / samples.sum() ** 2

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from chladni.signals.arrays import Complex, Mask, Real
 
 # References whose normalised matrix is worse conditioned than this are one and the same signal to the last digits
 # that an average over noisy segments has.
@@ -26,13 +27,13 @@ class LineSolution:
         ``[frequency]``; False where the references can't be told apart or have no power.
     """
 
-    values: NDArray[np.complex128]
-    explained: NDArray[np.float64]
-    inverse: NDArray[np.float64]
-    solvable: NDArray[np.bool_]
+    values: Complex
+    explained: Real
+    inverse: Real
+    solvable: Mask
 
 
-def solve_lines(density: NDArray[np.complex128], references: list[int], responses: list[int]) -> LineSolution:
+def solve_lines(density: Complex, references: list[int], responses: list[int]) -> LineSolution:
     """Solve G_xx H^T = G_xy on each line (Bendat & Piersol 2010, chapter 7).
 
     Parameters
@@ -62,14 +63,12 @@ def solve_lines(density: NDArray[np.complex128], references: list[int], response
     )
 
 
-def _well_conditioned(matrices: NDArray[np.complex128]) -> NDArray[np.bool_]:
+def _well_conditioned(matrices: Complex) -> Mask:
     eigenvalues = np.linalg.eigvalsh(matrices)
     return np.asarray(eigenvalues[:, 0] * WORST_CONDITION > eigenvalues[:, -1])
 
 
-def conditioned_density(
-    density: NDArray[np.complex128], removed: list[int], kept: list[int]
-) -> NDArray[np.complex128]:
+def conditioned_density(density: Complex, removed: list[int], kept: list[int]) -> Complex:
     """Take out of the `kept` channels what is linearly due to the `removed` ones.
 
     G_ij.r = G_ij - G_ir G_rr^-1 G_rj (Bendat & Piersol 2010, section 7.3); lines where the removed channels can't be
@@ -79,5 +78,5 @@ def conditioned_density(
     # H^T with a row for each removed channel; NaN lines have nothing to remove.
     due = np.nan_to_num(solution.values).transpose(2, 1, 0)
     cross = density[np.ix_(kept, removed)].transpose(2, 0, 1)
-    rest: NDArray[np.complex128] = density[np.ix_(kept, kept)] - (cross @ due).transpose(1, 2, 0)
+    rest: Complex = density[np.ix_(kept, kept)] - (cross @ due).transpose(1, 2, 0)
     return rest

@@ -7,8 +7,8 @@ import numpy as np
 import scipy.ndimage
 import scipy.special
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
@@ -32,7 +32,6 @@ LARGEST_RELATIVE_STD = 2.0
 COHERENT_BY_CHANCE = 1e-3
 UPPER_BOUND_CHANCE = 1e-3
 
-Floats = NDArray[np.float64]
 # A person reads so many; more are given when asked for.
 MOST_PEAKS = 10
 
@@ -45,14 +44,14 @@ class _Curve:
     is known of a window that would have smeared them.
     """
 
-    frequency_hz: Floats
-    power: Floats
-    relative_std: Floats
-    trusted: NDArray[np.bool_]
+    frequency_hz: Real
+    power: Real
+    relative_std: Real
+    trusted: Mask
     spacing_hz: float
     first_hz: float
     line_sampled: bool
-    window: Floats
+    window: Real
     tonal: bool
     sampled: bool = False
 
@@ -218,11 +217,11 @@ def _response_curve(response: FrequencyResponse, row: int, column: int) -> _Curv
 
 
 def _curve(
-    frequency_hz: Floats,
-    power: Floats,
-    relative_std: Floats,
+    frequency_hz: Real,
+    power: Real,
+    relative_std: Real,
     *,
-    trusted: NDArray[np.bool_],
+    trusted: Mask,
     provenance: Provenance,
     bandwidth_hz: float,
     tonal: bool,
@@ -271,7 +270,7 @@ def _leaks_below_hz(provenance: Provenance, bandwidth_hz: float) -> float:
     return 0.0 if provenance.averaging in ("periodic", "impact") else bandwidth_hz
 
 
-def _coherent(response: FrequencyResponse, row: int) -> NDArray[np.bool_]:
+def _coherent(response: FrequencyResponse, row: int) -> Mask:
     """Lines whose coherence unrelated channels would hardly show: P = (1 - coherence)^(n - q) (Carter 1987).
 
     With few averages the std is itself an accident, small on some of many lines; the coherence tells which.
@@ -317,11 +316,11 @@ def _significant(curve: _Curve, min_prominence_db: float, false_alarm: float) ->
     return found
 
 
-def _upper_bound(power: Floats, freedom: Floats) -> Floats:
+def _upper_bound(power: Real, freedom: Real) -> Real:
     return np.asarray(power * freedom / scipy.special.chdtri(freedom, 1 - UPPER_BOUND_CHANCE), dtype=np.float64)
 
 
-def _maxima(curve: _Curve) -> NDArray[np.bool_]:
+def _maxima(curve: _Curve) -> Mask:
     power, frequency_hz = curve.power, curve.frequency_hz
     inner = (power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])
     # Lines on the other side of a gap in the excitation are no neighbours.
@@ -330,7 +329,7 @@ def _maxima(curve: _Curve) -> NDArray[np.bool_]:
     return np.concatenate([[False], inner, [False]])
 
 
-def _floor(curve: _Curve) -> Floats:
+def _floor(curve: _Curve) -> Real:
     """Level that the lines around would have without peaks: their running median, freed of its bias."""
     lines = min(max(FLOOR_LINES, int(FLOOR_SHARE * curve.power.size)), curve.power.size) | 1
     median = scipy.ndimage.median_filter(curve.power, size=lines, mode="reflect")
@@ -338,7 +337,7 @@ def _floor(curve: _Curve) -> Floats:
     return np.asarray(median * freedom / scipy.special.chdtri(freedom, 0.5), dtype=np.float64)
 
 
-def _valley(power: Floats, sure: Floats, line: int) -> int:
+def _valley(power: Real, sure: Real, line: int) -> int:
     """Deepest line between a peak and the next higher one, on the side where that is less deep.
 
     Lines are as deep as they surely are (`sure`, an upper bound of each): the deepest of all, an antiresonance, may
@@ -350,7 +349,7 @@ def _valley(power: Floats, sure: Floats, line: int) -> int:
     return before if sure[before] > sure[after] else after
 
 
-def _realm(power: Floats, line: int) -> tuple[int, int]:
+def _realm(power: Real, line: int) -> tuple[int, int]:
     """Next higher line on either side of a peak; the ends where none is higher."""
     higher = np.flatnonzero(power > power[line])
     left, right = higher[higher < line], higher[higher > line]
@@ -390,7 +389,7 @@ def _falls_with_the_window(curve: _Curve, line: int) -> bool:
     return bool(np.all(bounds < curve.power[line] / 2))
 
 
-def _above_half(curve: _Curve, line: int) -> NDArray[np.int64]:
+def _above_half(curve: _Curve, line: int) -> Whole:
     """Lines around a peak that stay above half of it, seen through their scatter."""
     # So many neighbours averaged scatter by a seventh, and a dip to half of the peak is no accident any more.
     lines = min(int((7 * curve.relative_std[line]) ** 2), 8) // 2
@@ -423,7 +422,7 @@ def _from_three(curve: _Curve, line: int) -> tuple[float, float, float]:
     return curve.frequency_hz[line] + offset * curve.spacing_hz, slope * std_hz, float(curve.power[line] / shown)
 
 
-def _tone(window: Floats, vertex: float) -> tuple[float, float, float]:
+def _tone(window: Real, vertex: float) -> tuple[float, float, float]:
     """Where between lines a tone lies whose lines give this vertex, the slope of that, and what its line shows."""
     offsets = np.arange(-32, 33) / 64
     shown = leakage(window, np.stack([offsets + 1, offsets, offsets - 1]))
@@ -434,7 +433,7 @@ def _tone(window: Floats, vertex: float) -> tuple[float, float, float]:
     return float(offset), float(slope), float(np.interp(offset, offsets, shown[1]))
 
 
-def _from_resonance(curve: _Curve, line: int, run: NDArray[np.int64]) -> tuple[float, float, float]:
+def _from_resonance(curve: _Curve, line: int, run: Whole) -> tuple[float, float, float]:
     """Fit of 1/G to the lines above half the peak: a parabola in frequency, a cubic where there are lines for it.
 
     A lone resonance is a parabola near its top; its neighbours skew it, which the cubic term takes up. Averaged
@@ -454,7 +453,7 @@ def _from_resonance(curve: _Curve, line: int, run: NDArray[np.int64]) -> tuple[f
     return float(curve.frequency_hz[line]), flat_std_hz, float(curve.power[line])
 
 
-def _vertex(x: Floats, power: Floats, terms: int) -> tuple[float, float, float] | None:
+def _vertex(x: Real, power: Real, terms: int) -> tuple[float, float, float] | None:
     """Where a fitted 1/G has its minimum, G there, and the vertex's std for lines of relative std 1."""
     basis = np.vander(x, terms, increasing=True)
     expected = np.exp(basis @ np.linalg.lstsq(basis, np.log(power), rcond=None)[0])
@@ -511,7 +510,7 @@ def _peak(found: _Found, unit: str, channels: tuple[str, ...], *, magnitude: boo
     )
 
 
-def _spacing(frequency_hz: Floats) -> float:
+def _spacing(frequency_hz: Real) -> float:
     return float(np.median(np.diff(frequency_hz))) if frequency_hz.size > 1 else 0.0
 
 

@@ -3,16 +3,14 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from chladni.signals.arrays import Real
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.stretches import Run, valid_runs
-
-Floats = NDArray[np.float64]
 
 # Fewer can't show both that an excitation repeats and how much it scatters.
 FEWEST_PERIODS = 3
@@ -187,7 +185,7 @@ def _active(series: TimeSeries, row: int, run: Run) -> Run:
     return first + int(loud[0]) * size, (last if loud[-1] == blocks - 1 else first + int(loud[-1] + 1) * size)
 
 
-def _self_correlation(signal: Floats) -> Floats:
+def _self_correlation(signal: Real) -> Real:
     """Correlate a signal with itself at lags up to half its length, each over the power of the parts compared."""
     lags = signal.size // 2 + 1
     padded = fft.next_fast_len(signal.size + lags, real=True)
@@ -199,7 +197,7 @@ def _self_correlation(signal: Floats) -> Floats:
     return np.asarray(np.divide(products, norm, out=np.zeros(lags), where=norm > 0), dtype=np.float64)
 
 
-def _candidates(correlation: Floats) -> list[int]:
+def _candidates(correlation: Real) -> list[int]:
     """Give lags of high maxima beyond the main lobe, shortest first."""
     below = np.flatnonzero(correlation < MAIN_LOBE_FOOT)
     if below.size == 0:
@@ -218,7 +216,7 @@ def _candidates(correlation: Floats) -> list[int]:
     return [int(lag) for lag, height in zip(lags, heights, strict=True) if height > level][:MOST_CANDIDATES]
 
 
-def _refine(correlation: Floats, lag: int) -> float:
+def _refine(correlation: Real, lag: int) -> float:
     """Fit the period to fractions of a sample at the largest of its multiples 1, 2, 4, ... that is still in sight."""
     length, multiple = float(lag), 1
     while True:
@@ -233,16 +231,16 @@ def _refine(correlation: Floats, lag: int) -> float:
         multiple *= 2
 
 
-def _parabola(three: NDArray[np.floating[Any]]) -> float:
+def _parabola(three: NDArray[np.floating]) -> float:
     curvature = three[0] - 2 * three[1] + three[2]
     return 0.0 if curvature >= 0 else float(np.clip((three[0] - three[2]) / (2 * curvature), -0.5, 0.5))
 
 
-def _height(three: NDArray[np.floating[Any]]) -> float:
+def _height(three: NDArray[np.floating]) -> float:
     return float(three[1] - (three[0] - three[2]) * _parabola(three) / 4)
 
 
-def _cut(values: NDArray[np.floating[Any]], active: Run, length: float) -> Floats:
+def _cut(values: NDArray[np.floating], active: Run, length: float) -> Real:
     """Cut ``[..., period, sample]``; a period between samples begins at the sample nearest to its begin."""
     samples = round(length)
     starts = active[0] + np.rint(np.arange((active[1] - active[0]) / length + 1) * length).astype(np.intp)
@@ -251,7 +249,7 @@ def _cut(values: NDArray[np.floating[Any]], active: Run, length: float) -> Float
     return np.asarray(values[..., index], dtype=np.float64)
 
 
-def _repeating(periods: Floats) -> Run:
+def _repeating(periods: Real) -> Run:
     """Give the longest run of periods that agree with their median."""
     periods = periods - periods.mean()
     if len(periods) < FEWEST_PERIODS:
@@ -264,7 +262,7 @@ def _repeating(periods: Floats) -> Run:
     return max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
 
 
-def _is_broadband(period: Floats) -> bool:
+def _is_broadband(period: Real) -> bool:
     period = period - period.mean()
     lines = np.abs(fft.rfft(period)) ** 2
     effective_lines = lines.sum() ** 2 / np.sum(lines**2)
@@ -272,13 +270,13 @@ def _is_broadband(period: Floats) -> bool:
     return bool(effective_lines >= FEWEST_LINES and kurtosis <= LARGEST_KURTOSIS)
 
 
-def _tolerated_drift(period: Floats) -> float:
+def _tolerated_drift(period: Real) -> float:
     lines = np.abs(fft.rfft(period - period.mean())) ** 2
     cycles_per_sample = np.sqrt(np.sum((np.arange(lines.size) / period.size) ** 2 * lines) / lines.sum())
     return max(LARGEST_DRIFT_SAMPLES, LARGEST_DRIFT_CYCLES / float(cycles_per_sample))
 
 
-def _transients(periods: Floats) -> int:
+def _transients(periods: Real) -> int:
     """Count the leading ``[channel, period, sample]`` that differ from the later ones more than those do."""
     power = np.var(periods, axis=(1, 2))
     steady: int = periods.shape[1] - 2
@@ -292,7 +290,7 @@ def _transients(periods: Floats) -> int:
     return steady
 
 
-def _noise_share(periods: Floats) -> float:
+def _noise_share(periods: Real) -> float:
     scatter = float(periods.var(axis=0, ddof=1).mean())
     power = float(np.var(periods.mean(axis=0)))
     return scatter / power if power > 0 else inf

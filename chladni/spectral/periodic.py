@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import largest_magnitudes, require_in_range
@@ -97,13 +98,13 @@ class _PeriodScatter(Generic[SpectraT]):
     products: Products[SpectraT]
     _: KW_ONLY
     row: int
-    largest: NDArray[np.float64]
+    largest: Real
     count: int = 0
     skipped: int = 0
-    mean: NDArray[np.complex128] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.complex128))
+    mean: Complex = field(default_factory=lambda: np.zeros((0, 0), dtype=np.complex128))
     total: NDArray[Any] = field(default_factory=lambda: np.zeros(0))
 
-    def add(self, period: NDArray[np.float64] | None) -> None:
+    def add(self, period: Real | None) -> None:
         if period is None:
             self.skipped += 1
             return
@@ -121,7 +122,7 @@ class _PeriodScatter(Generic[SpectraT]):
         self.mean += before / self.count
         self.products.add(self.total, before, spectra - self.mean)
 
-    def _differs(self, excitation: NDArray[np.complex128]) -> bool:
+    def _differs(self, excitation: Complex) -> bool:
         # Twice the limit of the search: the first mean is a single period, with noise of its own.
         residual = np.sum(np.abs(excitation[1:] - self.mean[self.row, 1:]) ** 2)
         return bool(residual > 2 * LARGEST_RESIDUAL * np.sum(np.abs(self.mean[self.row, 1:]) ** 2))
@@ -171,14 +172,14 @@ def _notes(period: Period, scatter: _PeriodScatter[SpectraT]) -> tuple[str, ...]
     return tuple(notes)
 
 
-def _periods(blocks: Iterator[TimeSeries], period: Period) -> Iterator[NDArray[np.float64] | None]:
+def _periods(blocks: Iterator[TimeSeries], period: Period) -> Iterator[Real | None]:
     """Cut a stream into periods; None stands for one with missing samples.
 
     The grid of periods is counted in time from the first block on: the source of the excitation goes on while the
     recorder has a gap.
     """
     start_ns: int | None = None
-    held: NDArray[np.floating[Any]] = np.empty((0, 0))
+    held: NDArray[np.floating] = np.empty((0, 0))
     good = np.empty(0, dtype=bool)
     position = 0
     for block in blocks:

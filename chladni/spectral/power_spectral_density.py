@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 
@@ -47,12 +48,12 @@ def power_spectral_density(spectra: CrossSpectra | AutoSpectra) -> PowerSpectral
     )
 
 
-def auto_densities(density: NDArray[Any]) -> NDArray[np.float64]:
+def auto_densities(density: NDArray[Any]) -> Real:
     """Give the diagonal of ``[channel, channel, frequency]`` as ``[channel, frequency]``, real; or what is that."""
     return np.asarray((np.einsum("iif->if", density) if density.ndim == 3 else density).real, dtype=np.float64)
 
 
-def _std(spectra: CrossSpectra | AutoSpectra, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _std(spectra: CrossSpectra | AutoSpectra, values: Real) -> Real:
     if spectra.noise_density is None:
         return np.asarray(values / np.sqrt(spectra.provenance.effective_averages), dtype=np.float64)
     # Scatter of |mean + noise|^2: the noise beats with the mean, and with itself.

@@ -7,13 +7,12 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.spectral.averaging import PeakHold, PowerHold, SegmentAverage, WeightedPowers, WeightedSum
 
 SpectraT = TypeVar("SpectraT", CrossSpectra, AutoSpectra)
-Complex = NDArray[np.complex128]
-
 # An average of more than this is a mistyped resolution more often than a wish.
 MOST_RESULT_BYTES = 2 << 30
 

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.provenance import Provenance
 from chladni.signals.wording import counted, rounded_up
@@ -75,7 +75,7 @@ def _times(factor: float) -> str:
     return f"{factor:.0f} times" if factor >= 10 else f"{factor:.2g} times"
 
 
-def half_power_lines(magnitude: NDArray[np.float64], peak: int) -> float:
+def half_power_lines(magnitude: Real, peak: int) -> float:
     """Give the width of a peak at 1/sqrt(2) of its height in lines, interpolated; infinite when it has no foot.
 
     Examples
@@ -88,7 +88,7 @@ def half_power_lines(magnitude: NDArray[np.float64], peak: int) -> float:
     return left + _crossing(magnitude[peak:], level)
 
 
-def _crossing(falling: NDArray[np.float64], level: float) -> float:
+def _crossing(falling: Real, level: float) -> float:
     # Written so that NaN, a line that isn't trusted, ends the peak as well.
     below = np.flatnonzero(~(falling > level))
     if below.size == 0 or not np.isfinite(falling[below[0]]):

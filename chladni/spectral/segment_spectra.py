@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy import fft
 
+from chladni.signals.arrays import Complex, Real
 from chladni.spectral.segmentation import Detrend, Segmentation
 
 # Segments are transformed in groups of about this many samples, so that a group stays in the second-level cache
@@ -17,11 +17,11 @@ GROUP_SAMPLES = 1 << 18
 
 
 def segment_spectra(
-    values: NDArray[np.floating[Any]],
+    values: NDArray[np.floating],
     segmentation: Segmentation,
-    window: NDArray[np.float64],
+    window: Real,
     executor: Executor | None = None,
-) -> NDArray[np.complex128]:
+) -> Complex:
     """Transform all whole segments of a stretch of samples.
 
     Parameters
@@ -61,9 +61,7 @@ def run_all(work: Callable[[int], None], starts: Sequence[int], executor: Execut
         pass
 
 
-def _prepare(
-    segments: NDArray[np.floating[Any]], detrend: Detrend, window: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _prepare(segments: NDArray[np.floating], detrend: Detrend, window: Real) -> Real:
     # Made here in C order: NumPy would keep the order of the samples in memory, channel before segment.
     residual = np.empty(segments.shape)
     if detrend == "none":

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from math import ceil, floor, log10
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.time_series import TimeSeries
@@ -78,7 +78,7 @@ def third_octave_bands(low_hz: float, high_hz: float) -> tuple[ThirdOctaveBand, 
     return tuple(third_octave_band(number) for number in range(first, last + 1))
 
 
-def attenuation_limits(ratio: NDArray[np.float64], *, performance_class: int) -> NDArray[np.float64]:
+def attenuation_limits(ratio: Real, *, performance_class: int) -> Real:
     """Give the mask of a third-octave filter of class 1 or 2.
 
     Parameters
@@ -151,7 +151,7 @@ def third_octave_levels(
     return replace(levels, provenance=levels.provenance.with_estimator("third octaves").with_notes(note))
 
 
-def synthesised_class(band: ThirdOctaveBand, *, spacing_hz: float, window: NDArray[np.float64]) -> int | None:
+def synthesised_class(band: ThirdOctaveBand, *, spacing_hz: float, window: Real) -> int | None:
     """Tell which class's mask the attenuation of steady tones meets when a band is summed from lines: 1, 2 or None.
 
     Parameters
@@ -209,7 +209,7 @@ def third_octave_filter(series: TimeSeries, band: ThirdOctaveBand) -> TimeSeries
     return replace(series, values=sosfilt(filter_sections(band, series.sample_rate_hz), series.values, axis=1))
 
 
-def filter_sections(band: ThirdOctaveBand, sample_rate_hz: float) -> NDArray[np.float64]:
+def filter_sections(band: ThirdOctaveBand, sample_rate_hz: float) -> Real:
     """Give the second-order sections of a band's filter, ``[section, 6]``."""
     from scipy.signal import butter
 
@@ -222,7 +222,7 @@ def filter_sections(band: ThirdOctaveBand, sample_rate_hz: float) -> NDArray[np.
     return np.asarray(butter(FILTER_ORDER, edges_hz, "bandpass", fs=sample_rate_hz, output="sos"), dtype=np.float64)
 
 
-def _breakpoints(powers: NDArray[np.float64]) -> NDArray[np.float64]:
+def _breakpoints(powers: Real) -> Real:
     """Frequency ratios of a third octave that stand for these powers of the octave ratio."""
     scale = (OCTAVE ** (1 / 6) - 1) / (OCTAVE ** (1 / 2) - 1)
     return np.asarray(1 + scale * (OCTAVE**powers - 1), dtype=np.float64)

@@ -1,15 +1,14 @@
 """Random errors: how many independent averages there are, and what scatter that leaves."""
 
 from math import comb
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
-
-Floats = NDArray[np.float64]
 
 # Orders of differences from line to line: a curve of few lines adds least to low ones, one of many to high ones.
 DIFFERENCES = (2, 3, 4, 5)
@@ -45,7 +44,7 @@ class EffectiveAverages:
     10.0
     """
 
-    def __init__(self, window: Floats, hop: int, decay: float = 1.0) -> None:
+    def __init__(self, window: Real, hop: int, decay: float = 1.0) -> None:
         self.decay = decay
         self.segments = 0
         self.weight = 0.0
@@ -89,7 +88,7 @@ class EffectiveAverages:
             self.pairs *= self.decay ** (2 * segments)
 
 
-def window_correlation(window: Floats, hop: int) -> Floats:
+def window_correlation(window: Real, hop: int) -> Real:
     """Squared correlation of segment spectra at multiples of the hop, for white noise (Welch 1967); 1 at lag 0."""
     # Segments farther apart than a window share no sample.
     lags = range(0, window.size, hop)
@@ -97,9 +96,7 @@ def window_correlation(window: Floats, hop: int) -> Floats:
     return np.asarray((overlaps / overlaps[0]) ** 2, dtype=np.float64)
 
 
-def response_std(
-    residual_power: Floats, inverse_reference_power: Floats, *, averages: float, references: int
-) -> Floats:
+def response_std(residual_power: Real, inverse_reference_power: Real, *, averages: float, references: int) -> Real:
     """Give one sigma of the magnitude of least-squares frequency responses.
 
     With q references and n effective averages,
@@ -132,7 +129,7 @@ def response_std(
     return np.asarray(np.sqrt(variance / (2 * (averages - references))), dtype=np.float64)
 
 
-def std_or_scatter(values: NDArray[np.complexfloating[Any, Any]], std: Floats) -> Floats:
+def std_or_scatter(values: NDArray[np.complexfloating], std: Real) -> Real:
     """``[..., line]`` std of functions; one that has none has the scatter from line to line instead.
 
     A file holds functions without std, coherence or averages, a single average knows none, and a model's functions
@@ -142,7 +139,7 @@ def std_or_scatter(values: NDArray[np.complexfloating[Any, Any]], std: Floats) -
     return np.where(blind, line_scatter(values), std) if blind.any() else std
 
 
-def line_scatter(values: NDArray[np.complexfloating[Any, Any]]) -> Floats:
+def line_scatter(values: NDArray[np.complexfloating]) -> Real:
     """``[..., line]`` std of the real and of the imaginary part of complex noise on smooth functions.
 
     The n-th difference of noise has binom(2n, n) times its variance, and the median of squares of complex noise is
@@ -166,7 +163,7 @@ def line_scatter(values: NDArray[np.complexfloating[Any, Any]]) -> Floats:
     return np.sqrt(np.min(found, axis=0)) if found else np.full(values.shape, np.inf)
 
 
-def _course(squares: Floats, lines: int) -> Floats:
+def _course(squares: Real, lines: int) -> Real:
     """``[..., line]`` medians of neighbours, block by block and straight lines between their middles."""
     blocks = np.array_split(squares, max(squares.shape[-1] // SCATTER_LINES, 1), axis=-1)
     medians = np.stack([np.median(block, axis=-1) for block in blocks], axis=-1)
@@ -174,7 +171,7 @@ def _course(squares: Floats, lines: int) -> Floats:
     return np.apply_along_axis(lambda levels: np.interp(np.arange(lines), middles, levels), -1, medians)
 
 
-def coherence_std(coherence: Floats, averages: float) -> Floats:
+def coherence_std(coherence: Real, averages: float) -> Real:
     """One sigma of a coherence, sqrt(2) (1 - c) sqrt(c) / sqrt(n) (Bendat & Piersol 2010, table 9.6).
 
     Infinite when one average or less went in: such a coherence is 1 whatever the data.
@@ -184,9 +181,7 @@ def coherence_std(coherence: Floats, averages: float) -> Floats:
     return np.asarray((1 - coherence) * np.sqrt(2 * coherence / averages), dtype=np.float64)
 
 
-def periodic_response_std(
-    spectra: CrossSpectra, values: NDArray[np.complex128], reference: int, responses: list[int]
-) -> Floats:
+def periodic_response_std(spectra: CrossSpectra, values: Complex, reference: int, responses: list[int]) -> Real:
     """Give one sigma of the magnitude of mean response over mean reference, from the scatter between periods.
 
         var H = |H|^2 / M (s_yy/|Y|^2 + s_xx/|X|^2 - 2 Re(s_xy/(conj(X) Y)))

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import LARGEST, require_in_range
 from chladni.signals.provenance import Provenance
@@ -23,8 +24,6 @@ DEFAULT_SEGMENT = 2048
 PORTION = 1 << 20
 # Silence longer than this between two blocks is two measurements.
 LONGEST_GAP_SAMPLES = 100_000_000
-
-Samples = NDArray[np.floating[Any]]
 
 
 def waterfall(
@@ -105,10 +104,10 @@ class _Slices:
         self.most = most
         self.group = 1
         self.count = 0
-        self._means: list[NDArray[np.float64]] = []
-        self._pending: list[NDArray[np.float64]] = []
+        self._means: list[Real] = []
+        self._pending: list[Real] = []
 
-    def add(self, segments: NDArray[np.float64]) -> None:
+    def add(self, segments: Real) -> None:
         """Add powers ``[segment, channel, frequency]``, in order."""
         for power in segments:
             self.count += 1
@@ -116,7 +115,7 @@ class _Slices:
             if len(self._pending) == self.group:
                 self._close()
 
-    def slices(self) -> tuple[Samples, NDArray[np.float64]]:
+    def slices(self) -> tuple[NDArray[np.floating], Real]:
         """Give ``[channel, slice, frequency]`` and the mean segment number of each slice."""
         means = [*self._means, *([np.mean(self._pending, axis=0)] if self._pending else [])]
         first = np.arange(len(means)) * self.group
@@ -135,7 +134,7 @@ class _Slices:
         self._pending = []
 
 
-def _precision(power: NDArray[np.float64]) -> type[np.float32 | np.float64]:
+def _precision(power: Real) -> type[np.float32 | np.float64]:
     """Single precision where it holds the powers ``[channel, slice, frequency]``, and those 16 digits below them."""
     single = np.finfo(np.float32)
     largest = np.fmax.reduce(power, axis=(1, 2), initial=0.0)
@@ -143,9 +142,7 @@ def _precision(power: NDArray[np.float64]) -> type[np.float32 | np.float64]:
     return np.float32 if fits.all() else np.float64
 
 
-def _segments(
-    blocks: Iterator[TimeSeries], first: TimeSeries, plan: Segmentation, window: NDArray[np.float64]
-) -> Iterator[NDArray[np.float64]]:
+def _segments(blocks: Iterator[TimeSeries], first: TimeSeries, plan: Segmentation, window: Real) -> Iterator[Real]:
     """Powers ``[segment, channel, frequency]`` of portion after portion, the segments that span two portions too."""
     held = np.empty((len(first.channels), 0))
     largest = np.zeros(len(first.channels))
@@ -164,7 +161,7 @@ def _segments(
     require_in_range(first.channels, largest)
 
 
-def _portions(blocks: Iterator[TimeSeries], first: TimeSeries) -> Iterator[NDArray[np.float64]]:
+def _portions(blocks: Iterator[TimeSeries], first: TimeSeries) -> Iterator[Real]:
     """Samples in portions of bounded size, NaN where nothing was measured, gaps between blocks included."""
     size = max(1, PORTION // len(first.channels))
     position = 0
@@ -187,14 +184,14 @@ def _portions(blocks: Iterator[TimeSeries], first: TimeSeries) -> Iterator[NDArr
         position = start + block.samples
 
 
-def _marked(block: TimeSeries, part: slice) -> NDArray[np.float64]:
+def _marked(block: TimeSeries, part: slice) -> Real:
     values = block.values[:, part].astype(np.float64)
     if block.valid is not None:
         values[~block.valid[:, part]] = np.nan
     return values
 
 
-def _assembled(first: TimeSeries, plan: Segmentation, window: NDArray[np.float64], slices: _Slices) -> Waterfall:
+def _assembled(first: TimeSeries, plan: Segmentation, window: Real, slices: _Slices) -> Waterfall:
     rate_hz = first.sample_rate_hz
     power, number = slices.slices()
     scale = one_sided_weights(plan.samples) / (rate_hz * np.sum(window**2))

@@ -4,8 +4,8 @@ import difflib
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.errors import SetupError
 
 Window = str | tuple[Any, ...]
@@ -28,7 +28,7 @@ _ALIASES = {"rectangular": "boxcar", "rect": "boxcar", "box": "boxcar", "ones": 
 _PARAMETERS = {"kaiser": "8.6", "tukey": "0.25", "gaussian": "100", "chebwin": "100", "dpss": "2.5"}
 
 
-def window_samples(window: Window, samples: int) -> NDArray[np.float64]:
+def window_samples(window: Window, samples: int) -> Real:
     """Sample a window, periodic (one sample short of symmetric), as averaging of spectra wants it.
 
     Parameters
@@ -88,12 +88,12 @@ def _parted(window: Window) -> Window:
         return window
 
 
-def noise_bandwidth_bins(samples: NDArray[np.float64]) -> float:
+def noise_bandwidth_bins(samples: Real) -> float:
     """Effective noise bandwidth of a window in lines, N sum(w^2)/sum(w)^2 (Harris 1978, eq. 11); 1.5 for Hann."""
     return float(samples.size * np.sum(samples**2) / np.sum(samples) ** 2)
 
 
-def _scipy_window(window: Window, samples: int) -> NDArray[np.float64]:
+def _scipy_window(window: Window, samples: int) -> Real:
     # Imported here, where a window is asked for that isn't among the cheap ones.
     from scipy.signal import get_window
 

@@ -6,22 +6,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from chladni.signals.arrays import Index, Mask, Real
 
 
-def decibels_of_power(power: NDArray[np.floating[Any]]) -> Floats:
+def decibels_of_power(power: NDArray[np.floating]) -> Real:
     """Give 10 lg(power); NaN, which is drawn as a gap, where the power is not positive."""
     # Not minus infinity: one such point would stretch every automatic axis.
     positive = np.where(power > 0, power, np.nan)
     return np.asarray(10 * np.log10(positive), dtype=np.float64)
 
 
-def decibels_of_amplitude(amplitude: NDArray[np.floating[Any]]) -> Floats:
+def decibels_of_amplitude(amplitude: NDArray[np.floating]) -> Real:
     """Give 20 lg(amplitude); NaN, which is drawn as a gap, where the amplitude is not positive."""
     return 2 * decibels_of_power(amplitude)
 
 
-def thin(values: Floats, *, limit: int) -> tuple[NDArray[np.intp], int]:
+def thin(values: Real, *, limit: int) -> tuple[Index, int]:
     """Choose the samples that a plot of at most about `limit` points needs: the extremes of each stretch.
 
     Parameters
@@ -58,7 +58,7 @@ def thin(values: Floats, *, limit: int) -> tuple[NDArray[np.intp], int]:
     return np.unique(np.concatenate(chosen)), stretch
 
 
-def without_repeated_gaps(values: Floats) -> NDArray[np.bool_]:
+def without_repeated_gaps(values: Real) -> Mask:
     """Mark the samples to draw: all that were measured, and the first NaN of each gap, which breaks the line."""
     missing = np.isnan(values)
     repeated = missing & np.concatenate(([False], missing[:-1]))
@@ -84,7 +84,7 @@ def block_maximum(values: NDArray[Any], *, axis: int, limit: int) -> tuple[NDArr
     return np.fmax.reduceat(values, starts, axis=axis), run
 
 
-def level_limits(level_db: Floats) -> tuple[float, float]:
+def level_limits(level_db: Real) -> tuple[float, float]:
     """Choose the decibels that a plot shows at first: the upper 100 dB, and never a span of less than 20 dB.
 
     A line of zero frequency that was detrended to nothing would otherwise flatten everything else.
@@ -97,7 +97,7 @@ def level_limits(level_db: Floats) -> tuple[float, float]:
     return low - room, high + room
 
 
-def line_breaks(frequency_hz: Floats) -> NDArray[np.intp]:
+def line_breaks(frequency_hz: Real) -> Index:
     """Find where a line through chosen frequencies must break: after lines followed by an unusual step.
 
     A comb with every second line excited has an even step and is joined; a band left out is not bridged.
@@ -109,12 +109,12 @@ def line_breaks(frequency_hz: Floats) -> NDArray[np.intp]:
     return np.flatnonzero(steps > 1.5 * np.median(steps)) + 1
 
 
-def phase_wraps(phase_deg: Floats) -> NDArray[np.intp]:
+def phase_wraps(phase_deg: Real) -> Index:
     """Find where a phase between -180 and 180 degrees jumps round, so that no line is drawn down the plot."""
     return np.flatnonzero(np.abs(np.diff(phase_deg)) > 180) + 1
 
 
-def with_breaks(x: Floats, y: Floats, breaks: NDArray[np.intp]) -> tuple[Floats, Floats]:
+def with_breaks(x: Real, y: Real, breaks: Index) -> tuple[Real, Real]:
     """Insert a NaN before each index in `breaks`, half-way on the x axis.
 
     Parameters
@@ -132,7 +132,7 @@ def with_breaks(x: Floats, y: Floats, breaks: NDArray[np.intp]) -> tuple[Floats,
     return np.insert(x, breaks, middles), np.insert(y, breaks, np.nan, axis=0)
 
 
-def ticks(low: float, high: float, *, count: int = 5) -> Floats:
+def ticks(low: float, high: float, *, count: int = 5) -> Real:
     """Give round numbers between `low` and `high`, about `count` of them: steps of 1, 2 or 5 times a power of ten.
 
     Examples

@@ -4,8 +4,8 @@ import re
 from math import floor, isfinite, log10
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.viewers.labels import printed_unit
 
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 3: "k", 6: "M", 9: "G", 12: "T"}
@@ -59,7 +59,7 @@ def span(low: float, high: float, unit: str) -> str:
     return f"{_digits(low / scale)} to {_digits(high / scale)} {prefix}{printed_unit(unit)}".rstrip()
 
 
-def axis_scale(values: NDArray[np.float64], unit: str) -> tuple[float, str]:
+def axis_scale(values: Real, unit: str) -> tuple[float, str]:
     """Give the scale of an axis and its printed unit, so that the largest of its numbers is easily read.
 
     Examples

@@ -3,7 +3,7 @@
 import numpy as np
 
 from chladni.gap.records.diagnosis import GapSignals
-from chladni.viewers.drawing import Floats
+from chladni.signals.arrays import Real
 from chladni.viewers.engineering import percent
 
 # Of the gap so much may lie above the band that is shown; some room above it shows that nothing comes.
@@ -31,12 +31,12 @@ def band_told(signals: GapSignals) -> str:
     return f"{lines[0]:.3g} to {high_hz:.3g} of {lines[-1]:.4g} Hz, {percent(most)} of the gap above"
 
 
-def _power(density: Floats) -> Floats:
+def _power(density: Real) -> Real:
     """``[line]`` over all times that are known."""
     return np.asarray(np.nan_to_num(density, posinf=0.0).sum(axis=0))
 
 
-def _last_line(power: Floats, allowed: float) -> int:
+def _last_line(power: Real, allowed: float) -> int:
     """Line above which at most the power allowed lies."""
     rising = np.cumsum(power)
     return min(int(np.searchsorted(rising, rising[-1] - allowed)), power.size - 1)

@@ -2,14 +2,10 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.gap.records.diagnosis import Diagnosis, DistortionShare, GapSignals, Where
+from chladni.signals.arrays import Real
 from chladni.signals.value import Value, require_shape
 from chladni.viewers.style import ON_DARK, ON_LIGHT, Colour
-
-Matrix = NDArray[np.float64]
 
 # The same in every picture: what was measured, the error of the nominal model, the error with what was found.
 MEASURED_ON_LIGHT: Colour = (120, 120, 120)
@@ -33,11 +29,11 @@ class GapSpectra(Value):
         ``[output, line]``: the estimated noise.
     """
 
-    frequency_hz: Matrix
-    measured: Matrix
-    before: Matrix
-    after: Matrix
-    noise: Matrix
+    frequency_hz: Real
+    measured: Real
+    before: Real
+    after: Real
+    noise: Real
 
     def __post_init__(self) -> None:
         # Outputs in another order would be drawn against the wrong noise.

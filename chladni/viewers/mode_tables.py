@@ -4,11 +4,11 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 from math import isfinite
 
+from chladni.signals.arrays import Real
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.relative_motion import RelativeMotion
 from chladni.signals.study import Study
-from chladni.viewers.drawing import Floats
 from chladni.viewers.labels import LONGEST_NAME, value_with_deviation
 from chladni.viewers.style import Style
 
@@ -152,7 +152,7 @@ def _mass_unit(modes: ModeSet) -> str:
     return ""
 
 
-def _estimates(values: Floats, deviations: Floats) -> list[str]:
+def _estimates(values: Real, deviations: Real) -> list[str]:
     return [_estimate(float(value), float(std)) for value, std in zip(values, deviations, strict=True)]
 
 

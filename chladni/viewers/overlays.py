@@ -1,17 +1,16 @@
 """Measured functions beside those synthesised from modes: which are drawn, and together with which."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.channel import Channel
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.modal_fit import ModalFit
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.units import quotient
-from chladni.viewers.drawing import Floats
 from chladni.viewers.groups import Group, groups
 from chladni.viewers.labels import quantity, response_quantity
 
@@ -38,10 +37,10 @@ class Overlay:
 
     response: Channel
     reference: Channel
-    frequency_hz: Floats
-    synthesised: NDArray[np.complexfloating[Any, Any]]
-    measured_hz: Floats
-    measured: NDArray[np.complexfloating[Any, Any]]
+    frequency_hz: Real
+    synthesised: NDArray[np.complexfloating]
+    measured_hz: Real
+    measured: NDArray[np.complexfloating]
     error: float
 
 
@@ -88,7 +87,7 @@ def left_out(fit: ModalFit) -> str:
     return f" · the {FUNCTIONS} of {count} functions with the greatest error" if count > FUNCTIONS else ""
 
 
-def _worst(error: Floats) -> NDArray[np.bool_]:
+def _worst(error: Real) -> Mask:
     # NaN, an error that isn't known, counts as the greatest.
     order = np.argsort(-np.nan_to_num(error.ravel(), nan=np.inf), kind="stable")[:FUNCTIONS]
     chosen = np.zeros(error.size, dtype=np.bool_)
@@ -136,8 +135,8 @@ def _overlay(modes: ModeSet, fit: ModalFit, measured: FrequencyResponse | None, 
 
 
 def _measured(
-    measured: FrequencyResponse | None, response: str, reference: str, fitted_hz: Floats
-) -> tuple[Floats, NDArray[np.complexfloating[Any, Any]]]:
+    measured: FrequencyResponse | None, response: str, reference: str, fitted_hz: Real
+) -> tuple[Real, NDArray[np.complexfloating]]:
     """Give the measured function on its excited lines in the fitted band; nothing where it wasn't measured."""
     if measured is None:
         return np.empty(0), np.empty(0, dtype=np.complex128)

@@ -1,13 +1,12 @@
 """Which frequency responses are drawn together: one reference, one unit, a few responses."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.frequency_response import FrequencyResponse
-from chladni.viewers.drawing import Floats
 from chladni.viewers.groups import Group, groups
 from chladni.viewers.labels import printed_unit, response_quantity
 
@@ -40,19 +39,19 @@ class Panel:
         """The field's word for this kind of function."""
         return response_quantity(self.group.unit, self.response.references[self.reference].unit)
 
-    def frequency_hz(self) -> Floats:
+    def frequency_hz(self) -> Real:
         """Give the excited frequencies; the others hold only noise and are left out."""
         return self.response.frequency_hz[self.response.excited]
 
-    def function(self, row: int) -> NDArray[np.complexfloating[Any, Any]]:
+    def function(self, row: int) -> NDArray[np.complexfloating]:
         """Give one function on the excited frequencies."""
         return np.asarray(self.response.values[row, self.reference, self.response.excited])
 
-    def deviation(self, row: int) -> Floats:
+    def deviation(self, row: int) -> Real:
         """Give one sigma of the magnitude on the excited frequencies."""
         return np.asarray(self.response.std[row, self.reference, self.response.excited])
 
-    def coherence(self, row: int) -> Floats:
+    def coherence(self, row: int) -> Real:
         """Give the coherence on the excited frequencies."""
         return np.asarray(self.response.coherence[row, self.response.excited])
 

@@ -3,10 +3,9 @@
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.records.diagnosis import RestoringForce
-from chladni.viewers.drawing import Floats
+from chladni.signals.arrays import Bytes, Index, Real
 
 Over = Literal["displacement", "velocity"]
 
@@ -21,12 +20,12 @@ CENTRED = 1e-6
 SIGNED = np.array([(0, 114, 178), (158, 158, 158), (213, 94, 0)], dtype=np.float64)
 
 
-def spread_out(surface: RestoringForce) -> NDArray[np.intp]:
+def spread_out(surface: RestoringForce) -> Index:
     """Samples to draw, evenly over time."""
     return np.unique(np.linspace(0, surface.force.size - 1, min(POINTS, surface.force.size)).astype(np.intp))
 
 
-def motion(surface: RestoringForce, over: Over) -> Floats:
+def motion(surface: RestoringForce, over: Over) -> Real:
     """``[sample]`` of the displacement or the velocity."""
     return surface.displacement if over == "displacement" else surface.velocity
 
@@ -64,13 +63,13 @@ def motion_reach(surface: RestoringForce, over: Over) -> float:
     return _reach(motion(surface, over))
 
 
-def signed_colours(share: Floats) -> NDArray[np.uint8]:
+def signed_colours(share: Real) -> Bytes:
     """Give ``[..., rgb]`` of shares from -1 to 1; what lies outside has the colour of the end."""
     place = np.clip(np.nan_to_num(share), -1, 1) + 1
     parts = [np.interp(place, np.arange(len(SIGNED)), SIGNED[:, part]) for part in range(3)]
     return np.stack(parts, axis=-1).astype(np.uint8)
 
 
-def _reach(values: Floats) -> float:
+def _reach(values: Real) -> float:
     # Something must be left of a force that is zero nearly always, and of one that is zero throughout.
     return float(np.percentile(np.abs(values), SHOWN)) or float(np.abs(values).max()) or 1.0

@@ -3,14 +3,13 @@
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from chladni.viewers.drawing import Floats
+from chladni.signals.arrays import Index, Real
 
 
 def spread(
-    places: Floats, *, apart: tuple[float, float], first: Iterable[int] | None = None, limit: int | None = None
-) -> NDArray[np.intp]:
+    places: Real, *, apart: tuple[float, float], first: Iterable[int] | None = None, limit: int | None = None
+) -> Index:
     """Choose labels greedily so that none lies on another.
 
     Parameters

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from chladni.signals.arrays import Real
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
-from chladni.viewers.drawing import Floats
 
 # Share of the poles' span that is left free on both sides, and the share of the whole below which it's zoomed.
 ROOM, WORTH_ZOOMING = 0.1, 0.6
@@ -30,7 +30,7 @@ def title(diagram: StabilisationDiagram) -> str:
     return diagram.indicator_name[:1].upper() + diagram.indicator_name[1:]
 
 
-def _ends(values: Floats) -> tuple[float, float]:
+def _ends(values: Real) -> tuple[float, float]:
     if not values.size:
         return 0.0, 1.0
     low, high = float(values.min()), float(values.max())

@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.value import Value, require_shape
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -27,14 +25,14 @@ class StructureSketch(Value):
     """
 
     body_names: tuple[str, ...]
-    bodies: Matrix
-    body_share: Matrix
+    bodies: Real
+    body_share: Real
     joint_names: tuple[str, ...]
-    joints: Matrix
-    joint_share: Matrix
+    joints: Real
+    joint_share: Real
     signal_names: tuple[str, ...]
-    signals: Matrix
-    signal_share: Matrix
+    signals: Real
+    signal_share: Real
 
     def __post_init__(self) -> None:
         require_shape("bodies", self.bodies, (len(self.body_names), 3), "bodies and axes")
@@ -48,10 +46,10 @@ class StructureSketch(Value):
         return float(np.linalg.norm(np.ptp(self._all(), axis=0))) or 1.0
 
     @property
-    def centre(self) -> Matrix:
+    def centre(self) -> Real:
         """Middle of that box."""
         places = self._all()
         return np.asarray((places.min(axis=0) + places.max(axis=0)) / 2)
 
-    def _all(self) -> Matrix:
+    def _all(self) -> Real:
         return np.vstack([self.bodies, self.joints.reshape(-1, 3), self.signals])

@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Bytes, Real
 from chladni.signals.channel import Channel
 from chladni.signals.study import Study
 from chladni.viewers.labels import short_names
@@ -42,7 +43,7 @@ STATUS_ON_DARK: tuple[Colour, ...] = ((105, 105, 105), (240, 125, 50), (86, 180,
 AMPLITUDES = np.array([(40, 70, 160), (40, 160, 160), (235, 190, 60), (250, 90, 40)], dtype=np.float64)
 
 
-def amplitude_colours(share: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+def amplitude_colours(share: NDArray[np.floating]) -> Bytes:
     """Give ``[..., rgb]`` of amplitudes from 0 to 1; what lies outside has the colour of the end."""
     return _colours(AMPLITUDES, share)
 
@@ -51,7 +52,7 @@ def amplitude_colours(share: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
 LIKENESS = np.array([(18, 22, 40), (30, 75, 130), (20, 135, 140), (120, 175, 70), (235, 190, 60)], dtype=np.float64)
 
 
-def mac_colours(mac: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+def mac_colours(mac: NDArray[np.floating]) -> Bytes:
     """Give ``[..., rgb]`` of modal assurance criteria from 0 to 1."""
     return _colours(LIKENESS, mac)
 
@@ -105,7 +106,7 @@ class Style:
         return ON_LIGHT[self.numbers[channel.name]]
 
 
-def _colours(scale: NDArray[np.float64], share: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+def _colours(scale: Real, share: NDArray[np.floating]) -> Bytes:
     # What isn't known has the lowest colour.
     place = np.nan_to_num(np.clip(share, 0, 1)) * (len(scale) - 1)
     parts = [np.interp(place, np.arange(len(scale)), scale[:, part]) for part in range(3)]

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Index, Mask, Real
 from chladni.signals.channel import Channel
 from chladni.signals.geometry import Geometry
 from chladni.signals.visible import visible
-from chladni.viewers.drawing import Floats
 
-Motion = NDArray[np.complexfloating[Any, Any]]
 # The largest motion is drawn as this share of the structure's size.
 DRAWN_SHARE = 0.2
 
@@ -39,11 +38,11 @@ class Wireframe:
     """
 
     names: tuple[str, ...]
-    rest: Floats
+    rest: Real
     lines: tuple[tuple[int, ...], ...]
     rows: tuple[int, ...]
-    measured: NDArray[np.bool_]
-    to_motion: Floats
+    measured: Mask
+    to_motion: Real
 
     @classmethod
     def of(cls, geometry: Geometry, channels: Sequence[Channel]) -> "Wireframe | None":
@@ -78,12 +77,12 @@ class Wireframe:
         return float(np.linalg.norm(np.ptp(self.rest, axis=0))) or 1.0
 
     @property
-    def centre(self) -> Floats:
+    def centre(self) -> Real:
         """Middle of the box around the points."""
         return np.asarray((self.rest.min(axis=0) + self.rest.max(axis=0)) / 2)
 
     @property
-    def direction(self) -> Floats:
+    def direction(self) -> Real:
         """From where the structure is looked at: across its thin side, a little from the right and from above."""
         spans = np.ptp(self.rest, axis=0)
         thin_x, thin_z = spans[0] < 0.2 * spans.max(), spans[2] < 0.2 * spans.max()
@@ -92,12 +91,12 @@ class Wireframe:
         # A floor is looked at from higher than a tower.
         return np.array([0.5, -1.2, 0.9]) if thin_z and not thin_x else np.array([0.5, -1.3, 0.45])
 
-    def motion(self, shapes: Motion) -> Motion:
+    def motion(self, shapes: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
         """Give the motion ``[shape, point, axis]`` of shapes over all channels, ``[shape, channel]``."""
-        moved: Motion = np.einsum("par,sr->spa", self.to_motion, shapes[:, list(self.rows)])
+        moved: NDArray[np.complexfloating] = np.einsum("par,sr->spa", self.to_motion, shapes[:, list(self.rows)])
         return moved
 
-    def segments(self, pieces: int) -> tuple[NDArray[np.intp], Floats]:
+    def segments(self, pieces: int) -> tuple[Index, Real]:
         """Cut every line at its points and each part into equal pieces, so that colour can change along it.
 
         Returns
@@ -113,7 +112,7 @@ class Wireframe:
         return ends, np.tile(np.column_stack([cuts[:-1], cuts[1:]]), (len(parts), 1))
 
 
-def along(values: NDArray[Any], ends: NDArray[np.intp], shares: Floats) -> NDArray[Any]:
+def along(values: NDArray[Any], ends: Index, shares: Real) -> NDArray[Any]:
     """Interpolate what is known at points, ``[..., point, part]``, to both ends of each segment.
 
     Returns
@@ -125,14 +124,14 @@ def along(values: NDArray[Any], ends: NDArray[np.intp], shares: Floats) -> NDArr
     return np.asarray(first[..., None, :] + (second - first)[..., None, :] * shares[..., None])
 
 
-def amplitude(motion: Motion) -> Floats:
+def amplitude(motion: NDArray[np.complexfloating]) -> Real:
     """Give how far each point gets from rest, ``[..., point]``: the long half axis of its ellipse."""
     power = np.sum(np.abs(motion) ** 2, axis=-1)
     # For a motion in one phase both terms are equal, for a circle the second is zero.
     return np.asarray(np.sqrt((power + np.abs(np.sum(motion**2, axis=-1))) / 2))
 
 
-def furthest(motion: Motion) -> Floats:
+def furthest(motion: NDArray[np.complexfloating]) -> Real:
     """Give the real shape, largest length 1, at the instant when the point that moves most is furthest from rest."""
     shapes = np.arange(motion.shape[0])
     leader = motion[shapes, amplitude(motion).argmax(axis=1)]

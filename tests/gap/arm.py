@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 import chladni
 from chladni.gap.records.measurement import Measurement
@@ -14,6 +13,7 @@ from chladni.models.structures.structure import Body, Joint, Structure
 from chladni.models.structures.structure_input import StructureInput
 from chladni.models.structures.structure_model import StructureModel
 from chladni.models.structures.structure_output import StructureOutput
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 
@@ -56,7 +56,7 @@ def measured(
     off: dict[str, float] | None = None,
     colour: float = 0.0,
     model: StructureModel | None = None,
-    force: NDArray[np.float64] | None = None,
+    force: Real | None = None,
 ) -> Measurement:
     """Simulate the real machine and measure it.
 
@@ -106,13 +106,13 @@ def with_outputs(measurement: Measurement, names: Sequence[str]) -> Measurement:
     )
 
 
-def low_passed(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+def low_passed(signal: Real) -> Real:
     spectrum = np.fft.rfft(signal)
     frequency_hz = np.fft.rfftfreq(signal.size, 1 / RATE_HZ)
     return np.asarray(np.fft.irfft(spectrum / (1 + (frequency_hz / 200.0) ** 4), signal.size))
 
 
-def _coloured(white: NDArray[np.float64], colour: float) -> NDArray[np.float64]:
+def _coloured(white: Real, colour: float) -> Real:
     found = white.copy()
     for sample in range(1, white.shape[1]):
         found[:, sample] += colour * found[:, sample - 1]

@@ -4,17 +4,17 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from chladni.io.arrival import Arrivals, arrival_order, stored_late
+from chladni.signals.arrays import Real, Whole
 
 PERIOD_NS = 10_000_000
 COUNT = 400
 
-Order = Callable[[np.random.Generator], NDArray[np.int64]]
+Order = Callable[[np.random.Generator], Whole]
 
 
-def in_parts(rng: np.random.Generator) -> NDArray[np.int64]:
+def in_parts(rng: np.random.Generator) -> Whole:
     """Chunks of 50 messages in any order."""
     return np.arange(COUNT).reshape(-1, 50)[rng.permutation(COUNT // 50)].ravel()
 
@@ -28,10 +28,10 @@ ORDERS: dict[str, Order] = {
 
 
 def logged(
-    times_ns: NDArray[np.int64],
+    times_ns: Whole,
     *,
-    sequence: NDArray[np.int64] | None = None,
-    channel: NDArray[np.int64] | None = None,
+    sequence: Whole | None = None,
+    channel: Whole | None = None,
 ) -> Arrivals:
     """Arrivals in the order of the file."""
     return Arrivals(
@@ -74,12 +74,12 @@ def test_the_counter_tells_between_messages_of_one_log_time() -> None:
     np.testing.assert_array_equal(place[order], np.arange(COUNT))
 
 
-def episodes(rng: np.random.Generator) -> NDArray[np.int64]:
+def episodes(rng: np.random.Generator) -> Whole:
     """Simulated time that begins again after 12 messages."""
     return np.tile(np.arange(12), 30)
 
 
-def set_back(rng: np.random.Generator) -> NDArray[np.int64]:
+def set_back(rng: np.random.Generator) -> Whole:
     """A clock that is set back into what it told before, at any length of stretch."""
     starts = np.cumsum(rng.uniform(-60, 20, 12))
     return np.concatenate(
@@ -87,7 +87,7 @@ def set_back(rng: np.random.Generator) -> NDArray[np.int64]:
     )
 
 
-def before_all_else(rng: np.random.Generator) -> NDArray[np.int64]:
+def before_all_else(rng: np.random.Generator) -> Whole:
     """A clock that is set to a time before the log began."""
     return np.concatenate([5000 + np.arange(200), np.arange(200)])
 
@@ -96,7 +96,7 @@ def before_all_else(rng: np.random.Generator) -> NDArray[np.int64]:
 @pytest.mark.parametrize("resolution", [1, PERIOD_NS // 3, 2 * PERIOD_NS], ids=["exact", "coarse", "coarser"])
 @pytest.mark.parametrize("clock", [episodes, set_back, before_all_else])
 def test_a_clock_that_is_set_back_moves_no_message(
-    clock: Callable[[np.random.Generator], NDArray[np.float64]], resolution: int, counted: bool
+    clock: Callable[[np.random.Generator], Real], resolution: int, counted: bool
 ) -> None:
     times = np.rint(clock(np.random.default_rng(8)) * PERIOD_NS).astype(np.int64) // resolution * resolution
     arrivals = logged(times, sequence=np.arange(times.size) if counted else None)

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from google.protobuf import descriptor_pb2, message_factory
 from google.protobuf.descriptor_pool import DescriptorPool
-from numpy.typing import NDArray
 
 from chladni.io.log import open_log
+from chladni.signals.arrays import Real
 from tests.make_logs import START_NS, LogMaker
 
 MESSAGES = 100
@@ -101,7 +101,7 @@ def write(path: Path, encoding: str, messages: Sequence[bytes]) -> None:
             maker.write(sound, {"x": index}, START_NS + index * STEP_NS)
 
 
-def samples(path: Path) -> tuple[dict[str, NDArray[np.float64]], int]:
+def samples(path: Path) -> tuple[dict[str, Real], int]:
     """What each listed channel has on the grid of all messages, NaN for nothing; and how many messages are lost."""
     found = {}
     with open_log(path) as log:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from chladni.io.log import Log, open_log
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.testing import assert_close
 from chladni.signals.time_series import TimeSeries
@@ -34,7 +34,7 @@ from tests.make_logs import (
 AXES = ["/imu.linear_acceleration.x", "/imu.linear_acceleration.y", "/imu.linear_acceleration.z"]
 
 
-def noise(channels: int, samples: int, seed: int = 1) -> NDArray[np.float64]:
+def noise(channels: int, samples: int, seed: int = 1) -> Real:
     return np.random.default_rng(seed).standard_normal((channels, samples))
 
 
@@ -56,7 +56,7 @@ def together(blocks: Sequence[TimeSeries]) -> TimeSeries:
 
 
 @pytest.fixture(scope="module")
-def imu_log(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Log, NDArray[np.float64]]]:
+def imu_log(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Log, Real]]:
     path = tmp_path_factory.mktemp("imu") / "imu.mcap"
     linear = noise(3, 2000)
     write_imu_log(path, linear)
@@ -67,7 +67,7 @@ def imu_log(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Log, NDA
 # --- one topic ---------------------------------------------------------------------------------------------------
 
 
-def test_channels_of_an_imu(imu_log: tuple[Log, NDArray[np.float64]]) -> None:
+def test_channels_of_an_imu(imu_log: tuple[Log, Real]) -> None:
     log, _ = imu_log
     units = {channel.name: channel.unit for channel in log.channels}
     assert units == {
@@ -77,7 +77,7 @@ def test_channels_of_an_imu(imu_log: tuple[Log, NDArray[np.float64]]) -> None:
     }
 
 
-def test_samples_come_back_bit_for_bit(imu_log: tuple[Log, NDArray[np.float64]]) -> None:
+def test_samples_come_back_bit_for_bit(imu_log: tuple[Log, Real]) -> None:
     log, linear = imu_log
     series = log.read(AXES)
     np.testing.assert_array_equal(series.values, linear)
@@ -85,14 +85,14 @@ def test_samples_come_back_bit_for_bit(imu_log: tuple[Log, NDArray[np.float64]])
     assert [channel.name for channel in series.channels] == AXES
 
 
-def test_order_is_that_of_the_paths(imu_log: tuple[Log, NDArray[np.float64]]) -> None:
+def test_order_is_that_of_the_paths(imu_log: tuple[Log, Real]) -> None:
     log, linear = imu_log
     np.testing.assert_array_equal(log.read(AXES[::-1]).values, linear[::-1])
     # Asked for twice, it's there once: names are unique.
     assert log.read([AXES[1], AXES[1]]).values.shape == (1, 2000)
 
 
-def test_hidden_fields_can_be_read_by_path(imu_log: tuple[Log, NDArray[np.float64]]) -> None:
+def test_hidden_fields_can_be_read_by_path(imu_log: tuple[Log, Real]) -> None:
     log, _ = imu_log
     stamps = log.read(["/imu.header.stamp", "/imu.linear_acceleration_covariance[4]"])
     # Seconds since 1970 in double precision, rounded twice: half a microsecond.
@@ -110,7 +110,7 @@ def test_blocks_are_what_read_gives(tmp_path: Path, compression: str) -> None:
         assert_close(together(blocks), log.read(AXES), rtol=0, atol=0)
 
 
-def test_a_window_of_time(imu_log: tuple[Log, NDArray[np.float64]]) -> None:
+def test_a_window_of_time(imu_log: tuple[Log, Real]) -> None:
     log, linear = imu_log
     series = log.read(AXES, start_s=2.5, end_s=5.0)
     np.testing.assert_array_equal(series.values, linear[:, 500:1000])
@@ -129,15 +129,13 @@ def test_a_window_of_time(imu_log: tuple[Log, NDArray[np.float64]]) -> None:
         ({"start_s": float("nan")}, "must be finite"),
     ],
 )
-def test_windows_without_samples(
-    imu_log: tuple[Log, NDArray[np.float64]], window: dict[str, float], told: str
-) -> None:
+def test_windows_without_samples(imu_log: tuple[Log, Real], window: dict[str, float], told: str) -> None:
     log, _ = imu_log
     with pytest.raises(LogError, match=told):
         log.read(AXES, **window)
 
 
-def test_blocks_need_a_length(imu_log: tuple[Log, NDArray[np.float64]]) -> None:
+def test_blocks_need_a_length(imu_log: tuple[Log, Real]) -> None:
     log, _ = imu_log
     with pytest.raises(LogError, match="seconds must be finite and positive"):
         list(log.blocks(AXES, seconds=0))
@@ -164,13 +162,13 @@ def test_blocks_need_a_length(imu_log: tuple[Log, NDArray[np.float64]]) -> None:
         ("/imu{nothing==3}.orientation.x", "have no field 'nothing'"),
     ],
 )
-def test_paths_that_name_nothing(imu_log: tuple[Log, NDArray[np.float64]], path: str, told: str) -> None:
+def test_paths_that_name_nothing(imu_log: tuple[Log, Real], path: str, told: str) -> None:
     log, _ = imu_log
     with pytest.raises(LogError, match=told):
         log.read([path])
 
 
-def test_nothing_asked_for(imu_log: tuple[Log, NDArray[np.float64]]) -> None:
+def test_nothing_asked_for(imu_log: tuple[Log, Real]) -> None:
     with pytest.raises(LogError, match="no channel is asked for"):
         imu_log[0].read([])
 
@@ -178,7 +176,7 @@ def test_nothing_asked_for(imu_log: tuple[Log, NDArray[np.float64]]) -> None:
 # --- gaps, disorder, repeats -------------------------------------------------------------------------------------
 
 
-def scattered_log(path: Path, order: NDArray[np.int64], values: NDArray[np.float64]) -> None:
+def scattered_log(path: Path, order: Whole, values: Real) -> None:
     """Messages of a 100 Hz grid, written in the order given, as they're logged; some may be missing or repeated."""
     with LogMaker(path, chunk_size=2048) as log:
         channel = log.ros2("/imu", "sensor_msgs/msg/Imu", IMU)
@@ -393,7 +391,7 @@ def test_a_counter_called_timestamp_is_no_clock(tmp_path: Path) -> None:
 # --- several topics ----------------------------------------------------------------------------------------------
 
 
-def two_rates(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def two_rates(path: Path) -> tuple[Real, Real]:
     fast, slow = noise(1, 1000)[0], noise(1, 250, seed=2)[0]
     columns = {
         "/fast": (START_NS + np.arange(1000) * 5_000_000, fast),
@@ -638,7 +636,7 @@ def labelled_log(path: Path, *, twice: bool = False) -> None:
         ("/log.on", (np.arange(300) % 3 == 0).astype(float)),
     ],
 )
-def test_filters(tmp_path: Path, path: str, expected: NDArray[np.float64]) -> None:
+def test_filters(tmp_path: Path, path: str, expected: Real) -> None:
     labelled_log(tmp_path / "a.mcap")
     with open_log(tmp_path / "a.mcap") as log:
         np.testing.assert_array_equal(log.read([path]).values[0], expected)

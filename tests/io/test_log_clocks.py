@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from chladni.io import log_clocks
 from chladni.io.clocks import Stamped, clocks_of
 from chladni.io.convert import convert
 from chladni.io.log import Log, open_log
 from chladni.io.repeats import digests_of, repeats_of
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.testing import assert_close
 from chladni.signals.time_base import fit_time_base
@@ -32,17 +32,15 @@ MSG: builtin_interfaces/Time
 int32 sec
 uint32 nanosec
 """
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Topic:
     """Samples of a topic: when they were taken, what their clock said, and which of them were logged."""
 
-    true_s: Floats
-    told_s: Floats
-    values: Floats
+    true_s: Real
+    told_s: Real
+    values: Real
 
 
 def write(path: Path, topics: Mapping[str, Topic], *, chunk_size: int = 4096, start_s: float = 10.0) -> None:
@@ -295,12 +293,12 @@ def test_a_rate_that_is_none_is_refused(tmp_path: Path, rate_hz: float) -> None:
 # --- the pieces --------------------------------------------------------------------------------------------------
 
 
-def stamped(name: str, when: Ints) -> Stamped:
+def stamped(name: str, when: Whole) -> Stamped:
     return Stamped(key=(name,), stamps_ns=when, base=fit_time_base(when))
 
 
 def test_clocks_are_told_apart_by_how_often_and_when_they_were_set() -> None:
-    def restarts(rate_hz: float, lengths_s: Sequence[float]) -> Ints:
+    def restarts(rate_hz: float, lengths_s: Sequence[float]) -> Whole:
         return stamps(np.concatenate([np.arange(round(one * rate_hz)) / rate_hz for one in lengths_s]))
 
     found = clocks_of(

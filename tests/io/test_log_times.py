@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from chladni.io import grid_blocks
 from chladni.io.log import Log, open_log
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import LogError
 from chladni.signals.testing import assert_close
 from tests.io.test_log import together
@@ -41,10 +41,10 @@ LAYOUTS: Mapping[str, Mapping[str, Any]] = {
     "without chunks": {"use_chunking": False},
 }
 
-Place = Callable[[NDArray[np.int64]], NDArray[np.int64]]
+Place = Callable[[Whole], Whole]
 
 
-def require_whole(log: Log, path: str, expected: NDArray[np.float64]) -> None:
+def require_whole(log: Log, path: str, expected: Real) -> None:
     """The series has these values at 100 Hz, whole and in blocks, without a gap; and the log is as long."""
     series = log.read([path])
     assert series.sample_rate_hz == RATE_HZ

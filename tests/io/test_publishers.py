@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from chladni.io.publishers import at_once, count_by_stamps, evenly_in_turn, told_apart
+from chladni.signals.arrays import Whole
 
 SECONDS = 40.0
 
 
-def ticks(rate_hz: float, offset_s: float = 0.0, *, jitter: float = 0.0, lost: float = 0.0) -> NDArray[np.int64]:
+def ticks(rate_hz: float, offset_s: float = 0.0, *, jitter: float = 0.0, lost: float = 0.0) -> Whole:
     """Stamps of one publisher: a scatter in periods, and a share of messages that are lost."""
     rng = np.random.default_rng(round(1000 * rate_hz + 1e6 * offset_s))
     number = np.arange(int(SECONDS * rate_hz))
@@ -17,7 +17,7 @@ def ticks(rate_hz: float, offset_s: float = 0.0, *, jitter: float = 0.0, lost: f
     return np.rint((10 + times[rng.random(number.size) >= lost]) * 1e9).astype(np.int64)
 
 
-def together(*publishers: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def together(*publishers: Whole) -> tuple[Whole, Whole]:
     """Messages of all in the order of their stamps, and whose each is."""
     times = np.concatenate(publishers)
     owner = np.repeat(np.arange(len(publishers)), [one.size for one in publishers])
@@ -42,7 +42,7 @@ AT_ONCE = {
 
 
 @pytest.mark.parametrize("publishers", AT_ONCE.values(), ids=AT_ONCE.keys())
-def test_publishers_at_once(publishers: tuple[NDArray[np.int64], ...]) -> None:
+def test_publishers_at_once(publishers: tuple[Whole, ...]) -> None:
     assert at_once(*together(*publishers))
 
 
@@ -95,7 +95,7 @@ BY_STAMPS = {
 
 
 @pytest.mark.parametrize("publishers", BY_STAMPS.values(), ids=BY_STAMPS.keys())
-def test_publishers_that_only_their_stamps_tell_apart(publishers: tuple[NDArray[np.int64], ...]) -> None:
+def test_publishers_that_only_their_stamps_tell_apart(publishers: tuple[Whole, ...]) -> None:
     times, owner = together(*publishers)
     assert count_by_stamps(times, in_bursts=False) == len(publishers)
     apart = told_apart(times)
@@ -114,17 +114,17 @@ def test_publishers_that_pause_are_not_told_apart() -> None:
     assert told_apart(times[(times < 20 * 10**9) | (times > 23 * 10**9)]) == []
 
 
-def bursts(size: int) -> NDArray[np.int64]:
+def bursts(size: int) -> Whole:
     number = np.arange(4000)
     return number // size * size * 10_000_000 + number % size * 100_000
 
 
-def coarse(rate_hz: float, resolution_ns: int) -> NDArray[np.int64]:
+def coarse(rate_hz: float, resolution_ns: int) -> Whole:
     """Stamps of a clock that is coarser than the sampling."""
     return ticks(rate_hz) // resolution_ns * resolution_ns
 
 
-def delayed() -> NDArray[np.int64]:
+def delayed() -> Whole:
     """Messages that wait in a queue for a random time, and none overtakes another."""
     return np.maximum.accumulate(ticks(100) + np.random.default_rng(6).exponential(2e6, 4000).astype(np.int64))
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from chladni.cli.main import main
 from chladni.io.log import Log, open_log
 from chladni.io.log import open as open_any
+from chladni.signals.arrays import Whole
 from tests.make_logs import IMU, START_NS, LogMaker, imu, write_numbers, write_stored
 from tests.signals.stamp_makers import stamps as stamps_of
 
@@ -19,12 +19,12 @@ PERIOD_NS = 10_000_000
 CLAIMS = [-1234.5, -1.3, 0.078, 7.0, 33.4, 77.95, 119.5, 140.2, 2000.0]
 
 
-def jittered(samples: int, jitter: float, seed: int) -> NDArray[np.int64]:
+def jittered(samples: int, jitter: float, seed: int) -> Whole:
     scatter = np.random.default_rng(seed).uniform(-jitter, jitter, samples)
     return START_NS + np.rint((np.arange(samples) + scatter) * PERIOD_NS).astype(np.int64)
 
 
-def write_stamped(path: Path, stamps_ns: NDArray[np.int64], logged_ns: NDArray[np.int64]) -> None:
+def write_stamped(path: Path, stamps_ns: Whole, logged_ns: Whole) -> None:
     with LogMaker(path) as log:
         channel = log.ros2("/s", "sensor_msgs/msg/Imu", IMU)
         for number, (stamp_ns, log_ns) in enumerate(zip(stamps_ns.tolist(), logged_ns.tolist(), strict=True)):

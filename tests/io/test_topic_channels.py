@@ -10,9 +10,9 @@ import pytest
 from google.protobuf import descriptor_pb2, message_factory
 from google.protobuf.descriptor_pool import DescriptorPool
 from mcap_ros2._dynamic import serialize_dynamic
-from numpy.typing import NDArray
 
 from chladni.io.log import open_log
+from chladni.signals.arrays import Real
 from chladni.signals.errors import LogError
 from tests.make_logs import JOINT_STATE, START_NS, LogMaker, joint_state
 
@@ -83,7 +83,7 @@ def test_keys_with_brackets_of_their_own_are_not_indices(tmp_path: Path) -> None
 
 def joints_log(
     path: Path, odd: Collection[int], names: Sequence[str] = ("axis", "arm"), wrong: Sequence[str] = ("axiq", "arm")
-) -> NDArray[np.float64]:
+) -> Real:
     """Messages in `odd` have the wrong names."""
     values = np.random.default_rng(1).normal(size=(2, 300))
     with LogMaker(path) as maker:

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from chladni.io.untimed import untimed
+from chladni.signals.arrays import Mask, Whole
 from tests.make_logs import START_NS
 
 COUNT = 500
@@ -29,7 +29,7 @@ WHAT = {
 }
 
 
-def mask(places: object) -> NDArray[np.bool_]:
+def mask(places: object) -> Mask:
     told = np.zeros(COUNT, np.bool_)
     told[list(places)] = True  # type: ignore[call-overload]
     return told
@@ -56,28 +56,28 @@ def test_a_log_time_that_is_none_does_not_make_the_log_long() -> None:
     np.testing.assert_array_equal(untimed(np.where(wrong, 0, START_NS + EVEN), logged), wrong)
 
 
-def simulated() -> NDArray[np.int64]:
+def simulated() -> Whole:
     """Time from 0, whose first stamp is one."""
     return EVEN
 
 
-def episodes() -> NDArray[np.int64]:
+def episodes() -> Whole:
     return EVEN % (12 * STEP_NS)
 
 
-def set_after_a_while() -> NDArray[np.int64]:
+def set_after_a_while() -> Whole:
     """From when the machine was switched on, until the network told the time."""
     return np.where(np.arange(COUNT) < 40, EVEN, START_NS + EVEN)
 
 
-def late() -> NDArray[np.int64]:
+def late() -> Whole:
     """One message that was held up for 3 s, longer than the slack of a sound log by nothing."""
     stamps = START_NS + EVEN
     stamps[300] -= 3 * 10**9
     return stamps
 
 
-def sampled_fast() -> NDArray[np.int64]:
+def sampled_fast() -> Whole:
     """A simulation of hours that takes seconds."""
     return EVEN * 5000
 

@@ -7,19 +7,18 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.clock_check import HELD_UP, JITTERS, grid_agrees
 from chladni.signals.time_base import TimeBase, fit_batch_time_base, fit_time_base
 from chladni.signals.uniform import message_index
 from tests.signals.stamp_makers import START_NS, grid, stamps
 
-Stamps = NDArray[np.int64]
 ONE_EACH = np.ones(1, dtype=np.int64)
 KINDS = ("scattered", "log-normal", "alternating", "bimodal", "events", "dropped", "two rates", "late")
 
 
-def periods(kind: str, rng: np.random.Generator, samples: int, spread: float) -> NDArray[np.float64]:
+def periods(kind: str, rng: np.random.Generator, samples: int, spread: float) -> Real:
     """Times of one kind in periods; `spread` 0 to 1 from nearly even to wild."""
     number = np.arange(samples)
     if kind == "log-normal":

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.clock_steps import MAX_CANDIDATES, ClockSteps, find_clock_steps
 from chladni.signals.stamp_order import arrival_order, untangle
@@ -13,18 +13,17 @@ from chladni.signals.time_base import fit_batch_time_base, fit_time_base
 from chladni.signals.uniform import message_index, place
 from tests.signals.stamp_makers import START_NS, grid, in_bursts, stamps
 
-Ints = NDArray[np.int64]
 RATES_HZ = (1.0, 10.0, 250.0, 2000.0)
 
 
-def restarted(lengths: Ints, rate_hz: float) -> tuple[Ints, Ints]:
+def restarted(lengths: Whole, rate_hz: float) -> tuple[Whole, Whole]:
     """Stamps that start anew with each stretch, and the first message of each but the first."""
     first = np.cumsum(lengths) - lengths
     number = np.arange(lengths.sum()) - np.repeat(first, lengths)
     return stamps((number + 1) / rate_hz), first[1:]
 
 
-def random_lengths(seed: int, count: int, low: int, high: int) -> Ints:
+def random_lengths(seed: int, count: int, low: int, high: int) -> Whole:
     return np.random.default_rng(seed).integers(low, high + 1, count)
 
 
@@ -79,7 +78,7 @@ def test_no_sample_is_sorted_into_the_past_and_none_stands_where_the_clock_was_s
     np.testing.assert_array_equal(np.flatnonzero(~there), set_at + np.arange(set_at.size))
 
 
-def held_up(seed: int) -> tuple[Ints, int]:
+def held_up(seed: int) -> tuple[Whole, int]:
     """Ten places where one to three messages come behind up to six later ones."""
     rng = np.random.default_rng(seed)
     order = np.arange(4000)
@@ -166,7 +165,7 @@ def test_batches_of_a_clock_that_is_set_back_leave_out_one_sample() -> None:
 # --- another clock as a witness -----------------------------------------------------------------------------------
 
 
-def logged(times_s: NDArray[np.float64], seed: int = 5) -> Ints:
+def logged(times_s: Real, seed: int = 5) -> Whole:
     delay = 0.002 + np.abs(np.random.default_rng(seed).normal(0, 0.0005, times_s.size))
     return stamps(np.maximum.accumulate(times_s + delay + 3.0))
 

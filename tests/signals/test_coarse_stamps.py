@@ -4,24 +4,22 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.coarse_stamps import count_ticks, phase_period, stamp_quantum
 from chladni.signals.stamp_order import typical_period, untangle
 from chladni.signals.time_base import TimeBase, fit_time_base
 from chladni.signals.uniform import message_index
 from tests.signals.stamp_makers import START_NS, grid, in_bursts, stamps
 
-Ints = NDArray[np.int64]
 
-
-def ticked(times_s: NDArray[np.float64], tick_s: float) -> Ints:
+def ticked(times_s: Real, tick_s: float) -> Whole:
     """What a clock tells that ticks, in whole nanoseconds."""
     tick_ns = round(tick_s * 1e9)
     return START_NS + np.floor(times_s * 1e9 / tick_ns + 1e-6).astype(np.int64) * tick_ns
 
 
-def sampled(rate_hz: float, tick_s: float, samples: int, phase: float = 0.3) -> Ints:
+def sampled(rate_hz: float, tick_s: float, samples: int, phase: float = 0.3) -> Whole:
     return ticked((np.arange(samples) + phase) / rate_hz, tick_s)
 
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import resample_poly
 
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.resampling import is_staircase, join, join_resampled, resample
@@ -30,7 +31,7 @@ def sine(
     return one(np.cos(2 * np.pi * frequency_hz * times + 0.3), rate_hz, start_ns=start_ns, name=name)
 
 
-def truth(frequency_hz: float, series: TimeSeries) -> NDArray[np.float64]:
+def truth(frequency_hz: float, series: TimeSeries) -> Real:
     times = series.times_s() + (series.start_time_ns - START_NS) * 1e-9
     return np.cos(2 * np.pi * frequency_hz * times + 0.3)
 
@@ -212,7 +213,7 @@ def test_what_cant_be_resampled_is_refused() -> None:
 # --- held channels -----------------------------------------------------------------------------------------------
 
 
-def staircase(levels: NDArray[np.float64], rate_hz: float, *, name: str, held: bool = False) -> TimeSeries:
+def staircase(levels: Real, rate_hz: float, *, name: str, held: bool = False) -> TimeSeries:
     return TimeSeries(
         values=levels[None],
         sample_rate_hz=rate_hz,
@@ -294,5 +295,5 @@ def test_holding_keeps_the_delay_of_half_a_sample_that_a_held_input_has() -> Non
         (np.array([]), False),
     ],
 )
-def test_what_is_a_staircase(values: NDArray[np.float64], told: bool) -> None:
+def test_what_is_a_staircase(values: Real, told: bool) -> None:
     assert is_staircase(values) is told

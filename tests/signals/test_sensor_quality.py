@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
 
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.channel import Channel
 from chladni.signals.sensor_quality import SensorFault, sensor_quality
 from chladni.signals.time_series import TimeSeries
 
 RATE_HZ = 1000.0
 SAMPLES = 100_000
-Samples = NDArray[np.float64]
 
 
 def faults_of(
@@ -23,7 +23,7 @@ def faults_of(
     *,
     unit: str = "m/s^2",
     overload: float | None = None,
-    valid: NDArray[np.bool_] | None = None,
+    valid: Mask | None = None,
     role: str = "response",
 ) -> tuple[SensorFault, ...]:
     channel = Channel(name="/imu.x", unit=unit, overload=overload, role=role)  # type: ignore[arg-type]
@@ -38,27 +38,27 @@ def only(faults: tuple[SensorFault, ...]) -> SensorFault:
     return faults[0]
 
 
-def seconds() -> Samples:
+def seconds() -> Real:
     return np.arange(SAMPLES) / RATE_HZ
 
 
-def noise(seed: int = 1, samples: int = SAMPLES) -> Samples:
+def noise(seed: int = 1, samples: int = SAMPLES) -> Real:
     return np.random.default_rng(seed).normal(size=samples)
 
 
-def smooth(seed: int = 1) -> Samples:
-    filtered: Samples = lfilter(*butter(2, 0.1), noise(seed))
+def smooth(seed: int = 1) -> Real:
+    filtered: Real = lfilter(*butter(2, 0.1), noise(seed))
     return filtered / np.std(filtered)
 
 
-def impacts(width: int) -> Samples:
+def impacts(width: int) -> Real:
     signal = 1e-3 * noise(2)
     for start in range(1000, SAMPLES - 100, 9000):
         signal[start : start + width] += np.sin(np.pi * (np.arange(width) + 0.5) / width)
     return signal
 
 
-def ringing(background: float) -> Samples:
+def ringing(background: float) -> Real:
     decay = np.exp(-np.arange(9000) / 300) * np.sin(2 * np.pi * 0.31 * np.arange(9000))
     signal = background * noise(3)
     for start in range(1000, SAMPLES - 9000, 9000):
@@ -66,13 +66,13 @@ def ringing(background: float) -> Samples:
     return signal
 
 
-def multisine(crest_lines: int, seed: int) -> Samples:
+def multisine(crest_lines: int, seed: int) -> Real:
     lines = np.zeros(4097, dtype=complex)
     lines[1:crest_lines] = np.exp(2j * np.pi * np.random.default_rng(seed).random(crest_lines - 1))
     return np.tile(np.fft.irfft(lines), 12)
 
 
-def bursts_of_noise(quiet: float) -> Samples:
+def bursts_of_noise(quiet: float) -> Real:
     on = (np.arange(SAMPLES) // 5000) % 2 == 1
     return np.where(on, 1.0, quiet) * noise(4)
 
@@ -266,7 +266,7 @@ def test_a_motion_that_rests_at_its_end_is_not_clipped() -> None:
         (9.81 + 1e-3 * (noise(12, 500) > 0), "last digit"),
     ],
 )
-def test_a_dead_sensor(values: Samples, words: str) -> None:
+def test_a_dead_sensor(values: Real, words: str) -> None:
     fault = only(faults_of(values))
     assert (fault.kind, fault.count, fault.first_s) == ("dead", 500, 0.0)
     assert words in fault.sentence

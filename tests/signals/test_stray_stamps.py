@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.grid_index import NOWHERE
 from chladni.signals.stray_stamps import find_strays
@@ -17,12 +17,12 @@ STEP_NS = 10_000_000
 CHANNELS = [Channel(name="number")]
 
 
-def jittered(samples: int, jitter: float, seed: int) -> NDArray[np.int64]:
+def jittered(samples: int, jitter: float, seed: int) -> Whole:
     scatter = np.random.default_rng(seed).uniform(-jitter, jitter, samples)
     return START_NS + np.rint((np.arange(samples) + scatter) * STEP_NS).astype(np.int64)
 
 
-def where_it_claims(kind: str, true: NDArray[np.int64], place: int, share: float) -> int:
+def where_it_claims(kind: str, true: Whole, place: int, share: float) -> int:
     """Another time for one sample."""
     span = int(true[-1] - true[0])
     if kind == "inside":
@@ -48,9 +48,7 @@ one_wrong = given(
 )
 
 
-def spoiled(
-    samples: int, jitter: float, seed: int, kind: str, at: float, share: float
-) -> tuple[NDArray[np.int64], int]:
+def spoiled(samples: int, jitter: float, seed: int, kind: str, at: float, share: float) -> tuple[Whole, int]:
     # The first and the last sample are by themselves: before them and after them any time may be one.
     wrong = 1 + round(at * (samples - 3))
     stamps = jittered(samples, jitter, seed)
@@ -58,7 +56,7 @@ def spoiled(
     return stamps, wrong
 
 
-def require_places(values: NDArray[np.float64], first: int, wrong: int, samples: int, told: int) -> None:
+def require_places(values: Real, first: int, wrong: int, samples: int, told: int) -> None:
     """Every number at its own place but the wrong one, which is there or missing, and told where it's missing."""
     number = first + np.arange(values.size)
     there = np.isfinite(values)

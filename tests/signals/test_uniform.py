@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_base import TimeBase, fit_batch_time_base, fit_time_base
@@ -16,8 +16,7 @@ from chladni.signals.uniform import Placer, message_index, place
 from tests.signals.stamp_makers import START_NS, grid, in_bursts, stamps
 
 CHANNELS = (Channel(name="number"), Channel(name="twice"))
-Numbers = NDArray[np.int64]
-Case = tuple[Numbers, Numbers]
+Case = tuple[Whole, Whole]
 
 
 def ideal() -> Case:
@@ -146,12 +145,12 @@ CASES: list[Callable[[], Case]] = [
 ]
 
 
-def rows(number: Numbers) -> NDArray[np.float64]:
+def rows(number: Whole) -> Real:
     """Each sample's value is its true place, so that a sample in a wrong place shows."""
     return np.stack((number, 2.0 * number))
 
 
-def in_blocks(base: TimeBase, when: Numbers, values: NDArray[np.float64], seed: int) -> tuple[list[TimeSeries], int]:
+def in_blocks(base: TimeBase, when: Whole, values: Real, seed: int) -> tuple[list[TimeSeries], int]:
     rng = np.random.default_rng(seed)
     placer = Placer(base, CHANNELS)
     blocks = []

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 from rerun.chunk import RrdReader
+
+from chladni.signals.arrays import Real, Whole
 
 
 class Contents:
@@ -38,10 +39,10 @@ class Contents:
         rows = sorted((row for batch in batches for row in _rows(batch)), key=lambda row: row["time"])
         return [row.get(name) for row in rows]
 
-    def times(self, entity: str, timeline: str) -> NDArray[np.int64]:
+    def times(self, entity: str, timeline: str) -> Whole:
         return np.array(self.column(entity, timeline), dtype=np.int64)
 
-    def scalars(self, entity: str) -> NDArray[np.float64]:
+    def scalars(self, entity: str) -> Real:
         return np.array(self.column(entity, "Scalars:scalars"), dtype=np.float64)
 
     def view_names(self) -> list[str]:

@@ -4,8 +4,8 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.channel import Channel
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry, Point
@@ -45,7 +45,7 @@ PROVENANCE = Provenance(
 )
 
 
-def accelerance(frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+def accelerance(frequency_hz: Real) -> Complex:
     """[response, frequency] of the two-mode structure, force at the wrist."""
     omega = 2 * np.pi * frequency_hz
     total = np.zeros((3, frequency_hz.size), dtype=np.complex128)
@@ -56,7 +56,7 @@ def accelerance(frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
     return total
 
 
-def frequencies() -> NDArray[np.float64]:
+def frequencies() -> Real:
     return np.arange(int(RATE_HZ * SEGMENT_S / 2) + 1) / SEGMENT_S
 
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.structures.robot_arm import robot_arm
 from chladni.models.structures.structure import Structure
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.channel import Channel
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry, Point
@@ -72,7 +72,7 @@ def arm_study() -> Study:
 
 
 def _arm_modes(
-    structure: Structure, channels: tuple[Channel, ...], response: FrequencyResponse, exact: NDArray[np.complex128]
+    structure: Structure, channels: tuple[Channel, ...], response: FrequencyResponse, exact: Complex
 ) -> ModeSet:
     natural = structure.natural_modes()
     count = natural.frequency_hz.size
@@ -122,7 +122,7 @@ def _arm_modes(
     )
 
 
-def modal_a_of(structure: Structure) -> NDArray[np.complex128]:
+def modal_a_of(structure: Structure) -> Complex:
     """psi^T (2 lambda M + C) psi of each mode (Maia & Silva 1997, section 2.4)."""
     natural = structure.natural_modes()
     omega = 2 * np.pi * natural.frequency_hz
@@ -131,9 +131,7 @@ def modal_a_of(structure: Structure) -> NDArray[np.complex128]:
     return np.asarray(np.einsum("ri,rij,rj->r", natural.shapes, inner, natural.shapes))
 
 
-def stabilisation(
-    natural_hz: NDArray[np.float64], damping_ratio: NDArray[np.float64], response: FrequencyResponse
-) -> StabilisationDiagram:
+def stabilisation(natural_hz: Real, damping_ratio: Real, response: FrequencyResponse) -> StabilisationDiagram:
     """Each mode is stable from an order of its own on; a few poles of noise at each order are not."""
     rng = np.random.default_rng(1809)
     rows = []
@@ -191,7 +189,7 @@ def motions(modes: ModeSet) -> tuple[RelativeMotion, ...]:
     return tuple(sorted(found, key=lambda motion: -(motion.ratio or 0)))
 
 
-def made_modes(shapes: NDArray[np.complex128], channels: tuple[Channel, ...], first_hz: float = 10.0) -> ModeSet:
+def made_modes(shapes: Complex, channels: tuple[Channel, ...], first_hz: float = 10.0) -> ModeSet:
     """Modes from responses alone, 7 Hz apart, with the shapes given."""
     count = len(shapes)
     largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=1, keepdims=True), axis=1)

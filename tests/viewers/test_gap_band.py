@@ -4,16 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from chladni.gap.records.diagnosis import GapSignals
+from chladni.signals.arrays import Real
 from chladni.viewers.gap_band import band_told, shown_hz
 from tests import made_diagnosis as made
 
 LINES_HZ = np.arange(101.0)
 
 
-def maps(before: NDArray[np.float64], after: NDArray[np.float64]) -> GapSignals:
+def maps(before: Real, after: Real) -> GapSignals:
     """Signals whose maps have these powers at 0 to 100 Hz, at three times."""
     density, density_after = (np.tile(power, (3, 1)) for power in (before, after))
     times = np.arange(3.0)
@@ -22,7 +22,7 @@ def maps(before: NDArray[np.float64], after: NDArray[np.float64]) -> GapSignals:
     )
 
 
-def at(*lines: int, power: float = 1.0) -> NDArray[np.float64]:
+def at(*lines: int, power: float = 1.0) -> Real:
     return np.where(np.isin(LINES_HZ, lines), power, 0.0)
 
 
@@ -46,7 +46,7 @@ def test_noise_far_below_the_gap_does_not_widen_the_band_and_its_share_is_said()
     [(at(100), at(2)), (at(), at(2)), (np.full(101, np.nan), at(2))],
     ids=["up to the last line", "no gap", "nothing known"],
 )
-def test_of_a_whole_band_nothing_is_said(before: NDArray[np.float64], after: NDArray[np.float64]) -> None:
+def test_of_a_whole_band_nothing_is_said(before: Real, after: Real) -> None:
     assert shown_hz(maps(before, after)) == 100
     assert band_told(maps(before, after)) == ""
 

@@ -4,17 +4,20 @@ import io
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real
 from chladni.viewers.rerun import write_rrd
 from tests.viewers import synthetic_modes as made
 from tests.viewers.headless import HeadlessViewer, headless_viewer
 from tests.viewers.test_rerun_pictures import HAS_VULKAN
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 pytestmark = [
     pytest.mark.viewer,
@@ -32,18 +35,18 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
         yield viewer
 
 
-def pixels(viewer: HeadlessViewer) -> NDArray[np.float64]:
+def pixels(viewer: HeadlessViewer) -> Real:
     picture: NDArray[Any] = imread(io.BytesIO(viewer.picture()), format="png")
     return picture[:, :, :3].astype(np.float64)
 
 
-def red(picture: NDArray[np.float64]) -> NDArray[np.bool_]:
+def red(picture: Real) -> Mask:
     """Where the colour of the greatest amplitude is."""
     wanted = np.array([250, 90, 40]) / 255
     return np.asarray(np.abs(picture - wanted).max(axis=2) < 0.12)
 
 
-def seen(viewer: HeadlessViewer, wanted: Callable[[NDArray[np.float64]], bool]) -> NDArray[np.float64]:
+def seen(viewer: HeadlessViewer, wanted: Callable[[Real], bool]) -> Real:
     """Take pictures until one is as wanted: the viewer draws when it finds the time."""
     deadline = time.monotonic() + PATIENCE_S
     picture = pixels(viewer)
@@ -52,11 +55,11 @@ def seen(viewer: HeadlessViewer, wanted: Callable[[NDArray[np.float64]], bool]) 
     return picture
 
 
-def has_red(picture: NDArray[np.float64]) -> bool:
+def has_red(picture: Real) -> bool:
     return bool(red(picture[SHAPE]).sum() > 100)
 
 
-def across(picture: NDArray[np.float64]) -> float:
+def across(picture: Real) -> float:
     """Where on the screen the points of greatest amplitude are, from left to right."""
     columns = np.flatnonzero(red(picture[SHAPE]).any(axis=0))
     return float(columns.mean()) if columns.size else np.nan
@@ -87,7 +90,7 @@ def test_no_view_of_any_page_complains(arm: HeadlessViewer, page: str) -> None:
     arm.show(page)
     arm.move("time", 0.0)
 
-    def is_drawn(picture: NDArray[np.float64]) -> bool:
+    def is_drawn(picture: Real) -> bool:
         # More than the dark ground and its titles.
         return bool((picture[140:960] > 0.4).any(axis=2).mean() > 0.002)
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import rerun as rr
-from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
+from chladni.signals.arrays import Real
 from chladni.signals.study import Study
 from chladni.signals.time_series import TimeSeries
 from chladni.viewers.rerun import movement, write_rrd
@@ -53,7 +53,7 @@ def _plain(batch: Any) -> list[dict[str, Any]]:
     return pa.table(dict(zip(batch.schema.names, columns, strict=True))).to_pylist()
 
 
-def drawn_along_x(found: Contents, mode: int, phase_deg: int) -> NDArray[np.float64]:
+def drawn_along_x(found: Contents, mode: int, phase_deg: int) -> Real:
     """How far each point of the arm is from rest at one phase."""
     (row,) = (row for row in rows(found, f"/shapes/mode_{mode}/points", "phase") if row["phase"] == phase_deg)
     rest = np.array([point.position for point in ARM.geometry.points])

@@ -5,18 +5,21 @@ import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.study import Study
 from chladni.viewers.rerun import write_rrd
 from chladni.viewers.style import Style
 from tests.viewers import synthetic
 from tests.viewers.headless import HeadlessViewer, headless_viewer
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 DRIVERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
 HAS_VULKAN = "VK_ICD_FILENAMES" in os.environ or any(list(folder.glob("*.json")) for folder in DRIVERS)
@@ -34,15 +37,13 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
         yield viewer
 
 
-def pixels(viewer: HeadlessViewer) -> NDArray[np.float64]:
+def pixels(viewer: HeadlessViewer) -> Real:
     """[row, column, rgb] from 0 to 1."""
     picture: NDArray[Any] = imread(io.BytesIO(viewer.picture()), format="png")
     return picture[:, :, :3].astype(np.float64)
 
 
-def of_colour(
-    picture: NDArray[np.float64], colour: tuple[int, int, int], tolerance: float = 0.1
-) -> NDArray[np.bool_]:
+def of_colour(picture: Real, colour: tuple[int, int, int], tolerance: float = 0.1) -> Mask:
     return np.asarray(np.abs(picture - np.array(colour) / 255).max(axis=2) < tolerance)
 
 

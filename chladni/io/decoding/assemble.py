@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from chladni.io.decoding.piece import Piece
+    from chladni.signals.arrays import Mask, Whole
 
 
 def scattered(pieces: Sequence[Piece], messages: int) -> NDArray[np.generic]:
@@ -32,8 +33,8 @@ def scattered(pieces: Sequence[Piece], messages: int) -> NDArray[np.generic]:
 
 
 def joined(
-    pieces: Sequence[Piece], bad: NDArray[np.bool_], *, empty: NDArray[np.generic]
-) -> tuple[NDArray[np.generic], NDArray[np.int64] | None]:
+    pieces: Sequence[Piece], bad: Mask, *, empty: NDArray[np.generic]
+) -> tuple[NDArray[np.generic], Whole | None]:
     """All elements of an array field, in the order of messages and, in each, of the wire.
 
     Parameters
@@ -58,9 +59,7 @@ def joined(
     return dense_if_even(*gathered(pieces, bad, empty=empty), bad)
 
 
-def gathered(
-    pieces: Sequence[Piece], bad: NDArray[np.bool_], *, empty: NDArray[np.generic]
-) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
+def gathered(pieces: Sequence[Piece], bad: Mask, *, empty: NDArray[np.generic]) -> tuple[NDArray[np.generic], Whole]:
     """All elements of the sound messages, ``[element, ...]`` in the order of `joined`, and how many each has."""
     element_shape = empty.shape[1:]
     flat = np.concatenate([empty, *(piece.values.reshape(-1, *element_shape) for piece in pieces)])
@@ -74,9 +73,7 @@ def _is_whole(pieces: Sequence[Piece], messages: int, dimensions: int) -> bool:
     return len(pieces) == 1 and pieces[0].values.ndim == dimensions and len(pieces[0].rows) == messages
 
 
-def dense_if_even(
-    flat: NDArray[np.generic], counts: NDArray[np.int64], bad: NDArray[np.bool_]
-) -> tuple[NDArray[np.generic], NDArray[np.int64] | None]:
+def dense_if_even(flat: NDArray[np.generic], counts: Whole, bad: Mask) -> tuple[NDArray[np.generic], Whole | None]:
     """Give elements a row for each message where all sound messages have the same number of them.
 
     Parameters
@@ -104,7 +101,7 @@ def dense_if_even(
     return dense, None
 
 
-def _owners(piece: Piece, element_shape: tuple[int, ...]) -> NDArray[np.int64]:
+def _owners(piece: Piece, element_shape: tuple[int, ...]) -> Whole:
     if piece.counts is not None:
         return np.repeat(piece.rows, piece.counts)
     scalars = piece.values.ndim == 1 + len(element_shape)

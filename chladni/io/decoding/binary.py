@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from chladni.io.decoding.columns import EncodedMessages, StringValue
     from chladni.io.decoding.schema import FieldInfo, Leaf, Record, Tree
     from chladni.io.decoding.walk import WireRules
+    from chladni.signals.arrays import Bytes, Whole
 
 COMPACT_BYTES: Final = 256
 """Bytes a message for each column asked for, up to which irregular messages are first copied side by side."""
@@ -66,9 +67,9 @@ class _Batch:
 
     def strings(
         self,
-        buffer: NDArray[np.uint8],
+        buffer: Bytes,
         blocks: NDArray[np.generic],
-        counts: NDArray[np.int64] | None,
+        counts: Whole | None,
         decode: Callable[[bytes], StringValue],
     ) -> Strings:
         """Decode the strings in these places; messages with a malformed one become bad."""
@@ -220,8 +221,8 @@ class BinaryDecoder:
     def _column(self, leaf: Leaf, walk: Walk, batch: _Batch) -> Column:
         pieces, is_text = walk.pieces.get(leaf.info.path, []), leaf.info.kind == "string"
         empty: NDArray[np.generic] = np.empty((0, 2), np.int64) if is_text else np.empty(0, leaf.info.dtype)
-        counts: NDArray[np.int64] | None = None
-        nested: tuple[NDArray[np.int64], ...] = ()
+        counts: Whole | None = None
+        nested: tuple[Whole, ...] = ()
         if leaf.depth == 0:
             values = scattered(pieces, len(batch.bad))
         elif leaf.depth == 1:
@@ -235,7 +236,7 @@ class BinaryDecoder:
         decode = listed if isinstance(leaf.type, Array) else _decoded
         return Column(values=batch.strings(walk.cursor.buffer, values, counts, decode), counts=counts, nested=nested)
 
-    def _nested(self, leaf: Leaf, walk: Walk, batch: _Batch) -> tuple[NDArray[np.int64], ...]:
+    def _nested(self, leaf: Leaf, walk: Walk, batch: _Batch) -> tuple[Whole, ...]:
         levels = walk.lengths.get(leaf.info.path, [[]] * leaf.depth)
         outermost, *inner = (gathered(level, batch.bad, empty=np.empty(0, np.int64))[0] for level in levels)
         of_all = np.zeros(len(batch.bad), np.int64)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from chladni.io.decoding.schema import FieldInfo
+    from chladni.signals.arrays import Bytes, Mask, Whole
 
 StringValue = str | tuple[str, ...]
 """One string, or all strings of an array of strings."""
@@ -25,15 +26,15 @@ class EncodedMessages(Protocol):
     """Messages of one channel as they stand in one buffer."""
 
     @property
-    def buffer(self) -> NDArray[np.uint8]:
+    def buffer(self) -> Bytes:
         """Bytes that hold all messages (and whatever lies between them)."""
 
     @property
-    def offsets(self) -> NDArray[np.int64]:
+    def offsets(self) -> Whole:
         """Index of the first byte of each message."""
 
     @property
-    def lengths(self) -> NDArray[np.int64]:
+    def lengths(self) -> Whole:
         """Number of bytes of each message."""
 
 
@@ -83,11 +84,11 @@ class Column:
     """
 
     values: NDArray[np.generic] | Strings
-    counts: NDArray[np.int64] | None = None
-    nested: tuple[NDArray[np.int64], ...] = ()
+    counts: Whole | None = None
+    nested: tuple[Whole, ...] = ()
 
     @property
-    def lengths(self) -> tuple[NDArray[np.int64], ...]:
+    def lengths(self) -> tuple[Whole, ...]:
         """Length of every list, level by level as in `nested`; empty for one value a message."""
         if self.nested:
             return self.nested
@@ -122,7 +123,7 @@ class Column:
             raise LogError("a column of numbers was used as strings; choose a string field of the message")
         return self.values
 
-    def per_message(self) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
+    def per_message(self) -> tuple[NDArray[np.generic], Whole]:
         """All numbers, one message after another, and how many belong to each message.
 
         Returns
@@ -136,7 +137,7 @@ class Column:
         width = numbers.shape[1] if numbers.ndim == 2 else 1
         return numbers.reshape(-1), np.full(len(numbers), width, np.int64)
 
-    def select(self, messages: NDArray[np.bool_]) -> Column:
+    def select(self, messages: Mask) -> Column:
         """Give the column of some of the messages, dense again where those have the same number of elements.
 
         Parameters
@@ -160,7 +161,7 @@ class Column:
         return Column(values=_reshaped(values, len(counts))) if even else Column(values=values, counts=counts)
 
 
-def _taken(values: NDArray[np.generic] | Strings, chosen: NDArray[np.bool_]) -> NDArray[np.generic] | Strings:
+def _taken(values: NDArray[np.generic] | Strings, chosen: Mask) -> NDArray[np.generic] | Strings:
     if isinstance(values, Strings):
         return Strings(codes=values.codes[chosen], table=values.table)
     return values[chosen]
@@ -189,7 +190,7 @@ class Decoded:
     """
 
     columns: Mapping[str, Column]
-    bad: NDArray[np.bool_]
+    bad: Mask
     reasons: Mapping[str, int] = field(default_factory=dict)
     told: Mapping[str, int] = field(default_factory=dict)
 
@@ -259,7 +260,7 @@ def require_known(
             )
 
 
-def outside_buffer(messages: EncodedMessages) -> NDArray[np.bool_]:
+def outside_buffer(messages: EncodedMessages) -> Mask:
     """Messages whose claimed place isn't inside the buffer.
 
     Returns
@@ -268,5 +269,5 @@ def outside_buffer(messages: EncodedMessages) -> NDArray[np.bool_]:
     """
     # `size - lengths` can't overflow where `offsets + lengths` could: both are non-negative where it matters.
     room = messages.buffer.size - messages.lengths
-    outside: NDArray[np.bool_] = (messages.offsets < 0) | (messages.lengths < 0) | (messages.offsets > room)
+    outside: Mask = (messages.offsets < 0) | (messages.lengths < 0) | (messages.offsets > room)
     return outside

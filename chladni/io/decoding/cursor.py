@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from chladni.io.decoding.layout import FixedLayout
+    from chladni.signals.arrays import Bytes, Index, Mask, Whole
 
 
 class Cursor:
@@ -46,14 +47,14 @@ class Cursor:
     def __init__(
         self,
         *,
-        buffer: NDArray[np.uint8],
-        base: NDArray[np.int64],
-        size: NDArray[np.int64],
-        rows: NDArray[np.int64],
-        bad: NDArray[np.bool_],
+        buffer: Bytes,
+        base: Whole,
+        size: Whole,
+        rows: Whole,
+        bad: Mask,
         reasons: Counter[str],
         byte_order: Literal["<", ">"],
-        position: int | NDArray[np.int64] = 0,
+        position: int | Whole = 0,
     ) -> None:
         self.buffer = buffer
         self.bad = bad
@@ -64,10 +65,10 @@ class Cursor:
     def _place(
         self,
         *,
-        base: NDArray[np.int64],
-        size: NDArray[np.int64],
-        rows: NDArray[np.int64],
-        position: int | NDArray[np.int64],
+        base: Whole,
+        size: Whole,
+        rows: Whole,
+        position: int | Whole,
     ) -> None:
         self.base, self.size, self.rows = base, size, rows
         self.position = position
@@ -101,7 +102,7 @@ class Cursor:
         base = np.arange(len(self), dtype=np.int64) * length
         self._place(base=base, size=self.size, rows=self.rows, position=self.position)
 
-    def subset(self, index: NDArray[np.intp]) -> Cursor:
+    def subset(self, index: Index) -> Cursor:
         """Give a cursor on some of the rows, at the same place."""
         return Cursor(
             buffer=self.buffer,
@@ -114,7 +115,7 @@ class Cursor:
             position=self.position if isinstance(self.position, int) else self.position[index],
         )
 
-    def drop(self, wrong: NDArray[np.bool_], reason: str) -> NDArray[np.bool_] | None:
+    def drop(self, wrong: Mask, reason: str) -> Mask | None:
         """Mark rows as bad and go on without them.
 
         Parameters
@@ -134,12 +135,12 @@ class Cursor:
         self.bad[self.rows[wrong]] = True
         return self._keep(~wrong)
 
-    def drop_bad(self) -> NDArray[np.bool_] | None:
+    def drop_bad(self) -> Mask | None:
         """Go on without rows that another cursor found bad; gives the rows kept, or None where all were."""
         kept = ~self.bad[self.rows]
         return None if kept.all() else self._keep(kept)
 
-    def _keep(self, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _keep(self, kept: Mask) -> Mask:
         position = self.position if isinstance(self.position, int) else self.position[kept]
         self._place(base=self.base[kept], size=self.size[kept], rows=self.rows[kept], position=position)
         return kept
@@ -148,7 +149,7 @@ class Cursor:
         """Move to the next multiple of `alignment`, a power of two."""
         self.position = (self.position + (alignment - 1)) & -alignment
 
-    def advance(self, width: int | NDArray[np.int64]) -> None:
+    def advance(self, width: int | Whole) -> None:
         """Move by `width` bytes; whether they exist is checked by the next `claim`."""
         self.position = uniform(self.position + width)
 
@@ -156,7 +157,7 @@ class Cursor:
         """Move over a value of fixed size."""
         self.position = self.position + layout.at(self.position)
 
-    def claim(self, width: int | NDArray[np.int64], what: str) -> NDArray[np.bool_] | None:
+    def claim(self, width: int | Whole, what: str) -> Mask | None:
         """Drop rows that don't have `width` more bytes.
 
         Parameters
@@ -175,7 +176,7 @@ class Cursor:
             return None
         return self.drop(end > self.size, f"{what} runs past the end of the message")
 
-    def take(self, dtype: np.dtype[np.generic], *, at: int | NDArray[np.int64] = 0) -> NDArray[np.generic]:
+    def take(self, dtype: np.dtype[np.generic], *, at: int | Whole = 0) -> NDArray[np.generic]:
         """Read one number a message, `at` bytes after the place; bytes must have been claimed.
 
         Returns
@@ -202,7 +203,7 @@ class Cursor:
         shape: tuple[int, ...],
         strides: tuple[int, ...],
         dtype: np.dtype[np.generic],
-        at: int | NDArray[np.int64],
+        at: int | Whole,
     ) -> NDArray[np.generic]:
         rows = len(self)
         if rows == 0 or 0 in shape:
@@ -219,11 +220,11 @@ class Cursor:
     def take_ragged(
         self,
         dtype: np.dtype[np.generic],
-        counts: NDArray[np.int64],
+        counts: Whole,
         *,
-        step: NDArray[np.int64] | int | None = None,
-        first: NDArray[np.int64] | int = 0,
-        later: NDArray[np.int64] | int = 0,
+        step: Whole | int | None = None,
+        first: Whole | int = 0,
+        later: Whole | int = 0,
     ) -> NDArray[np.generic]:
         """Read a different number of numbers from each message.
 
@@ -255,7 +256,7 @@ class Cursor:
         return values
 
 
-def uniform(values: int | NDArray[np.int64]) -> int | NDArray[np.int64]:
+def uniform(values: int | Whole) -> int | Whole:
     """One number where all rows agree, else the vector itself."""
     if isinstance(values, int):
         return values
@@ -264,11 +265,11 @@ def uniform(values: int | NDArray[np.int64]) -> int | NDArray[np.int64]:
     return int(values[0]) if (values == values[0]).all() else values
 
 
-def _of_rows(values: NDArray[np.int64] | int, owner: NDArray[np.intp]) -> NDArray[np.int64] | int:
+def _of_rows(values: Whole | int, owner: Index) -> Whole | int:
     return values if isinstance(values, int) else values[owner]
 
 
-def _constant_step(base: NDArray[np.int64]) -> int | None:
+def _constant_step(base: Whole) -> int | None:
     if len(base) < 2:
         return 1
     step = int(base[1]) - int(base[0])

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from chladni.io.decoding.layout import FixedLayout
+    from chladni.signals.arrays import Whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -19,9 +17,9 @@ class ElementPlaces:
     Each is one number, or one a message.
     """
 
-    first: int | NDArray[np.int64]
-    later: int | NDArray[np.int64]
-    step: int | NDArray[np.int64]
+    first: int | Whole
+    later: int | Whole
+    step: int | Whole
 
     @property
     def evenly_spaced(self) -> bool:
@@ -46,16 +44,14 @@ class ElementSpan:
         Bytes of the whole array.
     """
 
-    phase: int | NDArray[np.int64]
-    later_phase: int | NDArray[np.int64]
-    size: int | NDArray[np.int64]
-    step: int | NDArray[np.int64]
-    total: int | NDArray[np.int64]
+    phase: int | Whole
+    later_phase: int | Whole
+    size: int | Whole
+    step: int | Whole
+    total: int | Whole
 
     @classmethod
-    def of(
-        cls, position: int | NDArray[np.int64], layout: FixedLayout, counts: int | NDArray[np.int64]
-    ) -> ElementSpan:
+    def of(cls, position: int | Whole, layout: FixedLayout, counts: int | Whole) -> ElementSpan:
         """Measure arrays of `counts` elements that start at `position`."""
         size = layout.at(position)
         later_phase = position + size

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from chladni.io.decoding.columns import StringValue
     from chladni.io.decoding.schema import Leaf
+    from chladni.signals.arrays import Mask, Whole
 
 Number = TypeVar("Number", bound=np.generic)
 
@@ -35,10 +36,10 @@ class Found:
     """
 
     values: NDArray[np.generic] | Strings
-    lengths: tuple[NDArray[np.int64], ...] = ()
+    lengths: tuple[Whole, ...] = ()
 
     @property
-    def counts(self) -> NDArray[np.int64] | None:
+    def counts(self) -> Whole | None:
         """Elements in each sound message; None where each has exactly one."""
         return totals(self.lengths) if self.lengths else None
 
@@ -64,7 +65,7 @@ class Row:
         self.values = [element for one in lists for element in one]
 
 
-def totals(lengths: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
+def totals(lengths: Sequence[Whole]) -> Whole:
     """Elements that lie in each list of the outermost level, in lists of all levels below it.
 
     Examples
@@ -137,7 +138,7 @@ def nothing(leaf: Leaf) -> NDArray[np.generic] | Strings:
     return np.empty(0, leaf.info.dtype)
 
 
-def joined_column(found: Sequence[Found], bad: NDArray[np.bool_], *, empty: NDArray[np.generic] | Strings) -> Column:
+def joined_column(found: Sequence[Found], bad: Mask, *, empty: NDArray[np.generic] | Strings) -> Column:
     """Make one column of what the blocks of a batch gave.
 
     Parameters
@@ -171,8 +172,8 @@ def joined_column(found: Sequence[Found], bad: NDArray[np.bool_], *, empty: NDAr
 
 
 def _placed(
-    flat: NDArray[np.generic], lengths: list[NDArray[np.int64]], bad: NDArray[np.bool_]
-) -> tuple[NDArray[np.generic], NDArray[np.int64] | None, tuple[NDArray[np.int64], ...]]:
+    flat: NDArray[np.generic], lengths: list[Whole], bad: Mask
+) -> tuple[NDArray[np.generic], Whole | None, tuple[Whole, ...]]:
     if not lengths:
         return (_of_all(flat, bad) if bad.any() else flat), None, ()
     if len(lengths) > 1:
@@ -180,7 +181,7 @@ def _placed(
     return *dense_if_even(flat, _of_all(lengths[0], bad), bad), ()
 
 
-def _of_all(sound: NDArray[Number], bad: NDArray[np.bool_]) -> NDArray[Number]:
+def _of_all(sound: NDArray[Number], bad: Mask) -> NDArray[Number]:
     """A value for each message, 0 for the bad ones."""
     values = np.zeros(len(bad), sound.dtype)
     values[~bad] = sound

@@ -11,9 +11,8 @@ from chladni.io.decoding.columns import Strings
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from chladni.io.decoding.columns import StringValue
+    from chladni.signals.arrays import Bytes, Mask, Whole
 
 MAX_TEMPLATES: Final = 8
 """Distinct strings searched for by comparing all messages at once, before going through them one by one."""
@@ -23,10 +22,10 @@ COMPARE_BYTES: Final = 1 << 22
 
 
 def intern_blocks(
-    buffer: NDArray[np.uint8],
-    blocks: NDArray[np.int64],
+    buffer: Bytes,
+    blocks: Whole,
     decode: Callable[[bytes], StringValue],
-) -> tuple[Strings, NDArray[np.bool_]]:
+) -> tuple[Strings, Mask]:
     """Decode strings, each distinct sequence of bytes once.
 
     Parameters
@@ -58,14 +57,14 @@ def intern_blocks(
     return Strings(codes=codes, table=table), malformed[codes]
 
 
-def _bytes_of(buffer: NDArray[np.uint8], block: NDArray[np.int64]) -> bytes:
+def _bytes_of(buffer: Bytes, block: Whole) -> bytes:
     start, length = int(block[0]), int(block[1])
     return buffer[start : start + length].tobytes()
 
 
-def _equal_to_first(buffer: NDArray[np.uint8], blocks: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _equal_to_first(buffer: Bytes, blocks: Whole) -> Mask:
     start, length = int(blocks[0, 0]), int(blocks[0, 1])
-    equal: NDArray[np.bool_] = blocks[:, 1] == length
+    equal: Mask = blocks[:, 1] == length
     if length == 0:
         return equal
     windows = np.lib.stride_tricks.sliding_window_view(buffer, length)
@@ -77,9 +76,7 @@ def _equal_to_first(buffer: NDArray[np.uint8], blocks: NDArray[np.int64]) -> NDA
     return equal
 
 
-def _decode_all(
-    values: list[bytes], decode: Callable[[bytes], StringValue]
-) -> tuple[tuple[StringValue, ...], NDArray[np.bool_]]:
+def _decode_all(values: list[bytes], decode: Callable[[bytes], StringValue]) -> tuple[tuple[StringValue, ...], Mask]:
     table: list[StringValue] = []
     malformed = np.zeros(max(1, len(values)), np.bool_)
     for code, value in enumerate(values):

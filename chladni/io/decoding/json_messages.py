@@ -21,10 +21,9 @@ from chladni.signals.errors import LogError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from chladni.io.decoding.columns import Column, EncodedMessages
     from chladni.io.decoding.schema import FieldInfo, Leaf, Record
+    from chladni.signals.arrays import Index, Mask
 
 FIRST_MESSAGES: Final = 32
 """Messages that tell the fields of a channel whose schema doesn't."""
@@ -146,7 +145,7 @@ class _Block:
     def __init__(self, chosen: Sequence[Leaf]) -> None:
         self.leaves = chosen
         self.found: list[list[Found]] = [[] for _ in chosen]
-        self.bad: list[NDArray[np.bool_]] = []
+        self.bad: list[Mask] = []
         self.reasons: Counter[str] = Counter()
         self.told: Counter[str] = Counter()
 
@@ -176,7 +175,7 @@ class _Block:
                 self.reasons["not JSON" if isinstance(error, _SYNTAX) else str(error)] += 1
         self._add(rows.found(), bad)
 
-    def _add(self, found: Sequence[Found], bad: NDArray[np.bool_]) -> None:
+    def _add(self, found: Sequence[Found], bad: Mask) -> None:
         for column, one in zip(self.found, found, strict=True):
             column.append(one)
         self.bad.append(bad)
@@ -235,6 +234,6 @@ def _may_lack(leaf: Leaf) -> bool:
     return leaf.info.kind == "number" and not any(leaf.lists) and isinstance(leaf.type, Primitive)
 
 
-def _span(messages: EncodedMessages, index: NDArray[np.intp]) -> Span:
+def _span(messages: EncodedMessages, index: Index) -> Span:
     starts = messages.offsets[index]
     return Span(buffer=messages.buffer, starts=starts, ends=starts + messages.lengths[index])

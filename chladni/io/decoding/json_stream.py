@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from chladni.signals.arrays import Bytes, Whole
 
 WHITE_SPACE: Final = b" \t\r\n"
 """What JSON counts as white space; `bytes.strip` alone would take more."""
@@ -27,9 +27,9 @@ class Span:
     starts, ends : int64 array [message]
     """
 
-    buffer: NDArray[np.uint8]
-    starts: NDArray[np.int64]
-    ends: NDArray[np.int64]
+    buffer: Bytes
+    starts: Whole
+    ends: Whole
 
     def __len__(self) -> int:
         return len(self.starts)

@@ -10,7 +10,7 @@ import numpy as np
 from chladni.io.decoding.schema import Array, Delimited, FieldType, Primitive, Record, Stamp, Text
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from chladni.signals.arrays import Whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -28,14 +28,14 @@ class FixedLayout:
     """
 
     sizes: tuple[int, ...]
-    table: NDArray[np.int64]
+    table: Whole
 
     @property
     def alignment(self) -> int:
         """Largest alignment of anything inside."""
         return len(self.sizes)
 
-    def at(self, position: int | NDArray[np.int64]) -> int | NDArray[np.int64]:
+    def at(self, position: int | Whole) -> int | Whole:
         """Bytes taken by a value that may start at `position`, for one position or for many."""
         phase = position & (len(self.sizes) - 1)
         return self.sizes[phase] if isinstance(phase, int) else self.table[phase]

@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from chladni.signals.arrays import Whole
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Piece:
@@ -23,6 +25,6 @@ class Piece:
     counts : int64 array [row], optional
     """
 
-    rows: NDArray[np.int64]
+    rows: Whole
     values: NDArray[np.generic]
-    counts: NDArray[np.int64] | None = None
+    counts: Whole | None = None

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from chladni.io.decoding.columns import EncodedMessages
     from chladni.io.decoding.protobuf_template import Slot
     from chladni.io.decoding.schema import FieldInfo, Leaf
+    from chladni.signals.arrays import Bytes, Index, Mask, Whole
 
 MAX_TEMPLATES: Final = 16
 """Layouts tried in a batch before the remaining messages are read one by one."""
@@ -151,9 +152,7 @@ class _Batch:
         values, counts = joined(pieces, self.bad, empty=np.empty(0, leaf.info.dtype))
         return Column(values=values, counts=counts)
 
-    def _by_template(
-        self, rows: NDArray[np.intp], descriptor: Descriptor, pieces: list[list[Piece]]
-    ) -> NDArray[np.bool_]:
+    def _by_template(self, rows: Index, descriptor: Descriptor, pieces: list[list[Piece]]) -> Mask:
         """Read all messages that have the layout of the first one; tells which those are."""
         done = np.zeros(len(rows), np.bool_)
         content = self._content(int(rows[0]))
@@ -178,7 +177,7 @@ class _Batch:
             some.append(Piece(rows=taken, values=_from_template(table, template, one)))
         return done
 
-    def _table(self, offsets: NDArray[np.int64], length: int) -> NDArray[np.uint8]:
+    def _table(self, offsets: Whole, length: int) -> Bytes:
         if not length:
             return np.empty((len(offsets), 0), np.uint8)
         buffer = self.messages.buffer
@@ -196,7 +195,7 @@ class _Batch:
         error: type[Exception] = DecodeError
         return error
 
-    def _read(self, rows: NDArray[np.intp]) -> list[Found]:
+    def _read(self, rows: Index) -> list[Found]:
         """Read messages one by one; bad ones are marked and give nothing."""
         decode_error = self._decode_error()
         readers = [_reader(one) for one in self.chosen]
@@ -224,7 +223,7 @@ def _slots_of(leaf: Leaf) -> list[tuple[str, ...]]:
     return [leaf.names]
 
 
-def _from_template(table: NDArray[np.uint8], template: Template, chosen: _Chosen) -> NDArray[np.generic]:
+def _from_template(table: Bytes, template: Template, chosen: _Chosen) -> NDArray[np.generic]:
     leaf, fields = chosen
     above = leaf.names if isinstance(leaf.type, Stamp) else leaf.names[:-1]
     inside = all(above[:depth] in template.entered for depth in range(1, len(above) + 1))
@@ -237,7 +236,7 @@ def _from_template(table: NDArray[np.uint8], template: Template, chosen: _Chosen
     if isinstance(leaf.type, Stamp):
         types = leaf.type.seconds, leaf.type.nanoseconds
         seconds, rest = (_read(table, slot, one).astype(np.int64) for slot, one in zip(slots, types, strict=True))
-        total: NDArray[np.int64] = seconds * 1_000_000_000 + rest
+        total: Whole = seconds * 1_000_000_000 + rest
         return total
     return _read(table, slots[0], dtype)
 
@@ -249,7 +248,7 @@ def _is_missing(leaf: Leaf, field: FieldDescriptor, *, inside: bool) -> bool:
     return field.has_presence or not inside
 
 
-def _read(table: NDArray[np.uint8], slot: Slot | None, dtype: np.dtype[np.generic]) -> NDArray[np.generic]:
+def _read(table: Bytes, slot: Slot | None, dtype: np.dtype[np.generic]) -> NDArray[np.generic]:
     return np.zeros(len(table), dtype) if slot is None else read_slot(table, slot, dtype)
 
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from google.protobuf.descriptor import Descriptor, FieldDescriptor
     from numpy.typing import NDArray
 
+    from chladni.signals.arrays import Bytes, Mask
+
 VARINT: Final = 0
 LENGTH: Final = 2
 _FIXED: Final = {1: 8, 5: 4}
@@ -86,7 +88,7 @@ class Template:
         self._above = {names[:depth] for names in wanted for depth in range(1, len(names))}
         self._scan(0, len(content), descriptor, ())
 
-    def fitting(self, rows: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    def fitting(self, rows: Bytes) -> Mask:
         """Messages that have this layout.
 
         Parameters
@@ -96,7 +98,7 @@ class Template:
         """
         fixed = np.flatnonzero(self.mask)
         differing = (rows[:, fixed] ^ self.content[fixed]) & self.mask[fixed]
-        fits: NDArray[np.bool_] = np.logical_not(differing.any(axis=1))
+        fits: Mask = np.logical_not(differing.any(axis=1))
         return fits
 
     def _varint(self, place: int, end: int) -> tuple[int, int]:
@@ -164,7 +166,7 @@ class Template:
             self._scan(slot.at, slot.at + slot.width, slot.field.message_type, names)
 
 
-def read_slot(rows: NDArray[np.uint8], slot: Slot, dtype: np.dtype[np.generic]) -> NDArray[np.generic]:
+def read_slot(rows: Bytes, slot: Slot, dtype: np.dtype[np.generic]) -> NDArray[np.generic]:
     """Read a number a message.
 
     Parameters
@@ -189,7 +191,7 @@ def read_slot(rows: NDArray[np.uint8], slot: Slot, dtype: np.dtype[np.generic]) 
     return value.astype(np.bool_) if dtype == np.bool_ else value.view(np.int64).astype(dtype)
 
 
-def read_block(rows: NDArray[np.uint8], slot: Slot, dtype: np.dtype[np.generic]) -> NDArray[np.generic]:
+def read_block(rows: Bytes, slot: Slot, dtype: np.dtype[np.generic]) -> NDArray[np.generic]:
     """Read an array of numbers of fixed width from each message.
 
     Returns

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from chladni.signals.arrays import Mask, Whole
+
 MAX_ELEMENT_STEPS: Final = 20_000
 """Most elements of varying size (strings, messages with strings) that a batch is walked through one after another.
 
@@ -178,19 +180,19 @@ class Walk:
         self.cursor.align(self.layouts.alignment(width))
         self.cursor.claim(width * count, "a field")
 
-    def _put(self, wanted: Tree | Leaf, values: NDArray[np.generic], counts: NDArray[np.int64] | None = None) -> None:
+    def _put(self, wanted: Tree | Leaf, values: NDArray[np.generic], counts: Whole | None = None) -> None:
         self.pieces.setdefault(_path(wanted), []).append(Piece(rows=self.cursor.rows, values=values, counts=counts))
 
-    def _nanoseconds(self, stamp: Stamp) -> NDArray[np.int64]:
+    def _nanoseconds(self, stamp: Stamp) -> Whole:
         return _to_ns(self.cursor.take(stamp.seconds), self.cursor.take(stamp.nanoseconds, at=4))
 
-    def _length(self) -> int | NDArray[np.int64]:
+    def _length(self) -> int | Whole:
         self._settle(4, 1)
         length = uniform(self.cursor.take(UINT32).astype(np.int64))
         self.cursor.advance(4)
         return length
 
-    def _delimiter(self) -> int | NDArray[np.int64]:
+    def _delimiter(self) -> int | Whole:
         length = self._length()
         return _kept(length, self.cursor.claim(length, "a delimited value"))
 
@@ -202,7 +204,7 @@ class Walk:
         end = end[np.searchsorted(before, self.cursor.rows)]
         self.cursor.drop(end != self.cursor.position, "a delimiter contradicts the definition")
 
-    def _text(self, text: Text) -> tuple[int | NDArray[np.int64], int | NDArray[np.int64]]:
+    def _text(self, text: Text) -> tuple[int | Whole, int | Whole]:
         """Move over a string; gives the place and the number of bytes of its characters."""
         if text.wide:
             raise AssertionError("fields behind a wstring can't be located, and aren't offered")
@@ -237,7 +239,7 @@ class Walk:
                 self._each_element(array.element, counts, wanted)
         self.level -= len(array.dims)
 
-    def _note_lengths(self, array: Array, counts: int | NDArray[np.int64], wanted: Tree | Leaf) -> None:
+    def _note_lengths(self, array: Array, counts: int | Whole, wanted: Tree | Leaf) -> None:
         """Keep the lengths of the lists that are about to be read, for leaves that lie in several."""
         rows = self.cursor.rows
         each = [np.broadcast_to(np.asarray(counts), rows.shape)]
@@ -250,7 +252,7 @@ class Walk:
                 for level, values in zip(range(self.level, leaf.depth), each, strict=False):
                     known[level].append(Piece(rows=rows, values=values))
 
-    def _counts(self, array: Array) -> int | NDArray[np.int64]:
+    def _counts(self, array: Array) -> int | Whole:
         """Elements in each message; what can't fit into the message is dropped before anything is allocated."""
         if array.length is not None:
             return array.length
@@ -261,9 +263,7 @@ class Walk:
         least = smallest_size(array.element, self.smallest)
         return _kept(counts, self.cursor.claim(counts * least, "an array"))
 
-    def _numbers(
-        self, dtype: np.dtype[np.generic], counts: int | NDArray[np.int64], wanted: Tree | Leaf | None
-    ) -> None:
+    def _numbers(self, dtype: np.dtype[np.generic], counts: int | Whole, wanted: Tree | Leaf | None) -> None:
         cursor = self.cursor
         self._align_nonempty(counts, dtype.itemsize)
         counts = _kept(counts, cursor.claim(counts * dtype.itemsize, "an array"))
@@ -273,7 +273,7 @@ class Walk:
             self._put(wanted, cursor.take_ragged(dtype, np.asarray(counts)), np.asarray(counts))
         cursor.advance(counts * dtype.itemsize)
 
-    def _align_nonempty(self, counts: int | NDArray[np.int64], width: int) -> None:
+    def _align_nonempty(self, counts: int | Whole, width: int) -> None:
         # Padding stands before an element, so an empty array has none.
         before = self.cursor.position
         self.cursor.align(self.layouts.alignment(width))
@@ -282,9 +282,7 @@ class Walk:
         else:
             self.cursor.position = uniform(np.where(counts > 0, self.cursor.position, before))
 
-    def _fixed_elements(
-        self, element: FieldType, counts: int | NDArray[np.int64], wanted: Tree | Leaf | None
-    ) -> bool:
+    def _fixed_elements(self, element: FieldType, counts: int | Whole, wanted: Tree | Leaf | None) -> bool:
         """Read leaves out of an array whose elements all have one size; False where this isn't such a one."""
         layout = self.layouts.of(element)
         leaves = [] if wanted is None else list(_leaves(wanted))
@@ -302,7 +300,7 @@ class Walk:
         self.cursor.advance(span.total)
         return True
 
-    def _leaf_of_elements(self, leaf: Leaf, places: ElementPlaces, counts: int | NDArray[np.int64]) -> None:
+    def _leaf_of_elements(self, leaf: Leaf, places: ElementPlaces, counts: int | Whole) -> None:
         kind = leaf.type.element if isinstance(leaf.type, Array) else leaf.type
         if isinstance(kind, Stamp):
             seconds = self._from_elements(kind.seconds, places, counts, 0)
@@ -313,7 +311,7 @@ class Walk:
         self._put(leaf, values, None if isinstance(counts, int) else counts)
 
     def _from_elements(
-        self, dtype: np.dtype[np.generic], places: ElementPlaces, counts: int | NDArray[np.int64], plus: int
+        self, dtype: np.dtype[np.generic], places: ElementPlaces, counts: int | Whole, plus: int
     ) -> NDArray[np.generic]:
         first, later, step = places.first + plus, places.later + plus, places.step
         if isinstance(counts, int) and isinstance(first, int) and isinstance(step, int) and places.evenly_spaced:
@@ -323,7 +321,7 @@ class Walk:
         values = self.cursor.take_ragged(dtype, each, step=step, first=first, later=later)
         return values.reshape(rows, counts) if isinstance(counts, int) else values
 
-    def _texts(self, text: Text, counts: int | NDArray[np.int64], wanted: Tree | Leaf) -> None:
+    def _texts(self, text: Text, counts: int | Whole, wanted: Tree | Leaf) -> None:
         """Measure an array of strings; it is put as one block of bytes, so equal lists are decoded once."""
         cursor = self.cursor
         cursor.align(self.layouts.alignment(4))
@@ -333,7 +331,7 @@ class Walk:
         start = start[np.searchsorted(before, cursor.rows)]
         self._put(wanted, np.stack([start, end - start], axis=1))
 
-    def _each_element(self, element: FieldType, counts: int | NDArray[np.int64], wanted: Tree | Leaf | None) -> None:
+    def _each_element(self, element: FieldType, counts: int | Whole, wanted: Tree | Leaf | None) -> None:
         """Go through the elements one after another: element k of all messages that have one, at once."""
         for k in range(counts if isinstance(counts, int) else int(counts.max(initial=0))):
             if not len(self.cursor):
@@ -354,9 +352,7 @@ class Walk:
         else:
             self.read(element, wanted)
 
-    def _element_of_some(
-        self, element: FieldType, counts: NDArray[np.int64], k: int, wanted: Tree | Leaf | None
-    ) -> NDArray[np.int64]:
+    def _element_of_some(self, element: FieldType, counts: Whole, k: int, wanted: Tree | Leaf | None) -> Whole:
         """Go through element `k` of the messages that have one; gives the counts of the messages still sound."""
         whole = self.cursor
         self.cursor = whole.subset(np.flatnonzero(counts > k))
@@ -386,9 +382,9 @@ def _path(wanted: Tree | Leaf) -> str:
     return wanted.info.path if isinstance(wanted, Leaf) else ""
 
 
-def _kept(values: int | NDArray[np.int64], kept: NDArray[np.bool_] | None) -> int | NDArray[np.int64]:
+def _kept(values: int | Whole, kept: Mask | None) -> int | Whole:
     return values if kept is None or isinstance(values, int) else uniform(values[kept])
 
 
-def _to_ns(seconds: NDArray[np.generic], nanoseconds: NDArray[np.generic]) -> NDArray[np.int64]:
+def _to_ns(seconds: NDArray[np.generic], nanoseconds: NDArray[np.generic]) -> Whole:
     return seconds.astype(np.int64) * 1_000_000_000 + nanoseconds.astype(np.int64)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, LogError, SetupError
 from chladni.signals.geometry import Geometry
@@ -125,15 +126,15 @@ def series_of_rows(
     )
 
 
-def finite_mask(values: NDArray[np.floating[Any]]) -> NDArray[np.bool_] | None:
+def finite_mask(values: NDArray[np.floating]) -> Mask | None:
     """Mark the finite values; None when all are."""
     finite = np.isfinite(values)
     return None if finite.all() else finite
 
 
 def placed_rows(
-    stamps_ns: NDArray[np.int64],
-    rows: Sequence[NDArray[np.floating[Any]]],
+    stamps_ns: Whole,
+    rows: Sequence[NDArray[np.floating]],
     channels: Sequence[Channel],
     *,
     where: str,
@@ -263,9 +264,7 @@ def require_no_gaps(series: TimeSeries, kind: str) -> None:
             )
 
 
-def times_to_ns(
-    times: NDArray[np.float64], *, unit_ns: int = NS_PER_S, start_ns: int = 0, where: str
-) -> NDArray[np.int64]:
+def times_to_ns(times: Real, *, unit_ns: int = NS_PER_S, start_ns: int = 0, where: str) -> Whole:
     """Round times to whole nanoseconds since 1970; `LogError` for what is no time within centuries."""
     largest = float(np.abs(times).max(initial=0.0)) * unit_ns + abs(start_ns)
     if not largest < 2**62:

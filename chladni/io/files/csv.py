@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.atomic import atomic_write
 from chladni.io.files.columns import Column, Title, distinct, parse_titles
@@ -19,6 +18,7 @@ from chladni.io.files.csv_dialect import sniff_csv
 from chladni.io.files.table import Part, series_of_parts
 from chladni.io.files.time_column import UNNAMED, is_time_name
 from chladni.io.files.time_reading import UNIT_OF, TimeOptions, spelled
+from chladni.signals.arrays import Mask
 from chladni.signals.errors import SetupError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.visible import cell_meant, cell_text
@@ -176,7 +176,7 @@ def _quoted(text: str) -> str:
     return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
 
 
-def _lines(series: TimeSeries, present: NDArray[np.bool_], part: slice) -> Iterator[str]:
+def _lines(series: TimeSeries, present: Mask, part: slice) -> Iterator[str]:
     times = series.times_s()[part].tolist()
     columns = series.values[:, part].T.tolist()
     # Whole stretches are the rule, and take half the time without a test of every cell.
@@ -190,7 +190,7 @@ def _lines(series: TimeSeries, present: NDArray[np.bool_], part: slice) -> Itera
             yield f"{time_s!r},{','.join(cells)}\r\n"
 
 
-def _losses(series: TimeSeries, present: NDArray[np.bool_]) -> tuple[str, ...]:
+def _losses(series: TimeSeries, present: Mask) -> tuple[str, ...]:
     losses = []
     if any(channel.point or channel.direction or channel.overload for channel in series.channels):
         losses.append("A CSV table holds no points, directions and overload limits; keep them in a setup file.")

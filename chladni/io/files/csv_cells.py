@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.files.csv_dialect import LONE, NUMBER, CsvDialect, is_number, split_cells
 from chladni.io.files.time_text import is_time_text
+from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.errors import LogError
 from chladni.signals.wording import counted
 
@@ -47,7 +47,7 @@ class Cells:
         Line and text of the first of the latter.
     """
 
-    numbers: list[NDArray[np.float64]] = field(default_factory=list)
+    numbers: list[Real] = field(default_factory=list)
     text: list["pa.Array"] = field(default_factory=list)
     numeric: bool
     keep_text: bool
@@ -166,7 +166,7 @@ class CellReader:
         self._short.append((number, len(cells)))
         return [""] * columns
 
-    def _convert(self, columns: list["pa.Array"], lines: NDArray[np.int64]) -> None:
+    def _convert(self, columns: list["pa.Array"], lines: Whole) -> None:
         import pyarrow as pa
 
         found = [_numbers(cells, comma) for cells, comma in zip(columns, self._dialect.decimal_commas, strict=True)]
@@ -187,7 +187,7 @@ class CellReader:
             if cells.keep_text:
                 cells.text.append(text.filter(pa.array(rows)))
 
-    def _note_bad(self, cells: Cells, text: "pa.Array", lines: NDArray[np.int64], bad: NDArray[np.bool_]) -> None:
+    def _note_bad(self, cells: Cells, text: "pa.Array", lines: Whole, bad: Mask) -> None:
         import pyarrow.compute as pc
 
         wrong = np.flatnonzero(bad)
@@ -228,7 +228,7 @@ def _transposed(rows: list[list[str]]) -> list["pa.Array"]:
     return [pa.array(cells, pa.string()) for cells in zip(*rows, strict=True)]
 
 
-def _numbers(cells: "pa.Array", decimal_comma: bool) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _numbers(cells: "pa.Array", decimal_comma: bool) -> tuple[Real, Mask]:
     """Give the numbers of a column, NaN where there's none, and where a cell is neither blank nor a number."""
     import pyarrow as pa
     import pyarrow.compute as pc

@@ -12,6 +12,7 @@ from chladni.io.files.contents import FileContents, joined, placed_rows, series_
 from chladni.io.files.time_column import find_times, is_row_number, rises
 from chladni.io.files.time_reading import NO_TIMES, TimeOptions, Times
 from chladni.io.untimed import untimed
+from chladni.signals.arrays import Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import ChladniError, LogError, SetupError
 from chladni.signals.time_series import NS_PER_S
@@ -20,7 +21,7 @@ from chladni.signals.wording import counted
 # A rate that is given and one that the times tell are the same when they're this near; clocks are far truer.
 _SAME_RATE = 0.01
 
-Rows = list[NDArray[np.floating[Any]]]
+Rows = list[NDArray[np.floating]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -197,7 +198,7 @@ def _why_no_signal(column: Column) -> str:
     return "empty" if kind == "f" and not np.isfinite(column.numbers).any() else ""
 
 
-def _floating(numbers: NDArray[Any]) -> NDArray[np.floating[Any]]:
+def _floating(numbers: NDArray[Any]) -> NDArray[np.floating]:
     # Integers become double, which holds 53 bits of them.
     return numbers if numbers.dtype in (np.float32, np.float64) else numbers.astype(np.float64)
 
@@ -241,9 +242,7 @@ def _placed(rows: Rows, channels: list[Channel], times: Times, options: TimeOpti
     return replace(placed, notes=(*notes, *placed.notes))
 
 
-def _at_rate(
-    stamps_ns: NDArray[np.int64], rows: Rows, channels: list[Channel], options: TimeOptions, where: str
-) -> FileContents:
+def _at_rate(stamps_ns: Whole, rows: Rows, channels: list[Channel], options: TimeOptions, where: str) -> FileContents:
     """Place rows by their times, at the given rate where there's one and the times run at it."""
     given_hz = options.rate_hz
     rate_hz = given_hz or options.stated_rate_hz
@@ -275,7 +274,7 @@ def _at_rate(
 
 
 def _in_order(
-    stamps_ns: NDArray[np.int64], rows: Rows, channels: list[Channel], rate_hz: float, where: str
+    stamps_ns: Whole, rows: Rows, channels: list[Channel], rate_hz: float, where: str
 ) -> FileContents | None:
     """Put rows one period after the other, where times that are coarser than it agree with that; else None."""
     period_ns = NS_PER_S / rate_hz

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from chladni.io.files.columns import Column
 from chladni.io.files.time_text import NS_PER_DAY, TextTimes
+from chladni.signals.arrays import Mask, Whole
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import NS_PER_S, is_sample_rate
 
@@ -114,8 +115,8 @@ class Times:
     """
 
     columns: tuple[str, ...]
-    stamps_ns: NDArray[np.int64]
-    known: NDArray[np.bool_]
+    stamps_ns: Whole
+    known: Mask
     told: str
 
 
@@ -280,9 +281,7 @@ def _typical_step(numbers: NDArray[Any]) -> float:
     return float(np.median(steps)) / lag if steps.size else 0.0
 
 
-def _stamps_ns(
-    column: Column, numbers: NDArray[Any], known: NDArray[np.bool_], reading: _Reading, where: str
-) -> NDArray[np.int64]:
+def _stamps_ns(column: Column, numbers: NDArray[Any], known: Mask, reading: _Reading, where: str) -> Whole:
     ns = NS_OF[reading.unit]
     kept = numbers[known]
     largest = float(np.abs(kept.astype(np.float64) - reading.zero).max(initial=0.0)) * ns + abs(column.start_ns)
@@ -296,7 +295,7 @@ def _stamps_ns(
     return exact if exact is not None else np.rint((kept - reading.zero) * ns).astype(np.int64)
 
 
-def _exact_ns(text: "pa.Array", known: NDArray[np.bool_], ns: int) -> NDArray[np.int64] | None:
+def _exact_ns(text: "pa.Array", known: Mask, ns: int) -> Whole | None:
     """Read plain decimal numbers digit by digit: double precision tells nanoseconds of our days apart by 256 only."""
     import pyarrow as pa
     import pyarrow.compute as pc
@@ -312,5 +311,5 @@ def _exact_ns(text: "pa.Array", known: NDArray[np.bool_], ns: int) -> NDArray[np
     whole, below = (np.asarray(pc.cast(part, pa.int64())) for part in (pc.struct_field(parts, "whole"), fraction))
     negative = np.asarray(pc.equal(pc.struct_field(parts, "sign"), "-"))
     magnitude = whole * ns + (below + 5) // 10
-    exact: NDArray[np.int64] = np.where(negative, -magnitude, magnitude)
+    exact: Whole = np.where(negative, -magnitude, magnitude)
     return exact

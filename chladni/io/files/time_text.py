@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Whole
 from chladni.signals.time_series import NS_PER_S
 
 if TYPE_CHECKING:
@@ -58,8 +58,8 @@ class TextTimes:
         What the text was taken for, as the end of a sentence.
     """
 
-    stamps_ns: NDArray[np.int64]
-    known: NDArray[np.bool_]
+    stamps_ns: Whole
+    known: Mask
     dated: bool
     clocked: bool
     told: str
@@ -116,7 +116,7 @@ def read_time_text(cells: "pa.Array") -> TextTimes | None:
 _Parts = dict[str, "pa.Array"]
 
 
-def _numbers(parts: _Parts, name: str, rows: int) -> NDArray[np.int64]:
+def _numbers(parts: _Parts, name: str, rows: int) -> Whole:
     import pyarrow as pa
     import pyarrow.compute as pc
 
@@ -126,7 +126,7 @@ def _numbers(parts: _Parts, name: str, rows: int) -> NDArray[np.int64]:
     return np.asarray(pc.cast(filled, pa.int64()))
 
 
-def _clock_ns(parts: _Parts, rows: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _clock_ns(parts: _Parts, rows: int) -> tuple[Whole, Mask]:
     hour, minute, second = (_numbers(parts, name, rows) for name in ("hour", "minute", "second"))
     # Minutes without hours run on past 60, hours of an elapsed time past 24; a second of 60 is a leap second.
     good = (second <= 60) & ((minute < 60) | ("hour" not in parts))
@@ -136,7 +136,7 @@ def _clock_ns(parts: _Parts, rows: int) -> tuple[NDArray[np.int64], NDArray[np.b
     return ((hour * 60 + minute) * 60 + second) * NS_PER_S + _fraction_ns(parts, rows), good
 
 
-def _fraction_ns(parts: _Parts, rows: int) -> NDArray[np.int64]:
+def _fraction_ns(parts: _Parts, rows: int) -> Whole:
     import pyarrow.compute as pc
 
     if "fraction" not in parts:
@@ -146,7 +146,7 @@ def _fraction_ns(parts: _Parts, rows: int) -> NDArray[np.int64]:
     return _numbers({"fraction": digits}, "fraction", rows)
 
 
-def _days(parts: _Parts, rows: int) -> tuple[NDArray[np.int64] | None, NDArray[np.bool_], str]:
+def _days(parts: _Parts, rows: int) -> tuple[Whole | None, Mask, str]:
     """Give days since 1970 (None without a date that can be told), which are days of the calendar, and a word."""
     everywhere = np.ones(rows, dtype=np.bool_)
     if "year" not in parts:
@@ -171,11 +171,11 @@ def _days(parts: _Parts, rows: int) -> tuple[NDArray[np.int64] | None, NDArray[n
     return first_of_month + np.where(in_calendar, day, 1) - 1, in_calendar & (day <= length), "dates"
 
 
-def _zone_ns(zones: "pa.Array") -> NDArray[np.int64]:
+def _zone_ns(zones: "pa.Array") -> Whole:
     """Give what to take off local times for UTC."""
     offsets = {text: _offset_ns(text) for text in zones.unique().to_pylist()}
     texts = np.asarray(zones, dtype=str)
-    total: NDArray[np.int64] = np.sum([offset * (texts == text) for text, offset in offsets.items()], axis=0)
+    total: Whole = np.sum([offset * (texts == text) for text, offset in offsets.items()], axis=0)
     return total
 
 
@@ -186,7 +186,7 @@ def _offset_ns(zone: str) -> int:
     return (-1 if zone[0] == "-" else 1) * (hours * 60 + minutes) * 60 * NS_PER_S
 
 
-def _past_midnight(clock_ns: NDArray[np.int64], known: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _past_midnight(clock_ns: Whole, known: Mask) -> Whole:
     """Let times of day run on over midnight: a step back by more than half a day is a new day."""
     run_on = clock_ns.copy()
     times = clock_ns[known]

@@ -167,7 +167,7 @@ class _Record:
 
     dataset: Dataset
     channel: Channel
-    values: NDArray[np.floating[Any]]
+    values: NDArray[np.floating]
     second: float
     start_ns: int
     notes: tuple[str, ...]
@@ -246,12 +246,12 @@ def _series(path: Path, group: list[_Record]) -> FileContents:
     return FileContents(series=(series,))
 
 
-def _values(dataset: Dataset, factor: float) -> NDArray[np.floating[Any]]:
+def _values(dataset: Dataset, factor: float) -> NDArray[np.floating]:
     # Text holds decimals, which double precision keeps better; binary single precision is exact in single.
     single = dataset["ord_data_type"] == _SINGLE and dataset["binary"]
     # Damaged binary values may be anything; what isn't finite counts as missing.
     with np.errstate(over="ignore", invalid="ignore"):
-        values: NDArray[np.floating[Any]] = dataset["data"].astype(np.float32 if single else np.float64)
+        values: NDArray[np.floating] = dataset["data"].astype(np.float32 if single else np.float64)
         return values if factor == 1.0 else values * factor
 
 

@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.files.uff_header import DIRECTIONS, quantity_code
 from chladni.io.files.uff_records import UniversalFile
 from chladni.io.files.uff_sets import FUNCTION_AT_NODE, LEFT_OUT, Dataset, read_dataset
 from chladni.io.files.uff_units import FoundUnit, abscissa_unit, function_units, unit_sentences
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
@@ -188,7 +188,7 @@ def _assembled(
     references: tuple[Channel, ...],
     beside: Mapping[int, Mapping[tuple[str, str], Dataset]],
 ) -> FrequencyResponse:
-    axis: NDArray[np.float64] = found[responses[0], references[0]]["x"]
+    axis: Real = found[responses[0], references[0]]["x"]
     shape = (len(responses), len(references), axis.size)
     values = np.empty(shape, dtype=np.complex128)
     # Infinite and NaN say that nothing is known, which zero and one would deny.
@@ -237,7 +237,7 @@ def _header(measured: Channel, source: Channel, places: Mapping[str, NodeDirecti
     }
 
 
-def _axis_fields(frequency_hz: NDArray[np.float64], *, binary: bool) -> tuple[Dataset, list[str]]:
+def _axis_fields(frequency_hz: Real, *, binary: bool) -> tuple[Dataset, list[str]]:
     if frequency_hz.size < 2:
         # Two abscissae are the least that the record's start and step can say.
         return {"abscissa_spacing": 0, "x": np.resize(frequency_hz, 2)}, []
@@ -262,7 +262,7 @@ def _brought_to_hertz(dataset: Dataset, where: str) -> tuple[str, ...]:
     return tuple(f"{where}: {note}." for note in found.notes)
 
 
-def _frequency_axis(dataset: Dataset) -> NDArray[np.float64]:
+def _frequency_axis(dataset: Dataset) -> Real:
     axis = np.asarray(dataset["x"], dtype=np.float64)
     said = _AXIS.match(str(dataset["id5"]).strip())
     if dataset["abscissa_spacing"] == 0 or said is None:

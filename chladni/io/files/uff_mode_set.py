@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from math import nan, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.files.uff_header import DIRECTIONS, direction_code
 from chladni.io.files.uff_nodes import NodeGeometry
 from chladni.io.files.uff_shapes import Degree, NodeMode
+from chladni.signals.arrays import Complex
 from chladni.signals.channel import Channel
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.modal_scale import ModalScale
@@ -88,7 +88,7 @@ def _channels(
 
 def _scale(
     ordered: Sequence[NodeMode],
-    largest: NDArray[np.complex128],
+    largest: Complex,
     degrees: Sequence[Degree],
     channels: Sequence[Channel],
     nodes: NodeGeometry,
@@ -122,13 +122,13 @@ def _reference_name(degree: Degree, nodes: NodeGeometry, response: FrequencyResp
 
 
 def _participation(
-    shapes: NDArray[np.complex128],
+    shapes: Complex,
     scale: ModalScale,
     channels: Sequence[Channel],
     references: Sequence[Channel],
     nodes: NodeGeometry,
     ordered: Sequence[NodeMode],
-) -> NDArray[np.complex128] | None:
+) -> Complex | None:
     """Shape at each reference over modal A, by reciprocity; None when a reference isn't at a measured place."""
     columns = {(one.point, abs(direction_code(one))): row for row, one in enumerate(channels)}
     factors = []

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Bytes, Real
 from chladni.signals.errors import LogError
 from chladni.signals.text_reading import real_number
 from chladni.signals.wording import counted
-
-Numbers = NDArray[np.float64]
 
 #: Bytes of a number and numbers of a value, by ordinate type.
 VALUE_SIZES = {2: (4, 1), 4: (8, 1), 5: (4, 2), 6: (8, 2)}
@@ -41,7 +40,7 @@ _WIDEST_SPAN = 2.0**64
 class Values:
     """Abscissae of unevenly spaced values, the values themselves, and sentences on how they were read."""
 
-    x: Numbers | None
+    x: Real | None
     data: NDArray[Any]
     notes: tuple[str, ...] = ()
 
@@ -76,13 +75,13 @@ class Layout:
         odd = sum(length != expected for length, expected in zip_longest(found, filter(None, due)))
         return odd if 2 * found.count(due[0]) > len(found) else 0
 
-    def arranged(self, numbers: Numbers) -> tuple[Numbers | None, NDArray[Any]]:
+    def arranged(self, numbers: Real) -> tuple[Real | None, NDArray[Any]]:
         """Take apart abscissae and values, which stand one after the other."""
         rows = numbers.reshape(self.count, -1)
         x = None if self.even else rows[:, 0].copy()
         return x, self.joined(rows if self.even else rows[:, 1:])
 
-    def joined(self, parts: Numbers) -> NDArray[Any]:
+    def joined(self, parts: Real) -> NDArray[Any]:
         """Make complex values of two numbers each; real ones have one."""
         columns = np.ascontiguousarray(parts)
         return (columns.view(np.complex128) if self.parts == 2 else columns)[:, 0]
@@ -151,7 +150,7 @@ def text_values(body: bytes, layout: Layout) -> Values:
     return Values(x=x, data=data, notes=tuple(notes))
 
 
-def _parsed(words: list[bytes]) -> Numbers | None:
+def _parsed(words: list[bytes]) -> Real | None:
     """The numbers of all words; None when one is none."""
     try:
         return np.array([fortran_number(word.decode("latin-1")) for word in words], dtype=np.float64)
@@ -232,7 +231,7 @@ class _Reading:
     believable: bool
 
 
-def _reading(rows: NDArray[np.uint8], head: int, layout: Layout, name: str) -> _Reading:
+def _reading(rows: Bytes, head: int, layout: Layout, name: str) -> _Reading:
     numbers, clean = _decoded(rows[:, head:], layout.width, name)
     x, clean_x = _decoded(rows[:, :head], head, name) if head else (None, True)
     data = layout.joined(numbers.reshape(layout.count, layout.parts))
@@ -240,7 +239,7 @@ def _reading(rows: NDArray[np.uint8], head: int, layout: Layout, name: str) -> _
     return _Reading(values=Values(x=x, data=data), believable=believable)
 
 
-def _decoded(columns: NDArray[np.uint8], width: int, name: str) -> tuple[Numbers, bool]:
+def _decoded(columns: Bytes, width: int, name: str) -> tuple[Real, bool]:
     """The numbers in columns of bytes, and whether each is one that the format's machines make."""
     raw = np.ascontiguousarray(columns).reshape(-1, width)
     # Damaged values may be anything; what isn't finite is for the reader to mask.
@@ -248,8 +247,8 @@ def _decoded(columns: NDArray[np.uint8], width: int, name: str) -> tuple[Numbers
         return _FORMATS[name](raw)
 
 
-def _ieee(order: str) -> Callable[[NDArray[np.uint8]], tuple[Numbers, bool]]:
-    def decoded(raw: NDArray[np.uint8]) -> tuple[Numbers, bool]:
+def _ieee(order: str) -> Callable[[Bytes], tuple[Real, bool]]:
+    def decoded(raw: Bytes) -> tuple[Real, bool]:
         single = raw.view(f"{order}f{raw.shape[1]}")
         numbers = single[:, 0].astype(np.float64)
         smallest = float(np.finfo(single.dtype).smallest_normal)
@@ -258,7 +257,7 @@ def _ieee(order: str) -> Callable[[NDArray[np.uint8]], tuple[Numbers, bool]]:
     return decoded
 
 
-def _dec(raw: NDArray[np.uint8]) -> tuple[Numbers, bool]:
+def _dec(raw: Bytes) -> tuple[Real, bool]:
     """F floating: sign, 8 bits of an exponent of 2 over 128, 23 of a fraction behind a hidden 0.1; words swapped."""
     if raw.shape[1] == _DOUBLE:
         return np.full(len(raw), np.nan), False
@@ -272,7 +271,7 @@ def _dec(raw: NDArray[np.uint8]) -> tuple[Numbers, bool]:
     return numbers, not bool(np.any((exponent == 0) & (bits != 0)))
 
 
-def _ibm(raw: NDArray[np.uint8]) -> tuple[Numbers, bool]:
+def _ibm(raw: Bytes) -> tuple[Real, bool]:
     """Sign, 7 bits of an exponent of 16 over 64, the rest a fraction whose first digit isn't 0."""
     digits = 8 * (raw.shape[1] - 1)
     bits = raw.view(f">u{raw.shape[1]}")[:, 0].astype(np.uint64)
@@ -283,7 +282,7 @@ def _ibm(raw: NDArray[np.uint8]) -> tuple[Numbers, bool]:
     return numbers, not bool(np.any((fraction >> np.uint64(digits - 4) == 0) & (bits != 0)))
 
 
-_FORMATS: dict[str, Callable[[NDArray[np.uint8]], tuple[Numbers, bool]]] = {
+_FORMATS: dict[str, Callable[[Bytes], tuple[Real, bool]]] = {
     _IEEE_LITTLE: _ieee("<"),
     _IEEE_BIG: _ieee(">"),
     "DEC": _dec,
@@ -291,7 +290,7 @@ _FORMATS: dict[str, Callable[[NDArray[np.uint8]], tuple[Numbers, bool]]] = {
 }
 
 
-def _measured(numbers: Numbers) -> bool:
+def _measured(numbers: Real) -> bool:
     """Whether numbers can be measured values: finite, and none farther above the others than a converter reaches."""
     sizes = np.abs(numbers[numbers != 0])
     if not np.isfinite(sizes).all():

@@ -290,13 +290,13 @@ def _frames(path: Path, file: IO[bytes], start: int, length: int, encoding: _Enc
     return raw.view(dtype).reshape(-1, encoding.channels)
 
 
-def _fractions(frames: NDArray[Any]) -> NDArray[np.floating[Any]]:
+def _fractions(frames: NDArray[Any]) -> NDArray[np.floating]:
     if np.issubdtype(frames.dtype, np.floating):
         return frames.astype(frames.dtype.newbyteorder("="), copy=False)
     if frames.dtype.itemsize == 1:
         return (frames.astype(np.float32) - 128) / 128
     # 24 bit samples come in the upper three bytes of 32; 16 bits fit single precision exactly, more need double.
     precision = np.float32 if frames.dtype.itemsize == 2 else np.float64
-    fractions: NDArray[np.floating[Any]] = frames.astype(precision)
+    fractions: NDArray[np.floating] = frames.astype(precision)
     fractions /= 2.0 ** (8 * frames.dtype.itemsize - 1)
     return fractions

@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chladni.io.mcap.ros2_definitions import DEFINITIONS, PRIMITIVES, MessageField, message_fields
+from chladni.signals.arrays import Bytes
 
 _ENCAPSULATION = b"\x00\x01\x00\x00"  # CDR, little endian
 
@@ -29,7 +30,7 @@ class CdrLayout:
     offsets: Mapping[str, int]
     formats: Mapping[str, str]
 
-    def encode(self, columns: Mapping[str, ArrayLike], count: int) -> NDArray[np.uint8]:
+    def encode(self, columns: Mapping[str, ArrayLike], count: int) -> Bytes:
         """Give `count` messages as bytes ``[message, byte]``; `columns` holds the numbers that vary, by path."""
         paths = list(columns)
         # One copy of the template for each message, then each number written as one strided column.

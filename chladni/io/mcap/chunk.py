@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from isal import isal_zlib
-from numpy.typing import NDArray
 
 from chladni.io.mcap.damage import Damage
 from chladni.io.mcap.data_section import ChunkSegment
@@ -15,6 +14,7 @@ from chladni.io.mcap.record_walk import walk_records
 from chladni.io.mcap.records import ChunkHeader
 from chladni.io.mcap.selection import Selection
 from chladni.io.mcap.stretch_content import StretchContent, fill_content
+from chladni.signals.arrays import Bytes
 
 # So many zeros at the end of compressed data don't come from compressing anything.
 _ZERO_TAIL_BYTES = 32
@@ -37,7 +37,7 @@ class _UnreadableChunkError(Exception):
 class OpenedChunk:
     """What could be decompressed; ``flaw`` says what is wrong when that isn't all, or is nothing (None)."""
 
-    buffer: NDArray[np.uint8] | None
+    buffer: Bytes | None
     flaw: str | None = None
 
 
@@ -127,9 +127,7 @@ def _check_crc(content: bytes | memoryview, crc: int, rules: ChunkRules) -> None
         raise _UnreadableChunkError("the chunk carries no checksum, unlike others of this log")
 
 
-def _find_records(
-    content: StretchContent, segment: ChunkSegment, buffer: NDArray[np.uint8], *, whole: bool
-) -> MessageTable:
+def _find_records(content: StretchContent, segment: ChunkSegment, buffer: Bytes, *, whole: bool) -> MessageTable:
     if segment.index and whole:
         table = table_from_index(buffer, segment.index)
         if table is not None:

@@ -1,10 +1,10 @@
 """Finds the next chunk behind damage by what its header looks like."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.mcap.log_file import LogFile
 from chladni.io.mcap.records import PREFIX_BYTES, Opcode
+from chladni.signals.arrays import Bytes
 
 _BLOCK_BYTES = 1 << 20
 _NAME_AT = PREFIX_BYTES + 28
@@ -30,7 +30,7 @@ def find_chunk(file: LogFile, *, start: int, stop: int) -> int | None:
     return None
 
 
-def _candidates(block: NDArray[np.uint8]) -> list[int]:
+def _candidates(block: Bytes) -> list[int]:
     if len(block) < _HEADER_BYTES:
         return []
     last = len(block) - _HEADER_BYTES + 1

@@ -1,11 +1,10 @@
 """The checksum over all data of a log, the only protection of messages outside chunks."""
 
-import numpy as np
 from isal import isal_zlib
-from numpy.typing import NDArray
 
 from chladni.io.mcap.log_file import LogFile
 from chladni.io.mcap.summary import LogEnd
+from chladni.signals.arrays import Bytes
 
 _BLOCK_BYTES = 1 << 20
 
@@ -30,7 +29,7 @@ class DataCrc:
         """Whether the log carries such a checksum."""
         return self._end.data_crc != 0
 
-    def take(self, offset: int, content: NDArray[np.uint8]) -> None:
+    def take(self, offset: int, content: Bytes) -> None:
         """Take in bytes that have been read already, and those of the file before them."""
         self._read_to(offset)
         if self._position == offset:

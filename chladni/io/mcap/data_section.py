@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.mcap.chunk_search import find_chunk
 from chladni.io.mcap.damage import DamageList
@@ -35,6 +34,7 @@ from chladni.io.mcap.records import (
 )
 from chladni.io.mcap.stepping_stones import SteppingStones, agrees, lies_alike
 from chladni.io.mcap.summary import ChunkIndex, LogEnd
+from chladni.signals.arrays import Bytes
 
 _STRETCH_BYTES = 4 * MIB
 _FIRST_STRETCH_BYTES = 64 * 1024
@@ -69,7 +69,7 @@ class BareSegment:
     """Whole records outside chunks; ``in_chunked_log`` when the log is known to have chunks."""
 
     offset: int
-    buffer: NDArray[np.uint8]
+    buffer: Bytes
     table: MessageTable
     in_chunked_log: bool
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Whole
 from chladni.signals.errors import SetupError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
@@ -34,18 +35,18 @@ class LogTopic:
     schema_name: str
     schema_text: str
     metadata: Mapping[str, str]
-    stamps_ns: NDArray[np.int64]
+    stamps_ns: Whole
     payloads: Callable[[], Iterator[bytes]]
 
 
-def measured(series: TimeSeries, rows: tuple[int, ...]) -> NDArray[np.bool_]:
+def measured(series: TimeSeries, rows: tuple[int, ...]) -> Mask:
     """Say of each sample whether any of the given rows holds a valid value."""
     if series.valid is None:
         return np.ones(series.samples, dtype=np.bool_)
     return np.asarray(series.valid[list(rows)].any(axis=0), dtype=np.bool_)
 
 
-def row_with_gaps(series: TimeSeries, row: int, samples: NDArray[np.int64] | slice) -> NDArray[np.floating]:
+def row_with_gaps(series: TimeSeries, row: int, samples: Whole | slice) -> NDArray[np.floating]:
     """Give samples of one row, with NaN where they are invalid."""
     values = series.values[row, samples]
     if series.valid is None:

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Bytes, Whole
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MessageBatch:
@@ -30,11 +32,11 @@ class MessageBatch:
     """
 
     channel_id: int
-    buffer: NDArray[np.uint8]
-    offsets: NDArray[np.int64]
-    lengths: NDArray[np.int64]
-    log_time_ns: NDArray[np.int64]
-    publish_time_ns: NDArray[np.int64]
+    buffer: Bytes
+    offsets: Whole
+    lengths: Whole
+    log_time_ns: Whole
+    publish_time_ns: Whole
     sequence: NDArray[np.uint32]
 
     def __len__(self) -> int:

@@ -13,6 +13,7 @@ from chladni.io.mcap.records import (
     MessageIndex,
     Opcode,
 )
+from chladni.signals.arrays import Bytes, Index, Whole
 
 MESSAGE_HEADER = np.dtype(
     [
@@ -27,20 +28,20 @@ MESSAGE_HEADER = np.dtype(
 MESSAGE_HEADER_BYTES = MESSAGE_HEADER.itemsize
 # With more stretches between indexed messages than this, one walk over all is faster than looking at each.
 _MOST_STRETCHES = 256
-_NO_STARTS: NDArray[np.int64] = np.empty(0, np.int64)
+_NO_STARTS: Whole = np.empty(0, np.int64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MessageTable:
     """Starts and headers of a stretch's messages, starts of its other records, end of its sound part."""
 
-    starts: NDArray[np.int64]
+    starts: Whole
     headers: NDArray[np.void]
-    others: NDArray[np.int64]
+    others: Whole
     end: int
 
 
-def message_headers(buffer: NDArray[np.uint8], starts: NDArray[np.int64]) -> NDArray[np.void]:
+def message_headers(buffer: Bytes, starts: Whole) -> NDArray[np.void]:
     """Return the headers of the messages at ``starts`` (which must lie inside), a view when equally spaced."""
     view = _even_headers(buffer, starts)
     if view is not None:
@@ -52,16 +53,14 @@ def message_headers(buffer: NDArray[np.uint8], starts: NDArray[np.int64]) -> NDA
     return everywhere[starts]
 
 
-def choose_messages(
-    buffer: NDArray[np.uint8], table: MessageTable, chosen: NDArray[np.intp]
-) -> tuple[NDArray[np.int64], NDArray[np.void]]:
+def choose_messages(buffer: Bytes, table: MessageTable, chosen: Index) -> tuple[Whole, NDArray[np.void]]:
     """Return starts and headers of some messages of a table, the headers as a view when equally spaced."""
     starts = table.starts[chosen]
     view = _even_headers(buffer, starts)
     return starts, table.headers[chosen] if view is None else view
 
 
-def _even_headers(buffer: NDArray[np.uint8], starts: NDArray[np.int64]) -> NDArray[np.void] | None:
+def _even_headers(buffer: Bytes, starts: Whole) -> NDArray[np.void] | None:
     if len(starts) == 0:
         return np.empty(0, MESSAGE_HEADER)
     stride = _constant_stride(starts)
@@ -70,7 +69,7 @@ def _even_headers(buffer: NDArray[np.uint8], starts: NDArray[np.int64]) -> NDArr
     return np.ndarray(len(starts), MESSAGE_HEADER, buffer, offset=int(starts[0]), strides=(stride,))
 
 
-def _constant_stride(starts: NDArray[np.int64]) -> int | None:
+def _constant_stride(starts: Whole) -> int | None:
     if len(starts) < 2:
         return MESSAGE_HEADER_BYTES
     stride = int(starts[1]) - int(starts[0])
@@ -80,14 +79,14 @@ def _constant_stride(starts: NDArray[np.int64]) -> int | None:
     return stride if (starts[1:] - starts[:-1] == stride).all() else None
 
 
-def table_from_walk(buffer: NDArray[np.uint8], walk: RecordWalk) -> MessageTable:
+def table_from_walk(buffer: Bytes, walk: RecordWalk) -> MessageTable:
     """Tell the messages that a walk has found from other records."""
     is_message = buffer[walk.starts] == Opcode.MESSAGE
     messages, others = walk.starts[is_message], walk.starts[~is_message]
     return MessageTable(starts=messages, headers=message_headers(buffer, messages), others=others, end=walk.end)
 
 
-def table_from_index(buffer: NDArray[np.uint8], index: Sequence[MessageIndex]) -> MessageTable | None:
+def table_from_index(buffer: Bytes, index: Sequence[MessageIndex]) -> MessageTable | None:
     """Find the messages of a chunk through its message indexes, which are not trusted.
 
     Returns
@@ -117,7 +116,7 @@ def table_from_index(buffer: NDArray[np.uint8], index: Sequence[MessageIndex]) -
 
 def _merge(
     index: Sequence[MessageIndex],
-) -> tuple[NDArray[np.int64], NDArray[np.uint64], NDArray[np.uint16] | int]:
+) -> tuple[Whole, NDArray[np.uint64], NDArray[np.uint16] | int]:
     """Return offset, log time and channel of all indexed messages, by offset."""
     if len(index) == 1:
         entries, channel_id = index[0].entries, index[0].channel_id
@@ -133,9 +132,7 @@ def _merge(
     return starts[order], log_time[order], channel_ids[order]
 
 
-def _others_between(
-    buffer: NDArray[np.uint8], starts: NDArray[np.int64], ends: NDArray[np.int64]
-) -> NDArray[np.int64] | None:
+def _others_between(buffer: Bytes, starts: Whole, ends: Whole) -> Whole | None:
     """Return the records other than messages between messages, None when these don't tile the buffer."""
     gaps = np.flatnonzero(ends[:-1] != starts[1:])
     if len(gaps) > _MOST_STRETCHES:

@@ -9,11 +9,15 @@ drops back to single steps where the guess fails.
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.mcap.records import MESSAGE_FIELDS_BYTES, PREFIX_BYTES, RECORD_PREFIX, Opcode
+from chladni.signals.arrays import Bytes, Whole
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _PREFIX = np.dtype([("opcode", "u1"), ("length", "<u8")])
 # Comparing with an enumeration's member costs more than all else in a step.
@@ -29,13 +33,11 @@ _STEPS_AFTER_FAILURE = 32
 class RecordWalk:
     """Starts of the records found, and the first byte that is not part of one of them."""
 
-    starts: NDArray[np.int64]
+    starts: Whole
     end: int
 
 
-def walk_records(
-    buffer: NDArray[np.uint8], *, start: int, stop: int, until: frozenset[int] = frozenset()
-) -> RecordWalk:
+def walk_records(buffer: Bytes, *, start: int, stop: int, until: frozenset[int] = frozenset()) -> RecordWalk:
     """Walk the records in ``buffer[start:stop]``.
 
     Parameters
@@ -57,7 +59,7 @@ def walk_records(
 
 
 class _Walk:
-    def __init__(self, buffer: NDArray[np.uint8], *, start: int, stop: int, until: frozenset[int]) -> None:
+    def __init__(self, buffer: Bytes, *, start: int, stop: int, until: frozenset[int]) -> None:
         self._buffer = buffer
         self._view = buffer.data
         self._stop = stop

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.mcap.cdr_layout import CdrLayout, cdr_layout
 from chladni.io.mcap.channel_metadata import channel_metadata
 from chladni.io.mcap.log_topic import LogTopic, measured, row_with_gaps
 from chladni.io.mcap.ros2_definitions import schema_name, schema_text
+from chladni.signals.arrays import Mask, Whole
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 
@@ -53,7 +53,7 @@ def block_topic(series: TimeSeries, topic: str, rows: dict[str, int], *, block_s
     )
 
 
-def _spans(present: NDArray[np.bool_], length: int) -> list[tuple[int, int]]:
+def _spans(present: Mask, length: int) -> list[tuple[int, int]]:
     """Cut the samples into blocks ``[first, last)`` and give those that hold any."""
     blocks = [(first, min(first + length, len(present))) for first in range(0, len(present), length)]
     return [(first, last) for first, last in blocks if present[first:last].any()]
@@ -66,7 +66,7 @@ class _BlockEncoder:
     layout: CdrLayout
     sample_type: str
     spans: list[tuple[int, int]]
-    stamps_ns: NDArray[np.int64]
+    stamps_ns: Whole
 
     def payloads(self) -> Iterator[bytes]:
         for (first, last), stamp_ns in zip(self.spans, self.stamps_ns.tolist(), strict=True):

@@ -2,14 +2,18 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from chladni.io.mcap.channel_metadata import channel_metadata
 from chladni.io.mcap.log_topic import LogTopic, measured, row_with_gaps
 from chladni.io.mcap.message_types import MessageType, message_type
+from chladni.signals.arrays import Bytes, Whole
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 _MESSAGES_AT_ONCE = 8192  # some MB: enough that NumPy's overhead vanishes, small beside the log
 
@@ -45,8 +49,8 @@ class _SampleEncoder:
     series: TimeSeries
     kind: MessageType
     rows: dict[str, int]
-    samples: NDArray[np.int64]
-    stamps_ns: NDArray[np.int64]
+    samples: Whole
+    stamps_ns: Whole
 
     def payloads(self) -> Iterator[bytes]:
         stride = len(self.kind.layout.template)
@@ -55,7 +59,7 @@ class _SampleEncoder:
             for offset in range(0, len(encoded), stride):
                 yield encoded[offset : offset + stride]
 
-    def _encode(self, part: slice) -> NDArray[np.uint8]:
+    def _encode(self, part: slice) -> Bytes:
         samples, stamps_ns = self.samples[part], self.stamps_ns[part]
         columns: dict[str, ArrayLike] = {
             "header.stamp.sec": stamps_ns // NS_PER_S,

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from chladni.signals.arrays import Mask, Whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +31,7 @@ class Selection:
         ends_behind = self.end_time_ns is None or last_ns < self.end_time_ns
         return starts_before and ends_behind
 
-    def mask(self, log_time_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def mask(self, log_time_ns: Whole) -> Mask:
         """Return which of these times are asked for."""
         chosen = np.ones(len(log_time_ns), np.bool_)
         if self.start_time_ns is not None:

@@ -17,6 +17,7 @@ from chladni.io.mcap.records import (
     Opcode,
 )
 from chladni.io.mcap.selection import Selection
+from chladni.signals.arrays import Bytes, Mask, Whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,9 +48,7 @@ class StretchContent:
     unprotected: bool = False
 
 
-def fill_content(
-    content: StretchContent, buffer: NDArray[np.uint8], table: MessageTable, selection: Selection
-) -> None:
+def fill_content(content: StretchContent, buffer: Bytes, table: MessageTable, selection: Selection) -> None:
     """Split the messages in ``table`` into batches by channel, and collect definitions."""
     content.definitions.extend(_definitions(buffer, table.others))
     for channel_id, starts, headers in _by_channel(buffer, table):
@@ -65,7 +64,7 @@ def fill_content(
         _add_batch(content, batch, selection)
 
 
-def _definitions(buffer: NDArray[np.uint8], starts: NDArray[np.int64]) -> Iterator[Definition]:
+def _definitions(buffer: Bytes, starts: Whole) -> Iterator[Definition]:
     if len(starts) == 0:
         return
     opcodes = buffer[starts]
@@ -75,9 +74,7 @@ def _definitions(buffer: NDArray[np.uint8], starts: NDArray[np.int64]) -> Iterat
         yield Definition(opcode=opcode, content=content, position=start)
 
 
-def _by_channel(
-    buffer: NDArray[np.uint8], table: MessageTable
-) -> Iterator[tuple[int, NDArray[np.int64], NDArray[np.void]]]:
+def _by_channel(buffer: Bytes, table: MessageTable) -> Iterator[tuple[int, Whole, NDArray[np.void]]]:
     """Group messages by channel, in file order within each."""
     if len(table.starts) == 0:
         return
@@ -114,7 +111,7 @@ def _add_batch(content: StretchContent, batch: MessageBatch, selection: Selectio
         content.batches.append(batch)
 
 
-def _chosen(batch: MessageBatch, mask: NDArray[np.bool_]) -> MessageBatch:
+def _chosen(batch: MessageBatch, mask: Mask) -> MessageBatch:
     return MessageBatch(
         channel_id=batch.channel_id,
         buffer=batch.buffer,

@@ -1,8 +1,8 @@
 """Operating deflection shapes at any frequency, from frequency responses or from cross-spectra."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Mask, Real
 from chladni.signals.channel import find_channel
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.deflection_shape import DeflectionShape
@@ -10,8 +10,6 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.provenance import Provenance
 from chladni.signals.wording import counted
-
-Floats = NDArray[np.float64]
 
 # A line this near to the frequency asked for is that frequency, but for the digits a person types.
 SAME_FREQUENCY = 1e-6
@@ -122,7 +120,7 @@ def _reference(response: FrequencyResponse, reference: str | None) -> int:
     return 0
 
 
-def _nearest(frequency_hz: Floats, usable: NDArray[np.bool_], wanted_hz: float) -> tuple[int, list[str]]:
+def _nearest(frequency_hz: Real, usable: Mask, wanted_hz: float) -> tuple[int, list[str]]:
     lines = np.flatnonzero(usable)
     if not lines.size:
         raise EstimateError("no line is excited, so there's no deflection shape")
@@ -146,7 +144,7 @@ def _masked_note(response: FrequencyResponse, column: int, line: int) -> list[st
     return [f"{', '.join(missing)}: no value at this line"] if missing else []
 
 
-def _coherence_note(spectra: CrossSpectra, amplitude: NDArray[np.complex128], powers: Floats) -> list[str]:
+def _coherence_note(spectra: CrossSpectra, amplitude: Complex, powers: Real) -> list[str]:
     moving = powers > 0
     explained = np.abs(amplitude[moving]) ** 2 < COHERENT * powers[moving] * spectra.bandwidth_hz
     names = [channel.name for channel, moves in zip(spectra.channels, moving, strict=True) if moves]

@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 import scipy.special
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Mask, Real, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
@@ -19,9 +19,6 @@ from chladni.spectral.response_advice import half_power_lines
 from chladni.spectral.uncertainty import std_or_scatter
 
 DrivingPointVerdict = Literal["sound", "reversed", "not a driving point", "phase error", "undecided"]
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-
 # A phase that amplifiers and filters may add without a sensor being wrong (ISO 7626-2 asks for matched channels).
 PHASE_ALLOWED_DEG = 5.0
 # Directions whose cosine is farther from one belong to two sensors mounted by eye, not to one axis.
@@ -232,11 +229,11 @@ def _one_function(response: FrequencyResponse, row: int, column: int) -> Frequen
 class _Mobility:
     """Mobility of one driving point on its usable lines, and how many sigma make a sign sure."""
 
-    frequency_hz: Floats
+    frequency_hz: Real
     values: Complex
-    std: Floats
+    std: Real
     sure: float
-    peaks: NDArray[np.int64]
+    peaks: Whole
 
 
 def _judged(function: FrequencyResponse, sign: int, false_alarm: float) -> DrivingPoint:
@@ -290,7 +287,7 @@ def _mobility(function: FrequencyResponse, sign: int, false_alarm: float) -> _Mo
     )
 
 
-def _gives_out_power(mobility: _Mobility) -> NDArray[np.bool_]:
+def _gives_out_power(mobility: _Mobility) -> Mask:
     """Lines whose phase is surely farther from zero than 90 degrees and what is allowed."""
     allowed = np.radians(PHASE_ALLOWED_DEG)
     inside = mobility.values.real * np.cos(allowed) + np.abs(mobility.values.imag) * np.sin(allowed)

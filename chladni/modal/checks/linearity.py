@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.comparison import PeakChange, ResponseComparison
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
@@ -15,8 +15,6 @@ from chladni.signals.wording import counted
 from chladni.spectral.comparison import compare_responses
 
 LinearityVerdict = Literal["linear", "nearly linear", "nonlinear", "undecided"]
-Floats = NDArray[np.float64]
-
 # Changes below this share of the function hardly move a mode within its bandwidth.
 NEARLY = 0.1
 
@@ -43,9 +41,9 @@ class LinearityCheck(Value):
     """
 
     comparisons: tuple[ResponseComparison, ...]
-    difference: Floats
-    expected: Floats
-    significant_share: Floats
+    difference: Real
+    expected: Real
+    significant_share: Real
     verdict: LinearityVerdict
     finding: str
 
@@ -123,11 +121,11 @@ def _require_same_channels(first: FrequencyResponse, other: FrequencyResponse, n
 
 def _distance(
     first: FrequencyResponse, other: FrequencyResponse, compared: ResponseComparison
-) -> tuple[Floats, Floats, Floats]:
+) -> tuple[Real, Real, Real]:
     """Relative difference of each function, what random error makes of it, and the share of lines it doesn't."""
     lines = np.isfinite(compared.change_db)
 
-    def total(power: Floats) -> Floats:
+    def total(power: Real) -> Real:
         return np.asarray(np.where(lines, power, 0.0).sum(axis=2), dtype=np.float64)
 
     level = total(np.abs(first.values) ** 2)
@@ -140,7 +138,7 @@ def _distance(
     return np.sqrt(apart / level), np.sqrt(random / level), share
 
 
-def _verdict(difference: Floats, significant: Floats) -> LinearityVerdict:
+def _verdict(difference: Real, significant: Real) -> LinearityVerdict:
     if np.isnan(significant).all():
         return "undecided"
     changed = np.nan_to_num(significant) > 0
@@ -152,9 +150,9 @@ def _verdict(difference: Floats, significant: Floats) -> LinearityVerdict:
 def _sentence(
     verdict: LinearityVerdict,
     comparisons: tuple[ResponseComparison, ...],
-    difference: Floats,
-    expected: Floats,
-    significant: Floats,
+    difference: Real,
+    expected: Real,
+    significant: Real,
 ) -> str:
     levels = counted(len(comparisons) + 1, "level")
     if verdict == "undecided":

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.checks.driving_point import same_place
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.value import Value, require_shape
@@ -14,9 +14,6 @@ from chladni.signals.wording import counted
 from chladni.spectral.comparison import compare_responses
 
 ReciprocityVerdict = Literal["reciprocal", "nearly reciprocal", "not reciprocal", "sign reversed", "not measured"]
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complexfloating]
-
 BANDS = 8
 # What calibration, and sensors beside the point that is hit, leave in a good test.
 NEARLY = 0.1
@@ -47,10 +44,10 @@ class ReciprocityCheck(Value):
     """
 
     pairs: tuple[tuple[str, str, str, str], ...]
-    bands_hz: Floats
-    difference: Floats
-    expected: Floats
-    significant_share: Floats
+    bands_hz: Real
+    difference: Real
+    expected: Real
+    significant_share: Real
     verdict: ReciprocityVerdict
     finding: str
 
@@ -174,17 +171,17 @@ def _names(response: FrequencyResponse, pair: tuple[Function, Function]) -> tupl
     )
 
 
-def _band(response: FrequencyResponse, tested: NDArray[np.bool_], edges: Floats, band: int) -> NDArray[np.bool_]:
+def _band(response: FrequencyResponse, tested: Mask, edges: Real, band: int) -> Mask:
     inside = (response.frequency_hz >= edges[band]) & (response.frequency_hz < edges[band + 1])
     if band == len(edges) - 2:
         inside |= response.frequency_hz == edges[-1]
     return np.asarray(tested & inside)
 
 
-def _distance(there: FrequencyResponse, back: FrequencyResponse, lines: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+def _distance(there: FrequencyResponse, back: FrequencyResponse, lines: Mask) -> tuple[Real, Real]:
     """Relative difference of each pair on its lines, and what random error makes of it."""
 
-    def total(power: Floats) -> Floats:
+    def total(power: Real) -> Real:
         return np.asarray(np.where(lines, power[:, 0], 0.0).sum(axis=1), dtype=np.float64)
 
     level = (total(np.abs(there.values) ** 2) + total(np.abs(back.values) ** 2)) / 2
@@ -195,7 +192,7 @@ def _distance(there: FrequencyResponse, back: FrequencyResponse, lines: NDArray[
     return np.sqrt(apart / level), np.sqrt(random / level)
 
 
-def _verdict(difference: Floats, share: Floats, opposite: NDArray[np.bool_]) -> ReciprocityVerdict:
+def _verdict(difference: Real, share: Real, opposite: Mask) -> ReciprocityVerdict:
     if not np.any(share > 0):
         return "reciprocal"
     if opposite.any():
@@ -206,9 +203,9 @@ def _verdict(difference: Floats, share: Floats, opposite: NDArray[np.bool_]) -> 
 def _sentence(
     verdict: ReciprocityVerdict,
     pairs: tuple[tuple[str, str, str, str], ...],
-    whole: tuple[Floats, Floats],
-    share: Floats,
-    opposite: NDArray[np.bool_],
+    whole: tuple[Real, Real],
+    share: Real,
+    opposite: Mask,
 ) -> str:
     measured = f"{counted(len(pairs), 'pair')} measured both ways"
     if verdict == "reciprocal":

@@ -2,20 +2,17 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.checks.driving_point import same_place
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.provenance import Provenance
 from chladni.signals.wording import counted
 from chladni.spectral.forms import MOTION_ORDER, form
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Lines of parts that were measured one after another are equal but for the rounding of their rate.
 SAME_LINES = 1e-6
@@ -150,7 +147,7 @@ def over_hit_points(response: FrequencyResponse) -> FrequencyResponse:
     return replace(turned, provenance=replace(turned.provenance, effective_averages=averages))
 
 
-def _turned_round(response: FrequencyResponse, coherence: NDArray[np.float64]) -> FrequencyResponse:
+def _turned_round(response: FrequencyResponse, coherence: Real) -> FrequencyResponse:
     """The transpose: places that were hit as responses, places that were measured as references."""
     measured, applied = _only_unit(response.responses, "responses"), _only_unit(response.references, "references")
     note = (
@@ -246,7 +243,7 @@ def _require_units(channels: Sequence[Channel]) -> None:
 
 
 def _require_new(
-    owner: NDArray[np.int64],
+    owner: Whole,
     rows: list[int],
     columns: list[int],
     number: int,
@@ -262,7 +259,7 @@ def _require_new(
         )
 
 
-def _require_complete(owner: NDArray[np.int64], responses: Sequence[Channel], references: Sequence[Channel]) -> None:
+def _require_complete(owner: Whole, responses: Sequence[Channel], references: Sequence[Channel]) -> None:
     missing = np.argwhere(owner < 0)
     if missing.size:
         row, column = missing[0]
@@ -293,7 +290,7 @@ def _hit(parts: Sequence[FrequencyResponse]) -> list[Channel]:
     return _distinct([channel for part in parts for channel in part.references])
 
 
-def _least_coherence(parts: Sequence[FrequencyResponse], hit: Channel) -> NDArray[np.float64]:
+def _least_coherence(parts: Sequence[FrequencyResponse], hit: Channel) -> Real:
     """Coherence of a hit point: the least that any accelerometer had when it was hit."""
     own = [part.coherence for part in parts if any(_same(hit, channel) for channel in part.references)]
     return np.asarray(np.concatenate(own).min(axis=0), dtype=np.float64)

@@ -3,14 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.leakage_scatter import NEAR_LINES, LeakageScatter
 from chladni.modal.fit.model_lines import ModelLines
 from chladni.modal.fit.parameter_spread import ParameterSpread
-
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
+from chladni.signals.arrays import Complex, Real
 
 # Rounds until the noise level beside the leakage settles.
 ROUNDS = 12
@@ -43,13 +40,13 @@ class ErrorParts:
     """
 
     near: slice
-    weights: Floats
-    noise: Floats
+    weights: Real
+    noise: Real
     functions: Complex
-    relative: Floats
+    relative: Real
     residues: Complex
     slopes: Complex
-    levels: Floats
+    levels: Real
     leakage: LeakageScatter
 
     def drives(self, fields: Complex) -> tuple[Complex, Complex]:
@@ -70,7 +67,7 @@ class ErrorParts:
         rest = np.einsum("iqjk,ilk->iqjlk", weighted, self.slopes)[..., np.newaxis, :]
         return np.concatenate([felt, rest], axis=-2), weighted * self.functions[:, np.newaxis]
 
-    def common_variance(self, leak: Complex, common: Complex) -> Floats:
+    def common_variance(self, leak: Complex, common: Complex) -> Real:
         """``[...]`` variance that errors common to all responses give to outputs."""
         pairs = (*leak.shape[:-4], -1, *leak.shape[-2:])
         power = (leak * np.sqrt(self.levels)[..., np.newaxis, np.newaxis]).reshape(pairs)
@@ -78,7 +75,7 @@ class ErrorParts:
         relative = np.sum(self.relative * self.leakage.noise_variance(common), axis=-1)
         return np.asarray(np.maximum(self.leakage.variance(power, plain), 0.0) + relative)
 
-    def noise_variance(self, fields: Complex) -> Floats:
+    def noise_variance(self, fields: Complex) -> Real:
         """``[output, response]`` variance by noise of each response, for ``fields[output, i, j, line]``."""
         variances = self.leakage.noise_variance(self.weights * np.sqrt(self.noise) * fields.conj())
         return np.asarray(variances.sum(axis=-1))
@@ -132,7 +129,7 @@ def _sources(
     return residues, np.gradient(rest, lines.frequency_hz[stretch.near] * lines.window.segment_s, axis=-1)
 
 
-def _leak(stretch: LeakageScatter, residues: Complex, slopes: Complex, levels: Floats) -> Floats:
+def _leak(stretch: LeakageScatter, residues: Complex, slopes: Complex, levels: Real) -> Real:
     """``[response, reference, line]`` variance along H that leakage makes."""
     lines = slopes.shape[-1]
     sizes = np.concatenate(
@@ -142,7 +139,7 @@ def _leak(stretch: LeakageScatter, residues: Complex, slopes: Complex, levels: F
     return np.asarray(np.einsum("jl,ilk->ijk", levels, power))
 
 
-def _levels(weights: Floats) -> Floats:
+def _levels(weights: Real) -> Real:
     """``[reference, source]`` power of a source over that of a reference: variances go with 1/power."""
     used = weights > 0
     logs = np.where(used, np.log(np.where(used, weights, 1.0)), 0.0)
@@ -151,7 +148,7 @@ def _levels(weights: Floats) -> Floats:
     return np.asarray(np.exp(means[np.newaxis, :] - means[:, np.newaxis]))
 
 
-def _noise_parts(weights: Floats, leak: Floats, squares: Floats) -> tuple[Floats, Floats]:
+def _noise_parts(weights: Real, leak: Real, squares: Real) -> tuple[Real, Real]:
     """Fit variance = leakage + level of each function + relative of each reference x abs(H)^2.
 
     Least squares, weighted by the fitted variance again and again; gives level ``[response, reference]`` and relative

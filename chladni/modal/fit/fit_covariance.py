@@ -3,7 +3,6 @@
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.fit_inflation import Misfit
 from chladni.modal.fit.fitted_modes import FittedModes
@@ -13,10 +12,8 @@ from chladni.modal.fit.mode_scatter import ModeScatter
 from chladni.modal.fit.model_lines import ModelLines
 from chladni.modal.fit.parameter_spread import ParameterSpread, parameter_spread
 from chladni.modal.fit.scatter_estimate import mode_scatters, too_many
+from chladni.signals.arrays import Complex, Index, Real
 from chladni.signals.provenance import Provenance
-
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
 
 SIMPLE = (
     "so many functions and lines that leakage isn't followed from line to line: error bars of frequency may be twice "
@@ -31,7 +28,7 @@ def fitted_modes(
     *,
     found: Misfit,
     provenance: Provenance,
-    kept: NDArray[np.intp],
+    kept: Index,
     notes: tuple[str, ...],
 ) -> FittedModes:
     """Attach error bars to poles and their best shapes, with what was found of the misfit."""
@@ -87,7 +84,7 @@ def no_modes(lines: ModelLines, notes: tuple[str, ...]) -> FittedModes:
     )
 
 
-def _covariance(poles: Complex, spread: ParameterSpread, scatters: list[ModeScatter]) -> tuple[Floats, Floats]:
+def _covariance(poles: Complex, spread: ParameterSpread, scatters: list[ModeScatter]) -> tuple[Real, Real]:
     """``[mode, 2, mode, 2]`` of natural frequency and damping ratio, and how far it exceeds independent lines."""
     independent = spread.poles()
     own = np.stack([independent[mode, :, mode] for mode in range(poles.size)])
@@ -102,7 +99,7 @@ def _covariance(poles: Complex, spread: ParameterSpread, scatters: list[ModeScat
     return np.asarray(np.einsum("rax,rxsy,sby->rasb", change, covariance, change)), inflation
 
 
-def _normalised(model: ModalModel) -> tuple[ModalModel, NDArray[np.intp]]:
+def _normalised(model: ModalModel) -> tuple[ModalModel, Index]:
     largest = np.argmax(np.abs(model.shapes), axis=1)
     scale = model.shapes[np.arange(largest.size), largest][:, np.newaxis]
     shapes = model.shapes / scale
@@ -118,13 +115,13 @@ def _normalised(model: ModalModel) -> tuple[ModalModel, NDArray[np.intp]]:
     return normalised, largest
 
 
-def _frequency_slopes(poles: Complex) -> Floats:
+def _frequency_slopes(poles: Complex) -> Real:
     """``[mode, 2]`` derivative of abs(lambda)/(2 pi) to Re and Im."""
     unit = poles / np.abs(poles)
     return np.stack([unit.real, unit.imag], axis=1) / (2 * pi)
 
 
-def _damping_slopes(poles: Complex) -> Floats:
+def _damping_slopes(poles: Complex) -> Real:
     """``[mode, 2]`` derivative of -Re/abs to Re and Im."""
     size = np.abs(poles)
     slopes = np.stack([-(poles.imag**2), poles.real * poles.imag], axis=1) / size[:, np.newaxis] ** 3

@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.line_information import line_correlation_factor
 from chladni.modal.fit.lsfd import ShapeSolution
 from chladni.modal.fit.model_lines import ModelLines
+from chladni.signals.arrays import Real
 from chladni.signals.provenance import Provenance
-
-Floats = NDArray[np.float64]
 
 # A misfit is told from chance beyond this many of its own sigmas.
 SIGNIFICANT = 3.0
@@ -35,7 +33,7 @@ class Misfit:
     chi_square: float
     correlation: float
     efficiency: float
-    excess: NDArray[np.float64]
+    excess: Real
 
 
 def misfit(lines: ModelLines, solution: ShapeSolution, provenance: Provenance) -> Misfit:
@@ -69,7 +67,7 @@ def _estimated_weights(lines: ModelLines, provenance: Provenance) -> tuple[float
     return freedom / (freedom - 2), freedom / (freedom - 4)
 
 
-def _near_modes(lines: ModelLines, solution: ShapeSolution, normalised: Floats) -> tuple[Floats, Floats, Floats]:
+def _near_modes(lines: ModelLines, solution: ShapeSolution, normalised: Real) -> tuple[Real, Real, Real]:
     """For each mode the sums of share x square, share and share^2 over all lines of all functions.
 
     A line's share is what it says about the pole: its weight times the square of the model's slope.
@@ -86,7 +84,7 @@ def _near_modes(lines: ModelLines, solution: ShapeSolution, normalised: Floats) 
     )
 
 
-def _excess(weighted: Floats, total: Floats, squared: Floats, correlation: float) -> Floats:
+def _excess(weighted: Real, total: Real, squared: Real, correlation: float) -> Real:
     """Mean square where it is more than chance makes of it, else 1."""
     safe = np.where(total > 0, total, 1.0)
     mean = weighted / safe

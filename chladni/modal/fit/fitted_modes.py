@@ -1,12 +1,12 @@
 """Modes fitted to frequency responses, each with its uncertainty."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.modal.fit.modal_model import ModalModel
+from chladni.signals.arrays import Index, Real
 from chladni.signals.value import Value, require_shape
 
 
@@ -44,15 +44,15 @@ class FittedModes(Value):
     """
 
     model: ModalModel
-    kept: NDArray[np.intp]
-    frequency_std_hz: NDArray[np.float64]
-    damping_std: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    shape_std: NDArray[np.complexfloating[Any, Any]]
-    participation_std: NDArray[np.complexfloating[Any, Any]]
-    modal_mass_std: NDArray[np.float64]
+    kept: Index
+    frequency_std_hz: Real
+    damping_std: Real
+    covariance: Real
+    shape_std: NDArray[np.complexfloating]
+    participation_std: NDArray[np.complexfloating]
+    modal_mass_std: Real
     chi_square: float
-    inflation: NDArray[np.float64]
+    inflation: Real
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

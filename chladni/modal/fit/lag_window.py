@@ -5,12 +5,10 @@ from functools import lru_cache
 from math import factorial, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex
 from chladni.signals.provenance import Provenance
 from chladni.spectral.leakage import SAMPLES, named_window
-
-Complex = NDArray[np.complex128]
 
 # Cosines that the lag window of any cosine window up to flattop is made of.
 HARMONICS = 4

@@ -5,14 +5,11 @@ from itertools import pairwise
 from math import ceil, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.model_lines import ModelLines
+from chladni.signals.arrays import Complex, Index, Real
 from chladni.signals.provenance import Provenance
 from chladni.spectral.leakage import SAMPLES, named_window
-
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
 
 # Reach of a window's spectrum, and of the correlation between lines, in lines.
 REACH, LAGS = 8, 3
@@ -52,13 +49,13 @@ class LeakageScatter:
     """
 
     near: slice
-    modes: NDArray[np.intp]
+    modes: Index
     hermitian: Complex
     plain: Complex
     apparent: Complex
-    noise: Floats
+    noise: Real
 
-    def variance(self, hermitian_weights: Complex, plain_weights: tuple[Complex, Complex]) -> Floats:
+    def variance(self, hermitian_weights: Complex, plain_weights: tuple[Complex, Complex]) -> Real:
         """``[...]`` variance of Re sum b u.
 
         Parameters
@@ -83,7 +80,7 @@ class LeakageScatter:
             total += part if lag == 0 else 2 * part
         return np.asarray(total / 2)
 
-    def noise_variance(self, weights: Complex) -> Floats:
+    def noise_variance(self, weights: Complex) -> Real:
         """``[...]`` variance of Re sum b e over lines ``[..., line]``, for noise e of unit variance along H."""
         total = np.sum(np.abs(weights) ** 2, axis=-1)
         for lag in range(1, len(self.noise)):
@@ -105,7 +102,7 @@ def leakage_scatter(lines: ModelLines, poles: Complex, provenance: Provenance) -
     )
 
 
-def _stretches(position: Floats, decays: Complex, reach: Floats) -> list[slice]:
+def _stretches(position: Real, decays: Complex, reach: Real) -> list[slice]:
     """Cut lines where the reach of a mode begins or ends, and where lines are missing."""
     place = decays.imag / (2 * pi)
     inside = np.any(np.abs(position - place[:, np.newaxis]) <= reach[:, np.newaxis], axis=0)
@@ -119,7 +116,7 @@ def _stretches(position: Floats, decays: Complex, reach: Floats) -> list[slice]:
     return [slice(first, last) for first, last in pairwise([0, *map(int, cuts), position.size])]
 
 
-def _stretch(near: slice, position: Floats, decays: Complex, reach: Floats, source: "_Sources") -> LeakageScatter:
+def _stretch(near: slice, position: Real, decays: Complex, reach: Real, source: "_Sources") -> LeakageScatter:
     place = decays.imag / (2 * pi)
     felt = np.flatnonzero((place >= position[0] - reach) & (place <= position[-1] + reach))
     if felt.size:
@@ -133,7 +130,7 @@ def _stretch(near: slice, position: Floats, decays: Complex, reach: Floats, sour
     )
 
 
-def _in_blocks(position: Floats, decays: Complex, source: "_Sources") -> tuple[Complex, ...]:
+def _in_blocks(position: Real, decays: Complex, source: "_Sources") -> tuple[Complex, ...]:
     """Compute moments over so many lines at a time as fit in memory."""
     slowest = -decays.real.max()
     steps = int(np.clip(ceil(2 * pi * STEPS_A_DECAY / slowest), FEWEST_STEPS, MOST_STEPS))
@@ -155,7 +152,7 @@ class _Sources:
     free: float
     provenance: Provenance
 
-    def moments(self, position: Floats, decays: Complex, steps: int) -> tuple[Complex, Complex, Complex]:
+    def moments(self, position: Real, decays: Complex, steps: int) -> tuple[Complex, Complex, Complex]:
         """Give hermitian, plain and apparent moments at lines given in units of their distance."""
         spectrum, offset = _window_spectrum(self.provenance.window, steps)
         s = 2j * pi * (position[:, np.newaxis] + offset) / self.segment_s
@@ -169,13 +166,13 @@ class _Sources:
         hermitian, plain = (np.stack(each) for each in zip(*lags, strict=True))
         return hermitian, plain, np.asarray(apparent, dtype=np.complex128)
 
-    def noise(self) -> Floats:
+    def noise(self) -> Real:
         """``[lag]`` correlation of noise: as the mean |X|^2 by which is divided, so that it is the same for all."""
         noise = self._powers()
         divided = 1 + noise / self.free
         return np.asarray(noise * divided / divided[0])
 
-    def _powers(self) -> Floats:
+    def _powers(self) -> Real:
         """``[lag]`` correlation of the mean |X|^2 of two lines."""
         spectrum, offset = _window_spectrum(self.provenance.window, FEWEST_STEPS)
         answer = np.zeros(LAGS + 1)
@@ -186,7 +183,7 @@ class _Sources:
         return np.asarray(answer / answer[0])
 
     def _moments_at(
-        self, lag: int, left: Complex, spectrum: Complex, offset: Floats, steps: int
+        self, lag: int, left: Complex, spectrum: Complex, offset: Real, steps: int
     ) -> tuple[Complex, Complex]:
         # The line `lag` further sees the same frequency at an offset smaller by `lag`.
         far = _moved(spectrum, lag * steps)
@@ -213,7 +210,7 @@ class _Sources:
         ] * back
 
 
-def _window_spectrum(name: str, steps: int) -> tuple[Complex, Floats]:
+def _window_spectrum(name: str, steps: int) -> tuple[Complex, Real]:
     """Spectrum of a window with unit power, and the offsets from the line, `steps` a line."""
     offset = np.arange(-REACH * steps, REACH * steps + 1) / steps
     spectrum = np.exp(2j * pi * np.outer(offset, np.arange(SAMPLES)) / SAMPLES) @ named_window(name)

@@ -1,7 +1,6 @@
 """Least-squares frequency domain: shapes and residuals for given poles and participation."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +17,10 @@ from chladni.modal.fit.normal_equations import (
     weight_course,
     weighted_power,
 )
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.value import require_shape
-
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
 
 # Rounds that bring the solution from the precision of normal equations to that of the data.
 REFINEMENTS = 40
@@ -34,8 +31,8 @@ RESIDUAL_COLUMNS = 4
 
 def least_squares_frequency_domain(
     response: FrequencyResponse,
-    poles: NDArray[np.complexfloating[Any, Any]],
-    participation: NDArray[np.complexfloating[Any, Any]] | None = None,
+    poles: NDArray[np.complexfloating],
+    participation: NDArray[np.complexfloating] | None = None,
     *,
     band_hz: tuple[float, float] | None = None,
 ) -> ModalModel:
@@ -76,8 +73,8 @@ def least_squares_frequency_domain(
 
 def checked_modes(
     response: FrequencyResponse,
-    poles: NDArray[np.complexfloating[Any, Any]],
-    participation: NDArray[np.complexfloating[Any, Any]] | None,
+    poles: NDArray[np.complexfloating],
+    participation: NDArray[np.complexfloating] | None,
 ) -> tuple[Complex, Complex]:
     """Check and convert poles and participation; see `least_squares_frequency_domain`."""
     checked = np.asarray(poles, dtype=np.complex128)
@@ -113,10 +110,10 @@ class ShapeSolution:
         The functions that the coefficients combine.
     """
 
-    coefficients: Floats
+    coefficients: Real
     participation: Complex
     residual: Complex
-    inverse: Floats
+    inverse: Real
     basis: ModalBasis
 
     @property
@@ -126,7 +123,7 @@ class ShapeSolution:
         return np.ascontiguousarray(self.coefficients[:, : 2 * modes]).view(np.complex128).T
 
     @property
-    def strength(self) -> Floats:
+    def strength(self) -> Real:
         """``[mode]`` root of the sum of squared residues."""
         participation = np.linalg.norm(self.participation, axis=1)
         return np.asarray(np.linalg.norm(self.shapes, axis=1) * participation, dtype=np.float64)
@@ -167,8 +164,8 @@ def solve_shapes(
 
 
 def _refined(
-    lines: ModelLines, basis: ModalBasis, participation: Complex, inverse: Floats, enough: float
-) -> tuple[Floats, Complex]:
+    lines: ModelLines, basis: ModalBasis, participation: Complex, inverse: Real, enough: float
+) -> tuple[Real, Complex]:
     """Conjugate gradients on each response's equations, preconditioned by their approximate inverse.
 
     Where the inverse is exact the first round solves, and the second adds the digits that normal equations lose.
@@ -204,7 +201,7 @@ def _refined(
     return coefficients, residual
 
 
-def synthesis(basis: ModalBasis, coefficients: Floats, participation: Complex) -> Complex:
+def synthesis(basis: ModalBasis, coefficients: Real, participation: Complex) -> Complex:
     """``[response, reference, line]`` that coefficients make."""
     modes, references = participation.shape
     shapes = np.ascontiguousarray(coefficients[:, : 2 * modes]).view(np.complex128)
@@ -213,7 +210,7 @@ def synthesis(basis: ModalBasis, coefficients: Floats, participation: Complex) -
     return combinations(np.concatenate([residues.view(np.float64), tails], axis=-1), basis.functions)
 
 
-def shape_equations(gram: Floats, participation: Complex) -> Floats:
+def shape_equations(gram: Real, participation: Complex) -> Real:
     """Normal matrix of each response from the Gram matrices ``[response, reference, column, column]``."""
     modes, references = participation.shape
     head, size = 2 * modes, 2 * modes + RESIDUAL_COLUMNS * references
@@ -228,7 +225,7 @@ def shape_equations(gram: Floats, participation: Complex) -> Floats:
     return matrix
 
 
-def shape_gradient(projected: Floats, participation: Complex) -> Floats:
+def shape_gradient(projected: Real, participation: Complex) -> Real:
     """Right-hand side of each response from projections ``[response, reference, column]``."""
     head = 2 * len(participation)
     shapes = sum(rotated(projected[:, j, :head], vector) for j, vector in enumerate(participation.T))

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.fit_covariance import fitted_modes, no_modes
 from chladni.modal.fit.fit_inflation import misfit
@@ -14,11 +13,9 @@ from chladni.modal.fit.modal_model import ModalModel
 from chladni.modal.fit.mode_guard import lost_mode
 from chladni.modal.fit.model_lines import ModelLines, model_lines, reweighted
 from chladni.modal.fit.reduced_equations import ReducedEquations, reduced_equations
+from chladni.signals.arrays import Complex
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.wording import counted
-
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
 
 # A step that moves no pole by more than this share of its decay rate ends the iteration, and so does one that
 # improves a fit with known variances by less than this: it is a small part of a sigma.

@@ -4,14 +4,11 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.lag_window import LagWindow
 from chladni.modal.fit.model_lines import ModelLines
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.value import Value
-
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,7 +32,7 @@ class ModalBasis(Value):
 
     functions: Complex
     slopes: Complex
-    residual_terms: Floats
+    residual_terms: Real
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -95,7 +92,7 @@ def _windowed(s: Complex, order: int, poles: Complex, window: LagWindow) -> tupl
     return start + pole**2 * decay, 1 + 2 * pole * decay + pole**2 * slope
 
 
-def _residual_functions(lines: ModelLines) -> tuple[Complex, Floats]:
+def _residual_functions(lines: ModelLines) -> tuple[Complex, Real]:
     # Over a narrow band s^-2 and 1 are nearly the same; orthonormal combinations keep the equations well conditioned.
     omega = lines.s.imag
     raw = np.stack([-(omega ** (lines.order - 2.0)), omega ** float(lines.order)])

@@ -7,11 +7,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value, require_shape
 from chladni.spectral.forms import ORDER, Form
-
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,10 +34,10 @@ class ModalModel(Value):
     """
 
     poles: Complex
-    shapes: NDArray[np.complexfloating[Any, Any]]
-    participation: NDArray[np.complexfloating[Any, Any]]
-    lower: NDArray[np.complexfloating[Any, Any]]
-    upper: NDArray[np.complexfloating[Any, Any]]
+    shapes: NDArray[np.complexfloating]
+    participation: NDArray[np.complexfloating]
+    lower: NDArray[np.complexfloating]
+    upper: NDArray[np.complexfloating]
 
     def __post_init__(self) -> None:
         modes = self.poles.size
@@ -51,12 +50,12 @@ class ModalModel(Value):
         self._freeze()
 
     @property
-    def frequency_hz(self) -> NDArray[np.float64]:
+    def frequency_hz(self) -> Real:
         """``[mode]`` undamped natural frequency abs(lambda)/(2 pi)."""
         return np.abs(self.poles) / (2 * pi)
 
     @property
-    def damping_ratio(self) -> NDArray[np.float64]:
+    def damping_ratio(self) -> Real:
         """``[mode]`` -Re(lambda)/abs(lambda)."""
         return np.asarray(-self.poles.real / np.abs(self.poles), dtype=np.float64)
 
@@ -65,7 +64,7 @@ class ModalModel(Value):
         """``[mode, response, reference]`` psi_ri L_rj."""
         return np.asarray(self.shapes[:, :, np.newaxis] * self.participation[:, np.newaxis], dtype=np.complex128)
 
-    def synthesise(self, frequency_hz: NDArray[np.float64], form: Form) -> Complex:
+    def synthesise(self, frequency_hz: Real, form: Form) -> Complex:
         """Add up the frequency responses, in the convention e^{+j omega t}.
 
         Parameters

@@ -1,11 +1,9 @@
 """Modes that a refinement has lost: outside the lines, far from where they began, or run into another mode."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.model_lines import ModelLines
-
-Complex = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 # Distances of poles in units of decay rates, or of half a line where that is more. A mode further from its start
 # answers another question than was asked; two modes nearer to each other are one that the data don't split.
@@ -15,9 +13,7 @@ NEAREST = 0.02
 NARROWEST = 0.02
 
 
-def lost_mode(
-    lines: ModelLines, began: Complex, poles: Complex, strength: NDArray[np.float64]
-) -> tuple[int, str] | None:
+def lost_mode(lines: ModelLines, began: Complex, poles: Complex, strength: Real) -> tuple[int, str] | None:
     """Find the mode that has most certainly been lost, and say why; None when all are where they should be.
 
     Parameters

@@ -2,10 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -26,8 +23,8 @@ class ModeScatter:
         On the variance of the scale: participation and modal mass.
     """
 
-    pole: Floats
+    pole: Real
     shared: float
-    shares: Floats
-    common: Floats
+    shares: Real
+    common: Real
     amplitude: float

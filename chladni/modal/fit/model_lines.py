@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass, replace
 from math import pi
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.modal.fit.lag_window import LagWindow, lag_window
+from chladni.signals.arrays import Complex, Mask, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.value import Value
@@ -18,8 +18,6 @@ ROUNDING = 1e-8
 EXACT = 1e-13
 # Steps until level and share of the variance stand still.
 ROUNDS = 60
-Floats = NDArray[np.float64]
-
 UNKNOWN_STD = "the functions carry no standard deviation: error bars rest on what the fit leaves of each function"
 
 
@@ -46,9 +44,9 @@ class ModelLines(Value):
         Where the weights come from, when not from `std`.
     """
 
-    frequency_hz: NDArray[np.float64]
-    values: NDArray[np.complexfloating[Any, Any]]
-    weights: NDArray[np.float64]
+    frequency_hz: Real
+    values: NDArray[np.complexfloating]
+    weights: Real
     order: int
     window: LagWindow | None
     weighted: bool
@@ -58,7 +56,7 @@ class ModelLines(Value):
         self._freeze()
 
     @property
-    def s(self) -> NDArray[np.complex128]:
+    def s(self) -> Complex:
         """``[line]`` j omega in rad/s."""
         return np.asarray(2j * pi * self.frequency_hz, dtype=np.complex128)
 
@@ -97,7 +95,7 @@ def model_lines(response: FrequencyResponse, band_hz: tuple[float, float] | None
     )
 
 
-def reweighted(lines: ModelLines, residual: NDArray[np.complex128], *, parameters: int) -> ModelLines:
+def reweighted(lines: ModelLines, residual: Complex, *, parameters: int) -> ModelLines:
     """Weigh each line by what a fit with `parameters` real coefficients a response leaves of its function.
 
     The variance is taken for a level and a share of the function's square: noise of a sensor is the same on all
@@ -114,7 +112,7 @@ def reweighted(lines: ModelLines, residual: NDArray[np.complex128], *, parameter
     return replace(lines, weights=np.where(used, 1 / np.maximum(variance, floor), 0.0))
 
 
-def _level_and_share(squares: Floats, power: Floats, used: NDArray[np.bool_]) -> Floats:
+def _level_and_share(squares: Real, power: Real, used: Mask) -> Real:
     """``[response, reference, line]`` variances level + share x power of greatest likelihood for exponential squares.
 
     Multiplicative steps keep both positive and raise the likelihood each time (Fevotte & Idier 2011, Neural
@@ -131,16 +129,14 @@ def _level_and_share(squares: Floats, power: Floats, used: NDArray[np.bool_]) ->
     return np.asarray(level + share * power, dtype=np.float64)
 
 
-def _ratio(above: Floats, below: Floats) -> Floats:
+def _ratio(above: Real, below: Real) -> Real:
     """Sums over the last axis, 0 of a function without lines or without power."""
     total = below.sum(axis=-1, keepdims=True)
     ratio = np.divide(above.sum(axis=-1, keepdims=True), total, out=np.zeros_like(total), where=total > 0)
     return np.asarray(ratio, dtype=np.float64)
 
 
-def _weights(
-    values: NDArray[np.complex128], std: NDArray[np.float64], usable: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], bool]:
+def _weights(values: Complex, std: Real, usable: Mask) -> tuple[Real, bool]:
     # A standard deviation of nothing but rounding, on some lines, must not make them outweigh all others.
     floor = ROUNDING * np.abs(values).max(axis=-1, keepdims=True)
     known = usable & np.isfinite(std) & (std > floor)

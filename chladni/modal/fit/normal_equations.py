@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
+from chladni.signals.arrays import Complex, Mask, Real
 
 # Products of basis functions that are held at once, in numbers (32 MB).
 LARGEST_TABLE = 2**22
@@ -40,10 +38,10 @@ class WeightCourse:
         Lines in a block.
     """
 
-    profile: Floats
+    profile: Real
     block: int
 
-    def summed(self, lines: Floats) -> Floats:
+    def summed(self, lines: Real) -> Real:
         """``[..., block]`` sums over the lines of each block."""
         if self.block == 1:
             return lines
@@ -55,7 +53,7 @@ class WeightCourse:
         size = max(1, LARGEST_BATCH // (references * columns**2))
         return [slice(first, min(first + size, responses)) for first in range(0, responses, size)]
 
-    def gram(self, functions: Complex, weights: Floats) -> Floats:
+    def gram(self, functions: Complex, weights: Real) -> Real:
         """Give ``[..., column, column]`` Re(sum of w conj(P_a) P_b) from ``[column, line]`` and ``[..., line]``."""
         columns = len(functions)
         profile, means = self.summed(self.profile), self.summed(weights)
@@ -73,7 +71,7 @@ class WeightCourse:
         return np.take(upper, place, axis=-1)
 
 
-def weight_course(weights: Floats, modes: int) -> WeightCourse:
+def weight_course(weights: Real, modes: int) -> WeightCourse:
     """Plan the Gram matrices of so many modes and their slopes for weights ``[response, reference, line]``."""
     lines = weights.shape[-1]
     strongest = weights.max(axis=-1, keepdims=True)
@@ -87,7 +85,7 @@ def weight_course(weights: Floats, modes: int) -> WeightCourse:
     return WeightCourse(profile=profile, block=-(-weights.size * columns * (columns + 1) // (2 * LARGEST_WORK)))
 
 
-def _line_products(functions: Complex) -> Floats:
+def _line_products(functions: Complex) -> Real:
     """``[pair, line]`` Re(conj(P_a) P_b), for the pairs of `numpy.triu_indices`."""
     columns, lines = functions.shape
     real, imag = np.ascontiguousarray(functions.real), np.ascontiguousarray(functions.imag)
@@ -101,7 +99,7 @@ def _line_products(functions: Complex) -> Floats:
     return products
 
 
-def _block_products(functions: Complex, block: int) -> Floats:
+def _block_products(functions: Complex, block: int) -> Real:
     """``[pair, block]`` sums of the same over blocks of lines."""
     columns, lines = functions.shape
     blocks = -(-lines // block)
@@ -112,28 +110,28 @@ def _block_products(functions: Complex, block: int) -> Floats:
     return np.ascontiguousarray((parts @ parts.transpose(0, 2, 1))[:, rows, others].T)
 
 
-def projections(functions: Complex, weighted: Complex) -> Floats:
+def projections(functions: Complex, weighted: Complex) -> Real:
     """Give ``[..., column]``: Re of the sum over lines of conj(P_a) times `weighted` ``[..., line]``."""
     return np.asarray(_parts(weighted) @ _parts(functions).T, dtype=np.float64)
 
 
-def combinations(coefficients: Floats, functions: Complex) -> Complex:
+def combinations(coefficients: Real, functions: Complex) -> Complex:
     """Add up functions ``[column, line]`` with real ``coefficients[..., column]``."""
     return np.asarray((coefficients @ _parts(functions)).view(np.complex128), dtype=np.complex128)
 
 
-def weighted_power(weighted: Complex, values: Complex) -> Floats:
+def weighted_power(weighted: Complex, values: Complex) -> Real:
     """``[row]`` sum of weight |value|^2, from ``[row, ...]`` weight times value and value."""
     rows = len(values)
     return np.asarray(np.einsum("ik,ik->i", _parts(weighted).reshape(rows, -1), _parts(values).reshape(rows, -1)))
 
 
-def _parts(values: Complex) -> Floats:
+def _parts(values: Complex) -> Real:
     """Re and Im of each line side by side: real products of them cost half of complex ones, and no copy."""
     return np.ascontiguousarray(values).view(np.float64)
 
 
-def rotated(pairs: Floats, factors: Complex) -> Floats:
+def rotated(pairs: Real, factors: Complex) -> Real:
     """Turn columns for Re, Im of a product into columns for Re, Im of its second factor, given the first.
 
     Parameters
@@ -148,12 +146,12 @@ def rotated(pairs: Floats, factors: Complex) -> Floats:
     return np.ascontiguousarray(whole * factors.conj()).view(np.float64)
 
 
-def rotated_rows(matrix: Floats, factors: Complex) -> Floats:
+def rotated_rows(matrix: Real, factors: Complex) -> Real:
     """Do the same to the rows of ``[..., 2 mode, column]``."""
     return np.swapaxes(rotated(np.swapaxes(matrix, -1, -2), factors[..., np.newaxis, :]), -1, -2)
 
 
-def symmetric_inverse(matrices: Floats) -> Floats:
+def symmetric_inverse(matrices: Real) -> Real:
     """Invert a stack of symmetric non-negative matrices, each scaled to a unit diagonal before.
 
     Directions that the data say nothing about are left at zero.
@@ -168,7 +166,7 @@ def symmetric_inverse(matrices: Floats) -> Floats:
     return np.asarray(inverse * scales, dtype=np.float64)
 
 
-def _plain_inverse(scaled: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def _plain_inverse(scaled: Real) -> tuple[Real, Mask]:
     """Invert without looking for weak directions, and tell which matrices surely have none."""
     try:
         inverse = np.linalg.inv(scaled)
@@ -183,7 +181,7 @@ def _plain_inverse(scaled: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     return (inverse + np.swapaxes(inverse, -1, -2)) / 2, np.asarray(sure)
 
 
-def _inverse_of_strong(scaled: Floats) -> Floats:
+def _inverse_of_strong(scaled: Real) -> Real:
     strengths, directions = np.linalg.eigh(scaled)
     strong = strengths > WEAKEST * strengths.shape[-1]
     gains = np.where(strong, 1 / np.where(strong, strengths, 1.0), 0.0)

@@ -3,16 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.lsfd import ShapeSolution, synthesis
 from chladni.modal.fit.mode_scatter import ModeScatter
 from chladni.modal.fit.model_lines import ModelLines
 from chladni.modal.fit.normal_equations import symmetric_inverse
 from chladni.modal.fit.reduced_equations import reduced_equations
-
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
+from chladni.signals.arrays import Complex, Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -25,11 +22,11 @@ class ParameterSpread:
     variance then is a sum of squares, which keeps many responses cheap.
     """
 
-    own: Floats
-    coupling: Floats
-    theta: Floats
-    root: Floats
-    rooted: Floats
+    own: Real
+    coupling: Real
+    theta: Real
+    root: Real
+    rooted: Real
     solution: ShapeSolution
 
     @property
@@ -42,7 +39,7 @@ class ParameterSpread:
         """``[mode, reference]`` as it was fitted."""
         return self.solution.participation
 
-    def poles(self) -> Floats:
+    def poles(self) -> Real:
         """``[mode, 2, mode, 2]`` covariance of Re and Im of the poles."""
         modes = len(self.participation)
         return self.theta[: 2 * modes, : 2 * modes].reshape(modes, 2, modes, 2)
@@ -73,7 +70,7 @@ class ParameterSpread:
         total = real_matrices(vector) @ own[largest] @ real_matrices(vector.conj()) + _squared(through)
         return _packed(total, np.ones_like(vector))
 
-    def amplitude(self, mode: int, largest: int) -> tuple[Floats, Floats]:
+    def amplitude(self, mode: int, largest: int) -> tuple[Real, Real]:
         """Directions whose fields are the influence of the data on Re and Im of the largest residue.
 
         They are of theta ``[2, parameter]`` and of the largest response's own scatter ``[2, coefficient]``.
@@ -85,7 +82,7 @@ class ParameterSpread:
         through += real_matrices(self.shapes[mode, largest]) @ self._components(mode)[reference]
         return through @ self.root.T, factor @ self.own[largest, rows]
 
-    def field(self, near: slice, theta: Floats, own: tuple[int, Floats] | None = None) -> Complex:
+    def field(self, near: slice, theta: Real, own: tuple[int, Real] | None = None) -> Complex:
         """Change of the model ``[response, reference, line]`` with theta and with one response's own scatter."""
         vectors, modes = self.participation, len(self.participation)
         changes = theta.view(np.complex128).reshape(-1, modes)
@@ -99,7 +96,7 @@ class ParameterSpread:
         moved = shapes[:, np.newaxis] * changes[1:]
         return np.asarray(total + np.ascontiguousarray(moved).view(np.float64) @ basis.modes[:, near])
 
-    def mass_std(self, mode: int, largest: int, pole: complex) -> Floats:
+    def mass_std(self, mode: int, largest: int, pole: complex) -> Real:
         """``[response, reference]`` of Re(a / (2 j omega_d)), a = (psi_i/psi_c)/(L_j psi_c)."""
         scale = self.shapes[mode, largest]
         vector, ratios = self.participation[mode], self.shapes[mode] / scale
@@ -111,7 +108,7 @@ class ParameterSpread:
 
     def _mass_std(
         self, mode: int, largest: int, scale: complex, pole: complex, reference: int, mass: Complex
-    ) -> Floats:
+    ) -> Real:
         own, coupling = self._shape(mode)
         here, there = 1 / (self.participation[mode, reference] * scale**2 * 2j * pole.imag), -2 * mass / scale
         beside = -mass / self.participation[mode, reference]
@@ -128,11 +125,11 @@ class ParameterSpread:
         total[largest] = both @ own[largest] @ both.T
         return np.asarray(np.sqrt((total + _squared(through))[:, 0, 0]), dtype=np.float64)
 
-    def _shape(self, mode: int) -> tuple[Floats, Floats]:
+    def _shape(self, mode: int) -> tuple[Real, Real]:
         rows = slice(2 * mode, 2 * mode + 2)
         return self.own[:, rows, rows], self.rooted[:, rows]
 
-    def _components(self, mode: int) -> Floats:
+    def _components(self, mode: int) -> Real:
         """``[reference, 2, direction]`` root of Re, Im of a participation vector."""
         modes, references = self.participation.shape
         return self.root[2 * modes :].reshape(references, modes, 2, -1)[:, mode]
@@ -163,7 +160,7 @@ def parameter_spread(lines: ModelLines, solution: ShapeSolution) -> ParameterSpr
     )
 
 
-def real_matrices(factors: Complex | complex) -> Floats:
+def real_matrices(factors: Complex | complex) -> Real:
     """``[..., 2, 2]`` matrices that multiply (Re, Im) by complex factors."""
     factors = np.asarray(factors)
     return np.stack(
@@ -171,11 +168,11 @@ def real_matrices(factors: Complex | complex) -> Floats:
     )
 
 
-def _squared(through: Floats) -> Floats:
+def _squared(through: Real) -> Real:
     return np.asarray(through @ np.swapaxes(through, -1, -2), dtype=np.float64)
 
 
-def _packed(covariance: Floats, factors: Complex, further: Floats | float = 0.0) -> Complex:
+def _packed(covariance: Real, factors: Complex, further: Real | float = 0.0) -> Complex:
     """One sigma of Re + j one sigma of Im, after multiplication by complex factors, and with further variance."""
     turned = real_matrices(factors) @ covariance @ np.swapaxes(real_matrices(factors), -1, -2)
     variances = np.maximum(np.einsum("...aa->...a", turned), 0.0) + further

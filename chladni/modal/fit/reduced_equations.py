@@ -3,14 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.lsfd import ShapeSolution
 from chladni.modal.fit.model_lines import ModelLines
 from chladni.modal.fit.normal_equations import projections, rotated, rotated_rows, symmetric_inverse, weight_course
-
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
+from chladni.signals.arrays import Complex, Index, Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,10 +27,10 @@ class ReducedEquations:
         components, reference by reference; the largest component of each vector is fixed at 1.
     """
 
-    curvature: Floats
-    descent: Floats
-    coupling: Floats
-    free: NDArray[np.intp]
+    curvature: Real
+    descent: Real
+    coupling: Real
+    free: Index
 
     def promised(self) -> float:
         """What a full step lowers the cost by, to first order."""
@@ -70,7 +67,7 @@ def reduced_equations(lines: ModelLines, solution: ShapeSolution) -> ReducedEqua
     return ReducedEquations(curvature=(curvature + curvature.T) / 2, descent=descent, coupling=coupling, free=free)
 
 
-def _free(participation: Complex) -> NDArray[np.intp]:
+def _free(participation: Complex) -> Index:
     modes, references = participation.shape
     free = np.ones((1 + references, modes, 2), dtype=bool)
     # A factor can be moved from shape to participation; this convention takes that freedom away.
@@ -78,7 +75,7 @@ def _free(participation: Complex) -> NDArray[np.intp]:
     return np.flatnonzero(free)
 
 
-def _blocks(gram: Floats, shapes: Complex, vectors: Complex) -> tuple[Floats, Floats]:
+def _blocks(gram: Real, shapes: Complex, vectors: Complex) -> tuple[Real, Real]:
     """Products of derivatives to the parameters with each other, summed, and with those to the coefficients."""
     modes, references = vectors.shape
     head = 2 * modes
@@ -103,7 +100,7 @@ def _blocks(gram: Floats, shapes: Complex, vectors: Complex) -> tuple[Floats, Fl
     return own, cross
 
 
-def _gradient(projected: Floats, shapes: Complex, vectors: Complex) -> Floats:
+def _gradient(projected: Real, shapes: Complex, vectors: Complex) -> Real:
     head = 2 * len(vectors)
     value, slope = projected[..., :head], projected[..., head:]
     residues = shapes[:, np.newaxis] * vectors.T

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.modal.checks.driving_point import driving_points, same_direction
 from chladni.modal.fit.fitted_modes import FittedModes
+from chladni.signals.arrays import Complex
 from chladni.signals.channel import Channel, find_channel
 from chladni.signals.modal_scale import ModalScale
 from chladni.spectral.forms import MOTION_ORDER
@@ -82,9 +82,7 @@ def modal_scale(
     return Scaling(scale=scale, notes=_doubts(fitted, scale))
 
 
-def unit_modal_mass_shapes(
-    shapes: NDArray[np.complexfloating[Any, Any]], scale: ModalScale
-) -> NDArray[np.complex128]:
+def unit_modal_mass_shapes(shapes: NDArray[np.complexfloating], scale: ModalScale) -> Complex:
     """Scale shapes ``[mode, response]`` to unit modal mass, 1/sqrt(kg) for translations.
 
     A mode whose modal mass isn't positive has none, and its row is NaN.

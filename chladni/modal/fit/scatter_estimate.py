@@ -1,7 +1,6 @@
 """Scatter of each mode from noise, leakage and misfit together."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.error_parts import ErrorParts, error_parts
 from chladni.modal.fit.fit_inflation import Misfit
@@ -10,10 +9,9 @@ from chladni.modal.fit.lsfd import synthesis
 from chladni.modal.fit.mode_scatter import ModeScatter
 from chladni.modal.fit.model_lines import ModelLines
 from chladni.modal.fit.parameter_spread import ParameterSpread, real_matrices
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.provenance import Provenance
 
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
 Parts = tuple[ErrorParts, ...]
 
 # Some twenty seconds of work. Beyond, lines are taken for independent but for what the window makes of neighbours.
@@ -91,7 +89,7 @@ def _with_sum(pair: Complex) -> Complex:
     return np.concatenate([pair, pair.sum(axis=0, keepdims=True)])
 
 
-def _matrix(variances: Floats) -> Floats:
+def _matrix(variances: Real) -> Real:
     """Covariance of two numbers from the variances of each and of their sum."""
     both = (variances[2] - variances[0] - variances[1]) / 2
     return np.array([[variances[0], both], [both, variances[1]]])
@@ -125,7 +123,7 @@ def _rows(spread: ParameterSpread, part: ErrorParts) -> list[int]:
 
 def _shapes(
     spread: ParameterSpread, parts: Parts, drives: list[tuple[Complex, Complex]], mode: int, largest: int
-) -> tuple[Floats, Floats]:
+) -> tuple[Real, Real]:
     """``[response]`` factor of own noise; ``[response, 2]`` variance of component over largest by common errors."""
     pair = slice(2 * mode, 2 * mode + 2)
     scale = spread.shapes[mode, largest]
@@ -151,7 +149,7 @@ def _shapes(
     return np.divide(noise, plain, out=np.ones_like(plain), where=plain > 0), variance
 
 
-def _combined(matrices: Floats, pairs: Complex) -> Complex:
+def _combined(matrices: Real, pairs: Complex) -> Complex:
     """Products of ``[response, 2, 2]`` with ``[response, 2, ...]``."""
     flat = pairs.reshape(*pairs.shape[:2], -1)
     return np.asarray(matrices @ flat).reshape(pairs.shape)

@@ -1,16 +1,13 @@
 """Frequency responses synthesised from a modal model, held against the measured ones."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.modal_basis import modal_basis
 from chladni.modal.fit.modal_model import ModalModel
 from chladni.modal.fit.model_lines import ModelLines, model_lines
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.modal_fit import ModalFit
-
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
 
 
 def modal_fit(
@@ -71,7 +68,7 @@ def windowed_synthesis(lines: ModelLines, model: ModalModel) -> Complex:
     return np.asarray(columns @ basis.modes + outside, dtype=np.complex128)
 
 
-def _edges(lines: ModelLines, model: ModalModel) -> Floats:
+def _edges(lines: ModelLines, model: ModalModel) -> Real:
     first, last = lines.frequency_hz[0], lines.frequency_hz[-1]
     modes = np.sort(model.frequency_hz)
     modes = modes[(modes >= first) & (modes <= last)]
@@ -82,6 +79,6 @@ def _edges(lines: ModelLines, model: ModalModel) -> Floats:
     return np.stack([ends[:-1], ends[1:]], axis=1)
 
 
-def _relative(wrong: Floats, power: Floats) -> Floats:
+def _relative(wrong: Real, power: Real) -> Real:
     share = np.divide(wrong, power, out=np.zeros(np.shape(wrong)), where=np.asarray(power) > 0)
     return np.asarray(np.sqrt(share), dtype=np.float64)

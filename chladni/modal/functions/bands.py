@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Index, Real, Whole
 from chladni.signals.errors import EstimateError
 from chladni.signals.modal_fit import ModalFit
 from chladni.signals.modal_scale import ModalScale
@@ -15,8 +15,6 @@ from chladni.signals.order_spread import OrderSpread
 from chladni.signals.provenance import Provenance
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
 from chladni.signals.value import ScalarT
-
-Rows = NDArray[np.int64]
 
 # Modes of two bands are one when their frequencies agree within so many sigmas, or within this part of the half-power
 # width (sigmas know nothing of what the other band's modes add at the border), and their shapes agree.
@@ -74,8 +72,8 @@ def join_bands(sets: Sequence[ModeSet]) -> ModeSet:
 class _Choice:
     """Which modes of all sets, one after the other, stay: ``rows``; ``place[row]`` is where each ends up."""
 
-    rows: Rows
-    place: Rows
+    rows: Whole
+    place: Whole
 
     def of(self, parts: Sequence[NDArray[ScalarT]]) -> NDArray[ScalarT]:
         chosen: NDArray[ScalarT] = np.concatenate(list(parts))[self.rows]
@@ -128,7 +126,7 @@ def _likeness(one: NDArray[np.complexfloating], other: NDArray[np.complexfloatin
     return float(abs(np.vdot(one, other)) ** 2 / (np.vdot(one, one).real * np.vdot(other, other).real))
 
 
-def _participation(sets: Sequence[ModeSet], choice: _Choice) -> NDArray[np.complexfloating[Any, Any]] | None:
+def _participation(sets: Sequence[ModeSet], choice: _Choice) -> NDArray[np.complexfloating] | None:
     parts = [one.participation for one in sets if one.participation is not None]
     return choice.of(parts) if len(parts) == len(sets) else None
 
@@ -219,12 +217,12 @@ def _fit(sets: Sequence[ModeSet]) -> ModalFit | None:
     )
 
 
-def _power(fit: ModalFit) -> NDArray[np.float64]:
+def _power(fit: ModalFit) -> Real:
     share = 1 - np.minimum(fit.function_error, 0.9) ** 2
     return np.asarray(np.sum(np.abs(fit.synthesised) ** 2, axis=-1) / share, dtype=np.float64)
 
 
-def _rows(fit: ModalFit, lines: NDArray[np.float64]) -> NDArray[np.intp]:
+def _rows(fit: ModalFit, lines: Real) -> Index:
     return np.searchsorted(fit.frequency_hz, lines)
 
 

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.poles.pole_selection import PoleSelection, SelectionRules, select_poles
 from chladni.modal.poles.pole_table import PoleTable
+from chladni.signals.arrays import Complex, Mask, Whole
 from chladni.signals.order_spread import OrderSpread
 
 
@@ -34,11 +34,11 @@ class Candidates:
     """
 
     table: PoleTable
-    pole: NDArray[np.complex128]
-    vector: NDArray[np.complex128]
-    member: NDArray[np.int64]
+    pole: Complex
+    vector: Complex
+    member: Whole
     spread: OrderSpread
-    asked: NDArray[np.bool_]
+    asked: Mask
     only_asked: bool
     notes: tuple[str, ...]
 
@@ -54,9 +54,7 @@ def candidates(table: PoleTable, rules: SelectionRules, frequencies_hz: Sequence
     return _gathered(table, [chosen, wanted], asked=asked, only_asked=True)
 
 
-def _gathered(
-    table: PoleTable, selections: list[PoleSelection], *, asked: NDArray[np.bool_], only_asked: bool
-) -> Candidates:
+def _gathered(table: PoleTable, selections: list[PoleSelection], *, asked: Mask, only_asked: bool) -> Candidates:
     """Join selections of one table, in which a cluster that both hold has the same row in both."""
     seen: set[int] = set()
     member = np.full(table.order.size, -1)

@@ -5,17 +5,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.functions.exponential_window import without_window_damping
 from chladni.modal.functions.nyquist_circle import NyquistCircle, fit_circle, sweep
 from chladni.modal.functions.resonance_lines import MobilityLines, Resonance, mobility_lines, resonances
 from chladni.modal.functions.single_modes import SingleMode, left_out, mode_set
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
-
-Floats = NDArray[np.float64]
 
 # Lines up to so many half-power half-widths from the peak span 250 of the circle's 360 degrees (Ewins asks for 270 at
 # most, for there the sweep is slow and other modes are strong).
@@ -152,7 +150,7 @@ def _words(lines: MobilityLines, span: slice, resonance: Resonance, circle: Nyqu
     return words
 
 
-def pair_damping(lines: MobilityLines, span: slice, function: tuple[int, int], circle: NyquistCircle) -> Floats:
+def pair_damping(lines: MobilityLines, span: slice, function: tuple[int, int], circle: NyquistCircle) -> Real:
     """Give the damping ratio of each pair of points on either side of the resonance, on one function's circle.
 
     Notes

@@ -1,12 +1,12 @@
 """Complex mode indicator function: singular values of the frequency responses, line by line."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.frequency_response import FrequencyResponse
 
 
-def complex_mode_indicator(response: FrequencyResponse) -> NDArray[np.float64]:
+def complex_mode_indicator(response: FrequencyResponse) -> Real:
     """Give the singular values of H on each line; a peak of the greatest is a mode, of the second a close mode.
 
     Parameters

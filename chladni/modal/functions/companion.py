@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
+
+from chladni.signals.arrays import Complex
 
 
-def denominators(matrix: NDArray[np.complex128], references: int, orders: range) -> Iterator[NDArray[np.complex128]]:
+def denominators(matrix: Complex, references: int, orders: range) -> Iterator[Complex]:
     """Solve for the coefficients alpha_1 to alpha_k of each order k, alpha_0 being the identity.
 
     Parameters
@@ -46,7 +47,7 @@ def denominators(matrix: NDArray[np.complex128], references: int, orders: range)
         yield (inverse[:size, :size].conj().T @ right[:size]).reshape(order, references, references)
 
 
-def stable_roots(coefficients: NDArray[np.complex128], *, beyond: float = 0.0) -> NDArray[np.complex128]:
+def stable_roots(coefficients: Complex, *, beyond: float = 0.0) -> Complex:
     """Roots z of det(I + sum alpha_r z^r) within the unit circle, or so little `beyond` it.
 
     Parameters
@@ -72,7 +73,7 @@ def stable_roots(coefficients: NDArray[np.complex128], *, beyond: float = 0.0) -
     return np.asarray(1 / inverse[np.abs(inverse) > np.exp(-beyond)])
 
 
-def participation(coefficients: NDArray[np.complex128], roots: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def participation(coefficients: Complex, roots: Complex) -> Complex:
     """Row vectors L with L A(z) = 0 at each root: how strongly each reference drives that pole.
 
     Returns

@@ -4,18 +4,14 @@ from dataclasses import replace
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.channel import find_channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.modal_scale import ModalScale
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.order_spread import OrderSpread
 from chladni.spectral.forms import MOTION_ORDER
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Rows = NDArray[np.int64]
 
 
 def without_window_damping(modes: ModeSet, decay_per_s: float) -> ModeSet:
@@ -94,7 +90,7 @@ def without_window_damping(modes: ModeSet, decay_per_s: float) -> ModeSet:
     return _kept(moved, frequency_hz, damping_ratio)
 
 
-def _shifted(frequency_hz: Floats, damping_ratio: Floats, decay_per_s: float) -> tuple[Floats, Floats]:
+def _shifted(frequency_hz: Real, damping_ratio: Real, decay_per_s: float) -> tuple[Real, Real]:
     """Natural frequency and damping ratio of poles that moved by +sigma."""
     omega = 2 * pi * frequency_hz
     real = decay_per_s - damping_ratio * omega
@@ -103,8 +99,8 @@ def _shifted(frequency_hz: Floats, damping_ratio: Floats, decay_per_s: float) ->
 
 
 def _propagated(
-    frequency_hz: Floats, damping_ratio: Floats, frequency_std_hz: Floats, damping_std: Floats, decay_per_s: float
-) -> tuple[Floats, Floats]:
+    frequency_hz: Real, damping_ratio: Real, frequency_std_hz: Real, damping_std: Real, decay_per_s: float
+) -> tuple[Real, Real]:
     """One sigma after the shift, from the derivatives of `_shifted`."""
     omega, zeta = 2 * pi * frequency_hz, damping_ratio
     shifted_hz, shifted_zeta = _shifted(frequency_hz, damping_ratio, decay_per_s)
@@ -152,7 +148,7 @@ def _shifted_spread(spread: OrderSpread, decay_per_s: float) -> OrderSpread:
     )
 
 
-def _kept(modes: ModeSet, frequency_hz: Floats, damping_ratio: Floats) -> ModeSet:
+def _kept(modes: ModeSet, frequency_hz: Real, damping_ratio: Real) -> ModeSet:
     """Give the modes whose pole is still on the stable side, by rising frequency, at their new place."""
     # Close modes of unequal damping may have changed places, which a set in the making must not show.
     rows = np.argsort(frequency_hz, kind="stable")
@@ -172,7 +168,7 @@ def _kept(modes: ModeSet, frequency_hz: Floats, damping_ratio: Floats) -> ModeSe
     )
 
 
-def _notes(modes: ModeSet, damping_ratio: Floats, damping_std: Floats, decay_per_s: float) -> list[str]:
+def _notes(modes: ModeSet, damping_ratio: Real, damping_std: Real, decay_per_s: float) -> list[str]:
     """Say by how much, and which modes have no damping left."""
     notes = []
     removed = modes.damping_ratio - damping_ratio

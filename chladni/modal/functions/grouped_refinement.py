@@ -5,17 +5,14 @@ from dataclasses import replace
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.fitted_modes import FittedModes
 from chladni.modal.fit.lsfd import least_squares_frequency_domain
 from chladni.modal.fit.maximum_likelihood import refine
 from chladni.modal.fit.modal_model import ModalModel
 from chladni.modal.fit.synthesis import modal_fit
+from chladni.signals.arrays import Complex, Index, Mask
 from chladni.signals.frequency_response import FrequencyResponse
-
-Complex = NDArray[np.complex128]
-Rows = NDArray[np.intp]
 
 # The work grows with the square of the modes fitted together, and with the lines.
 ALONE, GROUP = 12, 8
@@ -60,7 +57,7 @@ def grouped_refinement(
     return replace(fitted, kept=started)
 
 
-def _refined(response: FrequencyResponse, whole: ModalModel, group: Rows, max_iterations: int) -> FittedModes:
+def _refined(response: FrequencyResponse, whole: ModalModel, group: Index, max_iterations: int) -> FittedModes:
     """Refine a group on what the modes far from it, as they are so far, leave of the functions around it."""
     band, members = _surroundings(response, whole.poles, group)
     far = np.setdiff1d(np.arange(whole.poles.size), members)
@@ -78,14 +75,14 @@ def _without_residuals(model: ModalModel) -> ModalModel:
     return replace(model, lower=np.zeros_like(model.lower), upper=np.zeros_like(model.upper))
 
 
-def _surroundings(response: FrequencyResponse, poles: Complex, group: Rows) -> tuple[tuple[float, float], Rows]:
+def _surroundings(response: FrequencyResponse, poles: Complex, group: Index) -> tuple[tuple[float, float], Index]:
     """Band in which a group is fitted, and its modes followed by those of other groups that lie there."""
     band = _band(response, poles, group)
     inside = np.flatnonzero((poles.imag >= 2 * pi * band[0]) & (poles.imag <= 2 * pi * band[1]))
     return band, np.concatenate([group, np.setdiff1d(inside, group)])
 
 
-def _groups(poles: Complex) -> list[Rows]:
+def _groups(poles: Complex) -> list[Index]:
     """Cut poles at the gap that is widest for its half-widths, until no group is too large."""
     waiting, found = [np.argsort(poles.imag, kind="stable")], []
     while waiting:
@@ -102,7 +99,7 @@ def _groups(poles: Complex) -> list[Rows]:
     return found
 
 
-def _band(response: FrequencyResponse, poles: Complex, group: Rows) -> tuple[float, float]:
+def _band(response: FrequencyResponse, poles: Complex, group: Index) -> tuple[float, float]:
     """From midway to the next mode below to midway to the next above, but far enough to see the decay of its own."""
     excited_hz = response.frequency_hz[response.excited]
     own = poles[group] / (2 * pi)
@@ -120,7 +117,7 @@ def _band(response: FrequencyResponse, poles: Complex, group: Rows) -> tuple[flo
     return float(excited_hz[first]), float(excited_hz[last])
 
 
-def select_modes(fitted: FittedModes, chosen: NDArray[np.bool_]) -> FittedModes:
+def select_modes(fitted: FittedModes, chosen: Mask) -> FittedModes:
     """Give some of the modes of a fit, as they were fitted together with the others."""
     rows = np.flatnonzero(chosen)
     return replace(

@@ -4,17 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.functions.circle_fit import UNSCALED, closeness
 from chladni.modal.functions.exponential_window import without_window_damping
 from chladni.modal.functions.nyquist_circle import sweep
 from chladni.modal.functions.resonance_lines import MobilityLines, Resonance, mobility_lines, resonances
 from chladni.modal.functions.single_modes import SingleMode, left_out, mode_set
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
-
-Floats = NDArray[np.float64]
 
 STEPS = 30
 ROUNDS = 3
@@ -102,7 +100,7 @@ class _Peak:
 
     frequency_hz: float
     half_width_hz: float
-    std_hz: Floats
+    std_hz: Real
 
     def place(self) -> tuple[float, float]:
         return self.frequency_hz, self.half_width_hz
@@ -140,7 +138,7 @@ def _single_mode(lines: MobilityLines, span: slice, resonance: Resonance, peak: 
     )
 
 
-def _lorentzian(f_hz: Floats, power: Floats, std: Floats, correlation: Floats, place: Floats) -> _Peak | None:
+def _lorentzian(f_hz: Real, power: Real, std: Real, correlation: Real, place: Real) -> _Peak | None:
     """Fit |Y|^2 = h/(1 + x^2) from a first (height, frequency, half-width); None when there's no such peak."""
     for _ in range(STEPS):
         model, jacobian = _curve(f_hz, place)
@@ -164,7 +162,7 @@ def _lorentzian(f_hz: Floats, power: Floats, std: Floats, correlation: Floats, p
     return _Peak(frequency_hz=float(place[1]), half_width_hz=float(place[2]), std_hz=std_hz)
 
 
-def _curve(f_hz: Floats, place: Floats) -> tuple[Floats, Floats]:
+def _curve(f_hz: Real, place: Real) -> tuple[Real, Real]:
     """|Y|^2 and its derivatives by height, frequency and half-width."""
     height, natural, half_width = place
     x = sweep(f_hz, natural, half_width / natural)
@@ -174,9 +172,7 @@ def _curve(f_hz: Floats, place: Floats) -> tuple[Floats, Floats]:
     return height * model, np.stack([model, by_natural, by_x * -x / half_width], axis=1)
 
 
-def _at_peak(
-    lines: MobilityLines, span: slice, frequency_hz: float, half_width_hz: float
-) -> tuple[NDArray[np.complex128], Floats]:
+def _at_peak(lines: MobilityLines, span: slice, frequency_hz: float, half_width_hz: float) -> tuple[Complex, Real]:
     """Mobility of all functions at the peak: lines above half the power, each raised to what it is there."""
     raised = 1 + 1j * sweep(lines.frequency_hz[span], frequency_hz, half_width_hz / frequency_hz)
     weights = 1 / (np.abs(raised) * lines.std[:, :, span]) ** 2
@@ -189,10 +185,10 @@ def _at_peak(
 def _others(
     lines: MobilityLines,
     resonance: Resonance,
-    values: NDArray[np.complex128],
+    values: Complex,
     frequency_hz: float,
     half_width_hz: float,
-) -> Floats:
+) -> Real:
     """RMS of what lines on the flanks show beyond the mode and their scatter, of each function."""
     x = sweep(lines.frequency_hz, frequency_hz, half_width_hz / frequency_hz)
     flank = (np.abs(x) >= FLANK_HALF_WIDTHS[0]) & (np.abs(x) <= FLANK_HALF_WIDTHS[1])

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from chladni.signals.arrays import Complex, Mask, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.value import Value
@@ -42,9 +42,9 @@ class JudgedLines(Value):
         Lines that carry the information of one, because a window ties them together; 1 without.
     """
 
-    frequency_hz: NDArray[np.float64]
-    values: NDArray[np.complex128]
-    weight: NDArray[np.float64]
+    frequency_hz: Real
+    values: Complex
+    weight: Real
     step_hz: float
     correlated_lines: float = 1.0
 
@@ -52,7 +52,7 @@ class JudgedLines(Value):
         self._freeze()
 
 
-def usable_lines(response: FrequencyResponse, *, band_hz: tuple[float, float] | None) -> NDArray[np.bool_]:
+def usable_lines(response: FrequencyResponse, *, band_hz: tuple[float, float] | None) -> Mask:
     """``[line]`` excited, above 0 Hz, inside the band, with at least one function that has a value.
 
     Raises
@@ -127,7 +127,7 @@ def judged_lines(
     )
 
 
-def _weight(values: NDArray[np.complex128], std: NDArray[np.float64]) -> NDArray[np.float64]:
+def _weight(values: Complex, std: Real) -> Real:
     known = np.isfinite(std)
     variance = np.where(known, std, 0.0) ** 2
     share = uniform_filter1d(known.astype(float), STEADY_LINES, axis=-1, mode="nearest")

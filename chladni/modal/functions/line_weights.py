@@ -6,6 +6,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Index, Mask, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.value import Value
@@ -36,11 +37,11 @@ class WeightedLines(Value):
         What was left out, and why.
     """
 
-    frequency_hz: NDArray[np.float64]
-    values: NDArray[np.complexfloating[Any, Any]]
-    weight: NDArray[np.float64]
-    reference_scale: NDArray[np.float64]
-    noise_power: NDArray[np.float64]
+    frequency_hz: Real
+    values: NDArray[np.complexfloating]
+    weight: Real
+    reference_scale: Real
+    noise_power: Real
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -90,9 +91,7 @@ def weighted_lines(
     return _by_magnitude(frequency_hz, values, usable, relative=weighting == "relative")
 
 
-def _lines(
-    response: FrequencyResponse, finite: NDArray[np.bool_], band_hz: tuple[float, float] | None
-) -> NDArray[np.intp]:
+def _lines(response: FrequencyResponse, finite: Mask, band_hz: tuple[float, float] | None) -> Index:
     frequency_hz = response.frequency_hz
     low, high = band_hz if band_hz is not None else (float(frequency_hz[0]), float(frequency_hz[-1]))
     if not 0 <= low < high:
@@ -107,9 +106,7 @@ def _lines(
     return chosen
 
 
-def _by_magnitude(
-    frequency_hz: NDArray[np.float64], values: NDArray[np.complex128], usable: NDArray[np.bool_], *, relative: bool
-) -> WeightedLines:
+def _by_magnitude(frequency_hz: Real, values: Complex, usable: Mask, *, relative: bool) -> WeightedLines:
     scale = _typical(_rms(values, (2,)), axis=0)
     scaled = values / scale[:, None]
     # A function that is zero has no scale of its own.
@@ -126,14 +123,14 @@ def _by_magnitude(
 
 def _by_std(
     response: FrequencyResponse,
-    frequency_hz: NDArray[np.float64],
-    values: NDArray[np.complex128],
-    std: NDArray[np.float64],
+    frequency_hz: Real,
+    values: Complex,
+    std: Real,
 ) -> WeightedLines:
     # Any units of the references give the same numbers from here on.
     scale = _typical(std, axis=(0, 2))
     scaled, sigma = values / scale[:, None], std / scale[:, None]
-    usable: NDArray[np.bool_] = np.all(np.isfinite(sigma), axis=1)
+    usable: Mask = np.all(np.isfinite(sigma), axis=1)
     level = np.where(usable, _rms(sigma, (1,)), 1.0)
     floor = _typical(np.where(usable, level, np.nan), axis=1)
     steady = usable / np.hypot(level, FLOOR * floor[:, None])
@@ -154,7 +151,7 @@ def _by_std(
     )
 
 
-def _typical(numbers: NDArray[np.float64], axis: int | tuple[int, ...]) -> NDArray[np.float64]:
+def _typical(numbers: Real, axis: int | tuple[int, ...]) -> Real:
     """Geometric mean of the positive numbers, 1 where there are none; NaN counts for nothing.
 
     Unlike other means it only takes over the factor when a channel's unit changes.
@@ -164,12 +161,12 @@ def _typical(numbers: NDArray[np.float64], axis: int | tuple[int, ...]) -> NDArr
     return np.asarray(np.exp(logs.sum(axis=axis) / np.maximum(positive.sum(axis=axis), 1)))
 
 
-def _rms(values: NDArray[Any], axis: tuple[int, ...]) -> NDArray[np.float64]:
+def _rms(values: NDArray[Any], axis: tuple[int, ...]) -> Real:
     power = values.real**2
     if np.iscomplexobj(values):
         power += values.imag**2
     return np.asarray(np.sqrt(power.mean(axis=axis)), dtype=np.float64)
 
 
-def _or_one(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+def _or_one(numbers: Real) -> Real:
     return np.where(numbers > 0, numbers, 1.0)

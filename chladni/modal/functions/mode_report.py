@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.fitted_modes import FittedModes
 from chladni.modal.fit.lsfd import least_squares_frequency_domain
@@ -17,6 +16,7 @@ from chladni.modal.functions.grouped_refinement import select_modes
 from chladni.modal.functions.line_spacing import COARSE, lines_for, longest_modal_segment_s, nothing_found
 from chladni.modal.functions.pruned_fit import PrunedFit
 from chladni.modal.poles.stabilisation import StabilityLimits, stabilisation_diagram
+from chladni.signals.arrays import Index
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.modal_fit import ModalFit
 from chladni.signals.mode_set import ModeSet
@@ -26,7 +26,6 @@ from chladni.signals.stabilisation_diagram import StabilisationDiagram
 ESTIMATOR = "pLSCF"
 # Chi-square above which the modes don't explain the functions within their scatter.
 INFLATED = 2.0
-Rows = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -95,7 +94,7 @@ class ModeReport:
         whole = least_squares_frequency_domain(self.measured, model.poles, model.participation)
         return modal_fit(self.measured, whole)
 
-    def _shown(self, fit: PrunedFit, count: int | None) -> Rows:
+    def _shown(self, fit: PrunedFit, count: int | None) -> Index:
         rows = np.arange(fit.started.size)
         if self.candidates.only_asked:
             rows = rows[self.candidates.asked[fit.started]]
@@ -122,7 +121,7 @@ class ModeReport:
             ),
         )
 
-    def _spread(self, started: Rows) -> OrderSpread:
+    def _spread(self, started: Index) -> OrderSpread:
         spread = self.candidates.spread
         return OrderSpread(
             orders=spread.orders[started],
@@ -132,7 +131,7 @@ class ModeReport:
             damping_std=spread.damping_std[started],
         )
 
-    def _diagram(self, started: Rows) -> StabilisationDiagram:
+    def _diagram(self, started: Index) -> StabilisationDiagram:
         # Candidates that came to nothing, and poles of no candidate (-1, the last place), point to no mode.
         place = np.full(self.candidates.pole.size + 1, -1)
         place[started] = np.arange(started.size)
@@ -168,7 +167,7 @@ class ModeReport:
         )
         return (note,)
 
-    def _advice(self, fit: PrunedFit, fitted: FittedModes, shown: Rows) -> tuple[str, ...]:
+    def _advice(self, fit: PrunedFit, fitted: FittedModes, shown: Index) -> tuple[str, ...]:
         notes: list[str] = []
         if fitted.chi_square > INFLATED:
             notes.append(

@@ -1,10 +1,10 @@
 """The bias that noise brings to the reduced normal equations, and most of it taken off."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.functions.line_weights import WeightedLines
 from chladni.modal.functions.unit_circle import UnitCircle
+from chladni.signals.arrays import Complex
 
 # All of the noise that fits under the data would make the least-squares fit a total one, consistent but with noise
 # poles on both sides; four fifths leave a fifth of the bias and keep them apart.
@@ -13,9 +13,7 @@ SHARE = 0.8
 RIDGE = 1e-6
 
 
-def without_noise(
-    matrix: NDArray[np.complex128], lines: WeightedLines, circle: UnitCircle, order: int
-) -> NDArray[np.complex128]:
+def without_noise(matrix: Complex, lines: WeightedLines, circle: UnitCircle, order: int) -> Complex:
     """Take the expected contribution of noise off a reduced normal matrix, as far as it stays positive definite.
 
     Noise of H enters the quadratic form of A as if each line carried A itself, so that a small A, with roots off the

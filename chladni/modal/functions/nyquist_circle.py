@@ -3,12 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.functions.resonance_lines import MobilityLines
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 STEPS = 30
 # A step that changes a half-power bandwidth by less than this share is the last one.
@@ -42,10 +39,10 @@ class NyquistCircle:
 
     frequency_hz: float
     damping_ratio: float
-    covariance: Floats
+    covariance: Real
     origin: Complex
     diameter: Complex
-    diameter_std: Floats
+    diameter_std: Real
     misfit: float
     excess: float
     lines: int
@@ -88,7 +85,7 @@ def fit_circle(lines: MobilityLines, span: slice, frequency_hz: float, damping_r
     return _circle(lines, span, place, values, weights)
 
 
-def _circle(lines: MobilityLines, span: slice, place: Floats, values: Complex, weights: Floats) -> NyquistCircle:
+def _circle(lines: MobilityLines, span: slice, place: Real, values: Complex, weights: Real) -> NyquistCircle:
     """The circles at the pole that was found, and how sure they are when noise hangs together over lines."""
     f_hz, functions = lines.frequency_hz[span], lines.values.shape[:2]
     origin, diameter, inverse = _linear(f_hz, place, values, weights)
@@ -114,7 +111,7 @@ def _circle(lines: MobilityLines, span: slice, place: Floats, values: Complex, w
     )
 
 
-def sweep(frequency_hz: Floats, natural_hz: float, damping_ratio: float) -> Floats:
+def sweep(frequency_hz: Real, natural_hz: float, damping_ratio: float) -> Real:
     """Give x = (f/f_r - f_r/f)/(2 zeta), the tangent of half the angle on the circle.
 
     Examples
@@ -125,11 +122,11 @@ def sweep(frequency_hz: Floats, natural_hz: float, damping_ratio: float) -> Floa
     return np.asarray((frequency_hz / natural_hz - natural_hz / frequency_hz) / (2 * damping_ratio))
 
 
-def _basis(f_hz: Floats, place: Floats) -> Complex:
+def _basis(f_hz: Real, place: Real) -> Complex:
     return np.stack([np.ones(f_hz.size), 1 / (1 + 1j * sweep(f_hz, *place))])
 
 
-def _linear(f_hz: Floats, place: Floats, values: Complex, weights: Floats) -> tuple[Complex, Complex, Complex]:
+def _linear(f_hz: Real, place: Real, values: Complex, weights: Real) -> tuple[Complex, Complex, Complex]:
     """Origins and diameters at a given pole, and the inverse normal matrix of each function."""
     basis = _basis(f_hz, place)
     normal = np.einsum("al,fl,bl->fab", basis.conj(), weights**2, basis)
@@ -140,7 +137,7 @@ def _linear(f_hz: Floats, place: Floats, values: Complex, weights: Floats) -> tu
 
 
 def _projected(
-    f_hz: Floats, place: Floats, origin: Complex, diameter: Complex, values: Complex, weights: Floats
+    f_hz: Real, place: Real, origin: Complex, diameter: Complex, values: Complex, weights: Real
 ) -> tuple[Complex, Complex]:
     """Derivatives by frequency and damping, freed of what origins and diameters take up, and residual; weighted."""
     natural, zeta = place

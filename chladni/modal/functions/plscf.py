@@ -1,13 +1,13 @@
 """Poly-reference least-squares complex frequency estimator in the z domain (pLSCF, known as PolyMAX)."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.functions.companion import denominators, participation, stable_roots
 from chladni.modal.functions.line_weights import WeightedLines, Weighting, weighted_lines
 from chladni.modal.functions.reduced_normal_equations import reduced_normal_matrix
 from chladni.modal.functions.unit_circle import UnitCircle, unit_circle
 from chladni.modal.poles.pole_table import PoleTable
+from chladni.signals.arrays import Complex, Index, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 
@@ -125,14 +125,14 @@ def _pole_table(lines: WeightedLines, circle: UnitCircle, orders: range, notes: 
     )
 
 
-def _in_band(pole: NDArray[np.complex128], frequency_hz: NDArray[np.float64], step_hz: float) -> NDArray[np.intp]:
+def _in_band(pole: Complex, frequency_hz: Real, step_hz: float) -> Index:
     # A pole nearer to 0 Hz than half a line decays within the record or doesn't oscillate: no line could tell.
     damped_hz = pole.imag / (2 * np.pi)
     low_hz = max(frequency_hz[0] - step_hz, step_hz / 2)
     return np.flatnonzero((pole.real < 0) & (damped_hz >= low_hz) & (damped_hz <= frequency_hz[-1] + step_hz))
 
 
-def _unit(vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _unit(vectors: Complex) -> Complex:
     """Length 1, largest component real and positive."""
     if not vectors.size:
         return vectors

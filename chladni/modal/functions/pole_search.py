@@ -5,18 +5,16 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from chladni.modal.functions.judged_lines import TOLERATED, JudgedLines
 from chladni.modal.functions.plscf import polyreference_poles
 from chladni.modal.poles.pole_table import PoleTable
+from chladni.signals.arrays import Complex, Mask
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 
 Band = tuple[float, float]
-Floats = NDArray[np.float64]
-
 DEFAULT_ORDER = 60
 # Poles of all references together, beyond which the diagram gets slower and no clearer.
 MOST_POLES = 240
@@ -74,7 +72,7 @@ def first_search(response: FrequencyResponse, lines: JudgedLines, *, max_order: 
 
 
 def closer_search(
-    search: PoleSearch, response: FrequencyResponse, lines: JudgedLines, synthesised: NDArray[np.complex128]
+    search: PoleSearch, response: FrequencyResponse, lines: JudgedLines, synthesised: Complex
 ) -> PoleSearch | None:
     """Look again, in short bands, where the fit leaves more than noise.
 
@@ -107,7 +105,7 @@ def closer_search(
     return replace(search, cores_hz=tuple(parts), tables=tuple(parts.values()))
 
 
-def unexplained_lines(lines: JudgedLines, synthesised: NDArray[np.complex128]) -> NDArray[np.bool_]:
+def unexplained_lines(lines: JudgedLines, synthesised: Complex) -> Mask:
     """``[line]`` where the mean square of what is left, over any of `SCALES`, is more than noise and model error."""
     weight = lines.weight**2 / 2
     # Between resonances a fit may be off by a share of what is near, not of the little that is left there.
@@ -125,7 +123,7 @@ def unexplained_lines(lines: JudgedLines, synthesised: NDArray[np.complex128]) -
     return found
 
 
-def _looks(lines: JudgedLines, unexplained: NDArray[np.bool_]) -> list[Band]:
+def _looks(lines: JudgedLines, unexplained: Mask) -> list[Band]:
     """Bands around unexplained lines, none longer than `LONGEST_LOOK`, none overlapping."""
     reach = SHORTEST_LOOK // 2
     # A stretch grows by half the shortest look at each end, so that what is close together is looked at together.
@@ -163,7 +161,7 @@ def _without(table: PoleTable, band: Band) -> PoleTable:
     return _chosen(table, (table.frequency_hz < band[0]) | (table.frequency_hz > band[1]))
 
 
-def _chosen(table: PoleTable, kept: NDArray[np.bool_]) -> PoleTable:
+def _chosen(table: PoleTable, kept: Mask) -> PoleTable:
     return replace(table, order=table.order[kept], pole=table.pole[kept], vector=table.vector[kept])
 
 

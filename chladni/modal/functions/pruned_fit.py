@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.fitted_modes import FittedModes
 from chladni.modal.fit.lsfd import least_squares_frequency_domain
@@ -19,12 +18,9 @@ from chladni.modal.functions.significance import (
     SignificanceRules,
     mode_significance,
 )
+from chladni.signals.arrays import Complex, Index, Mask, Real
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.spectral.forms import ORDER, form
-
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 # A pole whose sigma is this part of its half-power width, or of a line where that is more, isn't known to be one; the
 # same for the width.
@@ -79,7 +75,7 @@ def _sharing_lines(lines: JudgedLines, poles: Complex, others: list[int]) -> Mas
     return np.asarray(np.any(apart <= 2 * (reach[:, None] + reach[others]), axis=1))
 
 
-def _one_of_each_place(poles: Complex, worst_first: NDArray[np.intp]) -> list[int]:
+def _one_of_each_place(poles: Complex, worst_first: Index) -> list[int]:
     """Modes that don't share lines: each of two that explain one peak looks needless as long as both are there."""
     chosen: list[int] = []
     for mode in worst_first:
@@ -107,7 +103,7 @@ class PrunedFit:
 
     fitted: FittedModes | None
     significance: ModeSignificance
-    started: NDArray[np.intp]
+    started: Index
     unresolved: Complex
 
 
@@ -170,7 +166,7 @@ def _doubtful(lines: JudgedLines, fitted: FittedModes, found: ModeSignificance, 
     return doubtful
 
 
-def _doubt(lines: JudgedLines, fitted: FittedModes) -> Floats:
+def _doubt(lines: JudgedLines, fitted: FittedModes) -> Real:
     """``[mode]`` sigma of place and width over what it may be at most; above 1 the pole isn't known to be one.
 
     Of a mode narrower than a line the lines tell where it is, and that its damping is small.

@@ -2,11 +2,11 @@
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
 from chladni.modal.functions.line_weights import WeightedLines
 from chladni.modal.functions.noise_compensation import without_noise
 from chladni.modal.functions.unit_circle import UnitCircle
+from chladni.signals.arrays import Complex, Real
 
 # Powers of z on an arc are nearly dependent, more so on lines with gaps: this part of the mean diagonal keeps the
 # numerators' matrix positive definite above rounding.
@@ -18,7 +18,7 @@ DENOMINATOR_RIDGE = 3e-13
 CHUNK = 4_000_000
 
 
-def reduced_normal_matrix(lines: WeightedLines, circle: UnitCircle, order: int) -> NDArray[np.complex128]:
+def reduced_normal_matrix(lines: WeightedLines, circle: UnitCircle, order: int) -> Complex:
     """Assemble M, whose quadratic form is the least-squares cost of a denominator with the best numerators.
 
     Parameters
@@ -66,7 +66,7 @@ def reduced_normal_matrix(lines: WeightedLines, circle: UnitCircle, order: int) 
     return matrix
 
 
-def _toeplitz(moments: NDArray[np.complex128], order: int) -> NDArray[np.complex128]:
+def _toeplitz(moments: Complex, order: int) -> Complex:
     """``[..., row, column]`` with the moment of lag row - column, from ``[..., lag]``; a view."""
     return sliding_window_view(moments, order + 1, axis=-1)[..., ::-1]
 
@@ -77,9 +77,7 @@ def _chunks(responses: int, numbers: int) -> list[slice]:
     return [slice(start, start + size) for start in range(0, responses, size)]
 
 
-def _eliminated(
-    circle: UnitCircle, power: NDArray[np.float64], moments: NDArray[np.complex128]
-) -> NDArray[np.complex128]:
+def _eliminated(circle: UnitCircle, power: Real, moments: Complex) -> Complex:
     """Sum over the responses of S^H R^-1 S, by the Cholesky factors of R."""
     responses, order = len(moments), moments.shape[-1] // 2
     share, common = _common_power(power)
@@ -98,7 +96,7 @@ def _eliminated(
     return _gram(wide.reshape((order + 1) * responses, -1))
 
 
-def _common_power(power: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+def _common_power(power: Real) -> tuple[Real, Real | None]:
     """Factor of each response and the lines' weights they share, None when they differ by more than rounding."""
     total = power.sum(axis=1)
     share = np.where(total > 0, total, 1.0)
@@ -107,7 +105,7 @@ def _common_power(power: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDAr
     return share, common if alike else None
 
 
-def _factors(numerators: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _factors(numerators: Complex) -> Complex:
     """Lower Cholesky factors of matrices ``[response, row, row]``, kept positive definite."""
     matrix = numerators.copy()
     diagonal = np.einsum("orr->or", matrix)
@@ -116,14 +114,14 @@ def _factors(numerators: NDArray[np.complex128]) -> NDArray[np.complex128]:
     return np.asarray(np.linalg.cholesky(matrix), dtype=np.complex128)
 
 
-def _solve_in_place(factor: NDArray[np.complex128], right: NDArray[np.complex128]) -> None:
+def _solve_in_place(factor: Complex, right: Complex) -> None:
     """Replace `right` by factor^-1 right; both are rows in memory, which BLAS sees as their transposes."""
     from scipy.linalg.blas import ztrsm
 
     ztrsm(1.0, factor.T, right.T, side=1, lower=0, overwrite_b=1)
 
 
-def _gram(tall: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _gram(tall: Complex) -> Complex:
     """``tall^H tall``, half of which BLAS computes."""
     from scipy.linalg.blas import zherk
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
@@ -15,9 +15,6 @@ from chladni.spectral.forms import convert_form
 from chladni.spectral.leakage import named_window
 from chladni.spectral.peaks import find_response_peaks
 from chladni.spectral.response_advice import half_power_lines
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # Lines whose std is zero or unknown are weighted as if they had this share of the function's RMS; the misfit of what
 # is fitted to them then says how sure it is.
@@ -47,9 +44,9 @@ class MobilityLines:
         False when no line has a finite std above zero.
     """
 
-    frequency_hz: Floats
+    frequency_hz: Real
     values: Complex
-    std: Floats
+    std: Real
     spacing_hz: float
     provenance: Provenance
     std_known: bool
@@ -120,7 +117,7 @@ def mobility_lines(response: FrequencyResponse, band_hz: tuple[float, float] | N
     )
 
 
-def _line_correlation(frequency_hz: Floats, spacing_hz: float, provenance: Provenance) -> Complex:
+def _line_correlation(frequency_hz: Real, spacing_hz: float, provenance: Provenance) -> Complex:
     """``[line, line]`` of the noise: sum w^2 exp(-2 pi j m n/N)/sum w^2 for lines m apart, by the window w."""
     numbers = np.rint(frequency_hz / spacing_hz).astype(np.int64)
     apart = numbers[:, np.newaxis] - numbers

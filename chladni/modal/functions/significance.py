@@ -4,15 +4,12 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import betainc, betaln
 
 from chladni.modal.functions.judged_lines import JudgedLines
+from chladni.signals.arrays import Complex, Index, Mask, Real
 from chladni.signals.errors import SetupError
 from chladni.signals.value import Value, require_shape
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # Half-power half-widths on either side of a mode in which it is weighed against what else could explain the lines.
 REACH = 8.0
@@ -62,23 +59,23 @@ class ModeSignificance(Value):
         ``[mode]`` half-power width in lines.
     """
 
-    gain: Floats
-    log_false_alarm: Floats
-    contribution: Floats
-    width: Floats
+    gain: Real
+    log_false_alarm: Real
+    contribution: Real
+    width: Real
 
     def __post_init__(self) -> None:
         for name in ("log_false_alarm", "contribution", "width"):
             require_shape(name, getattr(self, name), self.gain.shape, "modes")
         self._freeze()
 
-    def select(self, modes: NDArray[np.bool_]) -> "ModeSignificance":
+    def select(self, modes: Mask) -> "ModeSignificance":
         """Give it of some of the modes."""
         columns = (self.gain, self.log_false_alarm, self.contribution, self.width)
         gain, log_false_alarm, contribution, width = (column[modes] for column in columns)
         return ModeSignificance(gain=gain, log_false_alarm=log_false_alarm, contribution=contribution, width=width)
 
-    def passes(self, rules: SignificanceRules) -> NDArray[np.bool_]:
+    def passes(self, rules: SignificanceRules) -> Mask:
         """``[mode]`` whether the data need it by these rules."""
         return np.asarray(
             (self.log_false_alarm <= np.log(rules.false_alarm)) & (self.contribution >= rules.contribution)
@@ -86,7 +83,7 @@ class ModeSignificance(Value):
 
 
 def mode_significance(
-    lines: JudgedLines, poles: Complex, participation: Complex, *, modes: NDArray[np.intp] | None = None
+    lines: JudgedLines, poles: Complex, participation: Complex, *, modes: Index | None = None
 ) -> ModeSignificance:
     """Weigh each mode against a fit of the lines near it that has all modes but this one.
 
@@ -154,7 +151,7 @@ def log_f_tail(ratio: float, upper: float, lower: float) -> float:
     return float(b * np.log(x) + a * np.log1p(-x) - np.log(b) - betaln(a, b) - np.log1p(-shrinking))
 
 
-def _beside(lines: JudgedLines, own_hz: float, reach_hz: float) -> NDArray[np.intp]:
+def _beside(lines: JudgedLines, own_hz: float, reach_hz: float) -> Index:
     """Lines around a mode, without the nearest."""
     distance = np.abs(lines.frequency_hz - own_hz)
     count = max(int(np.count_nonzero(distance <= reach_hz)), FEWEST_LINES)
@@ -168,13 +165,13 @@ def _beside(lines: JudgedLines, own_hz: float, reach_hz: float) -> NDArray[np.in
 class _LocalFit:
     """Squares that the first mode takes off each response, squares left, degrees of freedom, share of the peak."""
 
-    taken: Floats
+    taken: Real
     left: float
     freedom: float
     contribution: float
 
 
-def _local_fit(lines: JudgedLines, places: NDArray[np.intp], poles: Complex, participation: Complex) -> _LocalFit:
+def _local_fit(lines: JudgedLines, places: Index, poles: Complex, participation: Complex) -> _LocalFit:
     design = _design(lines, places, poles, participation)
     weight = lines.weight[:, :, places]
     values = lines.values[:, :, places]
@@ -206,7 +203,7 @@ def _local_fit(lines: JudgedLines, places: NDArray[np.intp], poles: Complex, par
     )
 
 
-def _design(lines: JudgedLines, places: NDArray[np.intp], poles: Complex, participation: Complex) -> Floats:
+def _design(lines: JudgedLines, places: Index, poles: Complex, participation: Complex) -> Real:
     """``[row, column]``: real and imaginary part of each mode's shape, then the parabola of each reference."""
     s = 2j * pi * lines.frequency_hz[places]
     direct = participation[:, :, None] / (s - poles[:, None])[:, None, :]

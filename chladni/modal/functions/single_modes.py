@@ -4,14 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.functions.resonance_lines import MobilityLines, Resonance
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,7 +29,7 @@ class SingleMode:
     damping_ratio: float
     damping_std: float
     diameter: Complex
-    diameter_std: Floats
+    diameter_std: Real
 
 
 def left_out(lines: MobilityLines, resonance: Resonance) -> str:

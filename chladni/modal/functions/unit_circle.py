@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.value import Value
 
 # A band that filled the circle would force the polynomials to be periodic in it, and a jump from its end to its start
@@ -35,14 +36,14 @@ class UnitCircle(Value):
 
     origin_hz: float
     step_hz: float
-    position: NDArray[np.float64]
+    position: Real
     length: int
     gridded: bool
 
     def __post_init__(self) -> None:
         self._freeze()
 
-    def moments(self, terms: NDArray[Any], order: int) -> NDArray[np.complex128]:
+    def moments(self, terms: NDArray[Any], order: int) -> Complex:
         """Sum ``terms`` times z^-m over the lines, for the lags m from -order to order.
 
         Parameters
@@ -65,14 +66,14 @@ class UnitCircle(Value):
         places[..., self.position.astype(np.intp)] = terms
         return np.asarray(fft.fft(places, axis=-1, overwrite_x=True)[..., lags % self.length])
 
-    def pole(self, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def pole(self, z: Complex) -> Complex:
         """Pole in rad/s of each root z, unwrapped to the turn around the middle of the arc."""
         middle = np.pi * self.position[-1] / self.length
         log = np.log(z * np.exp(-1j * middle)) + 1j * middle
         return np.asarray(log * (self.length * self.step_hz) + 2j * np.pi * self.origin_hz)
 
 
-def unit_circle(frequency_hz: NDArray[np.float64]) -> UnitCircle:
+def unit_circle(frequency_hz: Real) -> UnitCircle:
     """Lay lines on an arc that takes nine tenths of the unit circle, the first at angle zero.
 
     Parameters

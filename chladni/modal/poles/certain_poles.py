@@ -1,15 +1,12 @@
 """Which pole of a cluster stands for the mode: the one that is known best."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.poles.pole_table import PoleTable
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
+from chladni.signals.arrays import Real, Whole
 
 
-def certain_pole(table: PoleTable, cluster: Rows, *, least_order: int = 0) -> int:
+def certain_pole(table: PoleTable, cluster: Whole, *, least_order: int = 0) -> int:
     """Give the row of the pole with the least sigma among those that the cluster doesn't contradict.
 
     The least order that describes a mode estimates it best, since every state more adds scatter; an order too low
@@ -40,7 +37,7 @@ def certain_pole(table: PoleTable, cluster: Rows, *, least_order: int = 0) -> in
     return int(cluster[agreeing[np.argmin(total[agreeing])]])
 
 
-def pole_std(table: PoleTable, rows: Rows) -> tuple[Floats, Floats]:
+def pole_std(table: PoleTable, rows: Whole) -> tuple[Real, Real]:
     """Standard deviations of frequency and damping of some rows; infinite where the table has none."""
     if table.frequency_std_hz is None or table.damping_std is None:
         return np.full(rows.size, np.inf), np.full(rows.size, np.inf)
@@ -48,7 +45,7 @@ def pole_std(table: PoleTable, rows: Rows) -> tuple[Floats, Floats]:
     return np.maximum(table.frequency_std_hz[rows], tiny), np.maximum(table.damping_std[rows], tiny)
 
 
-def least_std(frequency_hz: Floats, damping_ratio: Floats, duration_s: float) -> tuple[Floats, Floats]:
+def least_std(frequency_hz: Real, damping_ratio: Real, duration_s: float) -> tuple[Real, Real]:
     """Smallest standard deviations that a record under unmeasured random loads allows.
 
     sigma_f = f sqrt(zeta/(2 pi n)) and sigma_zeta = sqrt(zeta/(2 pi n)) for n = f T cycles of a mode that is seen

@@ -3,13 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.poles.pole_table import PoleTable
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import SetupError
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 # Pairs weighed at a time: some hundred megabytes at the most, however many poles there are.
 PAIRS_TOGETHER = 1 << 20
@@ -47,7 +44,7 @@ class ClusterTolerance:
             raise SetupError(f"order tolerance {self.orders} must be at least 1")
 
 
-def cluster_poles(table: PoleTable, rows: Rows, tolerance: ClusterTolerance) -> Rows:
+def cluster_poles(table: PoleTable, rows: Whole, tolerance: ClusterTolerance) -> Whole:
     """Join poles to clusters, the nearest pair first, never two of one order.
 
     Parameters
@@ -78,7 +75,7 @@ def cluster_poles(table: PoleTable, rows: Rows, tolerance: ClusterTolerance) -> 
     return _join(step, first[nearest].tolist(), second[nearest].tolist())
 
 
-def _near_pairs(table: PoleTable, rows: Rows, step: Rows, tolerance: ClusterTolerance) -> tuple[Rows, Rows, Floats]:
+def _near_pairs(table: PoleTable, rows: Whole, step: Whole, tolerance: ClusterTolerance) -> tuple[Whole, Whole, Real]:
     """Candidates within the tolerance of each other, and their distance in tolerances."""
     frequency_hz = table.frequency_hz[rows]
     by_frequency = np.argsort(frequency_hz, kind="stable")
@@ -86,7 +83,7 @@ def _near_pairs(table: PoleTable, rows: Rows, step: Rows, tolerance: ClusterTole
     # Sorted, the partners of a pole are those that follow it, as far as its own tolerance reaches.
     rising = frequency_hz[by_frequency]
     counts = np.searchsorted(rising, rising + reach[by_frequency], side="right") - np.arange(rising.size) - 1
-    found: list[tuple[Rows, Rows, Floats]] = []
+    found: list[tuple[Whole, Whole, Real]] = []
     for start, stop in _runs(counts):
         left, offset = _unrolled(counts[start:stop])
         first, second = by_frequency[start + left], by_frequency[start + left + 1 + offset]
@@ -97,27 +94,27 @@ def _near_pairs(table: PoleTable, rows: Rows, step: Rows, tolerance: ClusterTole
     return np.concatenate(firsts), np.concatenate(seconds), np.concatenate(distances)
 
 
-def _unrolled(counts: Rows) -> tuple[Rows, Rows]:
+def _unrolled(counts: Whole) -> tuple[Whole, Whole]:
     """Rows repeated as often as they have partners, and the number of each partner."""
     left = np.repeat(np.arange(counts.size), counts)
     return left, np.arange(left.size) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
-def _runs(counts: Rows) -> list[tuple[int, int]]:
+def _runs(counts: Whole) -> list[tuple[int, int]]:
     """Stretches of poles whose pairs fit together into memory."""
     total = np.cumsum(counts)
     cuts = np.flatnonzero(np.diff(total // PAIRS_TOGETHER)) + 1
     return list(zip([0, *cuts.tolist()], [*cuts.tolist(), counts.size], strict=True))
 
 
-def _frequency_reach(table: PoleTable, rows: Rows, tolerance: ClusterTolerance) -> Floats:
+def _frequency_reach(table: PoleTable, rows: Whole, tolerance: ClusterTolerance) -> Real:
     reach = tolerance.frequency * table.frequency_hz[rows]
     if table.frequency_std_hz is None:
         return reach
     return np.maximum(reach, tolerance.sigmas * table.frequency_std_hz[rows])
 
 
-def _damping_reach(table: PoleTable, first: Rows, second: Rows, tolerance: ClusterTolerance) -> Floats:
+def _damping_reach(table: PoleTable, first: Whole, second: Whole, tolerance: ClusterTolerance) -> Real:
     damping = table.damping_ratio
     reach = tolerance.damping * np.maximum(damping[first], damping[second])
     if table.damping_std is None:
@@ -126,8 +123,8 @@ def _damping_reach(table: PoleTable, first: Rows, second: Rows, tolerance: Clust
 
 
 def _within(
-    table: PoleTable, rows: Rows, first: Rows, second: Rows, tolerance: ClusterTolerance
-) -> tuple[Rows, Rows, Floats]:
+    table: PoleTable, rows: Whole, first: Whole, second: Whole, tolerance: ClusterTolerance
+) -> tuple[Whole, Whole, Real]:
     reach = _frequency_reach(table, rows, tolerance)
     frequency_hz, damping = table.frequency_hz[rows], table.damping_ratio
     a, b = rows[first], rows[second]
@@ -143,7 +140,7 @@ def _within(
     return first[alike], second[alike], distance[alike]
 
 
-def _join(step: Rows, first: list[int], second: list[int]) -> Rows:
+def _join(step: Whole, first: list[int], second: list[int]) -> Whole:
     """Union of pairs in the order given, refused when both clusters hold a pole of one order."""
     parent = list(range(step.size))
     # A bit for each order: two clusters may join when no bit is set in both.

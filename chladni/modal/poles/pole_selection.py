@@ -4,16 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.poles.pole_clusters import ClusterTolerance, cluster_poles
 from chladni.modal.poles.pole_table import PoleTable
+from chladni.signals.arrays import Complex, Real, Whole
 from chladni.signals.errors import SetupError
 from chladni.signals.order_spread import OrderSpread
 from chladni.signals.value import Value, require_shape
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,10 +70,10 @@ class PoleSelection(Value):
         What was asked for and isn't there, and why.
     """
 
-    row: Rows
-    pole: NDArray[np.complex128]
-    vector: NDArray[np.complex128]
-    member: Rows
+    row: Whole
+    pole: Complex
+    vector: Complex
+    member: Whole
     spread: OrderSpread
     notes: tuple[str, ...] = ()
 
@@ -170,7 +167,7 @@ def require_request(
 
 def _clusters(
     table: PoleTable, band_hz: tuple[float, float] | None, rules: SelectionRules, *, least: int
-) -> list[Rows]:
+) -> list[Whole]:
     """Clusters of at least so many poles, without what hangs on them."""
     rows = _candidates(table, band_hz, rules)
     label = cluster_poles(table, rows, rules.tolerance)
@@ -179,7 +176,7 @@ def _clusters(
     return [cluster for cluster in trimmed if cluster.size >= least]
 
 
-def _candidates(table: PoleTable, band_hz: tuple[float, float] | None, rules: SelectionRules) -> Rows:
+def _candidates(table: PoleTable, band_hz: tuple[float, float] | None, rules: SelectionRules) -> Whole:
     low, high = band_hz or (0.0, np.inf)
     frequency_hz, damping = table.frequency_hz, table.damping_ratio
     kept = (frequency_hz >= low) & (frequency_hz <= high) & (frequency_hz > 0)
@@ -196,11 +193,11 @@ def _orders_needed(table: PoleTable, rules: SelectionRules) -> int:
     return min(max(rules.least_orders, round(rules.share * table.orders.size)), max(table.orders.size, 1))
 
 
-def _centre(table: PoleTable, cluster: Rows) -> tuple[float, float]:
+def _centre(table: PoleTable, cluster: Whole) -> tuple[float, float]:
     return float(np.median(table.frequency_hz[cluster])), float(np.median(table.damping_ratio[cluster]))
 
 
-def _trimmed(table: PoleTable, cluster: Rows, rules: SelectionRules) -> Rows:
+def _trimmed(table: PoleTable, cluster: Whole, rules: SelectionRules) -> Whole:
     """Drop what only a chain of neighbours connects with the middle of the cluster."""
     frequency_hz, damping = _centre(table, cluster)
     off = np.abs(table.frequency_hz[cluster] - frequency_hz) / (rules.tolerance.frequency * frequency_hz)
@@ -208,7 +205,7 @@ def _trimmed(table: PoleTable, cluster: Rows, rules: SelectionRules) -> Rows:
     return cluster[(off <= 1) & (off_damping <= 1)]
 
 
-def _middle(table: PoleTable, cluster: Rows) -> int:
+def _middle(table: PoleTable, cluster: Whole) -> int:
     """Row of the pole nearest to the medians, in units of the cluster's own scatter."""
     centre = _centre(table, cluster)
     columns = (table.frequency_hz[cluster], table.damping_ratio[cluster])
@@ -221,7 +218,7 @@ def _middle(table: PoleTable, cluster: Rows) -> int:
     return int(cluster[best[-1]])
 
 
-def _different(table: PoleTable, clusters: list[Rows], rules: SelectionRules) -> list[Rows]:
+def _different(table: PoleTable, clusters: list[Whole], rules: SelectionRules) -> list[Whole]:
     """Keep of clusters that are the same pole twice the one that most orders hold."""
     ranked = _strongest(table, clusters, len(clusters))
     if not ranked:
@@ -240,13 +237,13 @@ def _different(table: PoleTable, clusters: list[Rows], rules: SelectionRules) ->
     return [ranked[place] for place in kept]
 
 
-def _scatter(values: Floats) -> float:
+def _scatter(values: Real) -> float:
     """Give a standard deviation that a few strays don't widen."""
     return 1.4826 * float(np.median(np.abs(values - np.median(values))))
 
 
-def _strongest(table: PoleTable, clusters: list[Rows], count: int) -> list[Rows]:
-    def rank(cluster: Rows) -> tuple[int, float]:
+def _strongest(table: PoleTable, clusters: list[Whole], count: int) -> list[Whole]:
+    def rank(cluster: Whole) -> tuple[int, float]:
         frequency_hz = table.frequency_hz[cluster]
         return -cluster.size, _scatter(frequency_hz) / float(np.median(frequency_hz))
 
@@ -260,11 +257,11 @@ def _shortfall(count: int, found: int) -> tuple[str, ...]:
 
 
 def _nearest(
-    table: PoleTable, clusters: list[Rows], frequencies_hz: Sequence[float], rules: SelectionRules
-) -> tuple[list[Rows], tuple[str, ...]]:
+    table: PoleTable, clusters: list[Whole], frequencies_hz: Sequence[float], rules: SelectionRules
+) -> tuple[list[Whole], tuple[str, ...]]:
     """Take for each frequency the nearest cluster that no other frequency is nearer to."""
     stable = [cluster for cluster in clusters if cluster.size >= _orders_needed(table, rules)]
-    chosen: dict[float, Rows] = {}
+    chosen: dict[float, Whole] = {}
     wanted = list(dict.fromkeys(float(frequency_hz) for frequency_hz in frequencies_hz))
     # What many orders hold is looked at first; a pole of few orders is better than none.
     for pool in (_different(table, stable, rules), [c for c in clusters if c.size < _orders_needed(table, rules)]):
@@ -288,7 +285,7 @@ def _nearest(
     return list(chosen.values()), notes
 
 
-def _selection(table: PoleTable, clusters: list[Rows], notes: tuple[str, ...]) -> PoleSelection:
+def _selection(table: PoleTable, clusters: list[Whole], notes: tuple[str, ...]) -> PoleSelection:
     middle = np.array([_middle(table, cluster) for cluster in clusters], dtype=np.int64)
     rising = np.argsort(table.frequency_hz[middle], kind="stable")
     ordered = [clusters[place] for place in rising]
@@ -306,7 +303,7 @@ def _selection(table: PoleTable, clusters: list[Rows], notes: tuple[str, ...]) -
     )
 
 
-def _spread(table: PoleTable, clusters: list[Rows]) -> OrderSpread:
+def _spread(table: PoleTable, clusters: list[Whole]) -> OrderSpread:
     frequency_hz = [table.frequency_hz[cluster] for cluster in clusters]
     damping = [table.damping_ratio[cluster] for cluster in clusters]
     return OrderSpread(

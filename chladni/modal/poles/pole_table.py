@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Real, Whole
 from chladni.signals.value import Value, require_shape
 
 
@@ -30,12 +30,12 @@ class PoleTable(Value):
         What was left out of the fit, such as orders that the lines don't determine, and why.
     """
 
-    orders: NDArray[np.int64]
-    order: NDArray[np.int64]
-    pole: NDArray[np.complex128]
-    vector: NDArray[np.complex128]
-    frequency_std_hz: NDArray[np.float64] | None = None
-    damping_std: NDArray[np.float64] | None = None
+    orders: Whole
+    order: Whole
+    pole: Complex
+    vector: Complex
+    frequency_std_hz: Real | None = None
+    damping_std: Real | None = None
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -44,11 +44,11 @@ class PoleTable(Value):
         self._freeze()
 
     @property
-    def frequency_hz(self) -> NDArray[np.float64]:
+    def frequency_hz(self) -> Real:
         """``[pole]`` undamped natural frequency."""
         return np.abs(self.pole) / (2 * pi)
 
     @property
-    def damping_ratio(self) -> NDArray[np.float64]:
+    def damping_ratio(self) -> Real:
         """``[pole]`` -Re/abs."""
         return -self.pole.real / np.abs(self.pole)

@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.poles.pole_table import PoleTable
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import SetupError
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
-
-Rows = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +32,7 @@ class StabilityLimits:
                 raise SetupError(f"stability limit {name} {getattr(self, name)} must be above 0 and below 1")
 
 
-def pole_status(table: PoleTable, limits: StabilityLimits | None = None) -> Rows:
+def pole_status(table: PoleTable, limits: StabilityLimits | None = None) -> Whole:
     """Compare each pole with the poles of the order below.
 
     Parameters
@@ -61,7 +59,7 @@ def pole_status(table: PoleTable, limits: StabilityLimits | None = None) -> Rows
     return status
 
 
-def _agreement(table: PoleTable, lower: slice, upper: slice, limits: StabilityLimits) -> Rows:
+def _agreement(table: PoleTable, lower: slice, upper: slice, limits: StabilityLimits) -> Whole:
     frequency = _change(table.frequency_hz[upper], table.frequency_hz[lower]) <= limits.frequency
     damping = frequency & (_change(table.damping_ratio[upper], table.damping_ratio[lower]) <= limits.damping)
     # Vectors have length 1, so that the MAC is their product squared.
@@ -71,16 +69,16 @@ def _agreement(table: PoleTable, lower: slice, upper: slice, limits: StabilityLi
     return np.asarray(levels.max(axis=1), dtype=np.int64)
 
 
-def _change(upper: NDArray[np.float64], lower: NDArray[np.float64]) -> NDArray[np.float64]:
+def _change(upper: Real, lower: Real) -> Real:
     return np.abs(upper[:, None] - lower) / lower
 
 
 def stabilisation_diagram(
     table: PoleTable,
     *,
-    member: Rows,
-    indicator_hz: NDArray[np.float64],
-    indicator: NDArray[np.float64],
+    member: Whole,
+    indicator_hz: Real,
+    indicator: Real,
     indicator_name: str,
     indicator_unit: str,
     limits: StabilityLimits | None = None,

@@ -1,7 +1,8 @@
 """The filter that lets correlation functions be taken at every n-th lag only."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from chladni.signals.arrays import Real
 
 # Share of the new half rate that passes unchanged; above it the power falls like a raised cosine, to nothing at the
 # half rate itself.
@@ -15,7 +16,7 @@ def reach(decimation: int) -> int:
     return REACH * decimation if decimation > 1 else 0
 
 
-def power_transfer(lines: int, decimation: int) -> NDArray[np.float64]:
+def power_transfer(lines: int, decimation: int) -> Real:
     """Squared magnitude of the filter on lines from 0 Hz to the new half rate, ``[line]``."""
     if decimation == 1:
         return np.ones(lines)

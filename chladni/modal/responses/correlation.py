@@ -3,13 +3,14 @@
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from chladni.modal.responses.lag_sums import LagSums, SpectralSums, plan_lags
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.number_range import require_in_range
@@ -19,9 +20,6 @@ from chladni.spectral.accumulator import require_finite
 from chladni.spectral.blocks import Source, leading_part, samples_known
 from chladni.spectral.segmentation import Segmentation
 from chladni.spectral.stretches import Stretch, valid_runs
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 # The scatter of fewer blocks says little: with 50, one sigma is known to a tenth.
 BLOCKS = 50
@@ -61,12 +59,12 @@ class CorrelationFunctions(Value):
         Samples left out, because they were not valid or in a stretch shorter than the lags.
     """
 
-    values: Floats
-    deviations: Floats
-    variance: Floats
+    values: Real
+    deviations: Real
+    variance: Real
     sample_rate_hz: float
     channels: tuple[Channel, ...]
-    references: Rows
+    references: Whole
     samples: int
     decimation: int = 1
     skipped: int = 0
@@ -95,7 +93,7 @@ class CorrelationFunctions(Value):
         """Length of what was averaged."""
         return self.samples / (self.sample_rate_hz * self.decimation)
 
-    def select(self, rows: Sequence[int] | Rows) -> Self:
+    def select(self, rows: Sequence[int] | Whole) -> Self:
         """Give the functions of these channels only, as rows and, as far as they are among them, as columns."""
         kept = np.asarray(rows, dtype=np.int64)
         columns = np.flatnonzero(np.isin(self.references, kept))
@@ -151,7 +149,7 @@ class CorrelationAccumulator:
         sample_rate_hz: float,
         *,
         lags: int,
-        references: Sequence[int] | Rows | None = None,
+        references: Sequence[int] | Whole | None = None,
         decimation: int = 1,
         blocks: int = BLOCKS,
         samples: int | None = None,
@@ -170,7 +168,7 @@ class CorrelationAccumulator:
         self._closed: tuple[LagSums, ...] = ()
         usable = 0 if samples is None else samples - self.plan.halo
         self._units_in_block = max(usable // self.plan.hop // blocks, 1)
-        self._offset: Floats | None = None
+        self._offset: Real | None = None
         self._samples = 0
         self._largest = np.zeros(len(self.channels))
 
@@ -235,7 +233,7 @@ class CorrelationAccumulator:
             skipped=self._samples - int(count.sum()),
         )
 
-    def _continue_run(self, values: NDArray[np.floating[Any]]) -> None:
+    def _continue_run(self, values: NDArray[np.floating]) -> None:
         if self._offset is None:
             # Sums of what is left after it lose no digits to an offset such as gravity.
             self._offset = values[:, : self.plan.hop].mean(axis=1, keepdims=True, dtype=np.float64)
@@ -297,7 +295,7 @@ def correlation_functions(
     source: Source,
     *,
     lags: int,
-    references: Sequence[int] | Rows | None = None,
+    references: Sequence[int] | Whole | None = None,
     decimation: int = 1,
     blocks: int = BLOCKS,
 ) -> CorrelationFunctions:
@@ -344,7 +342,7 @@ def correlation_functions(
     return accumulator.result()
 
 
-def _require_plan(channels: tuple[Channel, ...], references: Rows, lags: int, decimation: int, blocks: int) -> None:
+def _require_plan(channels: tuple[Channel, ...], references: Whole, lags: int, decimation: int, blocks: int) -> None:
     for name, number, least in (("lags", lags, 1), ("decimation", decimation, 1), ("blocks", blocks, 2)):
         if number < least:
             raise SetupError(f"{name} {number} must be at least {least}")

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.responses.fdd import half_power_half_width, nothing_found, require_shares, required_lag_window
 from chladni.modal.responses.response_modes import ResponseMode, response_mode_set
@@ -12,12 +11,11 @@ from chladni.modal.responses.response_peaks import ResponsePeak, close_mode_note
 from chladni.modal.responses.response_shapes import ResponseShape, modal_filters, modal_spectrum, shape_at
 from chladni.modal.responses.spectral_bell import Bell, BellData, fit_bell
 from chladni.modal.responses.spectral_decomposition import SpectralDecomposition, decompose
+from chladni.signals.arrays import Real
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.machine_harmonic import MachineHarmonic
 from chladni.signals.mode_set import ModeSet
-
-Floats = NDArray[np.float64]
 
 # Beyond ten half widths a bell is a hundredth of its top and tells nothing more; a few lines are needed in any case.
 REACH_WIDTHS = 10.0
@@ -86,7 +84,7 @@ class EnhancedFrequencyDomainDecomposition:
         *,
         band_hz: tuple[float, float] | None = None,
         count: int | None = None,
-        frequencies_hz: Sequence[float] | Floats | None = None,
+        frequencies_hz: Sequence[float] | Real | None = None,
     ) -> ModeSet:
         """Identify modes; parameters, result and errors are those of `FrequencyDomainDecomposition.identify`.
 
@@ -127,7 +125,7 @@ class EnhancedFrequencyDomainDecomposition:
     def _bell(
         self,
         decomposition: SpectralDecomposition,
-        spectrum: Floats,
+        spectrum: Real,
         peak: ResponsePeak,
         shape: ResponseShape,
         half_width_hz: float,

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from math import hypot, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.lag_window import LagWindow, lag_window
 from chladni.modal.responses.response_modes import ResponseMode, response_mode_set
@@ -13,11 +12,10 @@ from chladni.modal.responses.response_peaks import PickedPeaks, ResponsePeak, cl
 from chladni.modal.responses.response_shapes import shape_at
 from chladni.modal.responses.spectral_bell import own_half_width
 from chladni.modal.responses.spectral_decomposition import SpectralDecomposition, decompose, relative_std
+from chladni.signals.arrays import Real
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.mode_set import ModeSet
-
-Floats = NDArray[np.float64]
 
 HALF_POWER = (
     "FDD reads the damping from the half-power width of a scattering peak, corrected for the window; its error bar "
@@ -72,7 +70,7 @@ class FrequencyDomainDecomposition:
         *,
         band_hz: tuple[float, float] | None = None,
         count: int | None = None,
-        frequencies_hz: Sequence[float] | Floats | None = None,
+        frequencies_hz: Sequence[float] | Real | None = None,
     ) -> ModeSet:
         """Identify modes.
 
@@ -162,7 +160,7 @@ def _mode(decomposition: SpectralDecomposition, peak: ResponsePeak, half_width_h
     )
 
 
-def _shown_half_width(power: Floats, line: int) -> float:
+def _shown_half_width(power: Real, line: int) -> float:
     """Half of the distance, in lines, of the half-power points beside a peak, each between two lines."""
     # From the peak outwards the first line below half: farther ones belong to other modes.
     below = np.flatnonzero(power[: line + 1] <= power[line] / 2)
@@ -176,6 +174,6 @@ def _shown_half_width(power: Floats, line: int) -> float:
     return float(np.mean(sides)) if sides else float(power.size)
 
 
-def _crossing(power: Floats, low: int, high: int, level: float) -> float:
+def _crossing(power: Real, low: int, high: int, level: float) -> float:
     """Place between a line at or below the level and its neighbour above it."""
     return low + (high - low) * float((level - power[low]) / (power[high] - power[low]))

@@ -4,17 +4,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.responses.narrow_band_kurtosis import narrow_bands
 from chladni.modal.responses.steady_line import steady_lines
 from chladni.modal.responses.tones import Tone, even_tones, same_tone, steady_tones
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.machine_harmonic import MachineHarmonic
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.stretches import valid_runs
-
-Floats = NDArray[np.float64]
 
 # Bands from a 16th of the record, which tells close lines apart, to 16 times as wide, where the speed may wander.
 LONGEST_SEGMENT_SHARE = 16
@@ -29,7 +27,7 @@ MOST_MULTIPLE = 40
 def machine_harmonics(
     series: TimeSeries,
     *,
-    candidates_hz: Sequence[float] | NDArray[np.float64] | None = None,
+    candidates_hz: Sequence[float] | Real | None = None,
     band_hz: tuple[float, float] | None = None,
     false_alarm: float = 0.01,
     least_damping: float = 0.001,
@@ -111,7 +109,7 @@ def machine_harmonics(
 def _with_steady(
     even: list[Tone],
     series: TimeSeries,
-    candidates_hz: Sequence[float] | Floats | None,
+    candidates_hz: Sequence[float] | Real | None,
     band_hz: tuple[float, float] | None,
     false_alarm: float,
     least_damping: float,
@@ -155,8 +153,8 @@ def _longest_run(series: TimeSeries) -> int:
 
 
 def _lines(
-    frequency_hz: Floats, candidates_hz: Sequence[float] | Floats | None, band_hz: tuple[float, float] | None
-) -> NDArray[np.bool_]:
+    frequency_hz: Real, candidates_hz: Sequence[float] | Real | None, band_hz: tuple[float, float] | None
+) -> Mask:
     """Lines that are looked at."""
     chosen = np.arange(frequency_hz.size) >= FIRST_LINE
     # The last line is real: its amplitude is no complex Gaussian number.

@@ -4,13 +4,10 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from chladni.modal.responses.anti_alias import power_transfer, reach
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real, Whole
 
 # A transform so many times as long as the lags wastes little of it on the overlap.
 SPANS = 4
@@ -81,10 +78,10 @@ class LagSums:
         Samples k that were summed over, the same for every lag.
     """
 
-    products: Floats
-    early: Floats
-    squares: Floats
-    late: Floats
+    products: Real
+    early: Real
+    squares: Real
+    late: Real
     count: int
 
     def joined(self, other: Self) -> Self:
@@ -97,21 +94,21 @@ class LagSums:
             count=self.count + other.count,
         )
 
-    def covariance(self) -> Floats:
+    def covariance(self) -> Real:
         """``[lag, channel, reference]`` mean product less the product of the means."""
         mean = self.products / self.count
         return mean[..., :-1] - mean[..., -1:] * (self.early / self.count)
 
-    def variance(self) -> Floats:
+    def variance(self) -> Real:
         """``[channel]`` variance of the filtered samples about their mean."""
-        spread: Floats = np.maximum(self.squares / self.count - (self.late / self.count) ** 2, 0.0)
+        spread: Real = np.maximum(self.squares / self.count - (self.late / self.count) ** 2, 0.0)
         return spread
 
 
 class SpectralSums:
     """Sums of one block while it is open, by zero-padded transforms (Rader 1970; Stockham 1966)."""
 
-    def __init__(self, plan: LagPlan, channels: int, references: NDArray[np.int64]) -> None:
+    def __init__(self, plan: LagPlan, channels: int, references: Whole) -> None:
         self.plan, self.references = plan, references
         self.units = 0
         self.count = 0
@@ -121,7 +118,7 @@ class SpectralSums:
         self._late = np.zeros(channels)
         self._early = np.zeros(references.size)
 
-    def add(self, late: Floats, samples: int) -> None:
+    def add(self, late: Real, samples: int) -> None:
         """Add units, ``[channel, unit, sample]`` with their halo; `samples` of each are multiplied with followers."""
         plan, units, width = self.plan, late.shape[1], late.shape[2]
         early = late[self.references, :, plan.margin : plan.margin + samples]
@@ -151,7 +148,7 @@ class SpectralSums:
             count=self.count,
         )
 
-    def _on_lines(self, values: Floats) -> Complexes:
+    def _on_lines(self, values: Real) -> Complex:
         """``[line, channel, unit]`` transforms, up to the half of the decimated rate."""
         transformed = rfft(values, self.plan.transform, axis=-1)[..., : self._lines]
         return np.ascontiguousarray(transformed.transpose(2, 0, 1))

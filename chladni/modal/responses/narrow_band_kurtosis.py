@@ -5,8 +5,8 @@ from functools import lru_cache
 
 import numpy as np
 import scipy.special
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import require_in_range
 from chladni.signals.time_series import TimeSeries
@@ -15,8 +15,6 @@ from chladni.spectral.segment_spectra import segment_spectra
 from chladni.spectral.segmentation import Segmentation
 from chladni.spectral.stretches import valid_runs
 from chladni.spectral.windows import window_samples
-
-Floats = NDArray[np.float64]
 
 SINE_KURTOSIS = 1.5
 NOISE_KURTOSIS = 3.0
@@ -44,9 +42,9 @@ class NarrowBands:
         Length of one in seconds; a band is 1.5 lines of 1/segment_s wide.
     """
 
-    frequency_hz: Floats
-    power: Floats
-    kurtosis: Floats
+    frequency_hz: Real
+    power: Real
+    kurtosis: Real
     segments: int
     segment_s: float
 
@@ -94,7 +92,7 @@ def narrow_bands(series: TimeSeries, samples: int) -> NarrowBands:
     )
 
 
-def independent_samples(bands: NarrowBands, least_damping: float) -> Floats:
+def independent_samples(bands: NarrowBands, least_damping: float) -> Real:
     """Segments of each line that count as independent if a mode with `least_damping` rings in it.
 
     With rho_m the correlation of the amplitudes of two segments m hops apart, the variance of the kurtosis grows
@@ -113,7 +111,7 @@ def independent_samples(bands: NarrowBands, least_damping: float) -> Floats:
     return np.asarray(np.maximum(bands.segments / inflation, 1.0), dtype=np.float64)
 
 
-def chance_of_kurtosis(kurtosis: Floats, samples: Floats) -> Floats:
+def chance_of_kurtosis(kurtosis: Real, samples: Real) -> Real:
     """Chance that Gaussian noise shows a kurtosis this low or lower in so many independent samples.
 
     By Sanov's theorem the chance that n exponential numbers u show mean(u^2)/mean(u)^2 <= g falls like
@@ -139,7 +137,7 @@ def chance_of_kurtosis(kurtosis: Floats, samples: Floats) -> Floats:
     return np.asarray(np.where(np.isfinite(kurtosis), chance, 1.0), dtype=np.float64)
 
 
-def window_autocorrelation() -> tuple[Floats, Floats]:
+def window_autocorrelation() -> tuple[Real, Real]:
     """Autocorrelation of the Hann window: lags in segments, -1 to 1, and its values, 1 at 0."""
     window = window_samples("hann", CORRELATION_STEPS)
     correlation = np.correlate(window, window, mode="full")
@@ -147,7 +145,7 @@ def window_autocorrelation() -> tuple[Floats, Floats]:
     return lags, correlation / correlation.max()
 
 
-def _inflation(decay: Floats) -> Floats:
+def _inflation(decay: Real) -> Real:
     """1 + 2 sum rho_m^4 for envelopes that decay by exp(-decay) in the time of a segment."""
     lags, window = window_autocorrelation()
     own = np.exp(-decay[:, None] * np.abs(lags)) @ window
@@ -159,7 +157,7 @@ def _inflation(decay: Floats) -> Floats:
 
 
 @lru_cache(maxsize=1)
-def _rate_function() -> tuple[Floats, Floats]:
+def _rate_function() -> tuple[Real, Real]:
     """I of g, as a table over the truncated Gaussians; alpha is where they are cut off, in their sigma."""
     alpha = np.linspace(-1000.0, 30.0, 40_000)
     hazard = np.sqrt(2 / np.pi) / scipy.special.erfcx(alpha / np.sqrt(2))

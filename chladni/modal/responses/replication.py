@@ -4,15 +4,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.poles.pole_selection import PoleSelection
 from chladni.modal.poles.pole_table import PoleTable
 from chladni.modal.responses.correlation import CorrelationFunctions
 from chladni.modal.responses.ssi_cov import block_hankel, decompose, order_models, pole_table
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+from chladni.signals.arrays import Real, Whole
 
 # Orders looked at: more tell the same again.
 ORDERS = 10
@@ -26,7 +23,7 @@ def replication(
     selection: PoleSelection,
     *,
     block_rows: int,
-) -> Floats:
+) -> Real:
     """Give for each chosen mode how much of it comes back in data that it was not found in.
 
     Poles are found anew from every second block. The coefficient of a pole with eigenvectors chi, phi of A is
@@ -49,12 +46,12 @@ def replication(
     return np.asarray(np.array(scores, dtype=np.float64).reshape(-1, 2).min(axis=1), dtype=np.float64)
 
 
-def _some(orders: NDArray[np.int64]) -> list[int]:
+def _some(orders: Whole) -> list[int]:
     places = np.unique(np.linspace(0, orders.size - 1, min(ORDERS, orders.size)).round().astype(np.int64))
     return [int(order) for order in orders[places]]
 
 
-def _halves(correlations: CorrelationFunctions) -> tuple[Floats, Floats]:
+def _halves(correlations: CorrelationFunctions) -> tuple[Real, Real]:
     """Correlation functions of the even and of the odd blocks, taken as equally long."""
     blocks = correlations.blocks
     # Deviations are scaled to the covariance of the mean: this undoes it for the mean of some blocks.
@@ -64,8 +61,8 @@ def _halves(correlations: CorrelationFunctions) -> tuple[Floats, Floats]:
 
 
 def _coefficients(
-    correlations: CorrelationFunctions, own: Floats, foreign: Floats, block_rows: int, orders: Sequence[int]
-) -> tuple[PoleTable, Floats]:
+    correlations: CorrelationFunctions, own: Real, foreign: Real, block_rows: int, orders: Sequence[int]
+) -> tuple[PoleTable, Real]:
     half = replace(correlations, values=own)
     decomposition = decompose(half, block_rows=block_rows, max_order=max(orders, default=1))
     scale = decomposition.scale
@@ -79,7 +76,7 @@ def _coefficients(
     return pole_table(decomposition, models, orders), np.concatenate([np.zeros(0), *(part.real for part in found)])
 
 
-def _score(found: tuple[PoleTable, Floats], table: PoleTable, selection: PoleSelection, mode: int) -> float:
+def _score(found: tuple[PoleTable, Real], table: PoleTable, selection: PoleSelection, mode: int) -> float:
     halved, coefficients = found
     scores = []
     for row in np.flatnonzero(selection.member == mode):

@@ -4,17 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.responses.spectral_decomposition import SpectralDecomposition, relative_std
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.wording import counted
 from chladni.spectral.peaks import find_peaks
-
-Floats = NDArray[np.float64]
 
 # More than a person looks at, and than modes lie in a band that a method without an order can resolve.
 MOST_PEAKS = 200
@@ -48,7 +46,7 @@ def pick_peaks(
     *,
     band_hz: tuple[float, float] | None,
     count: int | None,
-    frequencies_hz: Sequence[float] | Floats | None,
+    frequencies_hz: Sequence[float] | Real | None,
     false_alarm: float,
     min_mac: float,
 ) -> PickedPeaks:
@@ -155,7 +153,7 @@ def _significant(
 
 
 def _by_hand(
-    decomposition: SpectralDecomposition, frequencies_hz: Sequence[float] | Floats
+    decomposition: SpectralDecomposition, frequencies_hz: Sequence[float] | Real
 ) -> tuple[ResponsePeak, ...]:
     """Highest lines nearest to the frequencies given, each once."""
     lines = set[int]()
@@ -176,7 +174,7 @@ def _require_request(
     decomposition: SpectralDecomposition,
     band_hz: tuple[float, float] | None,
     count: int | None,
-    frequencies_hz: Sequence[float] | Floats | None,
+    frequencies_hz: Sequence[float] | Real | None,
 ) -> None:
     first_hz, last_hz = decomposition.frequency_hz[[0, -1]]
     if count is not None and count < 1:

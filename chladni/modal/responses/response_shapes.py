@@ -3,12 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.responses.spectral_decomposition import SpectralDecomposition
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 # Shapes worse conditioned than this together can't be told apart by these sensors: each is then taken alone.
 WORST_CONDITION = 20.0
@@ -49,7 +46,7 @@ def shape_at(decomposition: SpectralDecomposition, line: int, half_width_hz: flo
     return ResponseShape(vector=vectors[:, -1], covariance=(others * (variance / apart**2)) @ others.conj().T)
 
 
-def largest_one(shape: ResponseShape, scale: Floats) -> tuple[Complex, Complex]:
+def largest_one(shape: ResponseShape, scale: Real) -> tuple[Complex, Complex]:
     """Shape in the channels' units with its largest component 1, and one sigma of real + j imaginary parts."""
     vector = shape.vector * scale
     largest = int(np.argmax(np.abs(vector)))
@@ -79,7 +76,7 @@ def modal_filters(shapes: list[Complex]) -> list[Complex]:
     return list(shapes)
 
 
-def modal_spectrum(decomposition: SpectralDecomposition, weights: Complex) -> Floats:
+def modal_spectrum(decomposition: SpectralDecomposition, weights: Complex) -> Real:
     """``[line]`` spectrum of the modal coordinate w^H x."""
     # As a product of matrices, which calls BLAS; hundreds of channels take minutes otherwise.
     spectrum = (decomposition.matrix @ weights) @ weights.conj()

@@ -3,13 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.responses.response_shapes import ResponseShape
 from chladni.modal.shapes.mac import SharedChannel
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 
 def measured_shape(shape: Complex, std: Complex) -> ResponseShape:
@@ -84,5 +81,5 @@ def _factor(
     return factor, by_first, -factor * by_first
 
 
-def _variances(shape: ResponseShape) -> Floats:
+def _variances(shape: ResponseShape) -> Real:
     return np.asarray(np.diagonal(shape.covariance).real, dtype=np.float64)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import scipy.optimize
@@ -12,15 +11,13 @@ from numpy.typing import NDArray
 from chladni.modal.responses.response_shapes import ResponseShape, largest_one
 from chladni.modal.responses.setup_shapes import joined, measured_shape
 from chladni.modal.shapes.mac import SharedChannel, mac, shared_channels
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel, find_channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.machine_harmonic import MachineHarmonic
 from chladni.signals.modal_scale import ModalScale
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.wording import counted
-
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Modes of two set-ups are one when their frequencies agree within so many sigma, or within this part of the
 # frequency, by which sensors that were moved and the weather shift modes, and their shapes agree by this MAC.
@@ -214,7 +211,7 @@ def _partners(
     return {int(row): int(column) for row, column in zip(rows, columns, strict=True) if fits[row, column]}
 
 
-def _mac_or_zero(mine: Complex, theirs: Complex) -> Floats:
+def _mac_or_zero(mine: NDArray[np.complexfloating], theirs: NDArray[np.complexfloating]) -> Real:
     """MAC of shapes that may not move at all at these channels, and then are like no other."""
     agreement = np.zeros((len(mine), len(theirs)))
     moving, moving_too = np.any(mine != 0, axis=1), np.any(theirs != 0, axis=1)
@@ -224,19 +221,19 @@ def _mac_or_zero(mine: Complex, theirs: Complex) -> Floats:
     return agreement
 
 
-def _frequencies(modes: Sequence[_GrowingMode], sets: Sequence[ModeSet]) -> Floats:
+def _frequencies(modes: Sequence[_GrowingMode], sets: Sequence[ModeSet]) -> Real:
     return np.array([sets[len(mode.rows) - 1].frequency_hz[mode.rows[-1]] for mode in modes])
 
 
-def _latest_std(modes: Sequence[_GrowingMode], sets: Sequence[ModeSet]) -> Floats:
+def _latest_std(modes: Sequence[_GrowingMode], sets: Sequence[ModeSet]) -> Real:
     return np.array([sets[len(mode.rows) - 1].frequency_std_hz[mode.rows[-1]] for mode in modes])
 
 
-def _listed(frequency_hz: Floats) -> str:
+def _listed(frequency_hz: Real) -> str:
     return ", ".join(f"{value:.4g}" for value in frequency_hz) + " Hz"
 
 
-def _mean(values: Floats, std: Floats) -> _Mean:
+def _mean(values: Real, std: Real) -> _Mean:
     """Mean by inverse variance; its error grows by the root of chi^2/(K - 1) where that is above 1 (Birge 1932)."""
     if np.any(std <= 0) or not np.all(np.isfinite(std)):
         # Error bars that aren't there can't weigh: what is left is the scatter between set-ups.
@@ -283,7 +280,7 @@ def _over_sets(mode: _GrowingMode, sets: Sequence[ModeSet], name: str, std_name:
     return _mean(values, np.array([getattr(one, std_name)[row] for one, row in pairs]))
 
 
-def _unit_shape(shape: ResponseShape) -> tuple[Complex, Complex]:
+def _unit_shape(shape: ResponseShape) -> tuple[NDArray[np.complexfloating], NDArray[np.complexfloating]]:
     return largest_one(shape, np.ones(shape.vector.size))
 
 
@@ -309,7 +306,7 @@ def _with_common_references(sets: Sequence[ModeSet]) -> tuple[ModeSet, tuple[str
     return bare, ("set-ups have different references: participation and modal scale are left out",)
 
 
-def _scale(first: ModeSet, rows: NDArray[np.int64], divisors: Complex) -> ModalScale | None:
+def _scale(first: ModeSet, rows: Whole, divisors: NDArray[np.complexfloating]) -> ModalScale | None:
     if first.scale is None:
         return None
     # A shape divided by s has its participation multiplied by s: modal A falls by s^2.

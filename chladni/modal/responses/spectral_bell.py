@@ -4,14 +4,12 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.fit.lag_window import LagWindow
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import EstimateError
 from chladni.spectral.leakage import leakage, named_window
 from chladni.spectral.windows import noise_bandwidth_bins
-
-Floats = NDArray[np.float64]
 
 # Scoring converges in a handful of steps; one that hasn't after so many never will.
 MOST_STEPS = 60
@@ -41,7 +39,7 @@ class Bell:
 
     frequency_hz: float
     damping_ratio: float
-    covariance: Floats
+    covariance: Real
     power: float
     power_std: float
     floor: float
@@ -66,8 +64,8 @@ class BellData:
         How often the response is the derivative of a displacement: 2 for accelerations.
     """
 
-    frequency_hz: Floats
-    power: Floats
+    frequency_hz: Real
+    power: Real
     lag_window: LagWindow
     window: str
     record_s: float
@@ -144,7 +142,7 @@ def own_half_width(shown: float, lag_window: LagWindow) -> float:
 
 
 @lru_cache(maxsize=8)
-def _widening(lag_window: LagWindow) -> tuple[Floats, Floats]:
+def _widening(lag_window: LagWindow) -> tuple[Real, Real]:
     """Half widths of modes in lines, and those that the window shows."""
     own = np.geomspace(0.01, 16.0, 60)
     offsets = np.arange(0.0, 32.0, 1 / 16)
@@ -160,11 +158,11 @@ def _widening(lag_window: LagWindow) -> tuple[Floats, Floats]:
 class _Expected:
     """Lines that are expected, ``[line]``, and their derivatives by theta, ``[line, 4]``."""
 
-    power: Floats
-    slopes: Floats
+    power: Real
+    slopes: Real
 
 
-def _start(data: BellData, frequency_hz: float, half_width_hz: float) -> Floats:
+def _start(data: BellData, frequency_hz: float, half_width_hz: float) -> Real:
     top = float(data.power.max())
     # Half of the lowest line: with no floor at all, steps would begin at the edge of what is allowed.
     floor = 0.5 * float(data.power.min())
@@ -172,7 +170,7 @@ def _start(data: BellData, frequency_hz: float, half_width_hz: float) -> Floats:
     return np.array([np.log(top), frequency_hz / data.spacing_hz, np.log(width), floor / top])
 
 
-def _scored(data: BellData, theta: Floats) -> tuple[Floats, _Expected]:
+def _scored(data: BellData, theta: Real) -> tuple[Real, _Expected]:
     """Fisher scoring with halved steps, until a step gains nothing."""
     expected = _expected(data, theta)
     best = _deviance(data, expected)
@@ -207,7 +205,7 @@ def _deviance(data: BellData, expected: _Expected) -> float:
     return float(np.sum(ratio - np.log(np.maximum(ratio, np.finfo(float).tiny)) - 1))
 
 
-def _expected(data: BellData, theta: Floats) -> _Expected:
+def _expected(data: BellData, theta: Real) -> _Expected:
     line, damped, width = data.frequency_hz / data.spacing_hz, float(theta[1]), float(np.exp(theta[2]))
     bell, by_pole = _bell(data.lag_window, damped, width, line)
     # What a line shows comes from here on average: near the line of a wide mode, near the top of a narrow one.
@@ -226,7 +224,7 @@ def _expected(data: BellData, theta: Floats) -> _Expected:
     return _Expected(power=power * (shape + theta[3]), slopes=power * np.stack(slopes, axis=1))
 
 
-def _smooth_part(origin: Floats, damped: float, width: float, derivatives: int) -> tuple[Floats, ...]:
+def _smooth_part(origin: Real, damped: float, width: float, derivatives: int) -> tuple[Real, ...]:
     """What the spectrum of a mode is besides its Lorentzian, 1 at the top, and its logarithm's slopes.
 
     S = omega^(2 p) / (((omega - omega_d)^2 + sigma^2) ((omega + omega_d)^2 + sigma^2)); only the first factor changes
@@ -240,9 +238,7 @@ def _smooth_part(origin: Floats, damped: float, width: float, derivatives: int) 
     return value, by_origin, by_damped, 2 * width / here - 2 * width / there
 
 
-def _bell(
-    lag_window: LagWindow, damped: float, width: float, line: Floats
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+def _bell(lag_window: LagWindow, damped: float, width: float, line: Real) -> tuple[Complex, Complex]:
     """``[line]`` 1/(2 pi (width + j (line - damped))) as the window shows it, and its slope by -width + j damped.
 
     In lines; the real part is a Lorentzian.
@@ -253,7 +249,7 @@ def _bell(
     return value[0], 2 * np.pi * slope[0]
 
 
-def _score_covariance(data: BellData, theta: Floats, coefficients: Floats) -> Floats:
+def _score_covariance(data: BellData, theta: Real, coefficients: Real) -> Real:
     """``[4, 4]`` covariance of the sums over lines with these coefficients, ``[line, 4]``."""
     line, step = _integration_lines(data, theta)
     damped, width = float(theta[1]), float(np.exp(theta[2]))
@@ -267,7 +263,7 @@ def _score_covariance(data: BellData, theta: Floats, coefficients: Floats) -> Fl
     return np.asarray(sums.T @ (weights[:, np.newaxis] * sums), dtype=np.float64)
 
 
-def _seen_by(data: BellData, coefficients: Floats, line: Floats) -> Floats:
+def _seen_by(data: BellData, coefficients: Real, line: Real) -> Real:
     """``[place, 4]`` sums over the data's lines of coefficients times the power of the window at that place.
 
     On a fine grid it's a convolution: a matrix of places and lines would take gigabytes for a wide bell.
@@ -283,7 +279,7 @@ def _seen_by(data: BellData, coefficients: Floats, line: Floats) -> Floats:
     return np.stack(columns, axis=1)
 
 
-def _integration_lines(data: BellData, theta: Floats) -> tuple[Floats, Floats]:
+def _integration_lines(data: BellData, theta: Real) -> tuple[Real, Real]:
     """Places in lines, dense around the mode, and the weight of each for the trapezoidal rule."""
     first, last = data.frequency_hz[[0, -1]] / data.spacing_hz
     # Squares of the window's power have no detail finer than a quarter of a line.
@@ -294,7 +290,7 @@ def _integration_lines(data: BellData, theta: Floats) -> tuple[Floats, Floats]:
     return line, np.concatenate([[gaps[0]], gaps[1:] + gaps[:-1], [gaps[-1]]]) / 2
 
 
-def _to_modal(theta: Floats, spacing_hz: float) -> Floats:
+def _to_modal(theta: Real, spacing_hz: float) -> Real:
     """Derivatives of natural frequency and damping ratio by damped frequency (lines) and log half width."""
     damped, width = theta[1], np.exp(theta[2])
     natural = np.hypot(damped, width)

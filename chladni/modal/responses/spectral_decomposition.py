@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.channel import Channel
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
@@ -14,8 +14,6 @@ from chladni.signals.value import Value
 from chladni.signals.wording import counted
 from chladni.spectral.leakage import named_window
 from chladni.spectral.uncertainty import window_correlation
-
-Floats = NDArray[np.float64]
 
 # Below so many effective averages the scatter of a line is as large as itself, and no peak can be told from it.
 LEAST_AVERAGES = 4.0
@@ -50,11 +48,11 @@ class SpectralDecomposition(Value):
         Of the spectra.
     """
 
-    frequency_hz: Floats
-    matrix: NDArray[np.complex128]
-    values: Floats
-    vectors: NDArray[np.complex128]
-    scale: Floats
+    frequency_hz: Real
+    matrix: Complex
+    values: Real
+    vectors: Complex
+    scale: Real
     channels: tuple[Channel, ...]
     record_s: float
     bandwidth_hz: float

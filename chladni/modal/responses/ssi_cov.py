@@ -5,16 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular, svd
 
 from chladni.modal.poles.pole_table import PoleTable
 from chladni.modal.responses.correlation import CorrelationFunctions
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.value import Value
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # White noise of sensors is correlated with itself at lag 0 only, so that the first lag used is 1.
 FIRST_LAG = 1
@@ -41,11 +38,11 @@ class SubspaceDecomposition(Value):
         One over the step between lags.
     """
 
-    left: Floats
-    singular: Floats
-    right: Floats
+    left: Real
+    singular: Real
+    right: Real
     block_rows: int
-    scale: Floats
+    scale: Real
     sample_rate_hz: float
 
     def __post_init__(self) -> None:
@@ -76,7 +73,7 @@ class OrderModel:
         ``[pole]`` those inside the unit circle with a positive imaginary part.
     """
 
-    def __init__(self, inverse: Floats, basis: Floats, shifted: Floats) -> None:
+    def __init__(self, inverse: Real, basis: Real, shifted: Real) -> None:
         self.order = int(inverse.shape[0])
         self._inverse, self._basis = inverse, basis
         state = inverse @ shifted
@@ -85,22 +82,22 @@ class OrderModel:
         self.kept = np.flatnonzero((self.eigenvalues.imag > 0) & (np.abs(self.eigenvalues) < 1))
 
     @property
-    def eigenvalue(self) -> Complexes:
+    def eigenvalue(self) -> Complex:
         """``[pole]`` eigenvalue of A of each pole."""
         return np.asarray(self.eigenvalues[self.kept], dtype=np.complex128)
 
     @property
-    def right(self) -> Complexes:
+    def right(self) -> Complex:
         """``[state, pole]`` its right eigenvector."""
         return np.asarray(self.vectors[:, self.kept], dtype=np.complex128)
 
     @cached_property
-    def left_vectors(self) -> Complexes:
+    def left_vectors(self) -> Complex:
         """``[state, state]`` left eigenvectors of A, their product with `vectors` 1."""
         return np.asarray(np.linalg.inv(self.vectors), dtype=np.complex128)
 
     @cached_property
-    def pseudo_inverse(self) -> Floats:
+    def pseudo_inverse(self) -> Real:
         """``[state, row]`` of the upper block rows of O."""
         return self._inverse @ self._basis.T
 
@@ -153,7 +150,7 @@ def decompose(
     )
 
 
-def block_hankel(functions: Floats, block_rows: int) -> Floats:
+def block_hankel(functions: Real, block_rows: int) -> Real:
     """Give ``[row, column]`` with R_(i+j+1) as block i, j, from ``[lag, channel, reference]``."""
     rows = np.arange(block_rows)
     blocks = functions[FIRST_LAG + rows[:, None] + rows]
@@ -186,12 +183,12 @@ def order_models(decomposition: SubspaceDecomposition, orders: Sequence[int]) ->
         yield OrderModel(inverse[corner], basis[:, :order], shifted[corner])
 
 
-def continuous(eigenvalue: Complexes, sample_rate_hz: float) -> Complexes:
+def continuous(eigenvalue: Complex, sample_rate_hz: float) -> Complex:
     """Poles in rad/s of eigenvalues of the discrete model."""
     return np.asarray(np.log(eigenvalue) * sample_rate_hz, dtype=np.complex128)
 
 
-def shapes_of(decomposition: SubspaceDecomposition, model: OrderModel) -> Complexes:
+def shapes_of(decomposition: SubspaceDecomposition, model: OrderModel) -> Complex:
     """``[pole, channel]`` shapes of length 1, in the channels' own units."""
     top = decomposition.left[: decomposition.channels, : model.order]
     shapes = (top @ model.right).T * decomposition.scale
@@ -251,8 +248,8 @@ def pole_table(
     models: Sequence[OrderModel],
     orders: Sequence[int],
     *,
-    frequency_std_hz: Floats | None = None,
-    damping_std: Floats | None = None,
+    frequency_std_hz: Real | None = None,
+    damping_std: Real | None = None,
 ) -> PoleTable:
     """Gather the poles of all models."""
     poles = [continuous(model.eigenvalue, decomposition.sample_rate_hz) for model in models]
@@ -277,7 +274,7 @@ def _require_lags(correlations: CorrelationFunctions, block_rows: int) -> None:
         )
 
 
-def _scale(correlations: CorrelationFunctions) -> Floats:
+def _scale(correlations: CorrelationFunctions) -> Real:
     constant = np.flatnonzero(~(correlations.variance > 0))
     if constant.size:
         names = ", ".join(correlations.channels[row].name for row in constant)

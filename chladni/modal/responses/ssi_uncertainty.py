@@ -5,16 +5,13 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import fft, ifft, next_fast_len
 from scipy.special import ndtri, stdtrit
 
 from chladni.modal.responses.correlation import CorrelationFunctions
 from chladni.modal.responses.ssi_cov import FIRST_LAG, OrderModel, SubspaceDecomposition, continuous
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import EstimateError
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # Values of sensitivities held at a time: some tens of megabytes.
 VALUES_TOGETHER = 1 << 21
@@ -49,7 +46,7 @@ class ErrorPropagation:
         scaled = used / scale[:, None] / scale[correlations.references]
         self._deviations = np.ascontiguousarray(scaled.reshape(correlations.blocks, -1).T)
 
-    def poles(self, model: OrderModel) -> Complexes:
+    def poles(self, model: OrderModel) -> Complex:
         """``[pole, block]`` deviations of the poles in rad/s."""
         eigenvalue = model.eigenvalue
         turned = self._off_the_subspace(
@@ -59,7 +56,7 @@ class ErrorPropagation:
         moved = self._propagated(turned, self._inputs(model, slice(None)))
         return np.asarray(moved / eigenvalue[:, None] * self._decomposition.sample_rate_hz, dtype=np.complex128)
 
-    def shape(self, model: OrderModel, pole: int) -> Complexes:
+    def shape(self, model: OrderModel, pole: int) -> Complex:
         """``[channel, block]`` deviations of the shape of one pole whose largest component is 1."""
         decomposition = self._decomposition
         channels = decomposition.channels
@@ -78,18 +75,18 @@ class ErrorPropagation:
         shape = top @ model.right[:, pole] * decomposition.scale
         return _normalised(shape, moved)
 
-    def _inputs(self, model: OrderModel, poles: slice) -> Complexes:
+    def _inputs(self, model: OrderModel, poles: slice) -> Complex:
         """``[pole, column]`` V S^-1 phi."""
         order = model.order
         weighted = model.right[:, poles] / self._decomposition.singular[:order, None]
         return np.asarray((self._decomposition.right[:, :order] @ weighted).T, dtype=np.complex128)
 
-    def _off_the_subspace(self, rows: Complexes, model: OrderModel) -> Complexes:
+    def _off_the_subspace(self, rows: Complex, model: OrderModel) -> Complex:
         """Rows times I - U U^T: a turn within the subspace only changes the basis."""
         basis = self._decomposition.left[:, : model.order]
         return np.asarray(rows - (rows @ basis) @ basis.T, dtype=np.complex128)
 
-    def _propagated(self, outputs: Complexes, inputs: Complexes) -> Complexes:
+    def _propagated(self, outputs: Complex, inputs: Complex) -> Complex:
         """``[result, block]`` sums of a dH v over the Hankel matrix, a and v one row a result."""
         some = max(VALUES_TOGETHER // max(self._deviations.shape[0], 1), 1)
         parts = [
@@ -98,7 +95,7 @@ class ErrorPropagation:
         ]
         return np.concatenate([np.zeros((0, self._deviations.shape[1]), dtype=np.complex128), *parts])
 
-    def _together(self, outputs: Complexes, inputs: Complexes) -> Complexes:
+    def _together(self, outputs: Complex, inputs: Complex) -> Complex:
         rows = self._decomposition.block_rows
         channels, references = self._shape
         length = next_fast_len(self._lags)
@@ -123,21 +120,21 @@ class PoleDeviations:
         ``[pole, block]``; the covariance of two of them is the sum over blocks of their product.
     """
 
-    frequency_hz: Floats
-    damping_ratio: Floats
+    frequency_hz: Real
+    damping_ratio: Real
 
     @property
-    def frequency_std_hz(self) -> Floats:
+    def frequency_std_hz(self) -> Real:
         """``[pole]`` one sigma."""
         return np.asarray(np.sqrt(np.sum(self.frequency_hz**2, axis=1)), dtype=np.float64)
 
     @property
-    def damping_std(self) -> Floats:
+    def damping_std(self) -> Real:
         """``[pole]`` one sigma."""
         return np.asarray(np.sqrt(np.sum(self.damping_ratio**2, axis=1)), dtype=np.float64)
 
 
-def pole_deviations(pole: Complexes, deviations: Complexes) -> PoleDeviations:
+def pole_deviations(pole: Complex, deviations: Complex) -> PoleDeviations:
     """Turn deviations of poles into those of frequency and damping.
 
     Parameters
@@ -190,14 +187,14 @@ def student_factor(blocks: int) -> float:
     return float(stdtrit(blocks - 1, 0.975) / ndtri(0.975))
 
 
-def shape_std(deviations: Complexes) -> Complexes:
+def shape_std(deviations: Complex) -> Complex:
     """One sigma of the real part + j one sigma of the imaginary part, from deviations ``[..., block]``."""
     real = np.sqrt(np.sum(deviations.real**2, axis=-1))
     imag = np.sqrt(np.sum(deviations.imag**2, axis=-1))
     return np.asarray(real + 1j * imag, dtype=np.complex128)
 
 
-def _shifted(rows: Complexes, eigenvalue: Complexes, channels: int) -> Complexes:
+def _shifted(rows: Complex, eigenvalue: Complex, channels: int) -> Complex:
     """Rows over O down less `eigenvalue` times rows over O up, as rows over O."""
     whole = np.zeros((rows.shape[0], rows.shape[1] + channels), dtype=np.complex128)
     whole[:, channels:] = rows
@@ -205,7 +202,7 @@ def _shifted(rows: Complexes, eigenvalue: Complexes, channels: int) -> Complexes
     return whole
 
 
-def _normalised(shape: Complexes, moved: Complexes) -> Complexes:
+def _normalised(shape: Complex, moved: Complex) -> Complex:
     """Deviations of shape over its largest component."""
     largest = int(np.argmax(np.abs(shape)))
     relative = shape / shape[largest]

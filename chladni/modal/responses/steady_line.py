@@ -4,17 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.special
-from numpy.typing import NDArray
 
 from chladni.modal.responses.narrow_band_kurtosis import window_autocorrelation
+from chladni.signals.arrays import Real
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.leakage import line_correlation, named_window
 from chladni.spectral.segment_spectra import segment_spectra
 from chladni.spectral.segmentation import Segmentation
 from chladni.spectral.stretches import valid_runs
 from chladni.spectral.windows import window_samples
-
-Floats = NDArray[np.float64]
 
 # The lines beside the main lobe of a Hann window that a line is held against, on either side.
 NEAREST, FARTHEST = 3, 18
@@ -40,10 +38,10 @@ class SteadyLines:
         Length of a segment in seconds.
     """
 
-    frequency_hz: Floats
-    power: Floats
-    over_neighbours: Floats
-    chance: Floats
+    frequency_hz: Real
+    power: Real
+    over_neighbours: Real
+    chance: Real
     segment_s: float
 
 
@@ -81,7 +79,7 @@ def steady_lines(series: TimeSeries, least_damping: float) -> SteadyLines:
     )
 
 
-def _over_neighbours(power: Floats) -> Floats:
+def _over_neighbours(power: Real) -> Real:
     """Each line over the mean of its neighbours, `NEAREST` to `FARTHEST` lines away on both sides."""
     over = np.zeros_like(power)
     total = np.cumsum(np.pad(power, ((0, 0), (1, 0))), axis=1)
@@ -96,7 +94,7 @@ def _over_neighbours(power: Floats) -> Floats:
     return over
 
 
-def _narrowest_mode(half_width: Floats) -> Floats:
+def _narrowest_mode(half_width: Real) -> Real:
     """Ratio that a mode shows at its top, for half of its half-power bandwidth in lines, zeta f T."""
     lags, window = window_autocorrelation()
     grid = np.geomspace(1e-3, 1e4, 300)

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from itertools import accumulate
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.poles.certain_poles import least_std, pole_std
 from chladni.modal.poles.pole_selection import SelectionRules, require_request
@@ -35,7 +34,6 @@ from chladni.signals.stabilisation_diagram import StabilisationDiagram
 from chladni.spectral.blocks import Source
 from chladni.spectral.stretches import valid_runs
 
-Complexes = NDArray[np.complex128]
 Band = tuple[float, float]
 
 UNSCALED = "shapes are unscaled: responses alone don't tell the forces, so that there is no modal mass"

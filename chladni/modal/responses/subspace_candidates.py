@@ -4,18 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.poles.certain_poles import certain_pole, least_std, pole_std
 from chladni.modal.poles.pole_selection import PoleSelection, SelectionRules, select_poles
 from chladni.modal.poles.pole_table import PoleTable
 from chladni.modal.responses.correlation import CorrelationFunctions
 from chladni.modal.responses.replication import replication
+from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.machine_harmonic import MachineHarmonic
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 # Relative standard deviations between which the replication asked for rises. Poles of white noise have 0.4 with two
 # channels, of which half may come back, and 0.15 with ten, of which less than a sixth does.
@@ -76,8 +72,8 @@ class ChosenPoles:
     """
 
     selection: PoleSelection
-    clusters: Rows
-    rows: Rows
+    clusters: Whole
+    rows: Whole
     notes: tuple[str, ...]
 
 
@@ -134,16 +130,14 @@ def choose_poles(
     return ChosenPoles(selection=found, clusters=kept[rising], rows=final[rising], notes=found.notes + notes)
 
 
-def _of_full_models(table: PoleTable, found: PoleSelection, kept: Rows) -> Rows:
+def _of_full_models(table: PoleTable, found: PoleSelection, kept: Whole) -> Whole:
     """Poles of models that are rich enough to hold all modes."""
     clusters = [np.flatnonzero(found.member == mode) for mode in kept]
     least = max((int(table.order[cluster].min()) for cluster in clusters), default=0)
     return np.array([certain_pole(table, cluster, least_order=least) for cluster in clusters], dtype=np.int64)
 
 
-def _unsure(
-    table: PoleTable, rows: Rows, shares: Floats, few: Bools, duration_s: float, rules: ResponseRules
-) -> Bools:
+def _unsure(table: PoleTable, rows: Whole, shares: Real, few: Mask, duration_s: float, rules: ResponseRules) -> Mask:
     frequency_hz, damping = table.frequency_hz[rows], table.damping_ratio[rows]
     frequency_std, damping_std = pole_std(table, rows)
     spread = np.hypot(frequency_std / frequency_hz, damping_std) / np.sqrt(2)
@@ -164,13 +158,13 @@ def _is_harmonic(table: PoleTable, row: int, harmonics: Sequence[MachineHarmonic
 
 def _kept(
     table: PoleTable,
-    rows: Rows,
+    rows: Whole,
     found: PoleSelection,
-    unsure: Bools,
-    machine: Bools,
-    few: Bools,
+    unsure: Mask,
+    machine: Mask,
+    few: Mask,
     rules: ResponseRules,
-) -> tuple[Rows, tuple[str, ...]]:
+) -> tuple[Whole, tuple[str, ...]]:
     kept, notes = np.flatnonzero(~unsure & ~machine), []
     if np.any(machine):
         notes.append(f"{_at(table, rows[machine])}: poles next to lines of machines are left out")
@@ -197,7 +191,7 @@ def _shortfall(count: int, found: int) -> tuple[str, ...]:
     return (f"{count} modes were asked for, but the record holds no more than {found} that are sure",)
 
 
-def _repeated(table: PoleTable, rows: Rows, clusters: Sequence[Rows], rules: ResponseRules) -> Bools:
+def _repeated(table: PoleTable, rows: Whole, clusters: Sequence[Whole], rules: ResponseRules) -> Mask:
     """Poles within the half-power half-width of one that more orders hold, and that no model tells from it.
 
     Two close modes have different shapes, and a model that is rich enough has a pole for each of them: what has the
@@ -217,7 +211,7 @@ def _repeated(table: PoleTable, rows: Rows, clusters: Sequence[Rows], rules: Res
     return repeated
 
 
-def _doubts(table: PoleTable, rows: Rows, unsure: Bools, machine: Bools) -> tuple[str, ...]:
+def _doubts(table: PoleTable, rows: Whole, unsure: Mask, machine: Mask) -> tuple[str, ...]:
     notes = []
     if np.any(machine):
         notes.append(
@@ -228,5 +222,5 @@ def _doubts(table: PoleTable, rows: Rows, unsure: Bools, machine: Bools) -> tupl
     return tuple(notes)
 
 
-def _at(table: PoleTable, rows: Rows) -> str:
+def _at(table: PoleTable, rows: Whole) -> str:
     return ", ".join(f"{frequency_hz:.4g}" for frequency_hz in sorted(table.frequency_hz[rows])) + " Hz"

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from math import ceil, floor
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from chladni.modal.responses.anti_alias import PASS_BAND
@@ -15,7 +14,6 @@ from chladni.signals.errors import SetupError
 from chladni.spectral.peaks import find_peaks
 from chladni.spectral.power_spectral_density import power_spectral_density
 
-Rows = NDArray[np.int64]
 Band = tuple[float, float]
 
 # The lags of the Hankel matrix span so many cycles of the lowest peak. Fewer don't separate modes that are a tenth

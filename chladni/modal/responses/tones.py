@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.responses.narrow_band_kurtosis import NarrowBands, chance_of_kurtosis, independent_samples
 from chladni.modal.responses.steady_line import SteadyLines
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.leakage import leakage, named_window
-
-Floats = NDArray[np.float64]
 
 # The sine has half the power of its band or more; with less, whatever else rings there would be named by it.
 MOST_KURTOSIS = 2.625
@@ -34,7 +32,7 @@ def same_tone(one: Tone, other: Tone) -> bool:
 
 
 def even_tones(
-    series: TimeSeries, bands: NarrowBands, lines: NDArray[np.bool_], *, chance: float, least_damping: float
+    series: TimeSeries, bands: NarrowBands, lines: Mask, *, chance: float, least_damping: float
 ) -> list[Tone]:
     """Sines in the lines of one width of band, by their kurtosis; the surest channel of each names it.
 
@@ -68,7 +66,7 @@ def even_tones(
 
 
 def steady_tones(
-    series: TimeSeries, record: SteadyLines, lines: NDArray[np.bool_], *, chance: float, least_damping: float
+    series: TimeSeries, record: SteadyLines, lines: Mask, *, chance: float, least_damping: float
 ) -> list[Tone]:
     """Sines in the lines of the whole record, by how far they stand over the lines beside them; the strongest first.
 
@@ -88,7 +86,7 @@ def steady_tones(
     return tones
 
 
-def _add(tones: list[Tone], power: Floats, line: int, segment_s: float, reason: str) -> None:
+def _add(tones: list[Tone], power: Real, line: int, segment_s: float, reason: str) -> None:
     tone = Tone(
         frequency_hz=_between_lines(power, line) / segment_s, width_hz=MAIN_LOBE_LINES / segment_s, reason=reason
     )
@@ -96,7 +94,7 @@ def _add(tones: list[Tone], power: Floats, line: int, segment_s: float, reason: 
         tones.append(tone)
 
 
-def _separate(power: Floats, sure: NDArray[np.bool_]) -> list[int]:
+def _separate(power: Real, sure: Mask) -> list[int]:
     """Lines of separate sines: the strongest first, without those that its leakage explains."""
     left, found, window = np.flatnonzero(sure), [], named_window("hann")
     while left.size:
@@ -108,7 +106,7 @@ def _separate(power: Floats, sure: NDArray[np.bool_]) -> list[int]:
     return found
 
 
-def _between_lines(power: Floats, line: int) -> float:
+def _between_lines(power: Real, line: int) -> float:
     """Where a sine lies, in lines, from the two largest amplitudes of its Hann main lobe."""
     before, top, after = np.sqrt(power[line - 1 : line + 2])
     side, sign = (after, 1) if after >= before else (before, -1)

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value
 
@@ -25,14 +26,14 @@ class MeanPhase(Value):
         whose phases are spread evenly.
     """
 
-    phase_deg: NDArray[np.float64]
-    deviation_deg: NDArray[np.float64]
+    phase_deg: Real
+    deviation_deg: Real
 
     def __post_init__(self) -> None:
         self._freeze()
 
 
-def phase_collinearity(shapes: ArrayLike) -> NDArray[np.float64]:
+def phase_collinearity(shapes: ArrayLike) -> Real:
     """Modal phase collinearity (MPC): 1 for shapes that move in one phase, 0 for phases without direction.
 
     Pappa, Elliott & Schenk (1993), "Consistent-mode indicator for the eigensystem realization algorithm", J.
@@ -63,7 +64,7 @@ def phase_collinearity(shapes: ArrayLike) -> NDArray[np.float64]:
     if phi.shape[1] == 1:
         return np.full(len(phi), np.nan)
     lengths = np.sum(np.abs(phi) ** 2, axis=1)
-    collinearity: NDArray[np.float64] = (np.abs(np.sum(phi**2, axis=1)) / lengths) ** 2
+    collinearity: Real = (np.abs(np.sum(phi**2, axis=1)) / lengths) ** 2
     return np.minimum(collinearity, 1.0)
 
 
@@ -109,7 +110,7 @@ def mean_phase(shapes: ArrayLike) -> MeanPhase:
     )
 
 
-def deviation_from_noise(shapes: ArrayLike, shape_std: ArrayLike) -> NDArray[np.float64]:
+def deviation_from_noise(shapes: ArrayLike, shape_std: ArrayLike) -> Real:
     """Mean phase deviation that the uncertainty of a real shape gives alone.
 
     An error of standard deviation s across the line turns a component of amplitude A by s sqrt(2/pi)/A on average,
@@ -133,7 +134,7 @@ def deviation_from_noise(shapes: ArrayLike, shape_std: ArrayLike) -> NDArray[np.
     return np.asarray(np.minimum(np.degrees(angles), 45.0), dtype=np.float64)
 
 
-def _scaled(shapes: ArrayLike) -> NDArray[np.complex128]:
+def _scaled(shapes: ArrayLike) -> Complex:
     phi = np.atleast_2d(np.asarray(shapes, dtype=np.complex128))
     if phi.ndim != 2 or phi.shape[1] == 0:
         raise EstimateError(f"shapes have shape {phi.shape}; they are [mode, channel] with at least one channel")

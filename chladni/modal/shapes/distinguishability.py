@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.shapes.mac import auto_mac
 from chladni.modal.shapes.mode_words import joined
+from chladni.signals.arrays import Real
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.wording import counted
 
@@ -49,7 +49,7 @@ def alike_modes(modes: ModeSet, *, limit: float = ALIKE_MAC) -> tuple[tuple[int,
 
 
 def alike_sentence(
-    modes: ModeSet, pairs: Sequence[tuple[int, int]], likeness: NDArray[np.float64], *, limit: float = ALIKE_MAC
+    modes: ModeSet, pairs: Sequence[tuple[int, int]], likeness: Real, *, limit: float = ALIKE_MAC
 ) -> str:
     """Say which modes are alike, why, and what to do; `pairs` must not be empty, `likeness` is their AutoMAC."""
     count = modes.frequency_hz.size
@@ -69,7 +69,7 @@ def alike_sentence(
     )
 
 
-def _named(modes: ModeSet, pairs: Sequence[tuple[int, int]], likeness: NDArray[np.float64]) -> list[str]:
+def _named(modes: ModeSet, pairs: Sequence[tuple[int, int]], likeness: Real) -> list[str]:
     return [
         f"{first + 1} and {second + 1} ({modes.frequency_hz[first]:.4g} and {modes.frequency_hz[second]:.4g} Hz, MAC "
         f"{likeness[first, second]:.2f})"
@@ -77,7 +77,7 @@ def _named(modes: ModeSet, pairs: Sequence[tuple[int, int]], likeness: NDArray[n
     ]
 
 
-def _sine_squared_of_noise(modes: ModeSet) -> NDArray[np.float64]:
+def _sine_squared_of_noise(modes: ModeSet) -> Real:
     """``[mode, mode]`` the 95 % point of 1 - MAC for shapes that differ by their errors only."""
     variance = np.nansum(np.abs(modes.shape_std) ** 2, axis=1) / np.sum(np.abs(modes.shapes) ** 2, axis=1)
     freedom = 2 * (len(modes.channels) - 1)

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.channel import Channel, Vector
 from chladni.signals.errors import EstimateError
 from chladni.signals.mode_set import ModeSet
@@ -33,7 +34,7 @@ class SharedChannel:
     sign: float
 
 
-def mac(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
+def mac(a: ArrayLike, b: ArrayLike) -> Real:
     """Compare each shape of `a` with each of `b`: abs(a^H b)^2/((a^H a)(b^H b)).
 
     Allemang (2003), "The modal assurance criterion: twenty years of use and abuse", Sound and Vibration 37(8), for
@@ -64,12 +65,12 @@ def mac(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
             f"shapes of {unit_a.shape[1]} and {unit_b.shape[1]} channels can't be compared; give both over the same "
             "channels, or use cross_mac, which finds those that two sets share"
         )
-    product: NDArray[np.float64] = np.abs(unit_a.conj() @ unit_b.T) ** 2
+    product: Real = np.abs(unit_a.conj() @ unit_b.T) ** 2
     # Rounding of the two lengths may exceed 1 by an epsilon, which 1 - MAC must not show as negative.
     return np.minimum(product, 1.0)
 
 
-def auto_mac(modes: ModeSet) -> NDArray[np.float64]:
+def auto_mac(modes: ModeSet) -> Real:
     """Compare the modes of a set with each other, ``[mode, mode]``; the diagonal is 1.
 
     Large values off the diagonal say that these sensors can't tell the two modes apart, or that one mode was found
@@ -78,7 +79,7 @@ def auto_mac(modes: ModeSet) -> NDArray[np.float64]:
     return mac(modes.shapes, modes.shapes)
 
 
-def cross_mac(a: ModeSet, b: ModeSet) -> NDArray[np.float64]:
+def cross_mac(a: ModeSet, b: ModeSet) -> Real:
     """Compare the modes of two sets over the channels that they share, ``[mode of a, mode of b]``.
 
     See `shared_channels` for what counts as shared. Over a single channel all shapes are alike and the result is 1.
@@ -151,7 +152,7 @@ def _neighbour(channel: Channel, others: Sequence[Channel], taken: set[int]) -> 
     return None
 
 
-def _unit_length(shapes: ArrayLike, name: str) -> NDArray[np.complex128]:
+def _unit_length(shapes: ArrayLike, name: str) -> Complex:
     array = np.atleast_2d(np.asarray(shapes, dtype=np.complex128))
     if array.ndim != 2 or array.shape[1] == 0:
         raise EstimateError(f"{name} has shape {array.shape}; shapes are [mode, channel] with at least one channel")

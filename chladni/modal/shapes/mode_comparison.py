@@ -3,11 +3,11 @@
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.special import ndtri
 
 from chladni.modal.shapes.mac import cross_mac
+from chladni.signals.arrays import Real
 from chladni.signals.mode_change import ModeChange
 from chladni.signals.mode_set import ModeSet
 
@@ -55,7 +55,7 @@ def compare_modes(before: ModeSet, after: ModeSet, *, false_alarm: float = FALSE
     return tuple(sorted(found, key=_place))
 
 
-def _pairs(before: ModeSet, after: ModeSet, likeness: NDArray[np.float64]) -> list[tuple[int, int]]:
+def _pairs(before: ModeSet, after: ModeSet, likeness: Real) -> list[tuple[int, int]]:
     apart = np.abs(before.frequency_hz[:, np.newaxis] / after.frequency_hz - 1)
     possible = (apart <= FARTHEST) & (likeness >= LEAST_MAC)
     # More than all possible pairs together: an impossible one is only taken for want of any other.

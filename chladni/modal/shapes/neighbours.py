@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.shapes.mode_words import joined
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.geometry import Geometry
 from chladni.signals.value import Value
@@ -32,8 +32,8 @@ class Neighbours(Value):
     """
 
     between: tuple[str, str]
-    first: NDArray[np.float64]
-    second: NDArray[np.float64]
+    first: Real
+    second: Real
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -127,9 +127,7 @@ def _compare(channels: Sequence[Channel], between: tuple[str, str], at_points: d
     return Neighbours(between=between, first=none, second=none)
 
 
-def _common_axes(
-    channels: Sequence[Channel], first: list[int], second: list[int]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+def _common_axes(channels: Sequence[Channel], first: list[int], second: list[int]) -> tuple[Real, Real] | None:
     sides = [[row for row in side if channels[row].direction is not None] for side in (first, second)]
     if all(sides):
         along = [np.array([channels[row].direction for row in side]) for side in sides]
@@ -147,7 +145,7 @@ def _common_axes(
     return None
 
 
-def _intersection(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _intersection(a: Real, b: Real) -> Real:
     """Orthonormal columns ``[3, axis]`` of the directions that lie in the span of the rows of both.
 
     They belong to the principal angles of zero between the two spans (Golub & Van Loan 2013, section 6.4.3).
@@ -158,15 +156,13 @@ def _intersection(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.
     return np.asarray(basis_a @ left[:, : int(np.sum(cosines > 1 - _PARALLEL))], dtype=np.float64)
 
 
-def _span(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+def _span(directions: Real) -> Real:
     left, sizes, _ = np.linalg.svd(directions.T, full_matrices=False)
     # Two directions less than 0.1 degrees apart measure one axis, whose noise the other would only magnify.
     return np.asarray(left[:, sizes > 1e-3 * sizes[0]], dtype=np.float64)
 
 
-def _reading(
-    channels: Sequence[Channel], rows: list[int], directions: NDArray[np.float64], axes: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _reading(channels: Sequence[Channel], rows: list[int], directions: Real, axes: Real) -> Real:
     """``[axis, channel]`` weights of the channels that give the motion along `axes`, by least squares."""
     weights = np.zeros((axes.shape[1], len(channels)))
     weights[:, rows] = (np.linalg.pinv(directions, rcond=1e-3).T @ axes).T

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from math import hypot, isfinite, nan, pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.shapes.neighbours import Neighbours, neighbours
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.geometry import Geometry
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.relative_motion import RelativeMotion
@@ -26,11 +26,11 @@ class JointMotion:
 
     first: complex
     second: complex
-    first_weights: NDArray[np.float64]
-    second_weights: NDArray[np.float64]
+    first_weights: Real
+    second_weights: Real
 
     @property
-    def weights(self) -> NDArray[np.float64]:
+    def weights(self) -> Real:
         """``[channel]`` real: `relative` is these times the shape."""
         return self.first_weights - self.second_weights
 
@@ -89,7 +89,7 @@ def relative_motion(modes: ModeSet, geometry: Geometry) -> tuple[RelativeMotion,
     return tuple(found)
 
 
-def joint_motion(shape: NDArray[np.complex128], pair: Neighbours) -> JointMotion | None:
+def joint_motion(shape: Complex, pair: Neighbours) -> JointMotion | None:
     """Give the motion of two neighbours in one shape ``[channel]``; None without a common direction."""
     if pair.first.shape[0] == 0:
         return None
@@ -112,7 +112,7 @@ def magnitude_std(value: complex, std_real: float, std_imag: float) -> float:
     return hypot(value.real / size * std_real, value.imag / size * std_imag)
 
 
-def kilogram_scale(modes: ModeSet) -> NDArray[np.float64]:
+def kilogram_scale(modes: ModeSet) -> Real:
     """``[mode]`` modal mass in kg, NaN where the modes have none, or one in other units."""
     unknown = np.full(modes.frequency_hz.size, nan)
     if modes.scale is None:

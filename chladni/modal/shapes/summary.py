@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.shapes.joint_treatment import JointTreatment, treatments
 from chladni.modal.shapes.mode_words import capital, joined, mode_names, percent_with_std, with_std
 from chladni.modal.shapes.neighbours import neighbour_note
+from chladni.signals.arrays import Real
 from chladni.signals.geometry import Geometry
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
@@ -71,7 +71,7 @@ def _main_modes(modes: ModeSet) -> list[str]:
     return [f"{start}; {which} {joined(listed)} (± one sigma)."]
 
 
-def _prominence(modes: ModeSet) -> NDArray[np.float64]:
+def _prominence(modes: ModeSet) -> Real:
     """``[mode]`` height of each resonance in accelerance, to a common factor.
 
     H at omega_r is about -omega^2 psi L/(zeta omega); without participation the lower modes go first, which usually

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.modal.shapes.complexity import deviation_from_noise, mean_phase, phase_collinearity
 from chladni.modal.shapes.distinguishability import alike_modes, alike_sentence
 from chladni.modal.shapes.mac import auto_mac
 from chladni.modal.shapes.mode_words import capital, joined, mode_name, mode_names
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.modal_fit import ModalFit
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
@@ -190,7 +190,7 @@ def _wide_error_bars(modes: ModeSet) -> list[str]:
     if not known.all():
         unknown = np.flatnonzero(~known).tolist()
         sentences.append(f"{capital(mode_names(modes, unknown))}: the error bars are unknown.")
-    checks: tuple[tuple[str, NDArray[np.float64], float], ...] = (
+    checks: tuple[tuple[str, Real, float], ...] = (
         ("frequency", modes.frequency_std_hz / modes.frequency_hz, _WIDE_FREQUENCY),
         ("damping", modes.damping_std / np.maximum(np.abs(modes.damping_ratio), 1e-12), _WIDE_DAMPING),
         ("shape", _largest_shape_std(modes), _WIDE_SHAPE),
@@ -206,19 +206,17 @@ def _wide_error_bars(modes: ModeSet) -> list[str]:
     return sentences
 
 
-def _has_error_bar(modes: ModeSet) -> NDArray[np.bool_]:
+def _has_error_bar(modes: ModeSet) -> Mask:
     numbers = (modes.frequency_std_hz, modes.damping_std, _largest_shape_std(modes))
     return np.asarray(np.isfinite(np.stack(numbers)).all(axis=0), dtype=np.bool_)
 
 
-def _largest_shape_std(modes: ModeSet) -> NDArray[np.float64]:
+def _largest_shape_std(modes: ModeSet) -> Real:
     # hypot passes NaN and infinity on, where abs of a complex number would warn.
     return np.asarray(np.hypot(modes.shape_std.real, modes.shape_std.imag).max(axis=1), dtype=np.float64)
 
 
-def _complex_shapes(
-    modes: ModeSet, collinearity: NDArray[np.float64], deviation_deg: NDArray[np.float64]
-) -> list[str]:
+def _complex_shapes(modes: ModeSet, collinearity: Real, deviation_deg: Real) -> list[str]:
     # Two means of the deviation that error bars give alone: beyond, the phases are the structure's, not the noise's.
     explained_deg = 2 * deviation_from_noise(modes.shapes, modes.shape_std)
     sentences = []

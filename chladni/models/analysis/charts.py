@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.frequency_curve import FrequencyCurve
 from chladni.models.analysis.linear_path import LinearPath
@@ -13,8 +12,8 @@ from chladni.models.analysis.root_locus import RootLocus
 from chladni.models.analysis.step_response import TransientResponse
 from chladni.models.core.port import Terminal
 from chladni.models.core.reading import Chart, Curve
+from chladni.signals.arrays import Complex, Real
 
-Matrix = NDArray[np.float64]
 NOW = "now"
 # A Nyquist plot of an integrator goes to infinity: beyond this many times its size at its first corner it is cut.
 NYQUIST_REACH = 10.0
@@ -146,15 +145,15 @@ def _time_curves(responses: Sequence[tuple[str, TransientResponse]], output: str
     return tuple(curves)
 
 
-def _curve(label: str, x: Matrix, y: Matrix) -> Curve:
+def _curve(label: str, x: Real, y: Real) -> Curve:
     return Curve(label=label, x=np.asarray(x, dtype=np.float64), y=np.asarray(y, dtype=np.float64))
 
 
-def _points(label: str, roots: NDArray[np.complex128]) -> Curve:
+def _points(label: str, roots: Complex) -> Curve:
     return Curve(label=label, x=roots.real.copy(), y=roots.imag.copy(), points=True)
 
 
-def _finite(values: Matrix) -> Matrix:
+def _finite(values: Real) -> Real:
     # A magnitude of zero has no level; a line with an infinite point isn't drawn at all.
     return np.where(np.isfinite(values), values, np.nan)
 

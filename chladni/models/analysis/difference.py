@@ -3,11 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.parameter import Parameter
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 # Equations are sums of products and quotients of parameters. With a step of 0.4 % the error of sixth order is
 # 36 * 0.004^6 = 1.5e-13 for 1/p and none for products; rounding is 1e-16/0.004.
@@ -15,7 +13,7 @@ RELATIVE_STEP = 4e-3
 NODES = 7
 
 
-def relative_derivative(function: Callable[[float], Matrix], parameter: Parameter) -> Matrix:
+def relative_derivative(function: Callable[[float], Real], parameter: Parameter) -> Real:
     """Differentiate ``p -> function(p)`` and multiply by p: the change of a function per relative change of p.
 
     Differences of sixth order on seven equidistant nodes (Fornberg 1988), central ones where the possible range
@@ -51,14 +49,14 @@ def relative_derivative(function: Callable[[float], Matrix], parameter: Paramete
     return np.asarray(np.sum(terms, axis=0) / RELATIVE_STEP)
 
 
-def first_derivative_weights(nodes: Matrix) -> Matrix:
+def first_derivative_weights(nodes: Real) -> Real:
     """Weights of function values at distinct `nodes` that sum to the first derivative at 0, exact for polynomials."""
     wanted = np.zeros(nodes.size)
     wanted[1] = 1.0
     return np.asarray(np.linalg.solve(np.vander(nodes, increasing=True).T, wanted))
 
 
-def _nodes(parameter: Parameter) -> Matrix | None:
+def _nodes(parameter: Parameter) -> Real | None:
     """Node numbers in steps from the value, as central as the possible range allows; None where it's too narrow."""
     centre = np.arange(NODES, dtype=np.float64) - NODES // 2
     for shift in sorted(range(-(NODES // 2), NODES // 2 + 1), key=abs):

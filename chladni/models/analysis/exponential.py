@@ -3,9 +3,8 @@
 from math import ceil, log2
 
 import numpy as np
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 # Coefficients of the diagonal Padé approximant of order 13, and the norm up to which it is exact to rounding
 # (Higham 2005, table 2.3 and equation 2.7).
@@ -18,7 +17,7 @@ _REACH = 5.371920351148152
 SHORT, NEGLIGIBLE = 1.0, 1e-18
 
 
-def exponential(matrix: Matrix) -> Matrix:
+def exponential(matrix: Real) -> Real:
     """Give e^matrix by scaling and squaring (Higham 2005, algorithm 2.3).
 
     Written out in NumPy's products: `scipy.linalg.expm` hands even matrices of four rows to waiting BLAS threads, and
@@ -51,7 +50,7 @@ def exponential(matrix: Matrix) -> Matrix:
     return np.asarray(result)
 
 
-def moved(matrix: Matrix, state: Matrix) -> Matrix:
+def moved(matrix: Real, state: Real) -> Real:
     """Give e^matrix times a state; for a small matrix by its series, which takes a fraction of the time.
 
     Examples

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.frequency_curve import FrequencyCurve, frequency_curve
 from chladni.models.analysis.frequency_marks import FrequencyMarks, Margin
@@ -12,6 +11,7 @@ from chladni.models.analysis.linear_path import LinearPath
 from chladni.models.analysis.resolvent import Resolvent
 from chladni.models.analysis.step_behaviour import none
 from chladni.models.core.reading import Quantity
+from chladni.signals.arrays import Complex
 
 # How many quarter turns the phase of a displacement lags behind that of an output in this unit.
 DISPLACEMENT_QUARTERS = {"m/s": 1, "rad/s": 1, "m/s^2": 2, "rad/s^2": 2}
@@ -64,7 +64,7 @@ def frequency_behaviour(path: LinearPath) -> FrequencyBehaviour:
     )
 
 
-def first_pair(poles: NDArray[np.complex128]) -> complex | None:
+def first_pair(poles: Complex) -> complex | None:
     """Give the oscillating pole of lowest frequency, the one with positive imaginary part; None when none does."""
     pairs = poles[(poles.imag > 0) & (np.abs(poles.real) < OVERDAMPED * np.abs(poles))]
     return complex(pairs[np.argmin(np.abs(pairs))]) if pairs.size else None

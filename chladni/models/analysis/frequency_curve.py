@@ -4,15 +4,12 @@ from dataclasses import dataclass
 from math import log10, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.linear_path import LinearPath
 from chladni.models.analysis.resolvent import Resolvent
 from chladni.models.analysis.zeros import zeros
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
-Roots = NDArray[np.complex128]
 
 # So dense that a Nyquist plot is round, where a turn of phase takes a good part of a decade.
 POINTS_A_DECADE = 60
@@ -46,16 +43,16 @@ class FrequencyCurve(Value):
         -1 when a slow positive input lowers the output, else 1.
     """
 
-    frequency_hz: Matrix
-    response: NDArray[np.complex128]
-    phase_deg: Matrix
-    zeros: Roots
+    frequency_hz: Real
+    response: Complex
+    phase_deg: Real
+    zeros: Complex
     sign: float
 
     def __post_init__(self) -> None:
         self._freeze()
 
-    def magnitude_db(self) -> Matrix:
+    def magnitude_db(self) -> Real:
         """20 log10 of the magnitude; -inf where there is no response."""
         with np.errstate(divide="ignore"):
             return np.asarray(20 * np.log10(np.abs(self.response)))
@@ -95,8 +92,8 @@ def frequency_curve(
 
 
 def frequency_grid(
-    roots: Roots, dead_time_s: float, loop_delay_s: float, band_hz: tuple[float, float] | None = None
-) -> Matrix:
+    roots: Complex, dead_time_s: float, loop_delay_s: float, band_hz: tuple[float, float] | None = None
+) -> Real:
     """Choose angular frequencies in rad/s by the poles and zeros, ``[frequency]``."""
     corners = np.abs(roots[roots != 0])
     delay = max(dead_time_s, loop_delay_s)
@@ -123,12 +120,12 @@ def _light(root: complex) -> bool:
     return root.imag > 0 and abs(root.real) < LIGHT * abs(root)
 
 
-def _about(root: complex) -> Matrix:
+def _about(root: complex) -> Real:
     """Frequencies about a light root at which its phase turns in equal steps; never at an undamped one itself."""
     return np.abs(root.imag + max(abs(root.real), 1e-7 * abs(root)) * _TURN)
 
 
-def _unwrapped(response: NDArray[np.complex128], order: int) -> tuple[Matrix, float]:
+def _unwrapped(response: Complex, order: int) -> tuple[Real, float]:
     phase = np.unwrap(np.angle(response))
     # A slow input of a path with `order` integrators turns by 90 degrees for each; what's left tells the sign.
     left = phase[0] + order * pi / 2

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.bracketed_root import bracketed_root
 from chladni.models.analysis.frequency_curve import FrequencyCurve
 from chladni.models.analysis.resolvent import Resolvent
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 # Phases that touch a level by rounding only (two integrators lie at -180 degrees for ever) don't cross it.
 ROUNDING_DEG = 1e-7
@@ -123,7 +121,7 @@ class FrequencyMarks:
         return value * turn, (slope - 1j * self._dead_time_s * value) * turn
 
     def _crossings(
-        self, measure: Callable[[float], tuple[float, float]], away: Matrix, *, falling_only: bool
+        self, measure: Callable[[float], tuple[float, float]], away: Real, *, falling_only: bool
     ) -> list[float]:
         """Refine each change of sign of `away` on the grid by what `measure` gives exactly."""
         found = []
@@ -152,7 +150,7 @@ class FrequencyMarks:
         return bracketed_root(measure, low, high, begins_below=False, guess=middle, rounding=ROUNDING * high)
 
 
-def _sign_changes(signal: Matrix) -> list[int]:
+def _sign_changes(signal: Real) -> list[int]:
     """Points after which the sign is the other one; where the signal is zero, it still has the sign it had."""
     sign = np.sign(signal)
     # A crossing may lie exactly on a point of the grid, and a response may end on the level without passing it.

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
+
+from chladni.signals.arrays import Complex
 
 # exp(-7) = 0.1 %: what is left of the slowest decay at the end.
 DECAYS = 7.0
@@ -42,7 +43,7 @@ class Horizon:
     note: str = ""
 
 
-def horizon(poles: NDArray[np.complex128], *, periods: int = PERIODS) -> Horizon:
+def horizon(poles: Complex, *, periods: int = PERIODS) -> Horizon:
     """Choose how long to look at a response by its poles.
 
     Parameters
@@ -67,7 +68,7 @@ def horizon(poles: NDArray[np.complex128], *, periods: int = PERIODS) -> Horizon
     )
 
 
-def _length(moving: NDArray[np.complex128], periods: int) -> tuple[float, str]:
+def _length(moving: Complex, periods: int) -> tuple[float, str]:
     rate = float(moving.real.max())
     slowest = moving[int(np.argmax(moving.real))]
     period_s = 2 * pi / abs(slowest.imag) if slowest.imag else np.inf
@@ -79,7 +80,7 @@ def _length(moving: NDArray[np.complex128], periods: int) -> tuple[float, str]:
     return min(decay_s, 1e12), ""
 
 
-def _period_s(moving: NDArray[np.complex128], seconds: float) -> float:
+def _period_s(moving: Complex, seconds: float) -> float:
     """Shortest period of the oscillations that are alive for a good part of the picture."""
     light = (
         (moving.imag > 0) & (-moving.real < LIGHT_DAMPING * np.abs(moving)) & (-moving.real * seconds < 40 * DECAYS)

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.behaviour import Behaviour, behaviour
 from chladni.models.analysis.difference import relative_derivative
@@ -16,10 +15,9 @@ from chladni.models.core.instrument import Instrument, Options, Values
 from chladni.models.core.model import Model
 from chladni.models.core.parameter import Parameter
 from chladni.models.core.reading import InfluenceTable
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.linear_algebra import in_one_thread
-
-Matrix = NDArray[np.float64]
 
 #: The four of the paper's table 1.
 PAPER_BEHAVIOUR = ("answer_time", "peak_acceleration", "resonance_frequency", "critical_frequency")
@@ -130,7 +128,7 @@ def influence(
     )
 
 
-def strongest(coefficients: Matrix) -> Strongest:
+def strongest(coefficients: Real) -> Strongest:
     """Find the largest magnitude of each row and column of ``[construction, behaviour]``, NaN and 0 left out."""
     sizes = np.nan_to_num(np.abs(coefficients), nan=0.0)
     return Strongest(of_rows=_largest(sizes), of_columns=_largest(sizes.T))
@@ -146,7 +144,7 @@ class _Study:
     size: float
     band: float
 
-    def values(self, found: Behaviour) -> Matrix:
+    def values(self, found: Behaviour) -> Real:
         numbers = {quantity.name: quantity.value for quantity in found.quantities}
         return np.array([np.nan if numbers[name] is None else numbers[name] for name in self.names], dtype=np.float64)
 
@@ -156,7 +154,7 @@ class _Study:
         linear = "" if isinstance(compiled, CompiledModel) and compiled.is_linear() else "; of the linear equations"
         return tuple(words[name] + linear for name in self.names)
 
-    def relative_change(self, parameter: Parameter, change: float) -> Matrix:
+    def relative_change(self, parameter: Parameter, change: float) -> Real:
         """R_PCD of each behaviour parameter."""
         if not np.isfinite(change):
             return np.full(len(self.names), np.nan)
@@ -170,10 +168,10 @@ class _Study:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(initial == 0, np.nan, (initial - self.values(found)) / initial)
 
-    def log_derivatives(self, parameter: Parameter) -> Matrix:
+    def log_derivatives(self, parameter: Parameter) -> Real:
         path, count = self.nominal.path, self.nominal.path.b.size
 
-        def equations(value: float) -> Matrix:
+        def equations(value: float) -> Real:
             return _equations(self.model.with_values({parameter.name: value}), path)
 
         change = relative_derivative(equations, parameter)
@@ -182,7 +180,7 @@ class _Study:
         return np.array([found.get(name, np.nan) for name in self.names])
 
 
-def _equations(model: Model, path: LinearPath) -> Matrix:
+def _equations(model: Model, path: LinearPath) -> Real:
     """``[A b; c d]`` in the states of `path`, and a last column that begins with the dead time."""
     compiled = model.compile()
     state_space = compiled.state_space()
@@ -240,5 +238,5 @@ def _applied(parameter: Parameter, changes: float | Mapping[str, float]) -> floa
     return np.nan
 
 
-def _largest(sizes: Matrix) -> tuple[int | None, ...]:
+def _largest(sizes: Real) -> tuple[int | None, ...]:
     return tuple(int(np.argmax(row)) if row.size and row.max() > 0 else None for row in sizes)

@@ -6,17 +6,16 @@ from math import log2
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.balance import balance
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
 from chladni.models.core.port import Terminal
 from chladni.models.core.state_space import StateSpace
+from chladni.signals.arrays import Complex, Index, Mask, Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
 
-Matrix = NDArray[np.float64]
 System = StateSpace | CompiledModel | Model
 
 # An eigenvalue this much smaller than the largest is the rounding error of an integrator.
@@ -53,16 +52,16 @@ class LinearPath(Value):
         The system, when only its own frequency response is exact: dead time inside a loop, ideal derivatives.
     """
 
-    a: Matrix
-    b: Matrix
-    c: Matrix
-    d: Matrix
-    poles: NDArray[np.complex128]
-    dead_time_s: Matrix
+    a: Real
+    b: Real
+    c: Real
+    d: Real
+    poles: Complex
+    dead_time_s: Real
     source: Terminal
     outputs: tuple[Terminal, ...]
-    kept: NDArray[np.intp]
-    scale: Matrix
+    kept: Index
+    scale: Real
     looped: bool = False
     exact: CompiledModel | None = None
 
@@ -191,7 +190,7 @@ def compiled_model(system: System) -> CompiledModel | StateSpace:
     return system if isinstance(system, (StateSpace, CompiledModel)) else system.compile()
 
 
-def poles_of(a: Matrix) -> NDArray[np.complex128]:
+def poles_of(a: Real) -> Complex:
     """Eigenvalues in rad/s, those of slowest decay first; rounding errors about the origin are made exactly 0."""
     if not a.size:
         return np.empty(0, np.complex128)
@@ -219,7 +218,7 @@ def index_of(terminals: Sequence[Terminal], name: str, what: str) -> int:
     return names.index(name) if name else 0
 
 
-def _reached(links: NDArray[np.bool_], start: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _reached(links: Mask, start: Mask) -> Index:
     """States that are reached from `start` along ``links[to, from]``."""
     reached = start
     for _ in range(len(start)):
@@ -230,7 +229,7 @@ def _reached(links: NDArray[np.bool_], start: NDArray[np.bool_]) -> NDArray[np.i
     return np.flatnonzero(reached)
 
 
-def _balanced(a: Matrix, b: Matrix) -> tuple[Matrix, Matrix]:
+def _balanced(a: Real, b: Real) -> tuple[Real, Real]:
     if not a.size:
         return a, np.ones(0)
     scaled, scale = balance(a)
@@ -241,7 +240,7 @@ def _balanced(a: Matrix, b: Matrix) -> tuple[Matrix, Matrix]:
     return scaled, np.asarray(scale * common)
 
 
-def _dead_time_s(compiled: CompiledModel | StateSpace, column: int) -> Matrix:
+def _dead_time_s(compiled: CompiledModel | StateSpace, column: int) -> Real:
     if isinstance(compiled, StateSpace):
         return np.zeros(len(compiled.outputs))
     return compiled.input_delays_s[column] + np.asarray(compiled.output_offsets_s)

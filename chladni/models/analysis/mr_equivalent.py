@@ -3,7 +3,6 @@
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.damper_placement import Damper
 from chladni.models.core.port_law import PortLaw
@@ -12,7 +11,6 @@ from chladni.models.drives.mr_damper import mr_damper_at
 from chladni.models.drives.mr_shipped import MEASURED_DAMPER
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 # The second period from rest has closed to a hundredth of its height.
 PERIODS, SAMPLES, SUBSTEPS = 2, 200, 8
 

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, differential_evolution, minimize
 
 from chladni.models.analysis.behaviour import path_behaviour
@@ -14,10 +13,10 @@ from chladni.models.core.instrument import Instrument
 from chladni.models.core.model import Model
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.reading import Quantity
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.linear_algebra import in_one_thread
 
-Matrix = NDArray[np.float64]
 BoundsByName = Mapping[str, tuple[float, float]]
 
 # A candidate that breaks a limit costs more than any that doesn't, and one that has no such behaviour still more.
@@ -144,13 +143,13 @@ class _Search:
         self._initial = np.array([model.parameters[name].value for name in names])
         self._scale = self._measure(self._initial, self._aim) if self._aim else None
 
-    def best(self, seed: int) -> Matrix:
+    def best(self, seed: int) -> Real:
         """Give the best values, ``[parameter]``."""
         low, high = np.array(self._bounds).T
         spans = high - low
 
         # Both walk in shares of the bounds: a pressure in Pa beside a stroke in m would tie a simplex's legs.
-        def cost(shares: Matrix) -> float:
+        def cost(shares: Real) -> float:
             return self._cost(low + shares * spans)
 
         unit = Bounds(np.zeros(spans.size), np.ones(spans.size))
@@ -168,7 +167,7 @@ class _Search:
         best = refined.x if refined.fun <= found.fun else found.x
         return np.asarray(low + best * spans)
 
-    def told(self, values: Matrix) -> Optimum:
+    def told(self, values: Real) -> Optimum:
         """Say what the values do."""
         best = dict(zip(self._names, (float(value) for value in values), strict=True))
         tuned = self._model.with_values(best)
@@ -192,7 +191,7 @@ class _Search:
             model=tuned,
         )
 
-    def _held(self, values: Matrix) -> list[str]:
+    def _held(self, values: Real) -> list[str]:
         told = []
         for name, value, (low, high) in zip(self._names, values, self._bounds, strict=True):
             for end, side in ((low, "lower"), (high, "upper")):
@@ -200,7 +199,7 @@ class _Search:
                     told.append(f"{name} lies at its {side} bound, {end:g}; a wider one may do better")
         return told
 
-    def _cost(self, values: Matrix) -> float:
+    def _cost(self, values: Real) -> float:
         try:
             path = self._path(values)
             found = [measured(path, wish, size=self._size).value for wish in self._wishes]
@@ -219,14 +218,14 @@ class _Search:
         value = numbers[self._wishes.index(self._aim)] / (self._scale or 1.0)
         return value if self._aim.sense == "least" else -value
 
-    def _spans(self) -> Matrix:
+    def _spans(self) -> Real:
         return np.array([high - low for low, high in self._bounds])
 
-    def _measure(self, values: Matrix, wish: Wish) -> float | None:
+    def _measure(self, values: Real, wish: Wish) -> float | None:
         value = measured(self._path(values), wish, size=self._size).value
         return abs(value) if value else None
 
-    def _path(self, values: Matrix) -> LinearPath:
+    def _path(self, values: Real) -> LinearPath:
         chosen = dict(zip(self._names, (float(value) for value in values), strict=True))
         source, output = self._ends
         return linear_path(self._model.with_values(chosen), from_input=source, to_outputs=(output,)).to(output)

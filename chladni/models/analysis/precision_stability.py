@@ -4,14 +4,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.linear_path import LinearPath
 from chladni.models.analysis.root_locus import RootLocus, gain_root_locus
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,12 +33,12 @@ class PrecisionStability(Value):
         ``[branch, gain]`` in rad/s.
     """
 
-    gain: Matrix
-    error: Matrix
+    gain: Real
+    error: Real
     follows: Literal["step", "ramp", "parabola"]
-    decay_per_s: Matrix
-    damping_ratio: Matrix
-    roots: NDArray[np.complex128]
+    decay_per_s: Real
+    damping_ratio: Real
+    roots: Complex
 
     def __post_init__(self) -> None:
         self._freeze()

@@ -1,13 +1,10 @@
 """Frequency response of a linear path at many frequencies, by one Schur decomposition."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import schur
 
 from chladni.models.analysis.linear_path import LinearPath
-
-Matrix = NDArray[np.float64]
-ComplexMatrix = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 
 class Resolvent:
@@ -38,7 +35,7 @@ class Resolvent:
             self._column = path.exact.inputs.index(path.source)
             self._row = path.exact.outputs.index(path.outputs[0])
 
-    def __call__(self, omega: Matrix) -> ComplexMatrix:
+    def __call__(self, omega: Real) -> Complex:
         """Give H at angular frequencies in rad/s, ``[frequency]``, without the dead time outside of loops."""
         omega = np.atleast_1d(np.asarray(omega, dtype=np.float64))
         if self._path.exact is not None:
@@ -46,7 +43,7 @@ class Resolvent:
             return np.asarray(exact * np.exp(1j * omega * self._path.dead_time_s[0]), dtype=np.complex128)
         return self.at(np.asarray(1j * omega, dtype=np.complex128))
 
-    def at(self, s: ComplexMatrix) -> ComplexMatrix:
+    def at(self, s: Complex) -> Complex:
         """Give H at points s of the complex plane in rad/s, ``[point]``; not with a dead time inside a loop."""
         count = self._diagonal.size
         # An undamped pole to the last digit; beside it the response is finite.
@@ -90,7 +87,7 @@ class Resolvent:
         left, right = path.c[0] @ inverse, inverse @ path.b
         return complex(left @ path.b + path.d[0]), complex(-1j * (left @ right)), complex(-2 * left @ inverse @ right)
 
-    def _at(self, omega: float) -> ComplexMatrix:
+    def _at(self, omega: float) -> Complex:
         """``j omega I - A``."""
         matrix = self._minus_a.copy()
         matrix.flat[:: len(matrix) + 1] += 1j * omega

@@ -5,16 +5,15 @@ from dataclasses import dataclass
 from math import log10
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from chladni.models.analysis.linear_path import LinearPath, compiled_model, poles_of
 from chladni.models.analysis.zeros import zeros
 from chladni.models.core.model import Model
+from chladni.signals.arrays import Complex, Mask, Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
 
-Matrix = NDArray[np.float64]
 GAINS = 61
 # From where nothing has moved to where the branches turn to their asymptotes.
 GAIN_DECADES = (2.0, 1.0)
@@ -38,20 +37,20 @@ class RootLocus(Value):
 
     name: str
     unit: str
-    values: Matrix
-    roots: NDArray[np.complex128]
-    start: NDArray[np.complex128]
-    end: NDArray[np.complex128]
+    values: Real
+    roots: Complex
+    start: Complex
+    end: Complex
 
     def __post_init__(self) -> None:
         self._freeze()
 
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> Mask:
         """Tell for each value whether every root decays."""
         return np.asarray(np.all(self.roots.real < 0, axis=0))
 
 
-def gain_root_locus(path: LinearPath, *, gains: Sequence[float] | Matrix | None = None) -> RootLocus:
+def gain_root_locus(path: LinearPath, *, gains: Sequence[float] | Real | None = None) -> RootLocus:
     """Follow the poles of a path to one output as negative feedback around it is raised: ``u = k (r - y)``.
 
     Raises
@@ -79,7 +78,7 @@ def gain_root_locus(path: LinearPath, *, gains: Sequence[float] | Matrix | None 
     )
 
 
-def parameter_root_locus(model: Model, parameter: str, values: Sequence[float] | Matrix) -> RootLocus:
+def parameter_root_locus(model: Model, parameter: str, values: Sequence[float] | Real) -> RootLocus:
     """Follow the poles of a model as one of its parameters changes.
 
     Raises
@@ -102,7 +101,7 @@ def parameter_root_locus(model: Model, parameter: str, values: Sequence[float] |
     )
 
 
-def default_gains(path: LinearPath) -> Matrix:
+def default_gains(path: LinearPath) -> Real:
     """Loop gains about the one at which the loop's magnitude at the middle of its poles is 1; 0 first, ``[gain]``."""
     moving = np.abs(path.poles[path.poles != 0])
     omega = float(np.exp(np.mean(np.log(moving)))) if moving.size else 1.0
@@ -112,7 +111,7 @@ def default_gains(path: LinearPath) -> Matrix:
     return np.concatenate([[0.0], np.logspace(middle - GAIN_DECADES[0], middle + GAIN_DECADES[1], GAINS - 1)])
 
 
-def _branches(roots: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _branches(roots: Complex) -> Complex:
     """``[branch, value]`` from unordered ``[value, root]``: each root goes on to the one it can have moved to."""
     ordered = roots.copy()
     for step in range(1, len(roots) if roots.shape[1] else 0):

@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.step_behaviour import ACCELERATION_RATES, SETTLING_BAND, none
 from chladni.models.core.port import Terminal
 from chladni.models.core.reading import Quantity
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 # The last tenth of a settled response stays within the settling band.
 LAST_SHARE = 0.1
@@ -31,8 +29,8 @@ class SampledStep:
         Of the step.
     """
 
-    time_s: Matrix
-    values: Matrix
+    time_s: Real
+    values: Real
     output: Terminal
     source: Terminal
     size: float
@@ -64,7 +62,7 @@ def sampled_quantities(step: SampledStep, *, band: float = SETTLING_BAND) -> lis
     return [*_times(step, relative, band), _overshoot(relative, top, step.output.name), *rated, *_final(step, final)]
 
 
-def _times(step: SampledStep, relative: Matrix, band: float) -> list[Quantity]:
+def _times(step: SampledStep, relative: Real, band: float) -> list[Quantity]:
     name, time_s = step.output.name, step.time_s
     inner = np.flatnonzero(
         (relative[1:-1] > relative[:-2]) & (relative[1:-1] >= relative[2:]) & (relative[1:-1] > 1 + 1e-6)
@@ -89,7 +87,7 @@ def _time(name: str, value: float | None, definition: str) -> Quantity:
     return Quantity(name=name, value=value, unit="s", definition=definition + _SOURCE)
 
 
-def _overshoot(relative: Matrix, top: int, name: str) -> Quantity:
+def _overshoot(relative: Real, top: int, name: str) -> Quantity:
     highest = _parabola(np.arange(relative.size, dtype=np.float64), relative, top)[1]
     definition = f"greatest value of {name} above its final value, over that" + _SOURCE
     return Quantity(name="overshoot", value=100 * max(highest - 1, 0.0), unit="%", definition=definition)
@@ -124,7 +122,7 @@ def with_sampled(linear: Sequence[Quantity], sampled: Sequence[Quantity]) -> tup
     return tuple(instead.get(quantity.name, quantity) for quantity in linear)
 
 
-def _first_above(time_s: Matrix, relative: Matrix, level: float) -> float | None:
+def _first_above(time_s: Real, relative: Real, level: float) -> float | None:
     above = np.flatnonzero(relative >= level)
     if not above.size or above[0] == 0:
         return None
@@ -133,7 +131,7 @@ def _first_above(time_s: Matrix, relative: Matrix, level: float) -> float | None
     return float(time_s[place - 1] + share * (time_s[place] - time_s[place - 1]))
 
 
-def _parabola(x: Matrix, y: Matrix, place: int) -> tuple[float, float]:
+def _parabola(x: Real, y: Real, place: int) -> tuple[float, float]:
     """Top of the parabola through a sample and its neighbours."""
     if not 0 < place < y.size - 1:
         return float(x[place]), float(y[place])

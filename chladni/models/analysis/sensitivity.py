@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.behaviour import Behaviour
 from chladni.models.analysis.exponential import exponential
@@ -11,9 +10,8 @@ from chladni.models.analysis.frequency_behaviour import FrequencyBehaviour
 from chladni.models.analysis.linear_path import LinearPath
 from chladni.models.analysis.resolvent import Resolvent
 from chladni.models.analysis.step_behaviour import SETTLING_BAND, StepMarks
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import ModelError
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +39,7 @@ class Tangent:
     dead_time_s: float
 
 
-def tangent(nominal: Behaviour, change: Matrix, dead_time_s: float) -> Tangent:
+def tangent(nominal: Behaviour, change: Real, dead_time_s: float) -> Tangent:
     """Make the tangent from the change of ``[A b; c d]`` of the path's own states.
 
     Parameters
@@ -189,7 +187,7 @@ def _pair(found: FrequencyBehaviour, path: LinearPath, moved: Tangent) -> dict[s
     return result
 
 
-def _eigenvector(matrix: Matrix, pole: complex) -> NDArray[np.complex128]:
+def _eigenvector(matrix: Real, pole: complex) -> Complex:
     poles, vectors = np.linalg.eig(matrix)
     return np.asarray(vectors[:, int(np.argmin(np.abs(poles - pole)))], dtype=np.complex128)
 
@@ -206,7 +204,7 @@ def _errors(nominal: Behaviour, moved: Tangent) -> dict[str, float]:
     return result
 
 
-def _doubled(path: LinearPath, change: Matrix) -> LinearPath:
+def _doubled(path: LinearPath, change: Real) -> LinearPath:
     count = path.b.size
     zero = np.zeros((count, count))
     return replace(

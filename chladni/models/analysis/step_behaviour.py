@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.horizon import horizon
 from chladni.models.analysis.linear_path import LinearPath
 from chladni.models.analysis.step_response import step_trajectory
 from chladni.models.analysis.trajectory import Trajectory
 from chladni.models.core.reading import Quantity
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 SETTLING_BAND = 0.02
 # A final value this close to the command, or to zero beside the response's size, differs by rounding only.
@@ -58,7 +56,7 @@ class StepMarks:
     fastest: float | None = None
     missing: str = ""
 
-    def row(self, rates: int = 0) -> Matrix:
+    def row(self, rates: int = 0) -> Real:
         """Row whose product with a state of `motion` is the reading, or a rate of it."""
         row = np.append(self.read.c[0], self.read.d[0])
         return np.asarray(row @ np.linalg.matrix_power(self.motion.generator, rates))
@@ -236,14 +234,14 @@ def _settles_away_from_zero(marks: StepMarks) -> bool:
     return abs(marks.final) > EXACT * scale
 
 
-def _constant(row: Matrix, value: float) -> Matrix:
+def _constant(row: Real, value: float) -> Real:
     """Row whose product with any state of a unit step is `value`: the last state is the input, 1."""
     constant = np.zeros_like(row)
     constant[-1] = value
     return constant
 
 
-def _first_peak_beyond(motion: Trajectory, towards: Matrix, final: float) -> float | None:
+def _first_peak_beyond(motion: Trajectory, towards: Real, final: float) -> float | None:
     signal, rate = towards @ motion.states, towards @ motion.generator @ motion.states
     falls = np.flatnonzero((rate[:-1] > 0) & (rate[1:] <= 0) & (np.maximum(signal[:-1], signal[1:]) > 0.99 * final))
     for point in falls:
@@ -253,7 +251,7 @@ def _first_peak_beyond(motion: Trajectory, towards: Matrix, final: float) -> flo
     return None
 
 
-def _top(motion: Trajectory, towards: Matrix, final: float) -> float | None:
+def _top(motion: Trajectory, towards: Real, final: float) -> float | None:
     time_s, value = motion.greatest(towards)
     return time_s if value > final * (1 + 1e-9) else None
 

@@ -4,16 +4,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.horizon import PERIODS, Horizon, horizon
 from chladni.models.analysis.linear_path import LinearPath
 from chladni.models.analysis.trajectory import Trajectory, trajectory
 from chladni.models.core.port import Terminal
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,11 +32,11 @@ class TransientResponse(Value):
         Sentences: where the picture ends before the response does.
     """
 
-    time_s: Matrix
-    values: Matrix
+    time_s: Real
+    values: Real
     source: Terminal
     outputs: tuple[Terminal, ...]
-    dead_time_s: Matrix
+    dead_time_s: Real
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -128,7 +126,7 @@ def _chosen(path: LinearPath, seconds: float | None) -> Horizon:
 
 
 def _response(
-    path: LinearPath, motion: Trajectory, rows: Matrix, chosen: Horizon, notes: tuple[str, ...] = ()
+    path: LinearPath, motion: Trajectory, rows: Real, chosen: Horizon, notes: tuple[str, ...] = ()
 ) -> TransientResponse:
     values = rows @ motion.states
     time_s = motion.time_s + path.dead_time_s[:, None]

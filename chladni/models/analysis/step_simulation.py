@@ -1,7 +1,6 @@
 """A step as a simulation: with the laws of a model where it has some, exactly from the linear equations where not."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.exponential import exponential
 from chladni.models.analysis.horizon import horizon
@@ -12,10 +11,10 @@ from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
 from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import Simulation
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 
-Matrix = NDArray[np.float64]
 SAMPLES = 500
 # Laws may swing faster than the linear part, and a stop is met in an instant.
 NONLINEAR_SAMPLES = 600
@@ -93,6 +92,6 @@ def _exact(model: Model, compiled: CompiledModel, path: LinearPath, size: float,
     )
 
 
-def _series(terminals: list[Terminal] | tuple[Terminal, ...], values: Matrix, rate_hz: float) -> TimeSeries:
+def _series(terminals: list[Terminal] | tuple[Terminal, ...], values: Real, rate_hz: float) -> TimeSeries:
     channels = tuple(Channel(name=one.channel or one.name, unit=one.unit) for one in terminals)
     return TimeSeries(values=values, sample_rate_hz=rate_hz, start_time_ns=0, channels=channels)

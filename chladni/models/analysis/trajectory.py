@@ -4,13 +4,11 @@ from dataclasses import dataclass
 from math import ceil, log2
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.bracketed_root import bracketed_root
 from chladni.models.analysis.exponential import exponential, moved
+from chladni.signals.arrays import Real
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 # Points of each stage of the grid whose step doubles from stage to stage: a fast start and a slow end both show.
 STAGE_POINTS = 32
@@ -34,25 +32,25 @@ class Trajectory(Value):
         ``[state, point]``, exact at each time.
     """
 
-    generator: Matrix
-    time_s: Matrix
-    states: Matrix
+    generator: Real
+    time_s: Real
+    states: Real
 
     def __post_init__(self) -> None:
         self._freeze()
 
-    def at(self, time_s: float) -> Matrix:
+    def at(self, time_s: float) -> Real:
         """Give the state at one time, exactly."""
         point = max(int(np.searchsorted(self.time_s, time_s, side="right")) - 1, 0)
         return moved(self.generator * (time_s - self.time_s[point]), self.states[:, point])
 
-    def crossings(self, row: Matrix, level: float = 0.0, *, at_most: int = 0) -> list[float]:
+    def crossings(self, row: Real, level: float = 0.0, *, at_most: int = 0) -> list[float]:
         """Times at which ``row . w`` passes `level`, to rounding; the first `at_most` unless that is 0."""
         signal = row @ self.states - level
         found = np.flatnonzero((signal[:-1] < 0) != (signal[1:] < 0))
         return [self.crossing(row, level, int(point)) for point in (found[:at_most] if at_most else found)]
 
-    def last_crossing(self, row: Matrix, level: float) -> float | None:
+    def last_crossing(self, row: Real, level: float) -> float | None:
         """Last time at which ``abs(row . w)`` falls under `level`; None when it ends above, 0 when never above."""
         above = np.flatnonzero(np.abs(row @ self.states) > level)
         if not above.size:
@@ -62,7 +60,7 @@ class Trajectory(Value):
         sign = 1.0 if row @ self.states[:, above[-1]] > 0 else -1.0
         return self.crossing(sign * row, level, int(above[-1]))
 
-    def largest(self, row: Matrix) -> tuple[float, float]:
+    def largest(self, row: Real) -> tuple[float, float]:
         """Time and value of the largest ``abs(row . w)``, refined to where its rate is zero."""
         signal = row @ self.states
         top = int(np.argmax(np.abs(signal)))
@@ -70,7 +68,7 @@ class Trajectory(Value):
         time_s, value = self.greatest(sign * row)
         return time_s, sign * value
 
-    def greatest(self, row: Matrix) -> tuple[float, float]:
+    def greatest(self, row: Real) -> tuple[float, float]:
         """Time and value of the greatest ``row . w``, refined to where its rate is zero."""
         signal = row @ self.states
         top = int(np.argmax(signal))
@@ -83,7 +81,7 @@ class Trajectory(Value):
                 best = max(best, (time_s, float(row @ self.at(time_s))), key=lambda pair: pair[1])
         return best
 
-    def crossing(self, row: Matrix, level: float, point: int) -> float:
+    def crossing(self, row: Real, level: float, point: int) -> float:
         """Time between a point and the next at which ``row . w`` passes `level`."""
         start, begun = self.states[:, point], float(self.time_s[point])
         width, rate = float(self.time_s[point + 1]) - begun, row @ self.generator
@@ -100,7 +98,7 @@ class Trajectory(Value):
 
 
 def trajectory(
-    generator: Matrix, start: Matrix, *, seconds: float, fastest_s: float, longest_step_s: float
+    generator: Real, start: Real, *, seconds: float, fastest_s: float, longest_step_s: float
 ) -> Trajectory:
     """Follow ``w' = M w`` for some seconds, with steps that double from a tenth of `fastest_s` to `longest_step_s`.
 
@@ -133,7 +131,7 @@ def _cubic_root(before: float, after: float, first: float, last: float) -> float
     return bracketed_root(measure, 0.0, 1.0, begins_below=before < 0, guess=line, rounding=1e-9)
 
 
-def powers(transition: Matrix, start: Matrix, count: int) -> Matrix:
+def powers(transition: Real, start: Real, count: int) -> Real:
     """``[state, count]``: start, T start, T^2 start, ... by doubling, in log2(count) products."""
     block = start[:, None]
     while block.shape[1] < count:
@@ -142,6 +140,6 @@ def powers(transition: Matrix, start: Matrix, count: int) -> Matrix:
     return block[:, :count]
 
 
-def _extend(times: list[Matrix], states: list[Matrix], transition: Matrix, step_s: float, count: int) -> None:
+def _extend(times: list[Real], states: list[Real], transition: Real, step_s: float, count: int) -> None:
     times.append(times[-1][-1] + step_s * np.arange(1, count + 1))
     states.append(powers(transition, transition @ states[-1][:, -1], count))

@@ -1,15 +1,15 @@
 """Zeros of the way from one input to one output."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.analysis.linear_path import LinearPath, poles_of
+from chladni.signals.arrays import Complex
 
 # A Markov parameter this much smaller than the sum of its terms' sizes is rounding.
 ROUNDING = 1e-11
 
 
-def zeros(path: LinearPath) -> NDArray[np.complex128]:
+def zeros(path: LinearPath) -> Complex:
     """Find where the transfer function of a path to one output is zero.
 
     With r the relative degree (the first Markov parameter ``c A^(r-1) b`` that isn't zero), zeros are the eigenvalues

@@ -1,12 +1,11 @@
 """Balance of a matrix whose rows have very different units."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
-def balance(matrix: Matrix) -> tuple[Matrix, Matrix]:
+def balance(matrix: Real) -> tuple[Real, Real]:
     """Scale states so that rows and columns are of one size (Parlett and Reinsch 1969).
 
     Parameters

@@ -5,19 +5,18 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.port import Port, PortKind, Terminal
 from chladni.models.core.port_law import PortLaw
 from chladni.models.core.resolvent import resolvent
 from chladni.models.core.state_space import StateSpace
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import ModelError
 from chladni.signals.number_range import LARGEST_OF_MODEL
 from chladni.signals.value import Value
 
-Matrix = NDArray[np.float64]
 #: ``map(samples, sample_rate_hz) -> samples``: what acts on the samples of one input or output.
-SampleMap = Callable[[Matrix, float], Matrix]
+SampleMap = Callable[[Real, float], Real]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +48,7 @@ class GeneratedInput:
     """An input that no log holds (a floor that shakes): its samples are computed from the sample times in seconds."""
 
     terminal: Terminal
-    samples: Callable[[Matrix], Matrix]
+    samples: Callable[[Real], Real]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -94,18 +93,18 @@ class CompiledModel(Value):
         How late the clock of each output is: ``y_sampled(t) = y(t - offset)``.
     """
 
-    a: Matrix
-    b: Matrix
-    c: Matrix
-    d: Matrix
-    g: Matrix
-    h: Matrix
-    displacement_state: Matrix
-    displacement_column: Matrix
-    displacement_port: Matrix
-    velocity_state: Matrix
-    velocity_column: Matrix
-    velocity_port: Matrix
+    a: Real
+    b: Real
+    c: Real
+    d: Real
+    g: Real
+    h: Real
+    displacement_state: Real
+    displacement_column: Real
+    displacement_port: Real
+    velocity_state: Real
+    velocity_column: Real
+    velocity_port: Real
     inputs: tuple[Terminal, ...]
     outputs: tuple[Terminal, ...]
     states: tuple[str, ...]
@@ -184,7 +183,7 @@ class CompiledModel(Value):
             states=self.states,
         )
 
-    def frequency_response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def frequency_response(self, frequency_hz: Real) -> Complex:
         """Response of each output to each input, ``[output, input, frequency]``, dead times and offsets included.
 
         Ideal derivatives are included too. Laws and sample maps are left out: it's the response of the linear part.
@@ -210,7 +209,7 @@ class CompiledModel(Value):
         shift = np.exp(-np.multiply.outer(s, np.asarray(self.output_offsets_s)))
         return np.moveaxis(np.asarray(to_u * shift[:, :, None], dtype=np.complex128), 0, -1)
 
-    def _signal_matrix(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def _signal_matrix(self, s: Complex) -> Complex:
         """``[frequency, column, input]``: the columns that one input of unit amplitude makes."""
         matrix = np.zeros((s.size, self.columns, len(self.inputs)), dtype=complex)
         for place, terminal in enumerate(self.inputs):
@@ -219,7 +218,7 @@ class CompiledModel(Value):
                 matrix[:, first + order, place] = s**order * np.exp(-s * self.input_delays_s[place])
         return matrix
 
-    def _delay_factors(self, s: NDArray[np.complex128], ports: list[int]) -> NDArray[np.complex128]:
+    def _delay_factors(self, s: Complex, ports: list[int]) -> Complex:
         factors = np.zeros((s.size, len(ports)), dtype=complex)
         for line in self.delays:
             factors[:, ports.index(line.port)] += np.exp(-s * line.delay_s) - 1

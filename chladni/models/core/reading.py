@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
 
@@ -17,8 +15,8 @@ class Curve(Value):
     """A line, or points when `points` is true; ``x`` and ``y`` are ``[point]``, NaN breaks the line."""
 
     label: str
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    x: Real
+    y: Real
     points: bool = False
 
     def __post_init__(self) -> None:
@@ -88,11 +86,11 @@ class InfluenceTable(Value):
 
     behaviour: tuple[str, ...]
     construction: tuple[str, ...]
-    nominal: NDArray[np.float64]
-    change: NDArray[np.float64]
-    relative_change: NDArray[np.float64]
-    finite: NDArray[np.float64]
-    log_derivative: NDArray[np.float64]
+    nominal: Real
+    change: Real
+    relative_change: Real
+    finite: Real
+    log_derivative: Real
     definitions: tuple[str, ...]
 
     def __post_init__(self) -> None:

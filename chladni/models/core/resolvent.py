@@ -1,13 +1,13 @@
 """Inverse of ``s I - A``, on which every frequency response rests."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.balance import balance
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import ModelError
 
 
-def resolvent(a: NDArray[np.float64], s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def resolvent(a: Real, s: Complex) -> Complex:
     """Give ``(s I - A)^-1`` at points of the complex plane, ``[point, state, state]``.
 
     A is balanced first (Parlett and Reinsch 1969): beside strokes in m, pressures in Pa would cost seven digits at
@@ -28,7 +28,7 @@ def resolvent(a: NDArray[np.float64], s: NDArray[np.complex128]) -> NDArray[np.c
     return np.asarray(inverse * (scale[:, None] / scale), dtype=np.complex128)
 
 
-def _at_a_pole(a: NDArray[np.float64], s: NDArray[np.complex128]) -> str:
+def _at_a_pole(a: Real, s: Complex) -> str:
     distance = np.abs(s[:, None] - np.linalg.eigvals(a)).min(axis=1)
     frequency_hz = abs(s[np.argmin(distance)]) / (2 * np.pi)
     return f"the model has a pole at {frequency_hz:g} Hz and no finite response there; leave this frequency out"

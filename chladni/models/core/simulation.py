@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.value import Value
@@ -26,9 +24,9 @@ class PortMotion(Value):
 
     name: str
     kind: str
-    displacement: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    force: NDArray[np.float64]
+    displacement: Real
+    velocity: Real
+    force: Real
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -62,7 +60,7 @@ class Simulation(Value):
     model: str
     inputs: TimeSeries
     outputs: TimeSeries
-    states: NDArray[np.float64]
+    states: Real
     state_names: tuple[str, ...]
     motions: tuple[PortMotion, ...] = ()
     flags: tuple[str, ...] = ()

@@ -4,13 +4,10 @@ from math import comb, factorial
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.balance import balance
 from chladni.models.core.compiled_model import CompiledModel
-
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 #: Order of what stands for a dead time. Even, so that it passes on at once what the dead time itself would: as much.
 #: Its phase is right up to 12 rad; a loop whose gain is above one so far out is unstable whatever the phase.
@@ -19,7 +16,7 @@ PADE_ORDER = 10
 _ROUNDINGS = 1e3
 
 
-def growing_poles(compiled: CompiledModel) -> NDArray[np.complex128]:
+def growing_poles(compiled: CompiledModel) -> Complex:
     """Poles right of the imaginary axis by more than rounding, rad/s, those without a negative imaginary part.
 
     Laws and sample maps are left out. For a dead time in a loop stands its Padé approximant (Golub and Van Loan,
@@ -40,7 +37,7 @@ def growing_poles(compiled: CompiledModel) -> NDArray[np.complex128]:
     return np.asarray(poles[(poles.real > moved) & (poles.imag >= 0)], dtype=np.complex128)
 
 
-def _with_dead_times(compiled: CompiledModel) -> Matrix:
+def _with_dead_times(compiled: CompiledModel) -> Real:
     """A with the states z of each line's approximant: ``z' = A_p z + b d``, ``f = d(t - tau) - d(t) = c z``."""
     from scipy.linalg import block_diag
 
@@ -59,7 +56,7 @@ def _with_dead_times(compiled: CompiledModel) -> Matrix:
     )
 
 
-def _companion(delay_s: float) -> tuple[Matrix, Matrix, Matrix]:
+def _companion(delay_s: float) -> tuple[Real, Real, Real]:
     """``e^(-s tau) - 1`` as ``c (s - A)^-1 b``, time counted in dead times: (A, b as a column, c as a row)."""
     n = PADE_ORDER
     below = np.array([comb(n, k) * factorial(2 * n - k) / factorial(2 * n) for k in range(n + 1)])

@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.port import Terminal
 from chladni.models.core.resolvent import resolvent
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -33,10 +31,10 @@ class StateSpace(Value):
         When shapes don't fit or an entry is not finite.
     """
 
-    a: Matrix
-    b: Matrix
-    c: Matrix
-    d: Matrix
+    a: Real
+    b: Real
+    c: Real
+    d: Real
     inputs: tuple[Terminal, ...]
     outputs: tuple[Terminal, ...]
     states: tuple[str, ...]
@@ -55,12 +53,12 @@ class StateSpace(Value):
                 raise ModelError(f"state space: {name} holds a number that is not finite")
         self._freeze()
 
-    def poles(self) -> NDArray[np.complex128]:
+    def poles(self) -> Complex:
         """Eigenvalues of A in rad/s, those of slowest decay first."""
         found = np.linalg.eigvals(self.a).astype(np.complex128) if len(self.states) else np.empty(0, np.complex128)
         return np.asarray(found[np.argsort(-found.real, kind="stable")], dtype=np.complex128)
 
-    def frequency_response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def frequency_response(self, frequency_hz: Real) -> Complex:
         """``H(j omega) = C (j omega I - A)^-1 B + D``, ``[output, input, frequency]``; e^{+j omega t}."""
         s = np.asarray(2j * pi * np.asarray(frequency_hz, dtype=np.float64), dtype=np.complex128)
         found = self.c @ resolvent(self.a, s) @ self.b + self.d

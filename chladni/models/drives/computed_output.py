@@ -3,16 +3,16 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import Simulation
+from chladni.signals.arrays import Real
 
 
 def computed_output(
     compiled: CompiledModel, simulation: Simulation, name: str, driven: Sequence[Terminal]
-) -> NDArray[np.float64] | None:
+) -> Real | None:
     """Give ``y = C x + D u + H f`` of one output, ``[sample]``, whether or not the model shows it.
 
     Parameters

@@ -4,14 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Port, Terminal
 from chladni.models.core.port_law import PortLaw
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 #: A sum of signals: coefficient by name.
 Sum = Mapping[str, float]
 
@@ -110,7 +109,7 @@ def compile_equations(
     )
 
 
-def _row(total: Sum, rows: Mapping[str, Matrix], what: str) -> Matrix:
+def _row(total: Sum, rows: Mapping[str, Real], what: str) -> Real:
     row = np.zeros(next(iter(rows.values())).size)
     for name, coefficient in total.items():
         if name not in rows:
@@ -119,11 +118,11 @@ def _row(total: Sum, rows: Mapping[str, Matrix], what: str) -> Matrix:
     return row
 
 
-def _output_row(terminal: Terminal, rows: Mapping[str, Matrix]) -> Matrix:
+def _output_row(terminal: Terminal, rows: Mapping[str, Real]) -> Real:
     carried = f"output:{terminal.name}"
     return _row({terminal.name: 1.0, **({carried: 1.0} if carried in rows else {})}, rows, f"output {terminal.name}")
 
 
-def _stack(rows: list[Matrix], columns: int) -> Matrix:
+def _stack(rows: list[Real], columns: int) -> Real:
     # Reshaped, because a list without rows has lost its number of columns.
     return np.asarray(rows, dtype=np.float64).reshape(len(rows), columns)

@@ -4,16 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Terminal
 from chladni.models.core.port_law import PortLaw
 from chladni.models.core.state_space import StateSpace
 from chladni.models.drives.signal_ports import limit_port, with_limit, with_port
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-
-Matrix = NDArray[np.float64]
 
 # Below this, the direct way around the loop is one but for rounding.
 _ILL_POSED = 1e-12
@@ -105,7 +103,7 @@ def _require_no_maps(plant: CompiledModel, loop: Loop) -> None:
             )
 
 
-def _taken(plant: CompiledModel, loop: Loop, references: list[int], old: Matrix) -> Matrix:
+def _taken(plant: CompiledModel, loop: Loop, references: list[int], old: Real) -> Real:
     """Inputs of the controller in the new coordinates, with the command at zero."""
     n, k = len(plant.states), len(loop.controller.states)
     outputs = np.hstack([plant.c, plant.d, plant.h]) @ old
@@ -119,7 +117,7 @@ def _taken(plant: CompiledModel, loop: Loop, references: list[int], old: Matrix)
     return rows
 
 
-def _direct(plant: CompiledModel, loop: Loop, command: int) -> Matrix:
+def _direct(plant: CompiledModel, loop: Loop, command: int) -> Real:
     """How much of the command each input of the controller sees at once."""
     names = [terminal.name for terminal in plant.outputs]
     return np.array(
@@ -127,7 +125,7 @@ def _direct(plant: CompiledModel, loop: Loop, command: int) -> Matrix:
     )
 
 
-def _command_row(loop: Loop, own: Matrix, taken: Matrix, direct: Matrix) -> Matrix:
+def _command_row(loop: Loop, own: Real, taken: Real, direct: Real) -> Real:
     around = (loop.controller.d @ direct).item()
     if abs(1.0 - around) < _ILL_POSED * max(1.0, abs(around)):
         raise ModelError(
@@ -137,7 +135,7 @@ def _command_row(loop: Loop, own: Matrix, taken: Matrix, direct: Matrix) -> Matr
     return np.asarray((loop.controller.c @ own + loop.controller.d @ taken)[0] / (1.0 - around), dtype=np.float64)
 
 
-def _tracking(plant: CompiledModel, loop: Loop, columns: int) -> Matrix:
+def _tracking(plant: CompiledModel, loop: Loop, columns: int) -> Real:
     rows = np.zeros((len(loop.controller.states), columns))
     limits = [place for place, port in enumerate(plant.ports) if port.name == limit_port(loop.command)]
     if loop.tracking and limits:
@@ -145,12 +143,12 @@ def _tracking(plant: CompiledModel, loop: Loop, columns: int) -> Matrix:
     return rows
 
 
-def _assembled(plant: CompiledModel, loop: Loop, references: list[int], old: Matrix, rates: Matrix) -> CompiledModel:
+def _assembled(plant: CompiledModel, loop: Loop, references: list[int], old: Real, rates: Real) -> CompiledModel:
     states, count = len(plant.states) + len(loop.controller.states), len(plant.ports)
     end = old.shape[1] - count
 
     # Every row of the plant is a sum of x, u and f, so one product rewrites them all.
-    def split(*blocks: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+    def split(*blocks: Real) -> tuple[Real, Real, Real]:
         rows = np.hstack(blocks) @ old
         return rows[:, :states], rows[:, states:end], rows[:, end:]
 

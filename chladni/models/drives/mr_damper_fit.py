@@ -4,15 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.drives.mr_coefficients import MrCoefficients
 from chladni.models.drives.mr_fit_layout import MrLayout, layout_of
 from chladni.models.drives.mr_record import MrRecord
 from chladni.models.integrator.known_motion import force_along_motion
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 
-Matrix = NDArray[np.float64]
 # Where a trial's force grows beyond all numbers it counts as this many times the measured RMS.
 _BEYOND = 1e3
 _ITERATIONS = 80
@@ -129,7 +128,7 @@ def fit_mr_damper(
     )
 
 
-def mr_force(coefficients: MrCoefficients, record: MrRecord) -> Matrix:
+def mr_force(coefficients: MrCoefficients, record: MrRecord) -> Real:
     """Force ``[sample]`` that the damper would have shown along the record's motion, from rest."""
     law = coefficients.law(record.current_a)
     return force_along_motion(law, record.displacement, record.velocity, record.times_s)
@@ -165,7 +164,7 @@ def _order(records: Sequence[MrRecord], order: int | None) -> int:
     return order
 
 
-def _starts(layout: MrLayout, records: Sequence[MrRecord], count: int, seed: int) -> list[Matrix]:
+def _starts(layout: MrLayout, records: Sequence[MrRecord], count: int, seed: int) -> list[Real]:
     rng = np.random.default_rng(seed)
     first = layout.start
     if layout.asymmetry:
@@ -176,12 +175,12 @@ def _starts(layout: MrLayout, records: Sequence[MrRecord], count: int, seed: int
     return [layout.inside(start) for start in [first, *scattered]]
 
 
-def _from_start(layout: MrLayout, records: Sequence[MrRecord], start: Matrix) -> tuple[Matrix, float]:
+def _from_start(layout: MrLayout, records: Sequence[MrRecord], start: Real) -> tuple[Real, float]:
     """Vector of least squares, and the pooled error there."""
     from scipy.optimize import least_squares
 
     # Differences, not sensitivities: fixed steps make the force smooth in the vector.
-    def residual(vector: Matrix) -> Matrix:
+    def residual(vector: Real) -> Real:
         coefficients = layout.coefficients(vector, "")
         return np.concatenate([_scaled_error(coefficients, record) for record in records])
 
@@ -195,7 +194,7 @@ def _from_start(layout: MrLayout, records: Sequence[MrRecord], start: Matrix) ->
     return np.asarray(solved.x, dtype=np.float64), float(np.sqrt(2.0 * solved.cost / len(records)))
 
 
-def _scaled_error(coefficients: MrCoefficients, record: MrRecord) -> Matrix:
+def _scaled_error(coefficients: MrCoefficients, record: MrRecord) -> Real:
     error = (mr_force(coefficients, record) - record.force) / record.rms_force
     # Least squares needs finite numbers, large enough to turn back from.
     bounded = np.clip(np.nan_to_num(error, nan=_BEYOND), -_BEYOND, _BEYOND)

@@ -6,12 +6,11 @@ from math import comb, exp, log
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.drives.mr_coefficients import MrAsymmetry, MrCoefficients, Polynomial
 from chladni.models.drives.mr_record import MrRecord
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: (name, low, high, start, scatter of starts) of the four polynomials: natural logarithms of multiples of F, F/V,
 #: F/X, the RMS force, force over RMS velocity and over RMS displacement.
 _LEVELS = (
@@ -73,27 +72,27 @@ class MrLayout:
     displacement: float
 
     @property
-    def low(self) -> Matrix:
+    def low(self) -> Real:
         """Lowest value of each number."""
         return np.array([row[1] for row in self.rows])
 
     @property
-    def high(self) -> Matrix:
+    def high(self) -> Real:
         """Highest value of each number."""
         return np.array([row[2] for row in self.rows])
 
     @property
-    def start(self) -> Matrix:
+    def start(self) -> Real:
         """Rule of thumb."""
         return np.array([row[3] for row in self.rows])
 
     @property
-    def scatter(self) -> Matrix:
+    def scatter(self) -> Real:
         """How far other starts lie from it."""
         return np.array([row[4] for row in self.rows])
 
     @property
-    def scale(self) -> Matrix:
+    def scale(self) -> Real:
         """Typical size of a step."""
         return np.maximum(self.scatter, 0.1)
 
@@ -106,20 +105,20 @@ class MrLayout:
         """Give the layout of the paper's law."""
         return replace(self, rows=self.rows[: self.plain], asymmetry=False)
 
-    def inside(self, vector: Matrix) -> Matrix:
+    def inside(self, vector: Real) -> Real:
         """Move numbers just inside of their bounds."""
         # Trust-region reflective steps need a start off the bounds.
         slack = 1e-6 * (self.high - self.low)
         return np.asarray(np.clip(vector, self.low + slack, self.high - slack), dtype=np.float64)
 
-    def at_bounds(self, vector: Matrix) -> tuple[str, ...]:
+    def at_bounds(self, vector: Real) -> tuple[str, ...]:
         """Names of the numbers that lie at a bound."""
         share = (vector - self.low) / (self.high - self.low)
         return tuple(
             row[0] for row, place in zip(self.rows, share, strict=True) if not _AT_BOUND < place < 1.0 - _AT_BOUND
         )
 
-    def coefficients(self, vector: Matrix, origin: str) -> MrCoefficients:
+    def coefficients(self, vector: Real, origin: str) -> MrCoefficients:
         """What the vector stands for."""
         count = self.order + 1
         # Shape and asymmetry are one for all currents, so they are counted from the largest force.
@@ -139,7 +138,7 @@ class MrLayout:
             highest_current_a=self.highest_current_a, origin=origin,
         )  # fmt: skip
 
-    def _polynomial(self, multiples: Matrix, level: float) -> Polynomial:
+    def _polynomial(self, multiples: Real, level: float) -> Polynomial:
         """Powers of the current from Bernstein coefficients (Farouki 2012, equation 8)."""
         m, powers = self.order, np.zeros(self.order + 1)
         for j, multiple in enumerate(multiples):
@@ -148,7 +147,7 @@ class MrLayout:
                 powers[k] += value * comb(m, k) * comb(k, j) * (-1.0) ** (k - j)
         return tuple(float(power) / self.highest_current_a**k for k, power in enumerate(powers))
 
-    def _asymmetry(self, numbers: Matrix, stiffness: float) -> MrAsymmetry:
+    def _asymmetry(self, numbers: Real, stiffness: float) -> MrAsymmetry:
         values = {row[0]: float(number) for row, number in zip(_ASYMMETRY, numbers, strict=True)}
         values["k1_sides"] *= stiffness
         values["speed"] = exp(values["speed"]) * self.velocity

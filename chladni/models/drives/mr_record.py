@@ -4,13 +4,12 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.value import Value
 
-Matrix = NDArray[np.float64]
 #: Degree of the spline through the positions; a prescribed motion is simulated along the same.
 _DEGREE = 5
 #: A velocity that is the difference of positions, to this share of its RMS, isn't one more measurement.
@@ -36,10 +35,10 @@ class MrRecord(Value):
 
     name: str
     current_a: float
-    times_s: Matrix
-    displacement: Matrix
-    velocity: Matrix
-    force: Matrix
+    times_s: Real
+    displacement: Real
+    velocity: Real
+    force: Real
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -124,7 +123,7 @@ def mr_record(
     )
 
 
-def _rate(x: Matrix, rate_hz: float) -> Matrix:
+def _rate(x: Real, rate_hz: float) -> Real:
     from scipy.interpolate import make_interp_spline
 
     places = np.arange(x.size)
@@ -132,7 +131,7 @@ def _rate(x: Matrix, rate_hz: float) -> Matrix:
     return np.asarray(make_interp_spline(places, x, k=_DEGREE).derivative()(places) * rate_hz, dtype=np.float64)
 
 
-def _require_damper(position: str, force: str, x: Matrix, v: Matrix, f: Matrix) -> None:
+def _require_damper(position: str, force: str, x: Real, v: Real, f: Real) -> None:
     if np.ptp(x) == 0.0 or np.ptp(f) == 0.0:
         raise EstimateError(f"{position}, {force}: nothing changes; a loop needs a motion and a force")
     # A sign turned around would be fitted by a damper that gives power, and badly.
@@ -143,18 +142,18 @@ def _require_damper(position: str, force: str, x: Matrix, v: Matrix, f: Matrix) 
         )
 
 
-def _position_note(channel: str, x: Matrix, times_s: Matrix) -> str:
+def _position_note(channel: str, x: Real, times_s: Real) -> str:
     drift = float(np.polyfit(times_s, x, 1)[0])
     return (
         f"{channel}: mean {x.mean():.2g} m, drift {drift:.2g} m/s over {np.ptp(x):.3g} m; kept, x0 takes the offset"
     )
 
 
-def _force_note(channel: str, f: Matrix) -> str:
+def _force_note(channel: str, f: Real) -> str:
     return f"{channel}: mean {f.mean():.2g} N of {np.ptp(f):.4g} N peak to peak; kept"
 
 
-def _velocity_note(channel: str, logged: Matrix, v: Matrix, x: Matrix, rate_hz: float) -> str:
+def _velocity_note(channel: str, logged: Real, v: Real, x: Real, rate_hz: float) -> str:
     level = float(np.sqrt(np.mean(v**2)))
     backward = float(np.sqrt(np.mean((np.diff(x) * rate_hz - logged[1:]) ** 2))) / level
     differs = float(np.sqrt(np.mean((logged - v) ** 2))) / level

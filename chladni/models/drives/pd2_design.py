@@ -5,13 +5,11 @@ from math import isfinite, sqrt
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import minimize
 
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-
-Matrix = NDArray[np.float64]
 
 # Of the normalised response, whose drive swings with 1 rad/s: long enough for the slowest answer worth having, at
 # steps that place a peak within 1e-4 of its height.
@@ -100,7 +98,7 @@ def best_pd2(*, omega: float, damping_ratio: float, flow_ratio: float = 2.0, ban
     """
     _require(omega, damping_ratio, flow_ratio, band)
 
-    def cost(numbers: Matrix) -> float:
+    def cost(numbers: Real) -> float:
         # The simplex doesn't know bounds; a filter that runs backwards would grow.
         if numbers[1] <= 0:
             return _PENALTY
@@ -158,9 +156,7 @@ def _judged(first: float, lag: float, damping_ratio: float, flow_ratio: float, b
     return float(time[here] + share * (time[here + 1] - time[here])), largest
 
 
-def _step_response(
-    first: float, lag: float, damping_ratio: float, flow_ratio: float
-) -> tuple[Matrix, Matrix, Matrix]:
+def _step_response(first: float, lag: float, damping_ratio: float, flow_ratio: float) -> tuple[Real, Real, Real]:
     """Time, flow and velocity, exact at each point.
 
     States: the filter's output before its zeros and its rate, velocity and its rate, the step. With T_1 = `first`,

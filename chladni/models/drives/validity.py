@@ -6,12 +6,12 @@ from math import inf, isfinite
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import Simulation
 from chladni.models.core.stability import growing_poles
+from chladni.signals.arrays import Real
 from chladni.signals.units import si_factor
 
 _ROUNDING = 1e-9
@@ -47,7 +47,7 @@ def broken_limits(
     limits: Sequence[Limit],
     simulation: Simulation,
     inputs: Sequence[tuple[str, Terminal]],
-    computed: Mapping[str, NDArray[np.float64] | None] = MappingProxyType({}),
+    computed: Mapping[str, Real | None] = MappingProxyType({}),
 ) -> tuple[str, ...]:
     """Give a sentence for each limit that the simulation breaks, with the numbers and the time.
 
@@ -86,7 +86,7 @@ def unstable_loop(compiled: CompiledModel) -> tuple[str, ...]:
     return (f"unstable: poles at {listed} rad/s; lower the gain of the loop",) if growing.size else ()
 
 
-def _samples(signal: str, simulation: Simulation, inputs: dict[str, str]) -> NDArray[np.float64] | None:
+def _samples(signal: str, simulation: Simulation, inputs: dict[str, str]) -> Real | None:
     # States are the truth; outputs may carry a sensor's faults.
     if signal in simulation.state_names:
         return np.asarray(simulation.states[simulation.state_names.index(signal)])
@@ -96,7 +96,7 @@ def _samples(signal: str, simulation: Simulation, inputs: dict[str, str]) -> NDA
     return None
 
 
-def _sentences(limit: Limit, samples: NDArray[np.float64], sample_rate_hz: float) -> list[str]:
+def _sentences(limit: Limit, samples: Real, sample_rate_hz: float) -> list[str]:
     factor, _ = si_factor(limit.unit)
     # What a law holds at its limit lies there but for rounding; so does a piston that rests at an end of its stroke.
     slack = _ROUNDING * max((abs(end) for end in (limit.low, limit.high) if isfinite(end)), default=0.0)

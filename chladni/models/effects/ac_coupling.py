@@ -11,7 +11,8 @@ from chladni.models.effects.attaching import pass_through
 from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.linear_filter import high_pass, two_stage_high_pass
-from chladni.models.effects.trial import Force, Matrix, Numbers, Shape, Trial, TrialMotion, logarithms, numbers
+from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, logarithms, numbers
+from chladni.signals.arrays import Real
 
 
 def attach_first_order(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
@@ -56,7 +57,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
     )  # fmt: skip
 
 
-def _two_stages(shape: Shape, _: Matrix) -> Numbers | None:
+def _two_stages(shape: Shape, _: Real) -> Numbers | None:
     corner, damping = numbers(shape)
     # Far apart, the upper corner is one stage's and the lower one shows nowhere.
     return {"corner": corner, "damping_ratio": damping} if damping < _UNLIKE else None

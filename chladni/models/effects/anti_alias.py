@@ -12,7 +12,8 @@ from chladni.models.effects.attaching import pass_through
 from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.linear_filter import first_order, second_order
-from chladni.models.effects.trial import Spectrum, Trial, TrialMotion, numbers, shaped
+from chladni.models.effects.trial import Trial, TrialMotion, numbers, shaped
+from chladni.signals.arrays import Complex
 
 #: Hz; a filter as fast as that is none.
 _NONE_HZ = 1e9
@@ -39,7 +40,7 @@ def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel
     return pass_through(compiled, site, first_order(1 / omega)) if order % 2 else compiled
 
 
-def response(s: Spectrum, corner_hz: float, order: int) -> Spectrum:
+def response(s: Complex, corner_hz: float, order: int) -> Complex:
     """Give the filter's response at ``s = j omega``."""
     p = s / (2 * pi * corner_hz)
     gain = np.ones_like(p) if order % 2 == 0 else 1 / (p + 1)

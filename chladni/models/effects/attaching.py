@@ -3,9 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Port
 from chladni.models.core.port_law import LawFunction, PortLaw
@@ -33,8 +30,7 @@ from chladni.models.effects.signal_path import (
     output_row,
     with_samples_mapped,
 )
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,10 +66,10 @@ class LawAtPort:
 class SampleShape:
     """A map of samples: ``shape(samples, sample_rate_hz, *numbers)``."""
 
-    shape: Callable[..., Matrix]
+    shape: Callable[..., Real]
     numbers: tuple[float, ...]
 
-    def __call__(self, samples: Matrix, sample_rate_hz: float) -> Matrix:
+    def __call__(self, samples: Real, sample_rate_hz: float) -> Real:
         """Give the samples in their new shape."""
         return self.shape(samples, sample_rate_hz, *self.numbers)
 
@@ -94,7 +90,7 @@ class ShapedSignal:
         Initial values of the law's states.
     """
 
-    shape: Callable[..., Matrix]
+    shape: Callable[..., Real]
     law: LawFunction
     numbers: Callable[[Values, Port], tuple[float, ...]]
     state: tuple[float, ...] = ()

@@ -4,11 +4,9 @@ from dataclasses import dataclass
 from math import pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-
-Matrix = NDArray[np.float64]
 
 # Enough lines for a sum that is normally distributed and, over minutes, free of visible lines.
 _LINES = 1024
@@ -40,7 +38,7 @@ class BandNoise:
     high_hz: float
     seed: int
 
-    def __call__(self, times_s: Matrix) -> Matrix:
+    def __call__(self, times_s: Real) -> Real:
         """Give the noise at some times; ``[sample]``.
 
         Raises
@@ -64,14 +62,14 @@ class BandNoise:
             )
         return _on_grid(times_s, interval, frequency_hz, phase) * amplitude
 
-    def lines(self) -> tuple[Matrix, Matrix]:
+    def lines(self) -> tuple[Real, Real]:
         """Frequencies in Hz and phases in rad of the tones."""
         rng = np.random.default_rng(self.seed)
         share = (np.arange(_LINES) + rng.random(_LINES)) / _LINES
         return self.low_hz + share * (self.high_hz - self.low_hz), rng.uniform(0, 2 * pi, _LINES)
 
 
-def _uniform_interval(times_s: Matrix) -> float | None:
+def _uniform_interval(times_s: Real) -> float | None:
     if times_s.size < 2:
         return None
     interval = float(times_s[-1] - times_s[0]) / (times_s.size - 1)
@@ -80,11 +78,11 @@ def _uniform_interval(times_s: Matrix) -> float | None:
     return interval if interval > 0 and np.all(np.abs(steps - interval) <= slack) else None
 
 
-def _at(times_s: Matrix, frequency_hz: Matrix, phase: Matrix) -> Matrix:
+def _at(times_s: Real, frequency_hz: Real, phase: Real) -> Real:
     return np.asarray(np.cos(np.outer(times_s, 2 * pi * frequency_hz) + phase).sum(axis=1), dtype=np.float64)
 
 
-def _on_grid(times_s: Matrix, interval: float, frequency_hz: Matrix, phase: Matrix) -> Matrix:
+def _on_grid(times_s: Real, interval: float, frequency_hz: Real, phase: Real) -> Real:
     """Sum on a uniform grid as one product of matrices: cos(a + b) = cos a cos b - sin a sin b.
 
     a is the phase at the start of a block, b the phase inside it, which is the same in every block: a sample costs

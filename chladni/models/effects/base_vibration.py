@@ -1,7 +1,6 @@
 """Base vibration: the floor shakes, and no channel of the log tells."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
@@ -10,8 +9,7 @@ from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.generated_signal import with_generated
 from chladni.models.effects.linear_feedback import with_feedback
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
@@ -39,12 +37,12 @@ def _check(values: Values) -> str:
 _TAIL = 0.05
 
 
-def _of_force(acceleration: Matrix, sample_rate_hz: float) -> Values:
+def _of_force(acceleration: Real, sample_rate_hz: float) -> Values:
     low_hz, high_hz = flat_band(acceleration, sample_rate_hz)
     return {"level": float(np.sqrt(np.mean(acceleration**2))), "band": high_hz, "band_start": low_hz}
 
 
-def flat_band(signal: Matrix, sample_rate_hz: float) -> tuple[float, float]:
+def flat_band(signal: Real, sample_rate_hz: float) -> tuple[float, float]:
     """Give the ends in Hz of the flat band between whose 5th and 95th percentile 90 % of a signal's power lies.
 
     Examples

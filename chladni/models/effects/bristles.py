@@ -3,14 +3,12 @@
 from math import copysign, exp
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.integrator.machine_code import machine_code, part_code
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 
-
-def bristles_along(velocity: Matrix, sample_rate_hz: float, presliding: float) -> Matrix:
+def bristles_along(velocity: Real, sample_rate_hz: float, presliding: float) -> Real:
     """Share of its sliding force that Dahl's friction resists with, ``[sample]`` between -1 and 1.
 
     Of ``w' = (s - abs(s) w)/presliding`` while the motion keeps its direction the solution is known: over a way x
@@ -30,7 +28,7 @@ def bristles_along(velocity: Matrix, sample_rate_hz: float, presliding: float) -
 
 
 @machine_code
-def _march(velocity: Matrix, interval: float, presliding: float, share: Matrix) -> None:
+def _march(velocity: Real, interval: float, presliding: float, share: Real) -> None:
     for sample in range(1, velocity.size):
         before, after, w = velocity[sample - 1], velocity[sample], share[sample - 1]
         if before * after < 0.0:

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
@@ -12,13 +11,13 @@ from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.signal_path import with_samples_mapped
 from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, logarithms, numbers
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Degree of the spline that runs through the samples.
 _DEGREE = 5
 
 
-def drifted(samples: Matrix, sample_rate_hz: float, ppm: float, offset: float) -> Matrix:
+def drifted(samples: Real, sample_rate_hz: float, ppm: float, offset: float) -> Real:
     """Give the samples at the times ``t (1 + 1e-6 ppm) + offset``; beyond the ends the last ones hold.
 
     By a spline of fifth degree through all samples: of a signal below a quarter of the sample rate it misses less
@@ -53,7 +52,7 @@ def _trial(motion: TrialMotion, sign: float) -> Trial:
             fixed=motion.spectrum(there - y), basis=np.stack([motion.spectrum(np.gradient(there) * rate_hz)])
         )
 
-    def values(shape: Shape, a: Matrix) -> Numbers:
+    def values(shape: Shape, a: Real) -> Numbers:
         return {"ppm": sign * numbers(shape)[0], "offset": float(a[0])}
 
     # From a tenth of a sample over the log to sixty.

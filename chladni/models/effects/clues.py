@@ -4,17 +4,13 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.models.core.parameter import Parameters
 from chladni.models.effects.lattice import Lattice
 from chladni.models.effects.trial import Numbers, Trial, TrialMotion
+from chladni.signals.arrays import Real
 
 if TYPE_CHECKING:
     from chladni.models.effects.effect_kind import EffectKind
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +42,7 @@ class FittedForm:
     values: Numbers
     duration_s: float
     band_hz: tuple[float, float]
-    motion: Callable[[], tuple[Matrix, Matrix]]
+    motion: Callable[[], tuple[Real, Real]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,5 +98,5 @@ class Clues:
     opposite: Callable[[Numbers], Relative | None] | None = None
     resisting: Callable[[float, float], Numbers] | None = None
     doubts: Callable[[str, Numbers, Parameters], Iterable[str]] | None = None
-    in_samples: Callable[[Matrix], Lattice | None] | None = None
-    of_force: Callable[[Matrix, float], Numbers] | None = None
+    in_samples: Callable[[Real], Lattice | None] | None = None
+    of_force: Callable[[Real, float], Numbers] | None = None

@@ -14,7 +14,8 @@ from chladni.models.effects.linear_feedback import (
     with_output,
 )
 from chladni.models.effects.signal_path import free_port, is_in_loop, output_row
-from chladni.models.effects.trial import Force, Spectrum, Trial, TrialMotion
+from chladni.models.effects.trial import Force, Trial, TrialMotion
+from chladni.signals.arrays import Complex
 from chladni.signals.errors import ModelError
 
 
@@ -46,7 +47,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
             yield _trial(name, motion.spectrum(samples))
 
 
-def _trial(source: str, spectrum: Spectrum) -> Trial:
+def _trial(source: str, spectrum: Complex) -> Trial:
     return Trial(
         source=source, build=lambda _: Force.of(spectrum), values=lambda _, a: {"coefficient": float(a[0])},
         parameters=1,

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
@@ -12,8 +11,7 @@ from chladni.models.effects.attaching import ShapedSignal
 from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.effects.trial import Trial, TrialMotion, shaped
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 def dead_zone(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -22,7 +20,7 @@ def dead_zone(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rat
     return float(-min(max(d, -parameters[0]), parameters[0]))
 
 
-def dead_zone_samples(samples: Matrix, _sample_rate_hz: float, width: float) -> Matrix:
+def dead_zone_samples(samples: Real, _sample_rate_hz: float, width: float) -> Real:
     """Give what is left of the samples outside the zone."""
     return np.asarray(samples - np.clip(samples, -width, width), dtype=np.float64)
 

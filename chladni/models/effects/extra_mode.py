@@ -19,17 +19,8 @@ from chladni.models.effects.linear_feedback import (
     with_states,
 )
 from chladni.models.effects.resonances import resonances
-from chladni.models.effects.trial import (
-    Force,
-    Matrix,
-    Numbers,
-    Shape,
-    Spectrum,
-    Trial,
-    TrialMotion,
-    logarithms,
-    numbers,
-)
+from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, logarithms, numbers
+from chladni.signals.arrays import Complex, Real
 
 
 def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
@@ -72,7 +63,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
     )  # fmt: skip
 
 
-def pull(motion: TrialMotion, acceleration: Spectrum, shape: Shape) -> Force:
+def pull(motion: TrialMotion, acceleration: Complex, shape: Shape) -> Force:
     """Give what an oscillator of a frequency in Hz and a damping ratio pulls with at a body that accelerates."""
     frequency, damping = numbers(shape)
     omega, s = 2 * np.pi * frequency, motion.s
@@ -82,7 +73,7 @@ def pull(motion: TrialMotion, acceleration: Spectrum, shape: Shape) -> Force:
     return Force.of(-acceleration * share, omega / turning, s / turning)
 
 
-def oscillator(shape: Shape, amplitudes: Matrix) -> Numbers | None:
+def oscillator(shape: Shape, amplitudes: Real) -> Numbers | None:
     """Give the values of an oscillator that pulls so; None without a mass."""
     if amplitudes[0] <= 0:
         return None

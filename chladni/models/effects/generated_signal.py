@@ -4,17 +4,15 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel, GeneratedInput
 from chladni.models.core.port import Terminal
 from chladni.models.effects.linear_feedback import Signal
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 def with_generated(
-    compiled: CompiledModel, *, name: str, unit: str, samples: Callable[[Matrix], Matrix]
+    compiled: CompiledModel, *, name: str, unit: str, samples: Callable[[Real], Real]
 ) -> tuple[CompiledModel, Signal]:
     """Add a computed input that acts nowhere yet; give the model and the input's signal."""
     # Names of inputs are sites and channels: two floors, or a floor and an input, must not share one.

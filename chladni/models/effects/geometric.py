@@ -5,7 +5,6 @@ from math import cos, hypot, pi, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
@@ -13,8 +12,8 @@ from chladni.models.effects.attaching import LawAtPort
 from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, logarithms, numbers, positive, rms
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Angles in degrees at which a spring may stand; at 90 it's a cube, near 0 it hardly turns.
 _ANGLES_DEG = (30.0, 60.0, 90.0, 120.0, 150.0)
 
@@ -50,7 +49,7 @@ def _trial(motion: TrialMotion, angle: float) -> Trial:
         stretched = np.maximum(np.hypot(along, length * np.sin(angle)), 1e-9 * length)
         return Force.of(motion.spectrum((stretched - length) * along / stretched - np.cos(angle) ** 2 * d))
 
-    def values(shape: Shape, a: Matrix) -> Numbers | None:
+    def values(shape: Shape, a: Real) -> Numbers | None:
         return positive(a, stiffness=a[0], length=numbers(shape)[0], angle=angle)
 
     # From a spring that turns over to one that only begins to turn.

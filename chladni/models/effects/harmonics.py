@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
@@ -12,8 +11,7 @@ from chladni.models.effects.attaching import ShapedSignal
 from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, rms
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 def bent(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -22,7 +20,7 @@ def bent(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: A
     return float(d * share * (parameters[0] + parameters[1] * share))
 
 
-def bent_samples(samples: Matrix, _sample_rate_hz: float, second: float, third: float, scale: float) -> Matrix:
+def bent_samples(samples: Real, _sample_rate_hz: float, second: float, third: float, scale: float) -> Real:
     """Give the samples as the actuator bends them."""
     share = samples / scale
     return np.asarray(samples * (1.0 + second * share + third * share**2), dtype=np.float64)
@@ -38,7 +36,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
     u, scale = motion.displacement, rms(motion.displacement)
     second, third = motion.spectrum(u**2 / scale), motion.spectrum(u**3 / scale**2)
 
-    def values(_: Shape, a: Matrix) -> Numbers:
+    def values(_: Shape, a: Real) -> Numbers:
         return {"second": float(a[0]), "third": float(a[1]), "scale": scale}
 
     yield Trial(build=lambda _: Force.of(second, third), values=values, parameters=2)

@@ -11,20 +11,9 @@ from chladni.models.core.port_law import LawFunction, PortLaw
 from chladni.models.effects.attaching import LawAtPort
 from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
-from chladni.models.effects.trial import (
-    Force,
-    Matrix,
-    Numbers,
-    Shape,
-    Spectrum,
-    Trial,
-    TrialMotion,
-    logarithms,
-    numbers,
-    positive,
-    rms,
-)
+from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, logarithms, numbers, positive, rms
 from chladni.models.integrator.known_motion import force_along_motion
+from chladni.signals.arrays import Complex, Real
 
 
 def bouc_wen(_d: float, s: float, _t: float, parameters: Any, state: Any, rates: Any) -> float:
@@ -87,7 +76,7 @@ def _plain_trial(motion: TrialMotion) -> Trial:
         bend, power = _bounded(shape)
         return Force.of(_along(bouc_wen, (1.0, bend, power), bend, motion))
 
-    def values(shape: Shape, a: Matrix) -> Numbers | None:
+    def values(shape: Shape, a: Real) -> Numbers | None:
         bend, power = _bounded(shape)
         return positive(a, force=a[0], shape=power, **{"yield": bend})
 
@@ -109,7 +98,7 @@ def _creeping_trial(motion: TrialMotion) -> Trial:
         bend, slip = max(numbers(shape)[0], _LEAST_CREEPING * reach), numbers(shape)[1]
         return Force.of(_along(creeping, (1.0, bend, 1.0, slip, 0.5), bend, motion))
 
-    def values(shape: Shape, a: Matrix) -> Numbers | None:
+    def values(shape: Shape, a: Real) -> Numbers | None:
         bend, slip = max(numbers(shape)[0], _LEAST_CREEPING * reach), numbers(shape)[1]
         # An element that the motion never makes yield is a spring and a dashpot in series.
         return positive(a, force=a[0], slip_speed=slip, **{"yield": bend}) if slip < fastest else None
@@ -121,7 +110,7 @@ def _creeping_trial(motion: TrialMotion) -> Trial:
     )  # fmt: skip
 
 
-def _along(law: LawFunction, parameters: tuple[float, ...], bend: float, motion: TrialMotion) -> Spectrum:
+def _along(law: LawFunction, parameters: tuple[float, ...], bend: float, motion: TrialMotion) -> Complex:
     """Spectrum of a law with a state that turns round within a way of about `bend`."""
     port_law = PortLaw(port=0, function=law, parameters=parameters, state=(0.0,))
     # Steps of more than 2.8 bends run away; where the motion is that fast the law slides anyway.

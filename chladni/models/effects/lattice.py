@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
+
 #: ``abs(mean exp(2 pi i y/step))`` of a signal without steps stays far below; of a quantised one it's near 1.
 _CLEAR = 0.9
 _BINS = 1 << 16
@@ -29,7 +29,7 @@ class Lattice:
         return self.step / float(np.sqrt(12.0))
 
 
-def lattice_of(signal: Matrix) -> Lattice | None:
+def lattice_of(signal: Real) -> Lattice | None:
     """Find the step of a quantised signal, None when its samples stand on no lattice.
 
     The transform of the histogram has a peak at the inverse of the step (Widrow and Kollar, *Quantization Noise*,
@@ -58,7 +58,7 @@ def lattice_of(signal: Matrix) -> Lattice | None:
     return Lattice(step=step, strength=sharp)
 
 
-def _coarsest(signal: Matrix, step: float) -> float:
+def _coarsest(signal: Real, step: float) -> float:
     """Largest multiple of a step on which the samples stand too: steps that the signal spans a few times only."""
     longest, middle = float(np.ptp(signal)), float(np.median(signal))
     # Those that stand where most do stand on every multiple.
@@ -71,12 +71,12 @@ def _coarsest(signal: Matrix, step: float) -> float:
     return step
 
 
-def _stands(signal: Matrix, step: float, level: float) -> float:
+def _stands(signal: Real, step: float, level: float) -> float:
     """How sharply samples stand on the lattice of a level, 1 when all do; of no samples 0."""
     return float(np.mean(np.cos(2.0 * np.pi * (signal - level) / step))) if signal.size else 0.0
 
 
-def _mostly_still(signal: Matrix, step: float) -> bool:
+def _mostly_still(signal: Real, step: float) -> bool:
     """Whether the samples seem to stand on a lattice because most of them stand at one level."""
     middle = float(np.median(signal))
     # A signal that repeats its values exactly has steps, however few; one that doesn't may rest beside a jump.
@@ -87,7 +87,7 @@ def _mostly_still(signal: Matrix, step: float) -> bool:
     return _stands(moving, step, middle) < _CLEAR
 
 
-def _sharpened(signal: Matrix, step: float, span: float) -> tuple[float, float]:
+def _sharpened(signal: Real, step: float, span: float) -> tuple[float, float]:
     """Search the step around a peak of the histogram's transform, whose lines are 1/span apart."""
     best_step, best = step, 0.0
     width = 1.0 / span

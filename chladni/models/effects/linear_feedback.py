@@ -5,12 +5,11 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import ModelError
 
-Vector = NDArray[np.float64]
 # A port whose own force reaches its signal with a gain of one to within rounding leaves nothing to solve for.
 _ILL_POSED = 1e-12
 # Share by which numbers may differ that are the same but for rounding.
@@ -21,9 +20,9 @@ _ROUNDING = 1e-5
 class Signal:
     """A row of a compiled model: ``states @ x + columns @ u + ports @ f``."""
 
-    states: Vector
-    columns: Vector
-    ports: Vector
+    states: Real
+    columns: Real
+    ports: Real
 
     def __add__(self, other: Self) -> Self:
         return type(self)(
@@ -122,12 +121,12 @@ def with_states(compiled: CompiledModel, names: Sequence[str]) -> CompiledModel:
     )
 
 
-def _wider(matrix: Vector, count: int) -> Vector:
+def _wider(matrix: Real, count: int) -> Real:
     """Zeros behind the last axis. `np.pad` takes ten times as long, and models are compiled by the thousand."""
     return np.concatenate([matrix, np.zeros((*matrix.shape[:-1], count))], axis=-1)
 
 
-def _higher(matrix: Vector, count: int) -> Vector:
+def _higher(matrix: Real, count: int) -> Real:
     return np.concatenate([matrix, np.zeros((count, matrix.shape[1]))])
 
 
@@ -219,7 +218,7 @@ def ground_acceleration(compiled: CompiledModel, port: int) -> Signal:
     return replace(rest, columns=shaking.astype(np.float64), ports=np.eye(len(compiled.ports))[ground])
 
 
-def _agrees(columns: Vector, wanted: Vector) -> NDArray[np.bool_]:
+def _agrees(columns: Real, wanted: Real) -> Mask:
     """``[column]``: those that are the wanted one but for rounding."""
     return np.asarray(np.all(np.abs(columns - wanted) <= _ROUNDING * np.abs(wanted), axis=0))
 
@@ -233,7 +232,7 @@ def with_columns_replaced(compiled: CompiledModel, first: int, passed: Sequence[
     states = np.array([signal.states for signal in passed])
     columns = np.array([signal.columns for signal in passed])
 
-    def through(matrix: Vector) -> tuple[Vector, Vector]:
+    def through(matrix: Real) -> tuple[Real, Real]:
         # What the old signals did is taken out, and put back as far as the new ones are made of them.
         kept = matrix.copy()
         kept[:, span] = 0.0
@@ -256,7 +255,7 @@ def with_columns_replaced(compiled: CompiledModel, first: int, passed: Sequence[
     )
 
 
-def _rate_of_columns(compiled: CompiledModel, through: Vector, name: str) -> Vector:
+def _rate_of_columns(compiled: CompiledModel, through: Real, name: str) -> Real:
     """Each column that holds a derivative is handed on to the one that holds the next."""
     shifted = np.zeros(compiled.columns)
     last = np.ones(compiled.columns, dtype=bool)

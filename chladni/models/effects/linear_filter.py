@@ -3,11 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,16 +28,16 @@ class LinearFilter(Value):
     array([1., 2.])
     """
 
-    a: Matrix
-    b: Matrix
-    c: Matrix
+    a: Real
+    b: Real
+    c: Real
     d: float
     states: tuple[str, ...]
 
     def __post_init__(self) -> None:
         self._freeze()
 
-    def __call__(self, samples: Matrix, sample_rate_hz: float) -> Matrix:
+    def __call__(self, samples: Real, sample_rate_hz: float) -> Real:
         """Filter samples; exact for the signal that joins them by straight lines."""
         # A plain gain, exact and for nothing.
         if not self.states:

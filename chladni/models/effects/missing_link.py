@@ -10,7 +10,8 @@ from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.linear_feedback import displacement, velocity, with_feedback
 from chladni.models.effects.pair import with_pair_port
-from chladni.models.effects.trial import Force, Matrix, Numbers, Shape, Trial, TrialMotion
+from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion
+from chladni.signals.arrays import Real
 
 
 def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel:
@@ -24,7 +25,7 @@ def attach(compiled: CompiledModel, site: Site, values: Values) -> CompiledModel
 def _trials(motion: TrialMotion) -> Iterator[Trial]:
     way, pace = motion.spectrum(motion.displacement), motion.spectrum(motion.velocity)
 
-    def of_both(_: Shape, a: Matrix) -> Numbers | None:
+    def of_both(_: Shape, a: Real) -> Numbers | None:
         return {"stiffness": float(a[0]), "damping": float(a[1])} if np.all(a > 0) else None
 
     def of_one(name: str) -> Trial:

@@ -3,15 +3,13 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import ShapedSignal
 from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 def constant(_d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -19,7 +17,7 @@ def constant(_d: float, _s: float, _t: float, parameters: Any, _state: Any, _rat
     return float(parameters[0])
 
 
-def lifted(samples: Matrix, _sample_rate_hz: float, value: float) -> Matrix:
+def lifted(samples: Real, _sample_rate_hz: float, value: float) -> Real:
     """Give the samples with the value added."""
     return np.asarray(samples + value, dtype=np.float64)
 

@@ -10,17 +10,8 @@ from chladni.models.core.port import Port
 from chladni.models.effects.attaching import LawAtPort
 from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
-from chladni.models.effects.trial import (
-    Force,
-    Matrix,
-    Numbers,
-    Shape,
-    Trial,
-    TrialMotion,
-    logarithms,
-    numbers,
-    positive,
-)
+from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, logarithms, numbers, positive
+from chladni.signals.arrays import Real
 
 
 def stop(d: float, s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -84,7 +75,7 @@ def _trial(motion: TrialMotion, side: float, variant: str, power: float) -> Tria
         pressed = side * np.maximum(d - clearance(shape), 0.0) ** power
         return Force.of(*(motion.spectrum(one) for one in ([pressed] if power == 1.0 else [pressed, pressed * s])))
 
-    def values(shape: Shape, a: Matrix) -> Numbers | None:
+    def values(shape: Shape, a: Real) -> Numbers | None:
         if power == 1.0:
             return positive(a, stiffness=a[0], clearance=clearance(shape), side=side)
         stiffness, loss = a[0] * np.sqrt(depth), max(a[1] / a[0], 0.0) if a[0] > 0 else 0.0

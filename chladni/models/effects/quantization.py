@@ -4,7 +4,6 @@ from math import floor
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
@@ -12,8 +11,7 @@ from chladni.models.effects.attaching import ShapedSignal
 from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.effects.lattice import lattice_of
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 def staircase(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -33,7 +31,7 @@ def staircase(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rat
     return float(step * (nearest + (climbed if from_middle > 0.0 else -climbed)) - d)
 
 
-def rounded_samples(samples: Matrix, _sample_rate_hz: float, step: float) -> Matrix:
+def rounded_samples(samples: Real, _sample_rate_hz: float, step: float) -> Real:
     """Give the nearest steps."""
     if step <= 0:
         return samples

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
@@ -13,8 +12,7 @@ from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.effects.trial import Trial, TrialMotion, shaped
 from chladni.models.integrator.machine_code import machine_code
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 def tracker(d: float, _s: float, _t: float, parameters: Any, state: Any, rates: Any) -> float:
@@ -27,7 +25,7 @@ def tracker(d: float, _s: float, _t: float, parameters: Any, state: Any, rates: 
     return float(state[0] - d)
 
 
-def limited_samples(samples: Matrix, sample_rate_hz: float, rate: float, _tracking_time: float) -> Matrix:
+def limited_samples(samples: Real, sample_rate_hz: float, rate: float, _tracking_time: float) -> Real:
     """Give samples that change by at most the rate, starting from zero one sample before the first."""
     followed = np.empty(samples.shape)
     _follow(np.ascontiguousarray(samples, dtype=np.float64), rate / sample_rate_hz, followed)
@@ -35,7 +33,7 @@ def limited_samples(samples: Matrix, sample_rate_hz: float, rate: float, _tracki
 
 
 @machine_code
-def _follow(samples: Matrix, step: float, followed: Matrix) -> None:
+def _follow(samples: Real, step: float, followed: Real) -> None:
     # Each sample depends on the one before, so there's nothing to vectorise.
     now = 0.0
     for place in range(samples.size):

@@ -3,17 +3,16 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from chladni.models.effects.trial import Shape, Spectrum
+from chladni.models.effects.trial import Shape
+from chladni.signals.arrays import Complex, Real
 
-Matrix = NDArray[np.float64]
 #: Damping ratios that are believed, lines that are enough, and steps.
 _DAMPING, _LINES, _STEPS = (1e-3, 0.2), 20, 8
 
 
 def resonances(
-    answer: Spectrum, drive: Spectrum, weight: Matrix, frequency_hz: Matrix, band_hz: tuple[float, float]
+    answer: Complex, drive: Complex, weight: Real, frequency_hz: Real, band_hz: tuple[float, float]
 ) -> Iterator[Shape]:
     """Give logarithms of frequency in Hz and damping ratio, step by step nearer.
 
@@ -49,7 +48,7 @@ def resonances(
             yield (float(np.log(frequency * band_hz[1])), float(np.log(damping)))
 
 
-def _least_squares(columns: Spectrum, target: Spectrum) -> Matrix:
+def _least_squares(columns: Complex, target: Complex) -> Real:
     """Real factors of complex columns ``[number, line]``."""
     real = np.hstack([columns.real, columns.imag])
     size = np.maximum(np.linalg.norm(real, axis=1), 1e-300)

@@ -15,7 +15,8 @@ from chladni.models.effects.attaching import LawAtPort
 from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.signal_path import last_port
-from chladni.models.effects.trial import Force, Matrix, Numbers, Shape, Trial, TrialMotion, logarithms, numbers
+from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, logarithms, numbers
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 
@@ -77,18 +78,18 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
         yield from _along(motion, motion.position_at(motion.compiled.port_index(motion.name, "actuation")))
 
 
-def _along(motion: TrialMotion, position: Matrix) -> Iterator[Trial]:
+def _along(motion: TrialMotion, position: Real) -> Iterator[Trial]:
     span = float(np.quantile(position, 0.98) - np.quantile(position, 0.02)) or 1.0
 
     def build(shape: Shape, *, orders: tuple[float, ...]) -> Force:
         angle = 2 * np.pi * position / numbers(shape)[0]
         return Force.of(*(motion.spectrum(wave(order * angle)) for order in orders for wave in (np.sin, np.cos)))
 
-    def first(shape: Shape, a: Matrix) -> Numbers:
+    def first(shape: Shape, a: Real) -> Numbers:
         phase = float(np.arctan2(a[1], a[0]))
         return {"amplitude": float(np.hypot(a[0], a[1])), "period": numbers(shape)[0], "phase": phase}
 
-    def both(shape: Shape, a: Matrix) -> Numbers | None:
+    def both(shape: Shape, a: Real) -> Numbers | None:
         found = first(shape, a)
         # Turned by twice the phase, since the law counts its second harmonic from where the first begins.
         second = complex(a[2], a[3]) * np.exp(-2j * found["phase"])

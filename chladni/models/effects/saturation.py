@@ -5,7 +5,6 @@ from math import exp, log1p, tanh
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
@@ -13,8 +12,8 @@ from chladni.models.effects.attaching import ShapedSignal
 from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.effects.trial import Force, Shape, Trial, TrialMotion, logarithms, numbers, shaped
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Wider ones would bend the line at rest, which is a gain.
 KNEE = Parameter(
     name="knee", value=0.2, unit="1", low=0.02, high=0.5, minimum=1e-6, maximum=0.5,
@@ -41,17 +40,17 @@ def rounded(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates
     return float(min(max(d, -limit), limit) + 0.5 * width * corners - d)
 
 
-def clipped_samples(samples: Matrix, _sample_rate_hz: float, limit: float) -> Matrix:
+def clipped_samples(samples: Real, _sample_rate_hz: float, limit: float) -> Real:
     """Give the samples, none beyond the limit."""
     return np.clip(samples, -limit, limit)
 
 
-def smooth_samples(samples: Matrix, _sample_rate_hz: float, limit: float) -> Matrix:
+def smooth_samples(samples: Real, _sample_rate_hz: float, limit: float) -> Real:
     """Give the samples, approaching the limit smoothly."""
     return np.asarray(limit * np.tanh(samples / limit), dtype=np.float64)
 
 
-def rounded_samples(samples: Matrix, _sample_rate_hz: float, limit: float, knee: float) -> Matrix:
+def rounded_samples(samples: Real, _sample_rate_hz: float, limit: float, knee: float) -> Real:
     """Give the samples, none beyond the limit, bent away from the line over the corners' width."""
     width = limit * knee
     above, below = (np.log1p(np.exp(-2.0 * np.abs(samples + side) / width)) for side in (limit, -limit))

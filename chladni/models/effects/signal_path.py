@@ -3,14 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel, SampleMap
 from chladni.models.core.port import Port, PortKind
 from chladni.models.effects.effect_kind import Site
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import ModelError
-
-Matrix = NDArray[np.float64]
 
 
 def last_port(compiled: CompiledModel, name: str, kind: PortKind) -> int | None:
@@ -112,7 +110,7 @@ class _Scaled:
     def __init__(self, action: SampleMap, factor: float) -> None:
         self._action, self._factor = action, factor
 
-    def __call__(self, samples: Matrix, sample_rate_hz: float) -> Matrix:
+    def __call__(self, samples: Real, sample_rate_hz: float) -> Real:
         return self._action(self._factor * samples, sample_rate_hz) / self._factor
 
 
@@ -141,11 +139,11 @@ def _carries(compiled: CompiledModel, port: int) -> bool:
     return any(law.port == port for law in compiled.laws) or any(line.port == port for line in compiled.delays)
 
 
-def _upstream(compiled: CompiledModel, port: int) -> NDArray[np.bool_]:
+def _upstream(compiled: CompiledModel, port: int) -> Mask:
     """Which states can move the signal at a port."""
-    reached: NDArray[np.bool_] = compiled.displacement_state[port] != 0
+    reached: Mask = compiled.displacement_state[port] != 0
     while True:
-        more: NDArray[np.bool_] = reached | np.any(compiled.a[reached] != 0, axis=0)
+        more: Mask = reached | np.any(compiled.a[reached] != 0, axis=0)
         if np.array_equal(more, reached):
             return reached
         reached = more
@@ -214,8 +212,8 @@ def _with_port(
     compiled: CompiledModel,
     port: Port,
     *,
-    displacement: tuple[Matrix, Matrix, Matrix],
-    effect: tuple[Matrix, Matrix, Matrix, Matrix],
+    displacement: tuple[Real, Real, Real],
+    effect: tuple[Real, Real, Real, Real],
 ) -> CompiledModel:
     """Append a port; `effect` says what its force does to states, outputs, and the other ports' d and s."""
     states, columns, ports = displacement

@@ -14,7 +14,6 @@ from chladni.models.effects.clues import Clues, Relative
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.effects.trial import (
     Force,
-    Matrix,
     Numbers,
     Shape,
     Trial,
@@ -25,6 +24,7 @@ from chladni.models.effects.trial import (
     proportional,
     rms,
 )
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 # Finite, because laws take finite numbers only.
@@ -98,7 +98,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
     def build(shape: Shape) -> Force:
         return Force.of(motion.spectrum(-d * (1.0 - 1.0 / np.sqrt(1.0 + (d / numbers(shape)[0]) ** 2))))
 
-    def values(shape: Shape, a: Matrix) -> Numbers | None:
+    def values(shape: Shape, a: Real) -> Numbers | None:
         lost = min(float(a[0]) / stiffness, 1.0)
         return positive(a, cubic=-0.5 * lost * stiffness / numbers(shape)[0] ** 2, lost=lost)
 

@@ -12,7 +12,8 @@ from chladni.models.effects.attaching import LawAtPort
 from chladni.models.effects.clues import Clues, FittedForm, Relative
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.effects.friction_parameters import CREEP_SPEED, PRESLIDING, holds_like_a_loop, slides_from
-from chladni.models.effects.trial import Force, Matrix, Numbers, Shape, Trial, TrialMotion, logarithms, numbers, rms
+from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, logarithms, numbers, rms
+from chladni.signals.arrays import Real
 
 
 def regularised(_d: float, s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -63,7 +64,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
         unit = np.tanh(s / creep)
         return Force.of(motion.spectrum(unit), motion.spectrum(unit * np.exp(-((s / at) ** 2))))
 
-    def values(shape: Shape, amplitudes: Matrix) -> Numbers | None:
+    def values(shape: Shape, amplitudes: Real) -> Numbers | None:
         # Less friction at rest than in motion is no Stribeck curve.
         if amplitudes[0] <= 0 or amplitudes[1] <= 0:
             return None
@@ -82,7 +83,7 @@ def _is_degenerate(fitted: FittedForm) -> bool:
     return _is_coulomb(fitted.values, fitted.motion()[1]) or holds_like_a_loop(fitted)
 
 
-def _is_coulomb(values: Values, s: Matrix) -> bool:
+def _is_coulomb(values: Values, s: Real) -> bool:
     """Whether the drop from static to sliding friction is hardly there, or over before anything slides."""
     speed = float(np.sqrt(np.mean(s**2)))
     return values["static"] < 1.05 * values["coulomb"] or not 0.01 * speed < values["speed"] < 5.0 * speed

@@ -6,7 +6,6 @@ from math import pi, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
@@ -17,8 +16,7 @@ from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.signal_path import is_in_loop, with_samples_mapped
 from chladni.models.effects.tones import strongest_tones
 from chladni.models.effects.trial import Force, Shape, Trial, TrialMotion, logarithms, numbers
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 def tone(_d: float, _s: float, t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -26,7 +24,7 @@ def tone(_d: float, _s: float, t: float, parameters: Any, _state: Any, _rates: A
     return float(parameters[0] * sin(parameters[1] * t + parameters[2]))
 
 
-def with_tone(samples: Matrix, sample_rate_hz: float, amplitude: float, omega: float, phase: float) -> Matrix:
+def with_tone(samples: Real, sample_rate_hz: float, amplitude: float, omega: float, phase: float) -> Real:
     """Add the tone to samples that begin at t = 0."""
     times_s = np.arange(samples.size) / sample_rate_hz
     return np.asarray(samples + amplitude * np.sin(omega * times_s + phase), dtype=np.float64)

@@ -1,14 +1,14 @@
 """Tones in a signal: sharp lines that stand out of what is around them."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
+
 #: Power over that of the lines around it, itself among them, of a line that stands out.
 _SHARP = 4.0
 
 
-def strongest_tones(signal: Matrix, sample_rate_hz: float, count: int = 3) -> list[float]:
+def strongest_tones(signal: Real, sample_rate_hz: float, count: int = 3) -> list[float]:
     """Give frequencies in Hz of the sharpest lines and of the highest sharp ones, to a fraction of a line.
 
     By the Hann-windowed transform and a parabola through the logarithm of its peak (Gasior and Gonzalez 2004).
@@ -39,7 +39,7 @@ def strongest_tones(signal: Matrix, sample_rate_hz: float, count: int = 3) -> li
     ]
 
 
-def _offset(three: Matrix) -> float:
+def _offset(three: Real) -> float:
     low, mid, high = np.log(np.maximum(three, 1e-300))
     bend = low - 2 * mid + high
     return float(0.5 * (low - high) / bend) if bend < 0 else 0.0

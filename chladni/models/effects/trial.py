@@ -4,13 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Port, PortKind
+from chladni.signals.arrays import Complex, Real
 
-Matrix = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
 Numbers = Mapping[str, float]
 #: Logarithms of what enters an effect's law nonlinearly.
 Shape = tuple[float, ...]
@@ -28,16 +26,16 @@ class Force:
         ``[amplitude, line]`` spectra of the parts whose amplitudes are found by regression.
     """
 
-    fixed: Spectrum | None = None
-    basis: Spectrum
+    fixed: Complex | None = None
+    basis: Complex
 
     @classmethod
-    def of(cls, *parts: Spectrum) -> "Force":
+    def of(cls, *parts: Complex) -> "Force":
         """Give a force of free amplitudes."""
         return cls(basis=np.stack(parts))
 
     @classmethod
-    def known(cls, spectrum: Spectrum) -> "Force":
+    def known(cls, spectrum: Complex) -> "Force":
         """Give a force without free amplitudes."""
         return cls(fixed=spectrum, basis=np.zeros((0, spectrum.size), dtype=np.complex128))
 
@@ -64,7 +62,7 @@ class Trial:
     source: str | None = None
     build: Callable[[Shape], Force]
     grid: Sequence[Shape] = field(default=((),))
-    values: Callable[[Shape, Matrix], Numbers | None]
+    values: Callable[[Shape, Real], Numbers | None]
     parameters: int
 
 
@@ -102,24 +100,24 @@ class TrialMotion:
     name: str
     kind: PortKind
     compiled: CompiledModel
-    force: Matrix
-    displacement: Matrix
-    velocity: Matrix
+    force: Real
+    displacement: Real
+    velocity: Real
     sample_rate_hz: float
-    frequency_hz: Matrix
-    believed: Matrix
-    spectrum: Callable[[Matrix], Spectrum]
+    frequency_hz: Real
+    believed: Real
+    spectrum: Callable[[Real], Complex]
     band_hz: tuple[float, float]
-    outputs: Mapping[str, Matrix]
-    position_at: Callable[[int], Matrix]
+    outputs: Mapping[str, Real]
+    position_at: Callable[[int], Real]
 
     @property
-    def time_s(self) -> Matrix:
+    def time_s(self) -> Real:
         """``[sample]`` from the start of the record."""
         return np.asarray(np.arange(self.force.size) / self.sample_rate_hz, dtype=np.float64)
 
     @property
-    def s(self) -> Spectrum:
+    def s(self) -> Complex:
         """``[line]`` j omega."""
         return np.asarray(2j * np.pi * self.frequency_hz, dtype=np.complex128)
 
@@ -153,7 +151,7 @@ def numbers(shape: Shape) -> list[float]:
     return [float(np.exp(one)) for one in shape]
 
 
-def proportional(spectrum: Spectrum, name: str, *, sign: float = 1.0) -> Trial:
+def proportional(spectrum: Complex, name: str, *, sign: float = 1.0) -> Trial:
     """Give the trial of a force that one number is the factor of; it must have the sign."""
     return Trial(
         build=lambda _: Force.of(spectrum),
@@ -161,7 +159,7 @@ def proportional(spectrum: Spectrum, name: str, *, sign: float = 1.0) -> Trial:
     )  # fmt: skip
 
 
-def shaped(force: Callable[[float], Spectrum], grid: Sequence[float], name: str, variant: str | None = None) -> Trial:
+def shaped(force: Callable[[float], Complex], grid: Sequence[float], name: str, variant: str | None = None) -> Trial:
     """Give the trial with one number and no free amplitude: what acts is a signal in another shape."""
     return Trial(
         variant=variant, build=lambda shape: Force.known(force(numbers(shape)[0])),
@@ -169,11 +167,11 @@ def shaped(force: Callable[[float], Spectrum], grid: Sequence[float], name: str,
     )  # fmt: skip
 
 
-def positive(amplitudes: Matrix, **values: float) -> Numbers | None:
+def positive(amplitudes: Real, **values: float) -> Numbers | None:
     """Give the values as they are where the first amplitude is positive, else None."""
     return {name: float(value) for name, value in values.items()} if amplitudes[0] > 0 else None
 
 
-def rms(signal: Matrix) -> float:
+def rms(signal: Real) -> float:
     """Give the root mean square; 1 of a signal without any, whose size no grid could follow."""
     return float(np.sqrt(np.mean(signal**2))) or 1.0

@@ -6,7 +6,6 @@ from math import pi, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
@@ -15,8 +14,8 @@ from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.effects.tones import strongest_tones
 from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Share of a log over which a speed is read at its start and at its end, and lines by which they must differ.
 _END, _APART = 0.2, 2.0
 
@@ -59,7 +58,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
         omega, angle = 2 * np.pi * (start + rise * t), 2 * np.pi * (start + 0.5 * rise * t) * t
         return Force.of(*(motion.spectrum(omega**2 * wave(angle)) for wave in (np.sin, np.cos)))
 
-    def values(shape: Shape, a: Matrix) -> Numbers:
+    def values(shape: Shape, a: Real) -> Numbers:
         moment, phase = float(np.hypot(a[0], a[1])), float(np.arctan2(a[1], a[0]))
         return {"moment": moment, "frequency": shape[0], "rise": shape[1], "phase": phase}
 

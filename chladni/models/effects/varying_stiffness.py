@@ -10,7 +10,8 @@ from chladni.models.core.port import Port
 from chladni.models.effects.attaching import LawAtPort
 from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
-from chladni.models.effects.trial import Force, Matrix, Numbers, Shape, Trial, TrialMotion, logarithms, numbers
+from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, logarithms, numbers
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 
@@ -48,7 +49,7 @@ def _step_numbers(values: Values, port: Port) -> tuple[float, ...]:
 _JUMP, _INSTANTS = 0.14, 1000
 
 
-def share_risen(t: Matrix, time: float, rise: float) -> Matrix:
+def share_risen(t: Real, time: float, rise: float) -> Real:
     """Give ``[sample]`` which share of a step's change is there at times t."""
     u = np.clip((t - time) / rise + 0.5, 0.0, 1.0)
     return np.asarray(u**3 * (10.0 + u * (6.0 * u - 15.0)), dtype=np.float64)
@@ -60,7 +61,7 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
         return
     length = float(t[-1])
 
-    def change(shape: Shape, amplitudes: Matrix) -> Numbers | None:
+    def change(shape: Shape, amplitudes: Real) -> Numbers | None:
         relative = float(amplitudes[0]) / stiffness
         return {"relative_change": relative, "time": numbers(shape)[0]} if relative > -0.95 else None
 

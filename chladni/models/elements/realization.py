@@ -4,15 +4,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.port import Terminal
 from chladni.models.core.state_space import StateSpace
 from chladni.models.elements.transfer_function import TransferFunction
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -27,10 +25,10 @@ class Realization(Value):
         ``[power]``: the polynomial part in ascending powers of s; one number when the function is proper.
     """
 
-    a: Matrix
-    b: Matrix
-    c: Matrix
-    q: Matrix
+    a: Real
+    b: Real
+    c: Real
+    q: Real
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -122,7 +120,7 @@ def state_space(
     )
 
 
-def _frequency_unit(ascending: Matrix) -> float:
+def _frequency_unit(ascending: Real) -> float:
     """Geometric mean of the poles that aren't zero, in rad/s; 1 when there are none."""
     # Poles at zero have no size to take part in a mean.
     lowest = int(np.flatnonzero(ascending)[0])

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.elements.realization import realize
 from chladni.models.elements.transfer_function import TransferFunction
+from chladni.signals.arrays import Real
 from chladni.signals.value import Value
 
 
@@ -23,14 +23,14 @@ class StepResponse(Value):
         improper function adds there, and no sample shows. Empty for a proper one.
     """
 
-    values: NDArray[np.float64]
-    impulses: NDArray[np.float64]
+    values: Real
+    impulses: Real
 
     def __post_init__(self) -> None:
         self._freeze()
 
 
-def step_response(transfer: TransferFunction, time_s: NDArray[np.float64]) -> StepResponse:
+def step_response(transfer: TransferFunction, time_s: Real) -> StepResponse:
     """Give the response at each instant by the matrix exponential.
 
     Parameters

@@ -5,8 +5,8 @@ from math import isfinite, pi
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import ModelError
 
 #: Highest power of s that is taken; roots of longer polynomials are ill-conditioned beyond use.
@@ -65,7 +65,7 @@ class TransferFunction:
         """Whether the response stays bounded at high frequency, so that equations in time exist."""
         return self.relative_degree >= 0
 
-    def frequency_response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def frequency_response(self, frequency_hz: Real) -> Complex:
         """``H(j omega)``, ``[frequency]``, exact with dead time and improper; infinite at a pole on the axis."""
         s = 2j * pi * np.asarray(frequency_hz, dtype=np.float64)
         above, below = np.polyval(self.num, s) * np.exp(-s * self.delay_s), np.polyval(self.den, s)
@@ -73,11 +73,11 @@ class TransferFunction:
         pole = below == 0
         return np.asarray(np.where(pole, complex(np.inf), above / np.where(pole, 1.0, below)), dtype=np.complex128)
 
-    def poles(self) -> NDArray[np.complex128]:
+    def poles(self) -> Complex:
         """Roots of den in rad/s."""
         return np.asarray(np.roots(self.den), dtype=np.complex128)
 
-    def zeros(self) -> NDArray[np.complex128]:
+    def zeros(self) -> Complex:
         """Roots of num in rad/s. A dead time has neither poles nor zeros."""
         return np.asarray(np.roots(self.num), dtype=np.complex128)
 
@@ -91,7 +91,7 @@ class TransferFunction:
             return float(np.copysign(np.inf, above * leading))
         return above / below
 
-    def polynomial_and_rest(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def polynomial_and_rest(self) -> tuple[Real, Real]:
         """Split num/den into a polynomial, descending, and what is left over den, as num = q den + r."""
         # NumPy's polydiv takes small leading coefficients of the rest for zero, which those of fast poles aren't.
         den, rest = np.asarray(self.den), np.asarray(self.num)

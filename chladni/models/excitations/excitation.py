@@ -4,15 +4,15 @@ from math import isfinite
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import ModelError
 
 
 class Excitation(Protocol):
     """A signal that drives one input of a simulation."""
 
-    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> Real:
         """Give ``[sample]`` in the input's unit.
 
         Parameters
@@ -33,9 +33,7 @@ def require_number(excitation: object, name: str, value: float, *, positive: boo
         raise ModelError(f"{type(excitation).__name__}: {name} = {value} must be {rule}")
 
 
-def band_lines(
-    excitation: object, band_hz: tuple[float, float] | None, frequency_hz: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def band_lines(excitation: object, band_hz: tuple[float, float] | None, frequency_hz: Real) -> Mask:
     """Find the lines inside a band, both ends included; everything but zero and the highest without a band.
 
     Raises

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.excitations.excitation import require_number
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 
@@ -41,7 +41,7 @@ class Impact:
                     f"Impact: a pulse every {self.every_s:g} s must leave room for its width of {self.width_s:g} s"
                 )
 
-    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> NDArray[np.float64]:  # noqa: ARG002  # nothing here is random
+    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> Real:  # noqa: ARG002  # nothing here is random
         """Give ``[sample]``."""
         if self.width_s * sample_rate_hz < 2:
             raise ModelError(

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.excitations.excitation import band_lines, require_number
+from chladni.signals.arrays import Index, Real
 from chladni.signals.errors import ModelError
 
 Lines = Literal["full", "odd", "odd-detection"]
@@ -47,7 +47,7 @@ class Multisine:
         if self.lines not in ("full", "odd", "odd-detection"):
             raise ModelError(f"Multisine: lines = {self.lines!r} is none of full, odd, odd-detection")
 
-    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> Real:
         """Give ``[sample]``, as many periods as fit and the beginning of one more."""
         size = self._period_samples(sample_rate_hz)
         excited = self.excited_lines(sample_rate_hz, rng)
@@ -57,7 +57,7 @@ class Multisine:
         period *= self.rms / np.sqrt(np.mean(period**2))
         return np.asarray(np.resize(period, count), dtype=np.float64)
 
-    def excited_lines(self, sample_rate_hz: float, rng: np.random.Generator) -> NDArray[np.intp]:
+    def excited_lines(self, sample_rate_hz: float, rng: np.random.Generator) -> Index:
         """Give the rising multiples of 1/`period_s` that are excited.
 
         The choice of lines is the first thing drawn from `rng`: a generator of the same seed gives the lines of
@@ -65,17 +65,17 @@ class Multisine:
         """
         size = self._period_samples(sample_rate_hz)
         frequency_hz = np.asarray(np.fft.rfftfreq(size, 1 / sample_rate_hz), dtype=np.float64)
-        lines: NDArray[np.intp] = np.flatnonzero(band_lines(self, self.band_hz, frequency_hz))
+        lines: Index = np.flatnonzero(band_lines(self, self.band_hz, frequency_hz))
         if self.lines == "full":
             return lines
-        odd: NDArray[np.intp] = lines[lines % 2 == 1]
+        odd: Index = lines[lines % 2 == 1]
         if odd.size == 0:
             raise ModelError("Multisine: no odd line in the band; widen it or take a longer period")
         if self.lines == "odd":
             return odd
         groups = odd.size // DETECTION_GROUP
         left_out = np.arange(groups) * DETECTION_GROUP + rng.integers(DETECTION_GROUP, size=groups)
-        kept: NDArray[np.intp] = np.delete(odd, left_out)
+        kept: Index = np.delete(odd, left_out)
         return kept
 
     def _period_samples(self, sample_rate_hz: float) -> int:

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.excitations.excitation import band_lines, require_number
+from chladni.signals.arrays import Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +32,7 @@ class RandomNoise:
     def __post_init__(self) -> None:
         require_number(self, "rms", self.rms, positive=True)
 
-    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> Real:
         """Give ``[sample]``; the record joins its own beginning, as a sum of lines does."""
         frequency_hz = np.asarray(np.fft.rfftfreq(count, 1 / sample_rate_hz), dtype=np.float64)
         inside = band_lines(self, self.band_hz, frequency_hz)

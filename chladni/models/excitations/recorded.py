@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.time_series import TimeSeries
 
@@ -16,7 +16,7 @@ class Recorded:
     series: TimeSeries
     channel: str
 
-    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> NDArray[np.float64]:  # noqa: ARG002  # nothing here is random
+    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> Real:  # noqa: ARG002  # nothing here is random
         """Give ``[sample]``.
 
         Raises

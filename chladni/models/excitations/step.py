@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.excitations.excitation import require_number
+from chladni.signals.arrays import Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,7 +23,7 @@ class Step:
         require_number(self, "size", self.size)
         require_number(self, "at_s", self.at_s)
 
-    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> NDArray[np.float64]:  # noqa: ARG002  # nothing here is random
+    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> Real:  # noqa: ARG002  # nothing here is random
         """Give ``[sample]``."""
         # A time within a thousandth of a sample of the grid means that sample, whatever floating point says.
         first = np.ceil(self.at_s * sample_rate_hz - 1e-3)

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.excitations.excitation import require_number
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 
@@ -36,7 +36,7 @@ class SweptSine:
         if self.law not in ("linear", "logarithmic"):
             raise ModelError(f"SweptSine: law = {self.law!r} is none of linear, logarithmic")
 
-    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> NDArray[np.float64]:  # noqa: ARG002  # nothing here is random
+    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> Real:  # noqa: ARG002  # nothing here is random
         """Give ``[sample]``, beginning at zero and rising."""
         # Slow to import, and most programs that know of excitations never sweep.
         from scipy.signal import chirp

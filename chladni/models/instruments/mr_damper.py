@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from math import ceil, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.instrument import Instrument
@@ -14,8 +13,8 @@ from chladni.models.drives.drive_model import DriveModel
 from chladni.models.drives.mr_damper import MR_DAMPER
 from chladni.models.drives.mr_shipped import MEASURED_STROKE_M
 from chladni.models.instruments.drive_pages import drive_at
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Currents whose loops are laid beside that of the knob, A.
 _BESIDE = (0.0, 0.25, 0.5, 0.75, 1.0)
 # After one period from rest the loop has closed to a hundredth of its height.
@@ -62,7 +61,7 @@ def loop_charts(model: Model) -> tuple[Chart, ...]:
     )  # fmt: skip
 
 
-def _loop(compiled: CompiledModel, amplitude: float, omega: float) -> tuple[Matrix, Matrix, Matrix]:
+def _loop(compiled: CompiledModel, amplitude: float, omega: float) -> tuple[Real, Real, Real]:
     """Displacement, velocity and force of one closed period; of every law at the joint."""
     # numba takes a moment to import; a page that shows no loop doesn't need it.
     from chladni.models.integrator.known_motion import force_along_motion

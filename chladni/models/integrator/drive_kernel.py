@@ -2,13 +2,9 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.models.integrator.machine_code import inlined_code
 from chladni.models.integrator.plane import Integers1, Numbers1, Numbers2
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 class Drive(NamedTuple):
@@ -26,7 +22,7 @@ class Drive(NamedTuple):
 
 
 @inlined_code
-def fill_inputs(drive: Drive, inputs: Matrix, sample: int, part: float, share: float, step_s: float) -> None:
+def fill_inputs(drive: Drive, inputs: Real, sample: int, part: float, share: float, step_s: float) -> None:
     """Row of the step that begins at `part` of the interval after `sample` and takes a `share` of it."""
     for place in range(inputs.size):
         inputs[place] = drive.rows[sample, place]
@@ -48,7 +44,7 @@ def fill_inputs(drive: Drive, inputs: Matrix, sample: int, part: float, share: f
 
 
 @inlined_code
-def _fill_kinks(drive: Drive, inputs: Matrix, sample: int, part: float, share: float) -> None:
+def _fill_kinks(drive: Drive, inputs: Real, sample: int, part: float, share: float) -> None:
     m, kinks = drive.rate.size, drive.kinked.size
     first = m + drive.straight.size
     for kink in range(kinks):

@@ -3,14 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.integrator.machine_code import inlined_code
 from chladni.models.integrator.plane import Integers1, Numbers1
 from chladni.models.integrator.port_kernel import Ports, port_forces
 from chladni.models.integrator.step_tables import SchemeTables
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 # How rates of law states add up at each stage: the classical scheme.
 _WEIGHTS = np.array([[1 / 2, 0, 0, 0], [0, 1 / 2, 0, 0], [0, 0, 1, 0], [1 / 6, 1 / 3, 1 / 3, 1 / 6]])
 
@@ -50,7 +49,7 @@ class Stride(NamedTuple):
 
 
 @inlined_code
-def advance_linear(advance: Matrix, level: int, state: Matrix, inputs: Matrix, lines: Matrix) -> None:
+def advance_linear(advance: Real, level: int, state: Real, inputs: Real, lines: Real) -> None:
     """``lines = [state, inputs] @ advance[level]``: everything but the forces of this step."""
     rows, n = advance.shape[2], advance.shape[1] - inputs.size
     for row in range(rows):
@@ -76,7 +75,7 @@ def note_scale(stride: Stride, n: int) -> None:
 
 @inlined_code
 def place_stage(
-    tables: SchemeTables, ports: Ports, stride: Stride, value: Matrix, weights: Matrix,
+    tables: SchemeTables, ports: Ports, stride: Stride, value: Real, weights: Real,
     level: int, stage: int, row: int, step_s: float,
 ) -> None:  # fmt: skip
     """Put motion and law states of a stage where the laws are asked.
@@ -99,7 +98,7 @@ def place_stage(
 
 
 @inlined_code
-def add_forces(tables: SchemeTables, ports: Ports, stride: Stride, value: Matrix, level: int) -> None:
+def add_forces(tables: SchemeTables, ports: Ports, stride: Stride, value: Real, level: int) -> None:
     """State at the end, with what the forces ``value [stage, channel]`` make of it."""
     n = tables.gain.shape[3]
     for row in range(n):

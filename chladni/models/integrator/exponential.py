@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from math import ceil, log2
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm
 
 from chladni.models.core.balance import balance
 from chladni.models.integrator.hold import Hold
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 #: Port forces run inside a step as polynomials of degree 2.
 POWERS = 3
 #: Terms of the exponential's series where the matrix has a norm of at most 1/2: the last one is below 1e-17.
@@ -34,13 +33,13 @@ class Response:
         at the start of the step to 1 at its end.
     """
 
-    state: Matrix
-    column: Matrix
-    force: Matrix
+    state: Real
+    column: Real
+    force: Real
 
 
 def responses(
-    a: Matrix, b: Matrix, g: Matrix, hold: Hold, *, step_s: float, kink_at: Matrix, fractions: Matrix
+    a: Real, b: Real, g: Real, hold: Hold, *, step_s: float, kink_at: Real, fractions: Real
 ) -> list[Response]:
     """Responses at some fractions of a step.
 
@@ -70,14 +69,14 @@ def responses(
 
 
 def response_slopes(
-    a: Matrix,
-    b: Matrix,
-    g: Matrix,
+    a: Real,
+    b: Real,
+    g: Real,
     hold: Hold,
-    changes: Sequence[tuple[Matrix, Matrix, Matrix]],
+    changes: Sequence[tuple[Real, Real, Real]],
     *,
     step_s: float,
-    kink_at: Matrix,
+    kink_at: Real,
 ) -> list[Response]:
     """Derivatives of the response at the end of a step, while a, b and g move along some directions.
 
@@ -102,7 +101,7 @@ def response_slopes(
     return [_response(found[:, place], n, g.shape[1], hold) for place in range(len(changes))]
 
 
-def _exponential_slopes(matrix: Matrix, ways: Matrix) -> Matrix:
+def _exponential_slopes(matrix: Real, ways: Real) -> Real:
     """``[way, row, column]``: derivatives of the exponential along ``ways [row, way, column]``.
 
     The series of the exponential and its derivative, scaled and squared (Al-Mohy and Higham 2009, section 4). Only
@@ -129,7 +128,7 @@ def _exponential_slopes(matrix: Matrix, ways: Matrix) -> Matrix:
     return np.asarray(slopes.transpose(1, 0, 2), dtype=np.float64)
 
 
-def _augmented(a: Matrix, b: Matrix, g: Matrix, hold: Hold, step_s: float) -> Matrix:
+def _augmented(a: Real, b: Real, g: Real, hold: Hold, step_s: float) -> Real:
     """Rates of ``[x, u, rise, f, f', f'']``."""
     n, p = g.shape
     inputs = hold.generator(step_s)
@@ -144,7 +143,7 @@ def _augmented(a: Matrix, b: Matrix, g: Matrix, hold: Hold, step_s: float) -> Ma
     return np.asarray(matrix, dtype=np.float64)
 
 
-def _exponentials(matrix: Matrix, times_s: Matrix) -> Matrix:
+def _exponentials(matrix: Real, times_s: Real) -> Real:
     # Balanced by powers of two (exact): stiffness over mass and one stand side by side in A, which would cost digits.
     balanced, scale = balance(matrix)
     distinct, places = np.unique(times_s, return_inverse=True)
@@ -158,7 +157,7 @@ def _exponentials(matrix: Matrix, times_s: Matrix) -> Matrix:
     return np.asarray(found[places], dtype=np.float64)
 
 
-def _response(found: Matrix, n: int, p: int, hold: Hold) -> Response:
+def _response(found: Real, n: int, p: int, hold: Hold) -> Response:
     """From the exponentials at the instant itself and at its distance from each kink, ``[1 + kink, row, row]``."""
     m, end = hold.columns, n + hold.columns + hold.straight.size
     rises = n + m + np.searchsorted(hold.straight, hold.kinked)

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
+from chladni.signals.arrays import Real, Whole
 
 #: A prescribed motion is a spline of degree 5: the signal and four rates, the last of which is a straight line.
 CHAIN = 5
@@ -35,11 +35,11 @@ class Hold:
         ``[kink]`` where, as a fraction of the step between two samples, above 0 and below 1.
     """
 
-    source: NDArray[np.int64]
-    rate: NDArray[np.int64]
-    straight: NDArray[np.int64]
-    kinked: NDArray[np.int64]
-    kink_at: NDArray[np.float64]
+    source: Whole
+    rate: Whole
+    straight: Whole
+    kinked: Whole
+    kink_at: Real
 
     @property
     def columns(self) -> int:
@@ -51,12 +51,12 @@ class Hold:
         """Length of the row of a step."""
         return self.columns + self.straight.size + 2 * self.kinked.size
 
-    def spread(self, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    def spread(self, matrix: Real) -> Real:
         """Give ``[row, internal column]`` of a matrix ``[row, column]`` that multiplies u."""
         padded = np.hstack([matrix, np.zeros((matrix.shape[0], 1))])
         return padded[:, self.source]
 
-    def generator(self, step_s: float) -> NDArray[np.float64]:
+    def generator(self, step_s: float) -> Real:
         """``[column + straight, column + straight]``: rates of the columns and of the rises (none) of one step."""
         size = self.columns + self.straight.size
         matrix = np.zeros((size, size))

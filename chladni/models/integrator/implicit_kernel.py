@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.integrator.explicit_kernel import (
     Stride,
@@ -20,8 +19,8 @@ from chladni.models.integrator.plane import Integers1, Numbers1, Numbers2, Numbe
 from chladni.models.integrator.port_kernel import Ports, law_force, port_forces
 from chladni.models.integrator.radau import GAMMA, LAGRANGE, NODES, WEIGHTS
 from chladni.models.integrator.step_tables import SchemeTables
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 STAGES = 3
 _ITERATIONS = 30
 _HALVINGS = 12
@@ -165,7 +164,7 @@ def _damped(
 
 @part_code
 def _ask_at(
-    tables: SchemeTables, ports: Ports, stride: Stride, value: Matrix, level: int, stage: int, step_s: float
+    tables: SchemeTables, ports: Ports, stride: Stride, value: Real, level: int, stage: int, step_s: float
 ) -> None:
     """Put motion and law states of a stage where the laws are asked, as the forces and rates in `value` make them."""
     count = ports.first.size - 1
@@ -182,7 +181,7 @@ def _residual(
     ports: Ports,
     stride: Stride,
     newton: Newton,
-    value: Matrix,
+    value: Real,
     level: int,
     t: float,
     step_s: float,
@@ -285,7 +284,7 @@ def _fill_matrix(tables: SchemeTables, ports: Ports, newton: Newton, level: int,
 
 
 @part_code
-def solve_in_place(matrix: Matrix, right: Matrix, result: Matrix) -> bool:
+def solve_in_place(matrix: Real, right: Real, result: Real) -> bool:
     """Gaussian elimination with row exchange; `matrix` is overwritten. False when it's singular."""
     size = right.size
     for row in range(size):
@@ -307,7 +306,7 @@ def solve_in_place(matrix: Matrix, right: Matrix, result: Matrix) -> bool:
 
 
 @part_code
-def _exchange(matrix: Matrix, result: Matrix, step: int) -> bool:
+def _exchange(matrix: Real, result: Real, step: int) -> bool:
     """Bring the row with the largest pivot into its place."""
     best = step
     for row in range(step + 1, result.size):

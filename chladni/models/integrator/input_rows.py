@@ -1,16 +1,14 @@
 """Samples of the inputs, made into the rows that each step takes."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.hold import CHAIN, Hold, split_delay
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 
-
-def input_rows(compiled: CompiledModel, hold: Hold, signals: Matrix, sample_rate_hz: float, extra: int) -> Matrix:
+def input_rows(compiled: CompiledModel, hold: Hold, signals: Real, sample_rate_hz: float, extra: int) -> Real:
     """Lay out what acts in each step, see `Hold`.
 
     Parameters
@@ -52,7 +50,7 @@ def input_rows(compiled: CompiledModel, hold: Hold, signals: Matrix, sample_rate
     return rows
 
 
-def _mapped(compiled: CompiledModel, signals: Matrix, sample_rate_hz: float) -> Matrix:
+def _mapped(compiled: CompiledModel, signals: Real, sample_rate_hz: float) -> Real:
     mapped = signals.copy() if compiled.input_maps else signals
     for place, sample_map in compiled.input_maps:
         mapped[place] = sample_map(mapped[place], sample_rate_hz)
@@ -60,7 +58,7 @@ def _mapped(compiled: CompiledModel, signals: Matrix, sample_rate_hz: float) -> 
     return mapped
 
 
-def _require(samples: Matrix, shape: tuple[int, ...], what: str) -> None:
+def _require(samples: Real, shape: tuple[int, ...], what: str) -> None:
     if samples.shape != shape:
         raise ModelError(f"{what}: shape {samples.shape}, {shape} was expected")
     if not np.all(np.isfinite(samples)):
@@ -68,13 +66,13 @@ def _require(samples: Matrix, shape: tuple[int, ...], what: str) -> None:
         raise ModelError(f"{what}: sample {sample} is {samples[sample]}; every sample must be a finite number")
 
 
-def _late(samples: Matrix, whole: int, count: int) -> Matrix:
+def _late(samples: Real, whole: int, count: int) -> Real:
     """``[count + 1]`` samples that come `whole` steps late: 0 before the first, the last value after the last."""
     places = np.arange(count + 1) - whole
     return np.where(places < 0, 0.0, samples[np.clip(places, 0, samples.size - 1)])
 
 
-def _fill_straight(rows: Matrix, hold: Hold, column: int, samples: Matrix, whole: int) -> None:
+def _fill_straight(rows: Real, hold: Hold, column: int, samples: Real, whole: int) -> None:
     late = _late(samples, whole, len(rows))
     rise = np.diff(late)
     # Before the dead time has passed nothing comes: the first sample is a jump, no ramp from zero.
@@ -83,7 +81,7 @@ def _fill_straight(rows: Matrix, hold: Hold, column: int, samples: Matrix, whole
     rows[:, hold.columns + int(np.flatnonzero(hold.straight == column)[0])] = rise
 
 
-def _fill_kinked(rows: Matrix, hold: Hold, kink: int, samples: Matrix, whole: int, fraction: float) -> None:
+def _fill_kinked(rows: Real, hold: Hold, kink: int, samples: Real, whole: int, fraction: float) -> None:
     """In each step the sample from ``whole`` steps ago falls at `fraction`: two straight pieces."""
     column = int(hold.kinked[kink])
     count = len(rows)
@@ -103,7 +101,7 @@ def _fill_kinked(rows: Matrix, hold: Hold, kink: int, samples: Matrix, whole: in
     rows[:, places + hold.kinked.size] = jump
 
 
-def _motion(samples: Matrix, late: float, count: int, sample_rate_hz: float) -> Matrix:
+def _motion(samples: Real, late: float, count: int, sample_rate_hz: float) -> Real:
     """``[order, count]``: a prescribed motion and its four rates, `late` samples late."""
     from scipy.interpolate import make_interp_spline
 
@@ -120,7 +118,7 @@ def _motion(samples: Matrix, late: float, count: int, sample_rate_hz: float) -> 
     return np.asarray(motion * sample_rate_hz ** np.arange(CHAIN)[:, None], dtype=np.float64)
 
 
-def _fill_motion(rows: Matrix, hold: Hold, column: int, motion: Matrix) -> None:
+def _fill_motion(rows: Real, hold: Hold, column: int, motion: Real) -> None:
     rows[:, column : column + CHAIN] = motion.T
     last = hold.columns + int(np.flatnonzero(hold.straight == column + CHAIN - 1)[0])
     rows[:-1, last] = np.diff(motion[-1])

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port_law import PortLaw
@@ -15,11 +14,11 @@ from chladni.models.integrator.linear_kernel import linear_march
 from chladni.models.integrator.port_plan import LawTable, PortPlan, law_table, port_plan
 from chladni.models.integrator.run import Run, RunResult
 from chladni.models.integrator.step_tables import StepTables
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.number_range import LARGEST, largest_magnitudes
 from chladni.signals.value import Value
 
-Matrix = NDArray[np.float64]
 Scheme = Literal["automatic", "explicit", "implicit"]
 #: What one run may keep in memory.
 MEMORY_BYTES = 4_000_000_000
@@ -45,12 +44,12 @@ class Integration(Value):
         Steps in all.
     """
 
-    states: Matrix
-    outputs: Matrix
+    states: Real
+    outputs: Real
     ports: tuple[int, ...]
-    displacement: Matrix
-    velocity: Matrix
-    force: Matrix
+    displacement: Real
+    velocity: Real
+    force: Real
     refined_steps: int
     steps: int
 
@@ -120,7 +119,7 @@ class Integrator:
         other._laws = law_table(self._compiled, self._plan, laws)
         return other
 
-    def run(self, signals: Matrix, *, initial: Mapping[str, float] | Matrix | None = None) -> Integration:
+    def run(self, signals: Real, *, initial: Mapping[str, float] | Real | None = None) -> Integration:
         """Simulate.
 
         Parameters
@@ -149,7 +148,7 @@ class Integrator:
             _require_in_range(result, found.outputs, self._compiled, self._sample_rate_hz)
         return found
 
-    def _checked(self, signals: Matrix) -> Matrix:
+    def _checked(self, signals: Real) -> Real:
         signals = np.asarray(signals, dtype=np.float64)
         inputs = self._compiled.inputs
         if signals.ndim != 2 or signals.shape[0] != len(inputs) or signals.shape[1] < 1:
@@ -163,7 +162,7 @@ class Integrator:
         require_memory(self._compiled, signals.shape[1], self._sample_rate_hz)
         return signals
 
-    def _run_linear(self, rows: Matrix, start: Matrix) -> RunResult:
+    def _run_linear(self, rows: Real, start: Real) -> RunResult:
         state = np.zeros((len(rows), start.size))
         state[0] = start
         n = start.size
@@ -173,7 +172,7 @@ class Integrator:
         empty = np.zeros((len(rows), 0))
         return RunResult(state=state, motion=empty, force=empty, dense=dense, refined=0, steps=len(rows) - 1)
 
-    def _run_laws(self, rows: Matrix, start: Matrix) -> RunResult:
+    def _run_laws(self, rows: Real, start: Real) -> RunResult:
         run = Run(
             self._compiled,
             self._plan,
@@ -185,7 +184,7 @@ class Integrator:
         )
         return run.march(rows, start)
 
-    def _integration(self, result: RunResult, rows: Matrix, count: int) -> Integration:
+    def _integration(self, result: RunResult, rows: Real, count: int) -> Integration:
         plan, m, p = self._plan, self._hold.columns, len(self._plan.ports)
         outputs = result.state @ plan.c.T + rows[:, :m] @ plan.d.T + result.force @ plan.h.T
         outputs = self._sampled(np.ascontiguousarray(outputs.T), result.dense, count)
@@ -203,7 +202,7 @@ class Integrator:
             steps=result.steps,
         )
 
-    def _sampled(self, outputs: Matrix, dense: Matrix, count: int) -> Matrix:
+    def _sampled(self, outputs: Real, dense: Real, count: int) -> Real:
         """Outputs as late as each clock is; before the start they are as at the start."""
         sampled = outputs[:, :count].copy()
         for place, (whole, fraction) in enumerate(self._late):
@@ -221,10 +220,10 @@ class Integrator:
 
 def integrate(
     compiled: CompiledModel,
-    signals: Matrix,
+    signals: Real,
     sample_rate_hz: float,
     *,
-    initial: Mapping[str, float] | Matrix | None = None,
+    initial: Mapping[str, float] | Real | None = None,
     tolerance: float = 1e-7,
 ) -> Integration:
     """Simulate a compiled model once; see `Integrator` for many runs of one model.
@@ -256,7 +255,7 @@ def require_memory(compiled: CompiledModel, samples: int, sample_rate_hz: float)
         )
 
 
-def initial_state(compiled: CompiledModel, initial: Mapping[str, float] | Matrix | None) -> Matrix:
+def initial_state(compiled: CompiledModel, initial: Mapping[str, float] | Real | None) -> Real:
     """``[state]`` from values by name, from an array, or at rest."""
     start = np.zeros(len(compiled.states))
     if isinstance(initial, Mapping):
@@ -274,7 +273,7 @@ def initial_state(compiled: CompiledModel, initial: Mapping[str, float] | Matrix
     return start
 
 
-def _require_in_range(result: RunResult, outputs: Matrix, compiled: CompiledModel, sample_rate_hz: float) -> None:
+def _require_in_range(result: RunResult, outputs: Real, compiled: CompiledModel, sample_rate_hz: float) -> None:
     """Refuse a run that leaves the numbers which can be squared, naming what did so first, and when."""
     outputs = outputs.T
     for kind, names, signals in (

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.integrator.drive_kernel import Drive
 from chladni.models.integrator.explicit_kernel import Stride, advance_linear
@@ -11,8 +10,8 @@ from chladni.models.integrator.machine_code import inlined_code
 from chladni.models.integrator.plane import Numbers1, Numbers2, Numbers3
 from chladni.models.integrator.port_kernel import Ports, port_forces
 from chladni.models.integrator.step_tables import DEEPEST
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 # Samples that a beginning motion is followed ahead, to know its scale.
 _AHEAD = 32
 # A bend counts ten times and more as much as it may miss: behind it neighbouring motions part.
@@ -59,7 +58,7 @@ def weigh(judge: Judge, stride: Stride, ports: Ports, level: int, step_s: float)
 
 
 @inlined_code
-def look_ahead(advance: Matrix, drive: Drive, ports: Ports, stride: Stride, sample: int, step_s: float) -> None:
+def look_ahead(advance: Real, drive: Drive, ports: Ports, stride: Stride, sample: int, step_s: float) -> None:
     """Renew the scales by what the coming samples would make of the states without forces.
 
     A motion that begins grows as a power of time: any step is wrong by a fixed share of it. Its scale is where it
@@ -107,7 +106,7 @@ def explicit_error(judge: Judge, ports: Ports, level: int, previous: int) -> flo
 
 
 @inlined_code
-def _curvature_error(judge: Judge, q: Matrix, channel: int, change: int) -> float:
+def _curvature_error(judge: Judge, q: Real, channel: int, change: int) -> float:
     """Error of the integral of a force over the step, by its fourth difference over this step and the one before.
 
     Of a smooth force Simpson's rule misses 1/180 of it. Of a force that bends sharply inside the step (contact

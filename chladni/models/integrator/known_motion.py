@@ -7,22 +7,18 @@ both are what a fit needs.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.port_law import PortLaw
 from chladni.models.integrator.law_address import law_address
 from chladni.models.integrator.machine_code import call_law, machine_code, part_code
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
 # numba passes the context itself, which a type checker can't know.
 _CALL: Callable[..., float] = call_law
 
 
-def force_along_motion(
-    law: PortLaw, displacement: Matrix, velocity: Matrix, times_s: Matrix, *, substeps: int = 4
-) -> Matrix:
+def force_along_motion(law: PortLaw, displacement: Real, velocity: Real, times_s: Real, *, substeps: int = 4) -> Real:
     """Force ``[sample]`` of a law whose port moves as given.
 
     Between samples the velocity runs along a straight line; the law's states are integrated by the classical
@@ -67,9 +63,7 @@ def force_along_motion(
 
 
 @machine_code
-def _march(
-    address: Integers, d: Matrix, v: Matrix, t: Matrix, substeps: int, state: Matrix, work: Matrix, force: Matrix
-) -> None:
+def _march(address: Whole, d: Real, v: Real, t: Real, substeps: int, state: Real, work: Real, force: Real) -> None:
     # work: trial state, rates of the four stages, rates that only a force is asked with.
     for sample in range(t.size):
         if sample > 0:
@@ -82,9 +76,7 @@ def _march(
 
 
 @part_code
-def _advance(
-    address: Integers, d: Matrix, v: Matrix, t: Matrix, sample: int, substeps: int, state: Matrix, work: Matrix
-) -> None:
+def _advance(address: Whole, d: Real, v: Real, t: Real, sample: int, substeps: int, state: Real, work: Real) -> None:
     span = t[sample] - t[sample - 1]
     step, rise, go = span / substeps, v[sample] - v[sample - 1], d[sample] - d[sample - 1]
     for substep in range(substeps):
@@ -101,6 +93,6 @@ def _advance(
 
 
 @part_code
-def _asked(address: Integers, d: float, s: float, t: float, width: int, row: int) -> float:
+def _asked(address: Whole, d: float, s: float, t: float, width: int, row: int) -> float:
     """Force of the law in the trial state; its rates go to a row of the work memory."""
     return _CALL(address[0], d, s, t, address[1], address[2], address[2] + 8 * row * width)

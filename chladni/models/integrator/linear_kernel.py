@@ -1,15 +1,11 @@
 """Kernel: the exact recursion of a model on which nothing but its inputs acts."""
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.models.integrator.machine_code import machine_code
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 @machine_code
-def linear_march(advance: Matrix, rows: Matrix, state: Matrix) -> None:
+def linear_march(advance: Real, rows: Real, state: Real) -> None:
     """``x[k + 1] = Phi x[k] + Gamma row[k]``, exact for inputs that run between samples as `Hold` says.
 
     Parameters

@@ -2,9 +2,6 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.models.integrator.drive_kernel import Drive, fill_inputs
 from chladni.models.integrator.explicit_kernel import Stride, explicit_step
 from chladni.models.integrator.judge_kernel import Judge, explicit_error, is_stiff, look_ahead, weigh
@@ -19,9 +16,7 @@ from chladni.models.integrator.plane import Integers1, Numbers2, opener
 from chladni.models.integrator.port_kernel import Ports
 from chladni.models.integrator.step_tables import DEEPEST, SchemeTables
 from chladni.models.integrator.turn_kernel import explicit_error_at_turns
-
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from chladni.signals.arrays import Whole
 
 #: Finest steps in a sample interval.
 UNIT = 1 << DEEPEST
@@ -79,7 +74,7 @@ def accept(ports: Ports, stride: Stride, judge: Judge) -> None:
 
 
 @inlined_code
-def move_on(cursor: Integers, error: float, tolerance: float) -> None:
+def move_on(cursor: Whole, error: float, tolerance: float) -> None:
     """Go to the end of an accepted step; the next is longer when this was much better than asked for."""
     level = cursor[LEVEL]
     size = UNIT >> level

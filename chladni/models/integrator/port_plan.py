@@ -3,16 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port_law import PortLaw
 from chladni.models.integrator.hold import Hold
 from chladni.models.integrator.law_address import law_address
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
-
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +30,10 @@ class LawTable:
         In this order.
     """
 
-    table: Integers
-    first: Integers
-    parameters: Matrix
-    state: Matrix
+    table: Whole
+    first: Whole
+    parameters: Real
+    state: Real
     laws: tuple[PortLaw, ...]
 
 
@@ -61,18 +58,18 @@ class PortPlan:
     """
 
     ports: tuple[int, ...]
-    a: Matrix
-    b: Matrix
-    g: Matrix
-    c: Matrix
-    d: Matrix
-    h: Matrix
-    motion_state: Matrix
-    motion_column: Matrix
-    through: Matrix
+    a: Real
+    b: Real
+    g: Real
+    c: Real
+    d: Real
+    h: Real
+    motion_state: Real
+    motion_column: Real
+    through: Real
     looped: bool
-    delay_port: Integers
-    delay_s: Matrix
+    delay_port: Whole
+    delay_s: Real
 
 
 def port_plan(compiled: CompiledModel, hold: Hold) -> PortPlan:
@@ -122,7 +119,7 @@ def law_table(compiled: CompiledModel, plan: PortPlan, laws: tuple[PortLaw, ...]
     return LawTable(table=table, first=first.astype(np.int64), parameters=parameters, state=state, laws=tuple(chosen))
 
 
-def _starts(lengths: list[int]) -> Integers:
+def _starts(lengths: list[int]) -> Whole:
     return np.cumsum([0, *lengths], dtype=np.int64)[:-1]
 
 

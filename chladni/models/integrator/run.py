@@ -5,7 +5,6 @@ from itertools import pairwise
 from math import ceil, log2
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.delay_kernel import History, ask_delays
@@ -51,9 +50,9 @@ from chladni.models.integrator.plane import book
 from chladni.models.integrator.port_kernel import Ports, ask_laws
 from chladni.models.integrator.port_plan import LawTable, PortPlan
 from chladni.models.integrator.step_tables import DEEPEST, StepTables
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 _SCHEMES = {"automatic": AUTOMATIC, "explicit": EXPLICIT, "implicit": IMPLICIT}
 #: Delays below this share of a sample interval are refused: every step would have to be as short.
 _SHORTEST_DELAY = 2.0**-10
@@ -65,10 +64,10 @@ _STEPS_A_SAMPLE = 1000
 class RunResult:
     """``[sample, ...]``: states, motion and forces at the ports; ``dense [instant, output, sample]`` inside steps."""
 
-    state: Matrix
-    motion: Matrix
-    force: Matrix
-    dense: Matrix
+    state: Real
+    motion: Real
+    force: Real
+    dense: Real
     refined: int
     steps: int
 
@@ -104,7 +103,7 @@ class Run:
             tolerance=np.array([tolerance]),
         )
 
-    def march(self, rows: Matrix, start: Matrix) -> RunResult:
+    def march(self, rows: Real, start: Real) -> RunResult:
         """Run through all rows but the last, which is where the run ends."""
         plan, n, p = self._plan, start.size, len(self._plan.ports)
         stride = _stride(plan, self._hold, self._laws, start)
@@ -125,7 +124,7 @@ class Run:
             steps=int(course.cursor[STEPS]),
         )
 
-    def _segments(self, rows: Matrix) -> list[tuple[int, int]]:
+    def _segments(self, rows: Real) -> list[tuple[int, int]]:
         """Stretches of steps that no jump of an input divides."""
         m, lines = self._hold.columns, self._hold.straight
         ends = rows[:-1, lines] + rows[:-1, m : m + lines.size]
@@ -139,7 +138,7 @@ class Run:
         stops = sorted({0, *jumps.tolist(), len(rows) - 1})
         return list(pairwise(stops))
 
-    def _begin(self, stride: Stride, course: Course, history: History, row: Matrix, sample: int) -> None:
+    def _begin(self, stride: Stride, course: Course, history: History, row: Real, sample: int) -> None:
         """Forces and rates at the start of a segment."""
         plan, ports, n = self._plan, self._ports, self._plan.a.shape[0]
         t = sample / self._rate_hz
@@ -159,7 +158,7 @@ class Run:
         if not np.all(np.isfinite(ports.channels[0])):
             raise ModelError(f"{self._where(ports.channels[0])} gives no number at {t:g} s; check its parameters")
 
-    def _solve_loop(self, base: Matrix, t: float) -> None:
+    def _solve_loop(self, base: Real, t: float) -> None:
         """Forces that agree with the motion that they themselves make at once: damped Newton."""
         count = len(self._plan.ports)
         through = self._plan.through.reshape(2 * count, count)
@@ -184,7 +183,7 @@ class Run:
                 f"the laws at {names} form an algebraic loop without a solution at {t:g} s; open the loop"
             )
 
-    def _loop_residual(self, base: Matrix, through: Matrix, force: Matrix, t: float) -> Matrix:
+    def _loop_residual(self, base: Real, through: Real, force: Real, t: float) -> Real:
         self._ports.motion[:] = base + through @ force
         ask_laws(self._words.ctypes.data, t, 0)
         found = self._ports.channels[0, : force.size].copy()
@@ -244,7 +243,7 @@ class Run:
             "gives no number there; check its parameters, or make its transition wider"
         )
 
-    def _where(self, channels: Matrix) -> str:
+    def _where(self, channels: Real) -> str:
         """Words for the port whose channel is largest, or not a number."""
         channel = int(np.argmax(np.where(np.isfinite(channels), np.abs(channels), np.inf)))
         count = len(self._plan.ports)
@@ -317,7 +316,7 @@ def _newton(count: int, states: int) -> Newton:
     )
 
 
-def _stride(plan: PortPlan, hold: Hold, laws: LawTable, start: Matrix) -> Stride:
+def _stride(plan: PortPlan, hold: Hold, laws: LawTable, start: Real) -> Stride:
     n, count = plan.a.shape[0], len(plan.ports)
     here = np.concatenate([start, laws.state, np.zeros(2 * count)])
     return Stride(
@@ -341,7 +340,7 @@ def _course(stride: Stride, count: int, ports: int, coarsest: int, *, implicit: 
     return Course(cursor=cursor, point=np.zeros((count, stride.here.size)), force=np.zeros((count, ports)))
 
 
-def _drive(hold: Hold, rows: Matrix) -> Drive:
+def _drive(hold: Hold, rows: Real) -> Drive:
     line = np.full(hold.columns, -1, dtype=np.int64)
     line[hold.straight] = np.arange(hold.straight.size)
     return Drive(rows, hold.rate, line, hold.straight, hold.kinked, hold.kink_at)
@@ -373,7 +372,7 @@ def _shorter(history: History, longest_s: float) -> History:
     return History(kept[0], kept[1], kept[2], hint)
 
 
-def _difference_weights() -> Matrix:
+def _difference_weights() -> Real:
     """Fourth difference on the start and middle of the step before, and the start, middle and end of this one.
 
     One row for each ratio of their lengths; the weight of this step's middle is 1.

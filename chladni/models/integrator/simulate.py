@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
 from chladni.models.core.port import Terminal
 from chladni.models.core.simulation import PortMotion, Simulation
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import ModelError
 from chladni.signals.linear_algebra import in_one_thread
@@ -19,13 +19,11 @@ from chladni.signals.visible import place_of
 if TYPE_CHECKING:
     from chladni.models.integrator.integrator import Integration
 
-Matrix = NDArray[np.float64]
-
 
 class Samples(Protocol):
     """An excitation: samples at any rate."""
 
-    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> Matrix:
+    def samples(self, count: int, sample_rate_hz: float, rng: np.random.Generator) -> Real:
         """``[sample]`` in the input's unit."""
 
 
@@ -39,7 +37,7 @@ def simulate(
     *,
     seconds: float | None = None,
     rate_hz: float | None = None,
-    initial: Mapping[str, float] | Matrix | None = None,
+    initial: Mapping[str, float] | Real | None = None,
     seed: int = 0,
     tolerance: float = 1e-7,
 ) -> Simulation:
@@ -119,7 +117,7 @@ def _grid(seconds: float | None, rate_hz: float | None) -> tuple[int, float]:
 
 def _from_series(
     compiled: CompiledModel, series: TimeSeries, seconds: float | None, rate_hz: float | None
-) -> tuple[Matrix, set[str]]:
+) -> tuple[Real, set[str]]:
     if rate_hz is not None and abs(rate_hz - series.sample_rate_hz) > 1e-9 * series.sample_rate_hz:
         raise ModelError(
             f"rate_hz = {rate_hz:g}, but the series has {series.sample_rate_hz:g} Hz; resample it first, or leave "
@@ -143,7 +141,7 @@ def _from_series(
     return signals, driven
 
 
-def _sound(series: TimeSeries, row: int, terminal: Terminal) -> Matrix:
+def _sound(series: TimeSeries, row: int, terminal: Terminal) -> Real:
     channel, values = series.channels[row], np.asarray(series.values[row], dtype=np.float64)
     good = np.isfinite(values) if series.valid is None else np.isfinite(values) & series.valid[row]
     if not good.all():
@@ -162,7 +160,7 @@ def _sound(series: TimeSeries, row: int, terminal: Terminal) -> Matrix:
 
 def _from_excitations(
     compiled: CompiledModel, excitation: Mapping[str, Samples] | Samples, count: int, rate_hz: float, seed: int
-) -> tuple[Matrix, set[str]]:
+) -> tuple[Real, set[str]]:
     from chladni.models.integrator.integrator import require_memory
 
     names = [terminal.name for terminal in compiled.inputs]
@@ -191,9 +189,7 @@ def _undriven(compiled: CompiledModel, driven: set[str]) -> tuple[str, ...]:
     return (f"not driven, taken as zero: {', '.join(idle)}",) if idle else ()
 
 
-def _series(
-    terminals: tuple[Terminal, ...], values: Matrix, rate_hz: float, start_ns: int, *, role: str
-) -> TimeSeries:
+def _series(terminals: tuple[Terminal, ...], values: Real, rate_hz: float, start_ns: int, *, role: str) -> TimeSeries:
     channels = tuple(
         Channel(
             name=terminal.channel or terminal.name,

@@ -5,15 +5,14 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.integrator.exponential import POWERS, Response, responses
 from chladni.models.integrator.hold import Hold
 from chladni.models.integrator.plane import Numbers2, Numbers3, Numbers4, Numbers5
 from chladni.models.integrator.port_plan import PortPlan
 from chladni.models.integrator.radau import LAGRANGE, NODES
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Steps are halved at most this often: a millisecond down to a nanosecond.
 DEEPEST = 20
 #: Inside a step, where the history of a delay line is kept.
@@ -72,13 +71,13 @@ class StepTables:
     plan: PortPlan
     hold: Hold
     step_s: float
-    instants: Matrix
+    instants: Real
     explicit: SchemeTables = field(init=False)
     implicit: SchemeTables = field(init=False)
     dense: DenseTables = field(init=False)
-    effect: Matrix = field(init=False)
-    _made: list[tuple[SchemeTables, SchemeTables, DenseTables, Matrix]] = field(init=False, default_factory=list)
-    _reach: Matrix = field(init=False)
+    effect: Real = field(init=False)
+    _made: list[tuple[SchemeTables, SchemeTables, DenseTables, Real]] = field(init=False, default_factory=list)
+    _reach: Real = field(init=False)
 
     def __post_init__(self) -> None:
         self._reach = _reach(self.plan)
@@ -98,7 +97,7 @@ class StepTables:
         self.dense = DenseTables(*map(_stack, zip(*dense, strict=True)))
         self.effect = _stack(effect)
 
-    def _level(self, level: int) -> tuple[SchemeTables, SchemeTables, DenseTables, Matrix]:
+    def _level(self, level: int) -> tuple[SchemeTables, SchemeTables, DenseTables, Real]:
         local = np.mod(self.instants * 2.0**level, 1.0)
         wanted = np.concatenate([local, HISTORY_NODES if self.plan.delay_s.size else ()])
         found = responses(
@@ -119,12 +118,12 @@ class StepTables:
         )
 
 
-def _stack(arrays: Sequence[Matrix]) -> Matrix:
+def _stack(arrays: Sequence[Real]) -> Real:
     # The order in memory is part of the type that a kernel is compiled for: always the same.
     return np.ascontiguousarray(np.stack(arrays))
 
 
-def _motion(plan: PortPlan, response: Response) -> Matrix:
+def _motion(plan: PortPlan, response: Response) -> Real:
     return plan.motion_state @ response.state + plan.motion_column @ response.column
 
 
@@ -147,7 +146,7 @@ def _implicit(plan: PortPlan, nodes: list[Response]) -> SchemeTables:
     return _scheme(plan, [nodes[-1].state, *(_motion(plan, node) for node in nodes)], force, force[-1])
 
 
-def _scheme(plan: PortPlan, rows: list[Matrix], force: Matrix, gain: Matrix) -> SchemeTables:
+def _scheme(plan: PortPlan, rows: list[Real], force: Real, gain: Real) -> SchemeTables:
     """Lay out for the kernels: ``force [stage, other, state, port]``, ``gain [stage, state, port]``."""
     return SchemeTables(
         advance=np.ascontiguousarray(np.vstack(rows).T),
@@ -156,7 +155,7 @@ def _scheme(plan: PortPlan, rows: list[Matrix], force: Matrix, gain: Matrix) -> 
     )
 
 
-def _dense(plan: PortPlan, hold: Hold, found: list[Response], wanted: Matrix) -> DenseTables:
+def _dense(plan: PortPlan, hold: Hold, found: list[Response], wanted: Real) -> DenseTables:
     state = np.vstack([plan.motion_state, plan.c])
     column = np.vstack([plan.motion_column, plan.d])
     advance = np.zeros((len(found), plan.a.shape[0] + hold.width, len(state)))
@@ -167,7 +166,7 @@ def _dense(plan: PortPlan, hold: Hold, found: list[Response], wanted: Matrix) ->
     return DenseTables(advance=advance, couple=couple, fraction=wanted)
 
 
-def _reach(plan: PortPlan) -> Matrix:
+def _reach(plan: PortPlan) -> Real:
     """``[port, state]``: 1 where the force of a port can reach the state at all; rounding reaches everywhere."""
     reach = (plan.a != 0) | np.eye(len(plan.a), dtype=bool)
     for _ in range(max(1, len(plan.a)).bit_length()):

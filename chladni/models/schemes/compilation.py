@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.balance import balance
 from chladni.models.core.compiled_model import CompiledModel, DelayLine, IdealDerivative
@@ -16,10 +15,9 @@ from chladni.models.schemes.equations import SchemeEquations, delay_of, solved_e
 from chladni.models.schemes.points import Point, points_of
 from chladni.models.schemes.scheme_output import SchemeOutput
 from chladni.models.schemes.wiring import Wiring, wired
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,16 +41,16 @@ class _Columns(Value):
         ``[block, column]``: to what leaves each block.
     """
 
-    into: Matrix
-    behind: Matrix
+    into: Real
+    behind: Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Rows(Value):
     """Signals as sums ``from_y y + from_w w``, y what leaves each block before its dead time."""
 
-    from_y: Matrix
-    from_w: Matrix
+    from_y: Real
+    from_w: Real
 
 
 def compiled_scheme(
@@ -238,7 +236,7 @@ def _derivative_ports(full: FilteredEquations, names: Sequence[str]) -> list[Por
     ]
 
 
-def _balanced(a: Matrix, b: Matrix, c: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+def _balanced(a: Real, b: Real, c: Real) -> tuple[Real, Real, Real]:
     """States in units that make rows and columns of A of like size: gains of 1e9 between them would cost digits."""
     if not a.size:
         return a, b, c

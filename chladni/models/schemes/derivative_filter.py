@@ -4,11 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -24,15 +22,15 @@ class FilteredEquations(Value):
         ``[ideal derivative]``: which column of w it differentiates, and how often.
     """
 
-    a: Matrix
-    b: Matrix
-    c: Matrix
-    d: Matrix
+    a: Real
+    b: Real
+    c: Real
+    d: Real
     sources: tuple[int, ...]
     orders: tuple[int, ...]
 
 
-def filtered_derivatives(a: Matrix, b: Matrix, c: Matrix, d: Matrix, *, filter_time_s: float) -> FilteredEquations:
+def filtered_derivatives(a: Real, b: Real, c: Real, d: Real, *, filter_time_s: float) -> FilteredEquations:
     """Put ``(s/(T s + 1))^k`` in place of each power ``s^k`` of an input.
 
     Parameters
@@ -80,5 +78,5 @@ def lag_names(sources: Sequence[int], orders: Sequence[int], names: Sequence[str
     return [f"{names[source]}.lag{number + 1}" for source, most in highest.items() for number in range(most)]
 
 
-def _highest(powers: Matrix) -> int:
+def _highest(powers: Real) -> int:
     return int(np.flatnonzero(powers.any(axis=1))[-1])

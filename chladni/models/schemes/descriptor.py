@@ -3,13 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.schemes.structural_inverse import structural_inverse, total
+from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 # Of a row or column of unit size: below, an equation doesn't determine the unknown.
 _RANK = 1e-11
@@ -34,14 +32,14 @@ class Descriptor(Value):
     `preferred` says which of the rest should be eliminated before the others.
     """
 
-    x_x: Matrix
-    x_r: Matrix
-    x_w: Matrix
-    e: Matrix
-    r_x: Matrix
-    r_r: Matrix
-    r_w: Matrix
-    preferred: NDArray[np.bool_]
+    x_x: Real
+    x_r: Real
+    x_w: Real
+    e: Real
+    r_x: Real
+    r_r: Real
+    r_w: Real
+    preferred: Mask
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -58,10 +56,10 @@ class Reduced(Value):
         Which of the rest became states, behind those of x.
     """
 
-    a: Matrix
-    b: Matrix
-    c: Matrix
-    d: Matrix
+    a: Real
+    b: Real
+    c: Real
+    d: Real
     kept: tuple[int, ...]
 
 
@@ -100,20 +98,20 @@ def reduced(given: Descriptor) -> Reduced:
 class _Recovery(Value):
     """All of the original rest from x, from what is left of it, and from w."""
 
-    from_x: Matrix
-    from_r: Matrix
-    from_w: Matrix
+    from_x: Real
+    from_r: Real
+    from_w: Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Solution(Value):
     """``r[solved] = from_x x + from_r r[free] + sum_k from_w[k] w^(k)``."""
 
-    solved: NDArray[np.int64]
-    free: NDArray[np.int64]
-    from_x: Matrix
-    from_r: Matrix
-    from_w: Matrix
+    solved: Whole
+    free: Whole
+    from_x: Real
+    from_r: Real
+    from_w: Real
 
 
 def _rows_with_derivatives_first(given: Descriptor) -> tuple[Descriptor, int]:
@@ -132,7 +130,7 @@ def _rows_with_derivatives_first(given: Descriptor) -> tuple[Descriptor, int]:
     return turned, rank
 
 
-def _elimination(e: Matrix) -> tuple[Matrix, int]:
+def _elimination(e: Real) -> tuple[Real, int]:
     """Give the combinations of rows that leave `rank` independent ones first and zeros below, and the rank.
 
     Gauss's elimination with complete pivoting: unlike rotations it leaves rows alone that need no combining, and with
@@ -241,11 +239,11 @@ def _with_room(given: Descriptor, recovery: _Recovery) -> tuple[Descriptor, _Rec
     return replace(given, x_w=x_w, r_w=r_w), replace(recovery, from_w=from_w)
 
 
-def _resized(w: Matrix, powers: int) -> Matrix:
+def _resized(w: Real, powers: int) -> Real:
     return np.concatenate([w[:powers], np.zeros((max(0, powers - w.shape[0]), *w.shape[1:]))])
 
 
-def _units(matrix: Matrix) -> tuple[Matrix, Matrix]:
+def _units(matrix: Real) -> tuple[Real, Real]:
     """Units of rows and columns that give each the largest entry 1, so that size doesn't hide rank (Ruiz 2001)."""
     row, column = np.ones(matrix.shape[0]), np.ones(matrix.shape[1])
     for _ in range(_UNIT_ROUNDS):

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.elements.element import Element
 from chladni.models.elements.realization import Realization, realize
@@ -12,10 +11,9 @@ from chladni.models.schemes.block import Block
 from chladni.models.schemes.descriptor import Descriptor, reduced
 from chladni.models.schemes.loops import loops_of, require_well_posed
 from chladni.models.schemes.structural_inverse import total
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,10 +30,10 @@ class SchemeEquations(Value):
         Name of each state: ``plant.x1``, and ``regulator.derivative1`` where a block differentiates.
     """
 
-    a: Matrix
-    b: Matrix
-    c: Matrix
-    d: Matrix
+    a: Real
+    b: Real
+    c: Real
+    d: Real
     states: tuple[str, ...]
 
 
@@ -52,7 +50,7 @@ def delay_of(block: Block) -> float:
     return block.acting.transfer.delay_s if isinstance(block.acting, Element) else 0.0
 
 
-def solved_equations(blocks: Sequence[Block], between: Matrix, columns: Matrix) -> SchemeEquations:
+def solved_equations(blocks: Sequence[Block], between: Real, columns: Real) -> SchemeEquations:
     """Close all loops.
 
     Parameters
@@ -95,7 +93,7 @@ def solved_equations(blocks: Sequence[Block], between: Matrix, columns: Matrix) 
     )
 
 
-def _descriptor(forms: Sequence[Realization], between: Matrix, columns: Matrix) -> Descriptor:
+def _descriptor(forms: Sequence[Realization], between: Real, columns: Real) -> Descriptor:
     """Rest r: derivatives p of what goes into improper blocks, then y.
 
     ::
@@ -140,7 +138,7 @@ def _descriptor(forms: Sequence[Realization], between: Matrix, columns: Matrix) 
     )
 
 
-def _stacked(vectors: Sequence[Matrix]) -> Matrix:
+def _stacked(vectors: Sequence[Real]) -> Real:
     """``[state, block]``: each block's vector in its own column."""
     matrix = np.zeros((sum(vector.size for vector in vectors), len(vectors)))
     row = 0
@@ -150,7 +148,7 @@ def _stacked(vectors: Sequence[Matrix]) -> Matrix:
     return matrix
 
 
-def _block_diagonal(parts: Sequence[Matrix]) -> Matrix:
+def _block_diagonal(parts: Sequence[Real]) -> Real:
     # As SciPy's `block_diag`, which looks at every array for so long that a scheme of many blocks waits for it.
     matrix = np.zeros((sum(len(part) for part in parts),) * 2)
     first = 0
@@ -169,13 +167,13 @@ def _rest_names(names: Sequence[str], forms: Sequence[Realization]) -> list[str]
     return [*derivatives, *(f"{name}.output" for name in names)]
 
 
-def _without_empty_powers(d: Matrix) -> Matrix:
+def _without_empty_powers(d: Real) -> Real:
     # An empty power costs lags and ports further on.
     used = np.flatnonzero(d.reshape(d.shape[0], -1).any(axis=1))
     return d[: max(1, int(used[-1]) + 1 if used.size else 1)]
 
 
-def _loops_with(improper: Sequence[bool], between: Matrix, names: Sequence[str]) -> str:
+def _loops_with(improper: Sequence[bool], between: Real, names: Sequence[str]) -> str:
     groups = [group for group in loops_of(between) if any(improper[place] for place in group)]
     told = ["loop of " + ", ".join(names[place] for place in group[:20]) for group in groups]
     return "; ".join(told[:5]) or "scheme"

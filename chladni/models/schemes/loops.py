@@ -4,17 +4,15 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import ModelError
 
 # Smallest singular value of I - D K, balanced, over the largest or over 1: below, rounding decides.
 _SINGULAR = 1e-12
 
-Matrix = NDArray[np.float64]
 
-
-def loops_of(blocks: Matrix, *, through: NDArray[np.bool_] | None = None) -> list[list[int]]:
+def loops_of(blocks: Real, *, through: Mask | None = None) -> list[list[int]]:
     """Give groups of blocks that lie on common loops, each group once.
 
     Parameters
@@ -42,7 +40,7 @@ def _groups(pattern: bytes, count: int) -> tuple[tuple[int, ...], ...]:
     return tuple(group for group in groups if len(group) > 1 or links[group[0], group[0]])
 
 
-def require_well_posed(direct: Matrix, blocks: Matrix, names: Sequence[str]) -> None:
+def require_well_posed(direct: Real, blocks: Real, names: Sequence[str]) -> None:
     """Raise `ModelError` when a loop without lag has the gain one, so that its signals aren't determined.
 
     Parameters

@@ -4,22 +4,20 @@ from collections.abc import Sequence
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.port import Terminal
 from chladni.models.elements.element import Element
 from chladni.models.schemes.block import Block
 from chladni.models.schemes.points import Point
 from chladni.models.schemes.wiring import Wiring, wired
+from chladni.signals.arrays import Complex, Index, Real
 
 # Numbers of one batch of matrices: 64 MB of complex ones.
 _BATCH = 4_000_000
 
-Complex = NDArray[np.complex128]
-
 
 def point_response(
-    blocks: Sequence[Block], inputs: Sequence[Terminal], points: Sequence[Point], frequency_hz: NDArray[np.float64]
+    blocks: Sequence[Block], inputs: Sequence[Terminal], points: Sequence[Point], frequency_hz: Real
 ) -> Complex:
     """Give ``[point, input, frequency]``.
 
@@ -51,7 +49,7 @@ def _entering(wiring: Wiring, block: int, behind: Complex) -> Complex:
     return np.asarray(added + wiring.inputs[block], dtype=np.complex128)
 
 
-def _fractions(blocks: Sequence[Block], frequency_hz: NDArray[np.float64]) -> tuple[Complex, Complex]:
+def _fractions(blocks: Sequence[Block], frequency_hz: Real) -> tuple[Complex, Complex]:
     """Numerator and denominator of each block, ``[frequency, block]``, the larger of each pair 1 in size."""
     s = 2j * pi * frequency_hz
     above = np.empty((s.size, len(blocks)), dtype=np.complex128)
@@ -97,7 +95,7 @@ def _solved_line(matrix: Complex, right: Complex) -> Complex:
     return found
 
 
-def _along_the_way(matrix: Complex) -> list[NDArray[np.intp]]:
+def _along_the_way(matrix: Complex) -> list[Index]:
     """Groups of unknowns that depend on each other, each after those that it depends on."""
     from scipy.sparse.csgraph import connected_components
 

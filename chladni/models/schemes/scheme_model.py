@@ -8,7 +8,6 @@ from math import isfinite
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Effect, ModelKind, flags_of_effects
@@ -24,6 +23,7 @@ from chladni.models.schemes.points import Point, points_of
 from chladni.models.schemes.remarks import scheme_remarks
 from chladni.models.schemes.scheme_output import SchemeOutput
 from chladni.models.schemes.wiring import nearest, require_wiring
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import ModelError
 
 #: Time constant in seconds of the lags through which a derivative is computed in time.
@@ -182,7 +182,7 @@ class SchemeModel:
             compiled = effect.attach(compiled)
         return compiled
 
-    def frequency_response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def frequency_response(self, frequency_hz: Real) -> Complex:
         """Response of every point to every input, ``[point, input, frequency]``, as `points` orders them.
 
         Exact with dead times and improper blocks; with effects, that of the linear part of the compiled equations.

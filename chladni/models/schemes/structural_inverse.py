@@ -5,15 +5,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import ModelError
-
-Matrix = NDArray[np.float64]
 
 # What is left of numbers that cancel, relative to them.
 _ROUNDING = 1e-13
 
 
-def total(*terms: Matrix | tuple[Matrix, Matrix]) -> Matrix:
+def total(*terms: Real | tuple[Real, Real]) -> Real:
     """Sum of matrices and of products; what only rounding leaves of numbers that cancel is zero."""
     parts = [term if isinstance(term, tuple) else (None, term) for term in terms]
     whole = sum(right if left is None else left @ right for left, right in parts)
@@ -21,7 +20,7 @@ def total(*terms: Matrix | tuple[Matrix, Matrix]) -> Matrix:
     return np.asarray(np.where(np.abs(whole) > _ROUNDING * size, whole, 0.0))
 
 
-def structural_inverse(matrix: Matrix) -> Matrix:
+def structural_inverse(matrix: Real) -> Real:
     """Inverse whose entries are exactly zero wherever the pattern of `matrix` makes them so.
 
     With rows in an order that puts an entry on each place of the diagonal, entry [i, j] of the inverse can only
@@ -44,7 +43,7 @@ def structural_inverse(matrix: Matrix) -> Matrix:
 
 # A pattern stays as it is while a knob turns.
 @lru_cache(maxsize=64)
-def _structure(pattern: bytes, count: int) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+def _structure(pattern: bytes, count: int) -> tuple[NDArray[np.int32], Mask]:
     """Row that gives each column its entry on the diagonal, and which entries of the inverse may not be zero."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import maximum_bipartite_matching

@@ -4,11 +4,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.port import Terminal
 from chladni.models.schemes.block import Block, require_name
 from chladni.models.schemes.scheme_output import SchemeOutput
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
 from chladni.signals.wording import near_words
@@ -29,8 +29,8 @@ class Wiring(Value):
         L, ``[block, input]``, likewise.
     """
 
-    blocks: NDArray[np.float64]
-    inputs: NDArray[np.float64]
+    blocks: Real
+    inputs: Real
 
     def __post_init__(self) -> None:
         self._freeze()

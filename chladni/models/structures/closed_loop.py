@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Port, Terminal
@@ -12,9 +11,8 @@ from chladni.models.core.port_law import PortLaw
 from chladni.models.structures.control_law import control_law
 from chladni.models.structures.controller import FILTER, Controller
 from chladni.models.structures.limiter import limiter
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-
-Matrix = NDArray[np.float64]
 
 # A direct way around the loop that comes nearer to 1 than this is 1 but for rounding.
 _ILL_POSED = 1e-9
@@ -92,7 +90,7 @@ class _Loop:
         still = np.zeros((len(added), self._size))
         return self._assembled(rates, outputs, np.vstack([displacement, *added]), np.vstack([velocity, still]))
 
-    def _old_signals(self) -> Matrix:
+    def _old_signals(self) -> Real:
         """Signals of the plant from those of the closed model; the row of the driven input is left zero."""
         plant, after_reference = self._plant, self._n + self._k + self._r
         old = np.zeros((self._n + self._m + self._q, self._size))
@@ -106,7 +104,7 @@ class _Loop:
             old[self._n + column, after_reference + place + behind] = 1.0
         return old
 
-    def _feedback_rows(self) -> Matrix:
+    def _feedback_rows(self) -> Real:
         """What is fed back and its rate, ``[2, signal of the plant]``."""
         plant, row = self._plant, self._feedback
         signal = np.concatenate([plant.c[row], plant.d[row], plant.h[row]])
@@ -115,7 +113,7 @@ class _Loop:
             return np.stack([signal, np.zeros_like(signal)])
         return np.stack([signal, self._rate_row()])
 
-    def _rate_row(self) -> Matrix:
+    def _rate_row(self) -> Real:
         """Exact derivative of what is fed back: ``y' = C (A x + B u + G f) + D u'``.
 
         What laws at the feedback's own port add (a sensor's defects) has no rate and isn't in it.
@@ -140,7 +138,7 @@ class _Loop:
             )
         return np.concatenate([plant.c[row] @ plant.a, columns, plant.c[row] @ plant.g])
 
-    def _command(self, feedback: Matrix, direct: Matrix) -> Matrix:
+    def _command(self, feedback: Real, direct: Real) -> Real:
         """Row of the driven input's command before the limit, with the direct way around the loop solved for."""
         law, gain = self._law, self._controller.gain
         row = law.d_feedback @ feedback
@@ -161,14 +159,14 @@ class _Loop:
         behind[self._first_port + self._q :] = around
         return np.asarray((gain * row + behind) / (1 - around))
 
-    def _controller_rates(self, feedback: Matrix) -> Matrix:
+    def _controller_rates(self, feedback: Real) -> Real:
         law = self._law
         rates = law.b_feedback @ feedback
         rates[:, self._n : self._n + self._k] += law.a
         rates[:, self._n + self._k : self._n + self._k + self._r] += law.b_reference[:, : self._r]
         return np.asarray(rates)
 
-    def _assembled(self, rates: Matrix, outputs: Matrix, displacement: Matrix, velocity: Matrix) -> CompiledModel:
+    def _assembled(self, rates: Real, outputs: Real, displacement: Real, velocity: Real) -> CompiledModel:
         plant, driven = self._plant, self._plant.inputs[self._driven]
         n, u, f = (
             slice(0, self._n + self._k),
@@ -221,7 +219,7 @@ class _Loop:
                 "its samples can't act inside the loop"
             )
 
-    def _unit(self, place: int) -> Matrix:
+    def _unit(self, place: int) -> Real:
         row = np.zeros(self._size)
         row[place] = 1.0
         return row

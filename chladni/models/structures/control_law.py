@@ -9,23 +9,21 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.structures.controller import FILTER, Controller
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControlLaw:
     """Matrices as in the module's equations; ``[.., 2]`` for a signal and its rate."""
 
-    a: Matrix
-    b_reference: Matrix
-    b_feedback: Matrix
-    c: Matrix
-    d_reference: Matrix
-    d_feedback: Matrix
+    a: Real
+    b_reference: Real
+    b_feedback: Real
+    c: Real
+    d_reference: Real
+    d_feedback: Real
     states: tuple[str, ...]
 
     @property
@@ -61,7 +59,7 @@ class _Law:
     def __init__(self, name: str) -> None:
         self._name = name
         self._direct = np.zeros((2, 2))  # of reference and feedback: (signal, rate)
-        self._states: list[tuple[str, float, Matrix, float]] = []  # name, pole, input as `_direct`, gain
+        self._states: list[tuple[str, float, Real, float]] = []  # name, pole, input as `_direct`, gain
 
     def error(self, gain: float) -> None:
         # Rows are reference and feedback: the error counts one up and the other down.

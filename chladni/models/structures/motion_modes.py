@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.structures.structure import AT_REST, NaturalModes
+from chladni.signals.arrays import Complex
 
 
-def ordered_poles(compiled: CompiledModel) -> NDArray[np.complex128]:
+def ordered_poles(compiled: CompiledModel) -> Complex:
     """Eigenvalues of the linear equations in rad/s, those of slowest decay first."""
     poles = np.linalg.eigvals(compiled.a).astype(np.complex128)
     return np.asarray(poles[np.argsort(-poles.real, kind="stable")])

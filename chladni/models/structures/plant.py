@@ -13,15 +13,13 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Port, PortKind, Terminal
 from chladni.models.structures.structure import GROUND, Body, Joint, Motion, Structure
 from chladni.models.structures.structure_input import StructureInput
 from chladni.models.structures.structure_output import StructureOutput, measure_unit
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 # One setting is compiled for its charts and for its flags.
@@ -52,7 +50,7 @@ def compile_plant(
     return _plant(bodies, joints, inputs, outputs, fed_back).compiled(structure)
 
 
-def force_pattern(structure: Structure, at: str) -> Matrix:
+def force_pattern(structure: Structure, at: str) -> Real:
     """``[body]``: how a unit force at a body, or of an actuator at a joint, acts on the bodies."""
     if any(body.name == at for body in structure.bodies):
         return structure.pattern((GROUND, at))
@@ -208,7 +206,7 @@ class _Plant:
             ports.append(Port(name=name, kind="output", unit=unit, displacement_unit=unit))
         return tuple(ports)
 
-    def _motion(self) -> tuple[Matrix, Matrix]:
+    def _motion(self) -> tuple[Real, Real]:
         """Displacement and velocity of each body, relative to the ground, ``[body, signal]``."""
         displacement, velocity = np.zeros((2, len(self._structure.bodies), self._size))
         for place, row in enumerate(self._free):
@@ -217,7 +215,7 @@ class _Plant:
             displacement[row, column] = velocity[row, column + 1] = 1.0
         return displacement, velocity
 
-    def _acceleration(self, structure: Structure) -> Matrix:
+    def _acceleration(self, structure: Structure) -> Real:
         """Acceleration of each body, relative to the ground, ``[body, signal]``."""
         stiffness = self._assembled([joint.stiffness for joint in structure.joints])
         damping = self._assembled([joint.damping for joint in structure.joints])
@@ -230,11 +228,11 @@ class _Plant:
             acceleration[row] = self._unit(column + 2)
         return np.asarray(acceleration, dtype=np.float64)
 
-    def _assembled(self, coefficients: Sequence[float]) -> Matrix:
+    def _assembled(self, coefficients: Sequence[float]) -> Real:
         """``[body, body]`` as `Structure.stiffness_matrix`, from patterns that are kept."""
         return np.asarray(self._joints.T @ (np.array(coefficients)[:, None] * self._joints))
 
-    def _all_applied(self) -> Matrix:
+    def _all_applied(self) -> Real:
         """Force on each body from inputs and laws, ``[body, signal]``."""
         structure = self._structure
         applied = np.zeros((len(structure.bodies), self._size))
@@ -250,19 +248,19 @@ class _Plant:
             applied[row, self._port(body.name, "body")] = 1.0
         return applied
 
-    def _ground_row(self) -> Matrix:
+    def _ground_row(self) -> Real:
         row = self._unit(self._port(GROUND, "ground"))
         for one in self._inputs:
             if one.kind == "base_acceleration":
                 row[self._column(one.name)] = 1.0
         return row
 
-    def _shaken_bodies(self) -> Matrix:
+    def _shaken_bodies(self) -> Real:
         """``[body]``: 1 for a body that feels the ground's acceleration."""
         motion = shaken_motion(self._structure)
         return np.array([float(body.motion == motion) for body in self._structure.bodies])
 
-    def _output_row(self, structure: Structure, place: int, acceleration: Matrix) -> Matrix:
+    def _output_row(self, structure: Structure, place: int, acceleration: Real) -> Real:
         one, pattern = self._outputs[place], self._patterns[place]
         if one.measures == "force":
             joint = structure.joint_named(one.at)
@@ -277,7 +275,7 @@ class _Plant:
             return pattern.of(acceleration)
         return pattern.of(acceleration + np.outer(self._shaken, self._ground))
 
-    def _port_rows(self) -> tuple[Matrix, Matrix]:
+    def _port_rows(self) -> tuple[Real, Real]:
         """Displacement and velocity at each port but those of outputs, ``[port, signal]``."""
         structure = self._structure
         displacement, velocity = np.zeros((2, len(self._ports), self._size))
@@ -305,7 +303,7 @@ class _Plant:
     def _output_place(self, name: str) -> int:
         return next(place for place, one in enumerate(self._outputs) if one.name == name)
 
-    def _unit(self, place: int) -> Matrix:
+    def _unit(self, place: int) -> Real:
         row = np.zeros(self._size)
         row[place] = 1.0
         return row
@@ -314,11 +312,11 @@ class _Plant:
 class _Pattern:
     """Product with a pattern that is mostly zero: one or two bodies of a thousand."""
 
-    def __init__(self, pattern: Matrix) -> None:
+    def __init__(self, pattern: Real) -> None:
         self._places = np.flatnonzero(pattern)
         self._signs = pattern[self._places]
 
-    def of(self, rows: Matrix) -> Matrix:
+    def of(self, rows: Real) -> Real:
         return np.asarray(self._signs @ rows[self._places])
 
 

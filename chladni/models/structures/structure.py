@@ -6,8 +6,8 @@ from math import pi
 from typing import Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.channel import Vector
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
@@ -78,9 +78,9 @@ class NaturalModes(Value):
         ``[mode, body]`` complex, largest component 1.
     """
 
-    frequency_hz: NDArray[np.float64]
-    damping_ratio: NDArray[np.float64]
-    shapes: NDArray[np.complex128]
+    frequency_hz: Real
+    damping_ratio: Real
+    shapes: Complex
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -129,19 +129,19 @@ class Structure:
         object.__setattr__(other, "joints", joints)
         return other
 
-    def mass_matrix(self) -> NDArray[np.float64]:
+    def mass_matrix(self) -> Real:
         """``[body, body]`` in kg."""
         return np.diag([body.mass for body in self.bodies])
 
-    def stiffness_matrix(self) -> NDArray[np.float64]:
+    def stiffness_matrix(self) -> Real:
         """``[body, body]`` in N/m."""
         return self._assemble([joint.stiffness for joint in self.joints])
 
-    def damping_matrix(self) -> NDArray[np.float64]:
+    def damping_matrix(self) -> Real:
         """``[body, body]`` in N s/m."""
         return self._assemble([joint.damping for joint in self.joints])
 
-    def receptance(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def receptance(self, frequency_hz: Real) -> Complex:
         """Displacement of each body per force on each body, (K + j omega C - omega^2 M)^-1.
 
         Parameters
@@ -158,7 +158,7 @@ class Structure:
         inverse = np.asarray(np.linalg.inv(elastic - omega**2 * self.mass_matrix()), dtype=np.complex128)
         return np.moveaxis(inverse, 0, -1)
 
-    def accelerance(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def accelerance(self, frequency_hz: Real) -> Complex:
         """Acceleration of each body per force on each body, ``[body, body, frequency]`` in (m/s^2)/N."""
         return self.receptance(frequency_hz) * -((2 * pi * frequency_hz) ** 2)
 
@@ -183,7 +183,7 @@ class Structure:
             shapes=shapes / np.take_along_axis(shapes, largest, axis=1),
         )
 
-    def acceleration(self, force: NDArray[np.float64], *, at: str, sample_rate_hz: float) -> NDArray[np.float64]:
+    def acceleration(self, force: Real, *, at: str, sample_rate_hz: float) -> Real:
         """Steady acceleration of every body under a force that repeats with the record.
 
         The product with the accelerance at each line of the record's Fourier series is exact for such a force:
@@ -215,7 +215,7 @@ class Structure:
                 return row
         raise ModelError(f"no body {name!r}; bodies: {', '.join(body.name for body in self.bodies)}")
 
-    def pattern(self, between: tuple[str, str]) -> NDArray[np.float64]:
+    def pattern(self, between: tuple[str, str]) -> Real:
         """``[body]``: +1 at the second end, -1 at the first, 0 at the ground.
 
         The motion between two ends is its product with the motion of all bodies; a force between them acts along it.
@@ -251,9 +251,9 @@ class Structure:
                 f"joint {joint.name!r}: {first!r} and {second!r} can't be joined, one translates and one rotates"
             )
 
-    def _assemble(self, coefficients: list[float]) -> NDArray[np.float64]:
+    def _assemble(self, coefficients: list[float]) -> Real:
         # K = sum of k p p^T over the joints: symmetric, and without a row for the ground, which doesn't move.
         patterns = np.array([self.pattern(joint.between) for joint in self.joints])
         patterns = patterns.reshape(len(self.joints), len(self.bodies))
-        matrix: NDArray[np.float64] = patterns.T @ (np.asarray(coefficients)[:, None] * patterns)
+        matrix: Real = patterns.T @ (np.asarray(coefficients)[:, None] * patterns)
         return matrix

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Effect, ModelKind, flags_of_effects
@@ -29,6 +28,7 @@ from chladni.models.structures.structure_parameters import (
     with_numbers,
 )
 from chladni.models.structures.wiring import Wiring, WiringMistake, name_mistakes, wiring_mistakes
+from chladni.signals.arrays import Complex
 from chladni.signals.errors import ModelError
 from chladni.signals.unit_text import with_unit
 
@@ -156,7 +156,7 @@ class StructureModel:
                 compiled = close_loop(compiled, controller, self._disturbances(controller))
             return self._attached(compiled, "input")
 
-    def poles(self, loop: Loop = "closed") -> NDArray[np.complex128]:
+    def poles(self, loop: Loop = "closed") -> Complex:
         """Eigenvalues in rad/s of the linear equations, those of slowest decay first; `loop` open: no controller."""
         return ordered_poles(self.compile() if loop == "closed" else self._open_loop())
 

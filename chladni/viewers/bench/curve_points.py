@@ -7,11 +7,9 @@ from typing import Any, cast
 
 import numpy as np
 from bokeh.core.serialization import Serializable, Serializer
-from numpy.typing import NDArray
 
 from chladni.models.core.reading import Scale
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Complex, Real
 
 #: A curve is thinned to so many stretches, more than a chart has columns of pixels on most screens.
 STRETCHES = 1000
@@ -41,12 +39,12 @@ class InlineArray(np.ndarray, Serializable):
         }
 
 
-def inline(values: Matrix) -> InlineArray:
+def inline(values: Real) -> InlineArray:
     """Give an array that travels inside its message."""
     return cast("InlineArray", np.asarray(values, dtype=np.float64).view(InlineArray))
 
 
-def thinned(x: Matrix, y: Matrix) -> tuple[Matrix, Matrix]:
+def thinned(x: Real, y: Real) -> tuple[Real, Real]:
     """Leave out points that no screen can show, of a line over rising x.
 
     Of each stretch its lowest and its highest point stay, so that no peak is lost; the ends of the line stay too.
@@ -64,7 +62,7 @@ def thinned(x: Matrix, y: Matrix) -> tuple[Matrix, Matrix]:
     return x[kept], y[kept]
 
 
-def straightened(x: Matrix, y: Matrix, x_scale: Scale = "linear", y_scale: Scale = "linear") -> tuple[Matrix, Matrix]:
+def straightened(x: Real, y: Real, x_scale: Scale = "linear", y_scale: Scale = "linear") -> tuple[Real, Real]:
     """Leave out points that lie on the straight line between their neighbours as the chart draws it.
 
     In each round at most every other point goes, so that those stay between which it's missed by nobody.
@@ -83,7 +81,7 @@ def straightened(x: Matrix, y: Matrix, x_scale: Scale = "linear", y_scale: Scale
     return x[kept], y[kept]
 
 
-def _on_the_chart(values: Matrix, scale: Scale) -> Matrix:
+def _on_the_chart(values: Real, scale: Scale) -> Real:
     """Place along an axis, in the span of the curve."""
     with np.errstate(divide="ignore", invalid="ignore"):
         place = np.log10(values) if scale == "log" else values
@@ -92,9 +90,7 @@ def _on_the_chart(values: Matrix, scale: Scale) -> Matrix:
     return np.asarray(place / span if span > 0 else place)
 
 
-def _off_chord(
-    before: NDArray[np.complex128], point: NDArray[np.complex128], after: NDArray[np.complex128]
-) -> Matrix:
+def _off_chord(before: Complex, point: Complex, after: Complex) -> Real:
     """Distance of each point from the line, with its ends, that joins its neighbours."""
     with np.errstate(invalid="ignore"):
         chord, away = after - before, point - before

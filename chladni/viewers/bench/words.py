@@ -6,9 +6,9 @@ from html import escape as inert
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.reading import InfluenceTable, Quantity
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.visible import visible
 from chladni.viewers.labels import printed_unit
 
@@ -168,7 +168,7 @@ def _influence_cell(finite: float, derivative: float, *, strongest: bool, strong
     return f"<td{shaded}>{text}<small>{coefficient(derivative)}</small></td>"
 
 
-def _strongest(values: NDArray[np.float64], *, axis: int) -> NDArray[np.bool_]:
+def _strongest(values: Real, *, axis: int) -> Mask:
     # NaN is no influence; it must not win.
     size = np.nan_to_num(np.abs(values), nan=-1.0)
     return np.asarray((size == size.max(axis=axis, keepdims=True, initial=-1.0)) & (size > 0))

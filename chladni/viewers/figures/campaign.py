@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import EstimateError
 from chladni.viewers.figures.sheet import look, paint, plain, sheet
 from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, BEFORE_ON_LIGHT
@@ -143,7 +143,7 @@ def _draw_detection(axes: Axes, steps: Sequence[Detection], place: int) -> None:
                   linewidth=1.0, color=paint(ON_LIGHT[place]), label=steps[0].what)  # fmt: skip
 
 
-def confusion_figure(counts: NDArray[np.int64], *, truths: Sequence[str], answers: Sequence[str]) -> Figure:
+def confusion_figure(counts: Whole, *, truths: Sequence[str], answers: Sequence[str]) -> Figure:
     """Draw how often each truth got each answer: blue where they are the same word, orange where not.
 
     Parameters
@@ -179,7 +179,7 @@ def confusion_figure(counts: NDArray[np.int64], *, truths: Sequence[str], answer
     return figure
 
 
-def _colours(counts: NDArray[np.int64], truths: Sequence[str], answers: Sequence[str]) -> NDArray[np.float64]:
+def _colours(counts: Whole, truths: Sequence[str], answers: Sequence[str]) -> Real:
     """``[truth, answer, rgba]`` by the share of its truth."""
     share = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
     same = np.array([[truth == answer for answer in answers] for truth in truths], dtype=np.bool_)

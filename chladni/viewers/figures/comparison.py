@@ -6,9 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.comparison import DensityComparison, ResponseComparison
-from chladni.viewers.drawing import Floats, line_breaks, with_breaks
+from chladni.viewers.drawing import line_breaks, with_breaks
 from chladni.viewers.figures.sheet import BAND_OPACITY, legend, look, paint, plain, sheet
 from chladni.viewers.groups import Group, groups
 from chladni.viewers.style import Style
@@ -91,9 +92,9 @@ def _response_figure(response: ResponseComparison, column: int, group: Group, st
 
 def _draw(
     axes: Axes,
-    frequency_hz: Floats,
-    change_db: Floats,
-    std_db: Floats,
+    frequency_hz: Real,
+    change_db: Real,
+    std_db: Real,
     significant: np.ndarray,
     *,
     channel: Channel,
@@ -119,7 +120,7 @@ def _draw(
     axes.set_title(plain(style.labels[channel.name]), loc="left", pad=2)
 
 
-def _limits(change_db: Floats, sigma_db: Floats) -> tuple[float, float]:
+def _limits(change_db: Real, sigma_db: Real) -> tuple[float, float]:
     """From the changes and a usual band around them; bands are endless where next to nothing is known."""
     change = change_db[np.isfinite(change_db)]
     sigma = sigma_db[np.isfinite(sigma_db)]
@@ -131,7 +132,7 @@ def _limits(change_db: Floats, sigma_db: Floats) -> tuple[float, float]:
     return low - 0.05 * (high - low), high + 0.05 * (high - low)
 
 
-def _finished(figure: Figure, stack: list[Axes], frequency_hz: Floats, label: str) -> Figure:
+def _finished(figure: Figure, stack: list[Axes], frequency_hz: Real, label: str) -> Figure:
     stack[0].set_xlim(frequency_hz[0], frequency_hz[-1])
     stack[-1].set_xlabel("Frequency [Hz]")
     figure.supylabel(label, fontsize=8.5)

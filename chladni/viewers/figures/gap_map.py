@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
 from chladni.gap.records.diagnosis import GapSignals
-from chladni.viewers.drawing import Floats, block_maximum, decibels_of_power
+from chladni.signals.arrays import Real
+from chladni.viewers.drawing import block_maximum, decibels_of_power
 from chladni.viewers.figures.sheet import look, sheet
 from chladni.viewers.gap_band import band_told, shown_hz
 from chladni.viewers.gap_evidence import Evidence
@@ -53,13 +54,13 @@ def _figure(signals: GapSignals, *, alone: bool) -> Figure:
     return figure
 
 
-def _shortened(density: Floats) -> Floats:
+def _shortened(density: Real) -> Real:
     for axis in (0, 1):
         density, _ = block_maximum(density, axis=axis, limit=PIXELS)
     return density
 
 
-def _draw(axes: Axes, signals: GapSignals, level: Floats, high: float) -> AxesImage:
+def _draw(axes: Axes, signals: GapSignals, level: Real, high: float) -> AxesImage:
     times, lines = signals.map_time_s, signals.map_frequency_hz
     # Pixels reach half a step to both sides of the slice and line that they show.
     hop, step = _half_step(times), _half_step(lines)
@@ -76,5 +77,5 @@ def _draw(axes: Axes, signals: GapSignals, level: Floats, high: float) -> AxesIm
     )
 
 
-def _half_step(axis: Floats) -> float:
+def _half_step(axis: Real) -> float:
     return float(axis[1] - axis[0]) / 2 if axis.size > 1 else 0.5

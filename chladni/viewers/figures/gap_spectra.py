@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chladni.gap.records.diagnosis import GapSignals
-from chladni.viewers.drawing import Floats
+from chladni.signals.arrays import Real
 from chladni.viewers.figures.gap_signals import AFTER, BEFORE, MEASURED, OUTPUTS_A_FIGURE, stacked
 from chladni.viewers.figures.log_axis import logarithmic, logarithmic_frequency
 from chladni.viewers.figures.panes import pages
@@ -75,7 +75,7 @@ def _last_line(spectra: GapSpectra) -> int:
     return min(round(ABOVE * (max(held, default=most) + 1)), most)
 
 
-def _lines(spectra: GapSpectra, row: int, after: str | None) -> Iterator[tuple[Floats, Paint, float, str]]:
+def _lines(spectra: GapSpectra, row: int, after: str | None) -> Iterator[tuple[Real, Paint, float, str]]:
     yield np.sqrt(spectra.measured[row]), MEASURED, 2.2, "measured"
     yield np.sqrt(spectra.before[row]), BEFORE, 1.4, "error" if after is None else "error before"
     if after is not None:

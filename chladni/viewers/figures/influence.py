@@ -7,12 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
 
 from chladni.models.core.reading import InfluenceTable
+from chladni.signals.arrays import Real
 from chladni.viewers.figures.sheet import look, plain
 
-Matrix = NDArray[np.float64]
 ROW_IN, COLUMN_IN, MARGIN_IN = 0.34, 0.82, 1.5
 # Blue lowers, white does nothing, orange raises; told apart with any colour vision. Stronger than 1 is full colour.
 _COLOURS = LinearSegmentedColormap.from_list("influence", [(0.35, 0.6, 0.85), (1, 1, 1), (0.95, 0.65, 0.35)])
@@ -46,12 +45,12 @@ def influence_figure(table: InfluenceTable, *, of: Literal["log_derivative", "fi
     return figure
 
 
-def _write(axes: Axes, coefficients: Matrix) -> None:
+def _write(axes: Axes, coefficients: Real) -> None:
     for (row, column), value in np.ndenumerate(coefficients):
         axes.text(column, row, _number(value), ha="center", va="center", fontsize=7.5)
 
 
-def _mark(axes: Axes, coefficients: Matrix) -> None:
+def _mark(axes: Axes, coefficients: Real) -> None:
     sizes = np.nan_to_num(np.abs(coefficients))
     for row, column in enumerate(np.argmax(sizes, axis=1)):
         if sizes[row, column] > 0:

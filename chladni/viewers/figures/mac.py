@@ -6,9 +6,9 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.study import Study
-from chladni.viewers.drawing import Floats
 from chladni.viewers.figures.sheet import WIDTH_IN, look, plain
 from chladni.viewers.mode_tables import has_mac, mode_ticks
 
@@ -33,7 +33,7 @@ def mac_figures(study: Study) -> dict[str, Figure]:
 
 
 def cross_mac_figure(
-    mac: Floats, *, rows: Sequence[str], columns: Sequence[str], row_name: str = "", column_name: str = ""
+    mac: Real, *, rows: Sequence[str], columns: Sequence[str], row_name: str = "", column_name: str = ""
 ) -> Figure:
     """Draw the modal assurance criterion between two sets of modes.
 
@@ -74,7 +74,7 @@ def cross_mac_figure(
     return figure
 
 
-def _draw_numbers(axes: Axes, mac: Floats) -> None:
+def _draw_numbers(axes: Axes, mac: Real) -> None:
     columns = mac.shape[1]
     if columns > ANY_NUMBERED:
         return

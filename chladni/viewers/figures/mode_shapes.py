@@ -7,15 +7,16 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.study import Study
-from chladni.viewers.drawing import Floats
 from chladni.viewers.figures.panes import pages, panes
 from chladni.viewers.figures.sheet import look, paint, plain
 from chladni.viewers.mode_tables import mode_title
 from chladni.viewers.style import AMPLITUDES, Style
-from chladni.viewers.wireframe import DRAWN_SHARE, Motion, Wireframe, along, amplitude, furthest
+from chladni.viewers.wireframe import DRAWN_SHARE, Wireframe, along, amplitude, furthest
 
 GHOST, NAMES = "#bbbbbb", "#777777"
 SHAPES_IN_A_FIGURE = 6
@@ -61,7 +62,9 @@ def _wires(modes: ModeSet, wireframe: Wireframe, rows: range) -> Figure:
     return figure
 
 
-def _draw(axes: Axes, wireframe: Wireframe, moved: Floats, motion: Motion, scale: LinearSegmentedColormap) -> None:
+def _draw(
+    axes: Axes, wireframe: Wireframe, moved: Real, motion: NDArray[np.complexfloating], scale: LinearSegmentedColormap
+) -> None:
     share = amplitude(motion)
     share = share / (float(share.max()) or 1.0)
     rest = _projected(wireframe, wireframe.rest)
@@ -90,7 +93,7 @@ def _draw(axes: Axes, wireframe: Wireframe, moved: Floats, motion: Motion, scale
             text.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
 
 
-def _one_scale(stack: list[Axes], wireframe: Wireframe, moved: Floats) -> None:
+def _one_scale(stack: list[Axes], wireframe: Wireframe, moved: Real) -> None:
     """Give every pane the room that the furthest of all shapes takes to both sides, so that all have one scale."""
     everywhere = np.concatenate([wireframe.rest[None], wireframe.rest + moved, wireframe.rest - moved])
     places = _projected(wireframe, everywhere).reshape(-1, 2)
@@ -106,7 +109,7 @@ def _one_scale(stack: list[Axes], wireframe: Wireframe, moved: Floats) -> None:
         _draw_axes(axes, wireframe, low, 1.4 * margin)
 
 
-def _draw_axes(axes: Axes, wireframe: Wireframe, corner: Floats, length: float) -> None:
+def _draw_axes(axes: Axes, wireframe: Wireframe, corner: Real, length: float) -> None:
     """Directions of x, y and z in a corner."""
     origin = _projected(wireframe, np.zeros((1, 3)))[0]
     arms = _projected(wireframe, np.eye(3)) - origin
@@ -120,7 +123,7 @@ def _draw_axes(axes: Axes, wireframe: Wireframe, corner: Floats, length: float) 
             axes.text(x, y, name, fontsize=5.5, color="#888888", ha="center", va="center")
 
 
-def _projected(wireframe: Wireframe, places: Floats) -> Floats:
+def _projected(wireframe: Wireframe, places: Real) -> Real:
     """Places as seen from the wireframe's direction, without perspective: ``[..., across and up]``."""
     towards = wireframe.direction / np.linalg.norm(wireframe.direction)
     across = np.cross([0.0, 0.0, 1.0], towards)

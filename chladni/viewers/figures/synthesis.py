@@ -4,8 +4,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chladni.signals.arrays import Real
 from chladni.signals.study import Study
-from chladni.viewers.drawing import Floats, decibels_of_amplitude, level_limits, line_breaks, with_breaks
+from chladni.viewers.drawing import decibels_of_amplitude, level_limits, line_breaks, with_breaks
 from chladni.viewers.figures.log_axis import logarithmic
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
 from chladni.viewers.labels import printed_unit
@@ -30,7 +31,7 @@ def synthesis_figures(study: Study) -> dict[str, Figure]:
         }
 
 
-def _figure(page: OverlayPage, natural_hz: Floats, style: Style, rest: str) -> Figure:
+def _figure(page: OverlayPage, natural_hz: Real, style: Style, rest: str) -> Figure:
     figure, stack = sheet(
         [HEIGHT_IN if len(page.overlays) > 1 else ALONE_IN] * len(page.overlays), above_points=30.0, sharex=True
     )
@@ -63,5 +64,5 @@ def _draw(axes: Axes, overlay: Overlay, style: Style) -> None:
     axes.set_title(f"{plain(style.labels[overlay.response.name])} · error {overlay.error:.1%}", loc="left", pad=2)
 
 
-def _broken(frequency_hz: Floats, magnitude: Floats) -> tuple[Floats, Floats]:
+def _broken(frequency_hz: Real, magnitude: Real) -> tuple[Real, Real]:
     return with_breaks(frequency_hz, magnitude, line_breaks(frequency_hz))

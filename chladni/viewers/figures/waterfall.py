@@ -5,13 +5,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.study import Study
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.units import power_density_unit
 from chladni.signals.waterfall import Waterfall
-from chladni.viewers.drawing import Floats, block_maximum, decibels_of_power
+from chladni.viewers.drawing import block_maximum, decibels_of_power
 from chladni.viewers.figures.sheet import look, plain, sheet
 from chladni.viewers.groups import Group, groups
 from chladni.viewers.labels import decibel_unit
@@ -55,22 +55,20 @@ def _figure(waterfall: Waterfall, group: Group, style: Style) -> Figure:
     return figure
 
 
-def _level(waterfall: Waterfall, row: int) -> Floats:
+def _level(waterfall: Waterfall, row: int) -> Real:
     shortened, _ = block_maximum(waterfall.values[row], axis=0, limit=PIXELS)
     shortened, _ = block_maximum(shortened, axis=1, limit=PIXELS)
     return decibels_of_power(shortened)
 
 
-def _colour_limits(levels: list[Floats]) -> tuple[float, float]:
+def _colour_limits(levels: list[Real]) -> tuple[float, float]:
     known = np.concatenate([level[np.isfinite(level)] for level in levels])
     if known.size == 0:
         return -DYNAMIC_RANGE_DB, 0.0
     return max(float(known.min()), float(known.max()) - DYNAMIC_RANGE_DB), float(known.max())
 
 
-def _draw(
-    axes: Axes, waterfall: Waterfall, level: NDArray[np.float64], limits: tuple[float, float], style: Style
-) -> AxesImage:
+def _draw(axes: Axes, waterfall: Waterfall, level: Real, limits: tuple[float, float], style: Style) -> AxesImage:
     # Grey is in no part of the scale: what is missing can't be taken for a low level.
     colours = mpl.colormaps["viridis"].with_extremes(bad=MISSING)
     start_s = (waterfall.start_time_ns - style.origin_ns) / NS_PER_S
@@ -91,5 +89,5 @@ def _draw(
     )
 
 
-def _step(axis: NDArray[np.float64]) -> float:
+def _step(axis: Real) -> float:
     return float(axis[1] - axis[0]) if axis.size > 1 else 1.0

@@ -4,9 +4,9 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from chladni.signals.arrays import Real
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.study import Study
-from chladni.viewers.drawing import Floats
 from chladni.viewers.mode_tables import mode_title
 from chladni.viewers.rerun.blueprint import ShapeViews
 from chladni.viewers.rerun.canvas import BEHIND, BELOW, LETTERS, Canvas, draw_labels
@@ -29,7 +29,7 @@ def draw_bars(recording: rr.RecordingStream, study: Study, modes: ModeSet, style
     return [_draw_mode(recording, canvas, movement, modes, row) for row in range(modes.frequency_hz.size)]
 
 
-def _rows(count: int) -> Floats:
+def _rows(count: int) -> Real:
     # The first channel on top.
     return np.asarray(count - 0.5 - np.arange(count))
 
@@ -77,6 +77,6 @@ def _view(name: str, *contents: str, left: float) -> rrb.View:
     )
 
 
-def _strips(frames: Floats) -> rr.ComponentColumnList:
+def _strips(frames: Real) -> rr.ComponentColumnList:
     rows, count = frames.shape[:2]
     return rr.LineStrips2D.columns(strips=np.asarray(frames.reshape(-1, 2, 2))).partition([count] * rows)

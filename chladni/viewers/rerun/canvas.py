@@ -7,8 +7,9 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from chladni.signals.arrays import Real
 from chladni.signals.visible import visible
-from chladni.viewers.drawing import Floats, ticks
+from chladni.viewers.drawing import ticks
 
 GRID_COLOUR = (50, 50, 50)
 AXIS_COLOUR = (110, 110, 110)
@@ -38,7 +39,7 @@ class Canvas:
     x_range: tuple[float, float]
     y_range: tuple[float, float]
 
-    def places(self, x: Floats | Sequence[float], y: Floats | Sequence[float]) -> Floats:
+    def places(self, x: Real | Sequence[float], y: Real | Sequence[float]) -> Real:
         """Give ``[point, 2]`` in units; the viewer's own y axis points down."""
         across = (np.asarray(x, dtype=np.float64) - self.x_range[0]) / (self.x_range[1] - self.x_range[0])
         up = (np.asarray(y, dtype=np.float64) - self.y_range[0]) / (self.y_range[1] - self.y_range[0])
@@ -76,7 +77,7 @@ class Canvas:
 def draw_labels(
     recording: rr.RecordingStream,
     path: str,
-    places: Floats,
+    places: Real,
     texts: Sequence[str],
     *,
     colours: Sequence[tuple[int, int, int]] | None = None,

@@ -9,14 +9,15 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Bytes, Real
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.study import Study
-from chladni.viewers.drawing import Floats, decibels_of_amplitude
+from chladni.viewers.drawing import decibels_of_amplitude
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.rerun.structure import draw_rest, shape_view
 from chladni.viewers.rerun.timelines import frequency_index, send_columns
 from chladni.viewers.style import Style, amplitude_colours
-from chladni.viewers.wireframe import DRAWN_SHARE, Motion, Wireframe, amplitude, furthest
+from chladni.viewers.wireframe import DRAWN_SHARE, Wireframe, amplitude, furthest
 
 # Colours run over this many decibels below the greatest amplitude of any point at any frequency.
 COLOUR_RANGE_DB = 60.0
@@ -26,9 +27,9 @@ COLOUR_RANGE_DB = 60.0
 class _Shape:
     """Complex motion of each point of the wireframe, ``motion[frequency, point, axis]``."""
 
-    frequency_hz: Floats
+    frequency_hz: Real
     wireframe: Wireframe
-    motion: Motion
+    motion: NDArray[np.complexfloating]
 
 
 def draw_deflections(
@@ -103,7 +104,7 @@ def _return_to_rest(recording: rr.RecordingStream, parent: str, shape: _Shape) -
     recording.reset_time()
 
 
-def _colours(shape: _Shape) -> NDArray[np.uint8]:
+def _colours(shape: _Shape) -> Bytes:
     """[frequency, point, rgb] from the amplitude in decibels below the greatest of all."""
     far = amplitude(shape.motion)
     greatest = far.max() or 1.0

@@ -6,7 +6,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from chladni.viewers.drawing import Floats, decibels_of_amplitude, level_limits, line_breaks, phase_wraps, with_breaks
+from chladni.signals.arrays import Real
+from chladni.viewers.drawing import decibels_of_amplitude, level_limits, line_breaks, phase_wraps, with_breaks
 from chladni.viewers.labels import decibel_unit
 from chladni.viewers.panels import Panel
 from chladni.viewers.rerun.entities import channel_entity, folder
@@ -73,7 +74,7 @@ def panel_folder(panel: Panel, kind: str) -> str:
     return folder(kind, f"reference {panel.reference + 1}", panel.group.name)
 
 
-def _broken(panel: Panel, values: Floats) -> tuple[Floats, Floats]:
+def _broken(panel: Panel, values: Real) -> tuple[Real, Real]:
     frequency_hz = panel.frequency_hz()
     return with_breaks(frequency_hz, values, line_breaks(frequency_hz))
 

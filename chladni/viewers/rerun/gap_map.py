@@ -5,7 +5,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from chladni.gap.records.diagnosis import GapSignals
-from chladni.viewers.drawing import Floats, block_maximum, decibels_of_power
+from chladni.signals.arrays import Real
+from chladni.viewers.drawing import block_maximum, decibels_of_power
 from chladni.viewers.gap_band import band_told, shown_hz
 from chladni.viewers.rerun.entities import folder
 
@@ -31,14 +32,14 @@ def draw_gap_maps(recording: rr.RecordingStream, signals: GapSignals | None) -> 
     return [_draw(recording, what, level, high, names, told) for what, level in levels.items()]
 
 
-def _level(density: Floats) -> Floats:
+def _level(density: Real) -> Real:
     for axis in (0, 1):
         density, _ = block_maximum(density, axis=axis, limit=PIXELS)
     return decibels_of_power(density)
 
 
 def _draw(
-    recording: rr.RecordingStream, what: str, level: Floats, high: float, names: tuple[str, str], told: str
+    recording: rr.RecordingStream, what: str, level: Real, high: float, names: tuple[str, str], told: str
 ) -> rrb.View:
     path, low = folder("gap map", what), high - DYNAMIC_RANGE_DB
     # Tensors have no colour for what isn't known; the lowest marks it.
@@ -57,5 +58,5 @@ def _draw(
     )
 
 
-def _span(axis: Floats) -> str:
+def _span(axis: Real) -> str:
     return f"{axis[0]:.4g}–{axis[-1]:.4g}" if axis.size else "none"

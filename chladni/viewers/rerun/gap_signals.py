@@ -5,9 +5,10 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from chladni.gap.records.diagnosis import GapSignals
+from chladni.signals.arrays import Real
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.visible import visible
-from chladni.viewers.drawing import Floats, thin
+from chladni.viewers.drawing import thin
 from chladni.viewers.gap_evidence import AFTER_ON_DARK, BEFORE_ON_DARK, MEASURED_ON_DARK
 from chladni.viewers.labels import printed_unit, thinned
 from chladni.viewers.rerun.entities import folder
@@ -64,7 +65,7 @@ def _line(
     recording: rr.RecordingStream,
     signals: GapSignals,
     path: str,
-    values: Floats,
+    values: Real,
     name: str,
     colour: Colour,
     width: float,

@@ -3,10 +3,9 @@
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Bytes, Real
 from chladni.signals.visible import visible
-from chladni.viewers.drawing import Floats
 from chladni.viewers.engineering import percent
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.structure_sketch import StructureSketch
@@ -49,11 +48,11 @@ def draw_structure(recording: rr.RecordingStream, sketch: StructureSketch) -> rr
     )
 
 
-def _labels(names: tuple[str, ...], share: Floats) -> list[str]:
+def _labels(names: tuple[str, ...], share: Real) -> list[str]:
     shown = zip(map(visible, names), share, strict=True)
     return [name if np.isnan(one) else f"{name} {percent(float(one))}" for name, one in shown]
 
 
-def _colours(share: Floats) -> NDArray[np.uint8]:
+def _colours(share: Real) -> Bytes:
     asked = ~np.isnan(share)[:, None]
     return np.where(asked, amplitude_colours(share), np.array(NOT_ASKED)).astype(np.uint8)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
-from chladni.viewers.drawing import Floats
+from chladni.signals.arrays import Real
 from chladni.viewers.rerun.timelines import frequency_index, send_scalars
 from chladni.viewers.style import Colour
 
@@ -16,7 +16,7 @@ BANDS_SHOWN_OF = 4
 
 
 def draw_line(
-    recording: rr.RecordingStream, path: str, frequency_hz: Floats, values: Floats, *, name: str, colour: Colour
+    recording: rr.RecordingStream, path: str, frequency_hz: Real, values: Real, *, name: str, colour: Colour
 ) -> None:
     """Write one line, ``[frequency]``; NaN breaks it."""
     # "Max", for the average that is the default would shave off every peak when zoomed out.
@@ -28,8 +28,8 @@ def draw_line(
 def draw_band(
     recording: rr.RecordingStream,
     path: str,
-    frequency_hz: Floats,
-    bounds: Sequence[Floats],
+    frequency_hz: Real,
+    bounds: Sequence[Real],
     *,
     colour: Colour,
     lines_in_view: int,

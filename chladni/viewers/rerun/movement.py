@@ -13,16 +13,15 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.study import Study
-from chladni.viewers.drawing import Floats
 from chladni.viewers.rerun.timelines import FREQUENCY, PERIOD_S, motion_index, phase_index, send_columns
-from chladni.viewers.wireframe import Motion
 
 STEP_DEG = 6
 # Twelve bytes each: a few megabytes of movement in a file.
 VERTICES_OF_A_STUDY = 400_000
 
-Columns = Callable[[Floats], rr.ComponentColumnList]
+Columns = Callable[[Real], rr.ComponentColumnList]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +36,7 @@ class Movement:
         How often the motion runs on `time`, at least once.
     """
 
-    phase_deg: NDArray[np.int64]
+    phase_deg: Whole
     periods: int
 
     @classmethod
@@ -48,12 +47,12 @@ class Movement:
         affordable = VERTICES_OF_A_STUDY // max(phase_deg.size * vertices, 1)
         return cls(phase_deg=phase_deg, periods=max(1, min(ceil(end_s / PERIOD_S), affordable)))
 
-    def frames(self, motion: Motion) -> Floats:
+    def frames(self, motion: NDArray[np.complexfloating]) -> Real:
         """Give Re(motion e^{j phase}), ``[frame, ...]``: a wave that travels in the shape travels on the screen."""
         turn = np.exp(1j * np.deg2rad(self.phase_deg))
         return np.asarray(np.multiply.outer(turn.real, motion.real) - np.multiply.outer(turn.imag, motion.imag))
 
-    def send(self, recording: rr.RecordingStream, path: str, frames: Floats, columns: Columns) -> None:
+    def send(self, recording: rr.RecordingStream, path: str, frames: Real, columns: Columns) -> None:
         """Write ``[frame, ...]`` on all timelines; `columns` makes rerun's columns of frames, one row a frame."""
         send_columns(recording, path, phase_index(self.phase_deg), columns(frames))
         # The last frame is the first of the next period; it is kept once, at the end.

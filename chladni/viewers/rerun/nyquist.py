@@ -4,7 +4,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from chladni.viewers.drawing import Floats, line_breaks, ticks
+from chladni.signals.arrays import Real
+from chladni.viewers.drawing import line_breaks, ticks
 from chladni.viewers.panels import Panel
 from chladni.viewers.rerun.entities import channel_entity
 from chladni.viewers.rerun.frequency_response import panel_folder
@@ -32,13 +33,13 @@ def draw_nyquist(recording: rr.RecordingStream, panel: Panel, style: Style) -> r
     )
 
 
-def _plane(panel: Panel, row: int) -> Floats:
+def _plane(panel: Panel, row: int) -> Real:
     """Points of a function as the viewer wants them: its y axis points down, so that Im is turned over."""
     value = panel.function(row)
     return np.column_stack([value.real, -value.imag]).astype(np.float64)
 
 
-def _square(points: Floats) -> tuple[Floats, Floats]:
+def _square(points: Real) -> tuple[Real, Real]:
     """Corners of a square around the origin and all points, so that circles of resonances look like circles."""
     # With the origin, from which gain and phase are read.
     finite = np.vstack([points[np.isfinite(points).all(axis=1)], [[0.0, 0.0]]])
@@ -48,7 +49,7 @@ def _square(points: Floats) -> tuple[Floats, Floats]:
 
 
 def _draw_curve(
-    recording: rr.RecordingStream, panel: Panel, row: int, points: Floats, parent: str, style: Style
+    recording: rr.RecordingStream, panel: Panel, row: int, points: Real, parent: str, style: Style
 ) -> None:
     channel = panel.response.responses[row]
     path, colour = channel_entity(parent, channel), style.on_dark(channel)
@@ -65,7 +66,7 @@ def _draw_curve(
     send_columns(recording, f"{path}/cursor", frequency_index(frequency_hz), rr.Points2D.columns(positions=points))
 
 
-def _draw_axes(recording: rr.RecordingStream, path: str, low: Floats, high: Floats) -> None:
+def _draw_axes(recording: rr.RecordingStream, path: str, low: Real, high: Real) -> None:
     real, imaginary = ticks(low[0], high[0]), ticks(-high[1], -low[1])
     grid = [[(x, low[1]), (x, high[1])] for x in real] + [[(low[0], -y), (high[0], -y)] for y in imaginary]
     axes = [[(low[0], 0.0), (high[0], 0.0)], [(0.0, low[1]), (0.0, high[1])]]

@@ -3,12 +3,12 @@
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from numpy.typing import NDArray
 
 from chladni.gap.records.diagnosis import RestoringForce
+from chladni.signals.arrays import Bytes, Real
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.visible import visible
-from chladni.viewers.drawing import Floats, thin
+from chladni.viewers.drawing import thin
 from chladni.viewers.engineering import axis_scale, engineering
 from chladni.viewers.gap_evidence import AFTER_ON_DARK, MEASURED_ON_DARK
 from chladni.viewers.labels import printed_unit
@@ -67,13 +67,11 @@ def _beyond(missing: int, dots: int) -> str:
     return f" · {missing} of {dots} dots lie beyond the axis" if missing else ""
 
 
-def _dots(
-    recording: rr.RecordingStream, path: str, places: Floats, colours: NDArray[np.uint8], *, points: float
-) -> None:
+def _dots(recording: rr.RecordingStream, path: str, places: Real, colours: Bytes, *, points: float) -> None:
     recording.log(path, rr.Points2D(places, colors=colours, radii=rr.Radius.ui_points(points)), static=True)
 
 
-def _padded(x: Floats) -> tuple[float, float]:
+def _padded(x: Real) -> tuple[float, float]:
     # Dots on the frame would be cut in half.
     low, high = float(x.min()), float(x.max())
     room = MARGIN * (high - low) or 1.0
@@ -101,9 +99,7 @@ def draw_force_over_time(recording: rr.RecordingStream, surface: RestoringForce,
     )
 
 
-def _line(
-    recording: rr.RecordingStream, path: str, time_s: Floats, values: Floats, name: str, colour: Colour
-) -> None:
+def _line(recording: rr.RecordingStream, path: str, time_s: Real, values: Real, name: str, colour: Colour) -> None:
     # The default averages neighbours when zoomed out, which makes a vibration look like silence.
     look = rr.SeriesLines(names=name, colors=[colour], widths=1.2, aggregation_policy="MinMax")
     recording.log(path, look, static=True)

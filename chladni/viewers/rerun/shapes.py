@@ -4,18 +4,19 @@ from functools import partial
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.study import Study
 from chladni.signals.wording import counted
-from chladni.viewers.drawing import Floats
 from chladni.viewers.mode_tables import mode_title
 from chladni.viewers.rerun.bars import draw_bars
 from chladni.viewers.rerun.blueprint import ShapeViews
 from chladni.viewers.rerun.movement import Movement
 from chladni.viewers.rerun.structure import draw_rest, shape_view
 from chladni.viewers.style import Style, amplitude_colours
-from chladni.viewers.wireframe import DRAWN_SHARE, Motion, Wireframe, along, amplitude
+from chladni.viewers.wireframe import DRAWN_SHARE, Wireframe, along, amplitude
 
 PATH = "/shapes"
 # The large view is upright, the small one lies; what moves must stay inside.
@@ -46,7 +47,7 @@ def _draw_mode(
     pieces: int,
     left_out: int,
     row: int,
-    motion: Motion,
+    motion: NDArray[np.complexfloating],
     title: str,
 ) -> ShapeViews:
     parent, size = f"{PATH}/mode_{row + 1}", wireframe.size
@@ -76,11 +77,11 @@ def _draw_mode(
     )
 
 
-def _points(frames: Floats) -> rr.ComponentColumnList:
+def _points(frames: Real) -> rr.ComponentColumnList:
     rows, count = frames.shape[:2]
     return rr.Points3D.columns(positions=frames.reshape(-1, 3)).partition([count] * rows)
 
 
-def _strips(frames: Floats) -> rr.ComponentColumnList:
+def _strips(frames: Real) -> rr.ComponentColumnList:
     rows, count = frames.shape[:2]
     return rr.LineStrips3D.columns(strips=np.asarray(frames.reshape(-1, 2, 3))).partition([count] * rows)

@@ -7,10 +7,11 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.study import Study
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.waterfall import Waterfall
-from chladni.viewers.drawing import Floats, block_maximum
+from chladni.viewers.drawing import block_maximum
 from chladni.viewers.labels import amplitude_density_unit, reduction
 from chladni.viewers.rerun.entities import channel_entity, folder
 from chladni.viewers.rerun.tensors import TensorColumn
@@ -58,7 +59,7 @@ def _draw_channel(
 
 
 def _log_look(
-    recording: rr.RecordingStream, path: str, abscissa: Floats, widths: NDArray[np.float32], colour: Colour
+    recording: rr.RecordingStream, path: str, abscissa: Real, widths: NDArray[np.float32], colour: Colour
 ) -> None:
     """Write what all slices share, once."""
     # By components: the archetype insists on values, which differ from slice to slice.
@@ -71,7 +72,7 @@ def _log_look(
     recording.log(path, look, static=True)
 
 
-def _log_bars(recording: rr.RecordingStream, path: str, starts_ns: NDArray[np.int64], bars: NDArray[Any]) -> None:
+def _log_bars(recording: rr.RecordingStream, path: str, starts_ns: Whole, bars: NDArray[Any]) -> None:
     """Write the bars of each slice; a slice with missing samples is an empty list, and the chart is empty then."""
     # Zeros instead would say that nothing vibrated.
     known = ~np.isnan(bars).any(axis=1)
@@ -80,13 +81,13 @@ def _log_bars(recording: rr.RecordingStream, path: str, starts_ns: NDArray[np.in
     send_columns(recording, path, time_index(starts_ns), rr.ComponentColumnList([column]))
 
 
-def _held_by_bars(bars: NDArray[np.floating[Any]]) -> bool:
+def _held_by_bars(bars: NDArray[np.floating]) -> bool:
     single = np.finfo(np.float32)
     largest = np.fmax.reduce(bars, axis=None, initial=0.0)
     return bool(largest == 0 or single.tiny <= largest <= single.max)
 
 
-def _starts_ns(waterfall: Waterfall, style: Style) -> NDArray[np.int64]:
+def _starts_ns(waterfall: Waterfall, style: Style) -> Whole:
     """Times from which each slice is the nearest to the cursor; the viewer shows the latest before it."""
     hop_s = _step(waterfall.time_s)
     since_origin_ns = waterfall.start_time_ns - style.origin_ns
@@ -95,5 +96,5 @@ def _starts_ns(waterfall: Waterfall, style: Style) -> NDArray[np.int64]:
     return np.asarray(np.rint(starts_s * NS_PER_S).astype(np.int64) + since_origin_ns)
 
 
-def _step(axis: NDArray[np.float64]) -> float:
+def _step(axis: Real) -> float:
     return float(axis[1] - axis[0]) if axis.size > 1 else 1.0

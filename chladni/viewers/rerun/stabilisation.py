@@ -6,9 +6,10 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from chladni.signals.arrays import Real
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
-from chladni.viewers.drawing import Floats, decibels_of_amplitude, level_limits, ticks
+from chladni.viewers.drawing import decibels_of_amplitude, level_limits, ticks
 from chladni.viewers.labels import decibel_unit
 from chladni.viewers.mode_tables import hertz
 from chladni.viewers.rerun.canvas import BEHIND, BELOW, LETTERS, Canvas, draw_labels
@@ -130,7 +131,7 @@ def _draw_poles(
         recording.log(f"{PATH}/taken/{name.replace(' ', '_')}", circles, static=True)
 
 
-def _ring(place: Floats) -> Floats:
+def _ring(place: Real) -> Real:
     angle = np.linspace(0, 2 * np.pi, 13)
     return np.asarray(place + 4.2 * np.column_stack([np.cos(angle), np.sin(angle)]))
 

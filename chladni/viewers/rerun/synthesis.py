@@ -4,9 +4,10 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from chladni.signals.arrays import Real
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.study import Study
-from chladni.viewers.drawing import Floats, decibels_of_amplitude, level_limits, line_breaks, with_breaks
+from chladni.viewers.drawing import decibels_of_amplitude, level_limits, line_breaks, with_breaks
 from chladni.viewers.labels import decibel_unit, printed_unit
 from chladni.viewers.overlays import Overlay, OverlayPage, left_out, overlay_pages
 from chladni.viewers.rerun.entities import channel_entity, folder
@@ -64,5 +65,5 @@ def _bright(colour: Colour) -> Colour:
     return red, green, blue
 
 
-def _broken(frequency_hz: Floats, level: Floats) -> tuple[Floats, Floats]:
+def _broken(frequency_hz: Real, level: Real) -> tuple[Real, Real]:
     return with_breaks(frequency_hz, level, line_breaks(frequency_hz))

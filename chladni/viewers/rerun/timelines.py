@@ -6,7 +6,8 @@ alone they would stay empty until the reader switches to it; ``docs/decisions/00
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
+
+from chladni.signals.arrays import Real, Whole
 
 TIME = "time"
 FREQUENCY = "frequency"
@@ -19,24 +20,24 @@ NS_PER_HZ = 1_000_000
 ROWS_IN_A_BATCH = 16384
 
 
-def time_index(offsets_ns: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
+def time_index(offsets_ns: Whole) -> dict[str, Whole]:
     """Give the index of rows at `offsets_ns` after second 0 of the study."""
     return {TIME: offsets_ns}
 
 
-def frequency_index(frequency_hz: NDArray[np.float64]) -> dict[str, NDArray[np.int64]]:
+def frequency_index(frequency_hz: Real) -> dict[str, Whole]:
     """Give the index of rows at frequencies: 1 Hz is 1 ms on both timelines."""
     # Whole nanoseconds: a millionth of a hertz, finer than any line spacing.
     ticks = np.rint(frequency_hz * NS_PER_HZ).astype(np.int64)
     return {FREQUENCY: ticks, TIME: ticks}
 
 
-def phase_index(phase_deg: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
+def phase_index(phase_deg: Whole) -> dict[str, Whole]:
     """Give the index of rows at phases of a motion, 0 to 360 degrees."""
     return {PHASE: phase_deg}
 
 
-def motion_index(period: NDArray[np.int64], phase_deg: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
+def motion_index(period: Whole, phase_deg: Whole) -> dict[str, Whole]:
     """Give the index of rows of a motion that is repeated from second 0 on, in the period and at the phase given."""
     ns_per_degree = PERIOD_S * 1e9 / 360
     return {TIME: np.rint((360 * period + phase_deg) * ns_per_degree).astype(np.int64)}
@@ -45,16 +46,14 @@ def motion_index(period: NDArray[np.int64], phase_deg: NDArray[np.int64]) -> dic
 def send_columns(
     recording: rr.RecordingStream,
     path: str,
-    index: dict[str, NDArray[np.int64]],
+    index: dict[str, Whole],
     columns: rr.ComponentColumnList,
 ) -> None:
     """Write rows of any archetype at once."""
     recording.send_columns(path, _time_columns(index, slice(None)), columns)
 
 
-def send_scalars(
-    recording: rr.RecordingStream, path: str, index: dict[str, NDArray[np.int64]], values: NDArray[np.float64]
-) -> None:
+def send_scalars(recording: rr.RecordingStream, path: str, index: dict[str, Whole], values: Real) -> None:
     """Write rows of scalars, ``[row]`` or ``[row, line]``, in batches."""
     for start in range(0, values.shape[0], ROWS_IN_A_BATCH):
         rows = slice(start, start + ROWS_IN_A_BATCH)
@@ -78,11 +77,11 @@ def frequency_axis(low_hz: float, high_hz: float) -> rr.blueprint.TimeAxis:
     return time_axis(round(high_hz * NS_PER_HZ), start_ns=round(low_hz * NS_PER_HZ))
 
 
-def _time_columns(index: dict[str, NDArray[np.int64]], rows: slice) -> list[rr.TimeColumn]:
+def _time_columns(index: dict[str, Whole], rows: slice) -> list[rr.TimeColumn]:
     return [_time_column(name, places[rows]) for name, places in index.items()]
 
 
-def _time_column(name: str, places: NDArray[np.int64]) -> rr.TimeColumn:
+def _time_column(name: str, places: Whole) -> rr.TimeColumn:
     if name == PHASE:
         return rr.TimeColumn(name, sequence=places)
     # As timedelta64, which is taken as it is; numbers would go through floating point seconds.

@@ -5,6 +5,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.study import Study
 from chladni.signals.units import power_density_unit
 from chladni.signals.waterfall import Waterfall
@@ -57,7 +58,7 @@ def _draw_channel(
     )
 
 
-def _span(axis: NDArray[np.float64]) -> str:
+def _span(axis: Real) -> str:
     return f"{axis[0]:g}–{axis[-1]:g}" if axis.size else "none"
 
 

@@ -4,21 +4,19 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 import chladni
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.records.measurement import Measurement
+from chladni.signals.arrays import Index, Real
 
 RATE_HZ = 500.0
 # Modes in cycles a sample, with their damping ratios.
 MODES = ((0.021, 0.01), (0.054, 0.008), (0.093, 0.015))
 
-Matrix = NDArray[np.float64]
 
-
-def measurement(inputs: Matrix, outputs: Matrix, *, rate_hz: float = RATE_HZ, log: str = "made.mcap") -> Measurement:
+def measurement(inputs: Real, outputs: Real, *, rate_hz: float = RATE_HZ, log: str = "made.mcap") -> Measurement:
     return Measurement(
         log=log,
         sample_rate_hz=rate_hz,
@@ -30,7 +28,7 @@ def measurement(inputs: Matrix, outputs: Matrix, *, rate_hz: float = RATE_HZ, lo
     )
 
 
-def machine(force: Matrix, weights: Matrix) -> Matrix:
+def machine(force: Real, weights: Real) -> Real:
     """Outputs ``[output, sample]`` of three modes that a force excites, from rest; `weights` is [output, mode]."""
     modal = []
     for cycles, zeta in MODES:
@@ -40,13 +38,13 @@ def machine(force: Matrix, weights: Matrix) -> Matrix:
     return np.asarray(weights @ np.array(modal))
 
 
-def weights(outputs: int, seed: int) -> Matrix:
+def weights(outputs: int, seed: int) -> Real:
     return np.asarray(np.random.default_rng([seed, 7]).uniform(0.3, 1.0, (outputs, len(MODES)))) * np.sign(
         np.random.default_rng([seed, 8]).standard_normal((outputs, len(MODES)))
     )
 
 
-def coloured(rng: np.random.Generator, shape: tuple[int, int], colour: str) -> Matrix:
+def coloured(rng: np.random.Generator, shape: tuple[int, int], colour: str) -> Real:
     """Noise of unit RMS: white, pink down to a thousandth of a cycle, or resonant."""
     white = rng.standard_normal(shape)
     if colour == "white":
@@ -60,7 +58,7 @@ def coloured(rng: np.random.Generator, shape: tuple[int, int], colour: str) -> M
     return np.asarray(noise / noise.std(axis=1, keepdims=True))
 
 
-def multisine(rng: np.random.Generator, period: int, lines: NDArray[np.intp]) -> Matrix:
+def multisine(rng: np.random.Generator, period: int, lines: Index) -> Real:
     """One period of random phases and unit RMS."""
     spectrum = np.zeros(period // 2 + 1, dtype=complex)
     spectrum[lines] = np.exp(2j * np.pi * rng.random(lines.size))

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import chladni
 from chladni.gap.diagnosis.evidence import evidence
 from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.records.diagnosis import Cause
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 from tests import made_diagnosis as made
@@ -27,7 +27,7 @@ def studied(*effects: AttachedEffect, off: dict[str, float], outputs: Sequence[s
     return study_of(arm(), with_outputs(log, outputs) if outputs else log, leave_out=frozenset(), own={})
 
 
-def believing(study: Study, *, wide: Sequence[str] = (), z: NDArray[np.float64] | None = None) -> SimpleNamespace:
+def believing(study: Study, *, wide: Sequence[str] = (), z: Real | None = None) -> SimpleNamespace:
     """What the contest would say: that parameters are nominal but for `z`, of which those of `wide` are wrong."""
     z = np.zeros(len(study.contest.run.tunables.names)) if z is None else z
     best = SimpleNamespace(fit=SimpleNamespace(z=z), hypothesis=SimpleNamespace(wide=dict.fromkeys(wide, 7.0)))
@@ -38,13 +38,13 @@ def named(*effects: AttachedEffect) -> list[Cause]:
     return [made.friction(effect=one.effect, site=one.site) for one in effects]
 
 
-def true_force(study: Study, site: str, *effects: AttachedEffect) -> NDArray[np.float64]:
+def true_force(study: Study, site: str, *effects: AttachedEffect) -> Real:
     channel = Channel(name="shaker", unit="N", role="reference")
     driven = TimeSeries(values=study.measurement.inputs, sample_rate_hz=RATE_HZ, channels=(channel,))
     return chladni.simulate(arm().with_effects(effects), driven).motion(site).force
 
 
-def missed(found: NDArray[np.float64], true: NDArray[np.float64]) -> float:
+def missed(found: Real, true: Real) -> float:
     """RMS of the difference over that of the truth, between the record's ends, which ring."""
     inside = slice(300, -300)
     difference = (found - found.mean() - true + true.mean())[inside]

@@ -7,18 +7,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.io.decoding import Decoded, Decoder, make_decoder
+from chladni.signals.arrays import Bytes, Whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Encoded:
     """The least that a decoder takes."""
 
-    buffer: NDArray[np.uint8]
-    offsets: NDArray[np.int64]
-    lengths: NDArray[np.int64]
+    buffer: Bytes
+    offsets: Whole
+    lengths: Whole
 
 
 def batch_of(messages: Sequence[bytes], *, gaps: Sequence[int] = (5,)) -> Encoded:

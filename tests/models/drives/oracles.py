@@ -2,10 +2,10 @@
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.state_space import StateSpace
+from chladni.signals.arrays import Complex
 
 S = control.tf("s")
 FREQUENCY_HZ = np.geomspace(1e-3, 1e4, 141)
@@ -29,12 +29,12 @@ def piston(values: dict[str, float], capacity: float) -> dict[tuple[str, str], c
     return found
 
 
-def response(transfer: control.TransferFunction) -> NDArray[np.complex128]:
+def response(transfer: control.TransferFunction) -> Complex:
     return np.asarray(transfer(2j * np.pi * FREQUENCY_HZ))
 
 
 def assert_same_response(
-    system: StateSpace | CompiledModel, output: str, entry: str, expected: NDArray[np.complex128], rtol: float = 1e-9
+    system: StateSpace | CompiledModel, output: str, entry: str, expected: Complex, rtol: float = 1e-9
 ) -> None:
     """Relative at every frequency, but for the rounding of terms that cancel: some epsilon of the largest."""
     names = [terminal.name for terminal in system.outputs], [terminal.name for terminal in system.inputs]

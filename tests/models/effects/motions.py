@@ -3,14 +3,12 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port_law import PortLaw
 from chladni.models.effects.attached_effect import AttachedEffect
-
-Array = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 def law_of(effect: AttachedEffect, compiled: CompiledModel) -> PortLaw:
@@ -23,11 +21,11 @@ def force(law: PortLaw, d: float = 0.0, s: float = 0.0, t: float = 0.0) -> float
     return law.function(d, s, t, law.parameters, (), [])
 
 
-def driven(law: PortLaw, d: Callable[[Array], Array], s: Callable[[Array], Array], times_s: Array) -> Array:
+def driven(law: PortLaw, d: Callable[[Real], Real], s: Callable[[Real], Real], times_s: Real) -> Real:
     """Force along a prescribed motion; the law's states by SciPy's Radau."""
     states = np.zeros((0, times_s.size))
 
-    def rates(t: float, state: Array) -> list[float]:
+    def rates(t: float, state: Real) -> list[float]:
         found = [0.0] * len(law.state)
         law.function(float(d(np.float64(t))), float(s(np.float64(t))), t, law.parameters, list(state), found)
         return found
@@ -46,7 +44,7 @@ def driven(law: PortLaw, d: Callable[[Array], Array], s: Callable[[Array], Array
     )
 
 
-def loop(law: PortLaw, amplitude: float, omega: float, samples: int = 4001) -> tuple[Array, Array]:
+def loop(law: PortLaw, amplitude: float, omega: float, samples: int = 4001) -> tuple[Real, Real]:
     """Displacement and force over the second cycle of ``d = amplitude sin(omega t)``."""
     period = 2 * np.pi / omega
     times_s = np.linspace(0, 2 * period, 2 * samples - 1)
@@ -56,6 +54,6 @@ def loop(law: PortLaw, amplitude: float, omega: float, samples: int = 4001) -> t
     return amplitude * np.sin(omega * times_s[samples - 1 :]), found[samples - 1 :]
 
 
-def energy(d: Array, f: Array) -> float:
+def energy(d: Real, f: Real) -> float:
     """What a closed loop takes."""
     return float(np.trapezoid(f, d))

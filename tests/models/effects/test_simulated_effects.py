@@ -7,25 +7,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.signal import lsim
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.effects.attached_effect import AttachedEffect, attached
 from chladni.models.integrator.integrator import integrate
+from chladni.signals.arrays import Real
 from tests.models.effects.own_effect import CUBIC_DAMPING
 from tests.models.effects.small_models import one_body, with_loop
 from tests.models.structures.made_models import tree
 
-Array = NDArray[np.float64]
-Shape = Callable[[Array], Array]
+Shape = Callable[[Real], Real]
 RATE_HZ = 1000.0
 COUNT = 300
 TIMES_S = np.arange(COUNT) / RATE_HZ
 
 
-def _push(seed: int = 0, size: float = 40.0) -> Array:
+def _push(seed: int = 0, size: float = 40.0) -> Real:
     """A force (or a reference) without energy near the Nyquist frequency, starting from zero."""
     rng = np.random.default_rng(seed)
     tones = [
@@ -35,7 +34,7 @@ def _push(seed: int = 0, size: float = 40.0) -> Array:
     return size / 3 * np.sum(tones, axis=0)
 
 
-def _linear(compiled: CompiledModel, signal: Array) -> Array:
+def _linear(compiled: CompiledModel, signal: Real) -> Real:
     """Outputs of the linear equations by SciPy, for an input that joins its samples by straight lines."""
     _, found, _ = lsim((compiled.a, compiled.b, compiled.c, compiled.d), signal, TIMES_S)
     return found.T
@@ -44,7 +43,7 @@ def _linear(compiled: CompiledModel, signal: Array) -> Array:
 class _Oracle:
     """A compiled model with one input and laws, written for SciPy: laws as Python, port after port."""
 
-    def __init__(self, compiled: CompiledModel, signal: Array) -> None:
+    def __init__(self, compiled: CompiledModel, signal: Real) -> None:
         self._model, self._signal = compiled, signal
         self._rise = np.append(np.diff(signal), 0.0)
         self._n = len(compiled.states)
@@ -57,7 +56,7 @@ class _Oracle:
         place = min(int(t * RATE_HZ + 1e-9), COUNT - 1)
         return float(self._signal[place] + self._rise[place] * (t * RATE_HZ - place))
 
-    def forces(self, t: float, x: Array, rates: Array) -> Array:
+    def forces(self, t: float, x: Real, rates: Real) -> Real:
         """Forces at all ports; each port's motion needs forces of ports before it only."""
         model, z, u = self._model, x[: self._n], self.input(t)
         f = np.zeros(len(model.ports))
@@ -72,7 +71,7 @@ class _Oracle:
                     rates[start:stop] = found
         return f
 
-    def rates(self, t: float, x: Array) -> Array:
+    def rates(self, t: float, x: Real) -> Real:
         """Rates of all states."""
         rates = np.zeros_like(x)
         f = self.forces(t, x, rates)
@@ -80,7 +79,7 @@ class _Oracle:
         rates[: self._n] = model.a @ x[: self._n] + model.b[:, 0] * self.input(t) + model.g @ f
         return rates
 
-    def outputs(self) -> Array:
+    def outputs(self) -> Real:
         """``[output, sample]``."""
         model = self._model
         start = np.concatenate([np.zeros(self._n), *(law.state for law in model.laws)])
@@ -92,7 +91,7 @@ class _Oracle:
         return (x[:, : self._n] @ model.c.T + np.outer(self._signal, model.d[:, 0]) + f @ model.h.T).T
 
 
-def _by_scipy(compiled: CompiledModel, signal: Array) -> Array:
+def _by_scipy(compiled: CompiledModel, signal: Real) -> Real:
     return _Oracle(compiled, signal).outputs()
 
 
@@ -107,7 +106,7 @@ def _in_order(compiled: CompiledModel) -> list[int]:
     return order
 
 
-def _error(found: Array, wanted: Array) -> float:
+def _error(found: Real, wanted: Real) -> float:
     """Largest RMS error of an output over its RMS."""
     return float(np.max(np.sqrt(np.mean((found - wanted) ** 2, axis=1) / np.mean(wanted**2, axis=1))))
 

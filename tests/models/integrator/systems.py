@@ -3,15 +3,13 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Port, Terminal
 from chladni.models.core.port_law import PortLaw
 from chladni.models.structures.structure import GROUND, Body, Joint, Structure
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 def oscillator(*, mass=1.0, frequency_hz=10.0, damping=1.0):
@@ -93,7 +91,7 @@ def plain_model(a, b, c, d, *, g=None, h=None, motion=None, laws=(), kind="input
     return CompiledModel(**(parts | changes))
 
 
-def reference_states(compiled: CompiledModel, signals: Matrix, rate_hz: float, **options) -> Matrix:
+def reference_states(compiled: CompiledModel, signals: Real, rate_hz: float, **options) -> Real:
     """``[state, sample]`` by SciPy, from the same laws called as Python."""
     n, times = len(compiled.states), np.arange(signals.shape[1]) / rate_hz
     starts = np.cumsum([n, *(len(law.state) for law in compiled.laws)])
@@ -115,12 +113,12 @@ def reference_states(compiled: CompiledModel, signals: Matrix, rate_hz: float, *
     return found.y[:n]
 
 
-def relative_rms(found: Matrix, truth: Matrix) -> float:
+def relative_rms(found: Real, truth: Real) -> float:
     """Largest over the rows."""
     return float(np.max(np.sqrt(np.mean((found - truth) ** 2, axis=1) / np.mean(truth**2, axis=1))))
 
 
-def refined(signals: Matrix, times: int) -> Matrix:
+def refined(signals: Real, times: int) -> Real:
     """The same straight lines, sampled `times` as fast."""
     count = signals.shape[1]
     return np.array([np.interp(np.arange((count - 1) * times + 1) / times, np.arange(count), row) for row in signals])

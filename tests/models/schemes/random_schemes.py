@@ -8,6 +8,7 @@ from chladni.models.core.port import Terminal
 from chladni.models.elements.catalogue import ELEMENTS, element
 from chladni.models.schemes.block import Block
 from chladni.models.schemes.scheme_model import SchemeModel
+from chladni.signals.arrays import Real
 
 INPUTS = (Terminal(name="u", unit="1"), Terminal(name="w", unit="1"))
 # Elements whose poles, zeros and gains lie within a decade or so of 1: what is tested is the algebra of loops.
@@ -38,7 +39,7 @@ def schemes(draw: st.DrawFn, *, kinds: tuple[str, ...] = KINDS, most: int = 6) -
     return SchemeModel(name="random", blocks=tuple(drawn), inputs=INPUTS)
 
 
-def brute_force(scheme: SchemeModel, frequency_hz: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+def brute_force(scheme: SchemeModel, frequency_hz: Real) -> tuple[NDArray, NDArray]:
     """What leaves each block, ``[block, input, frequency]``, by ``(I - H K)^-1 H L``; condition, ``[frequency]``."""
     names = [block.name for block in scheme.blocks]
     k, from_inputs = np.zeros((len(names),) * 2), np.zeros((len(names), 2))

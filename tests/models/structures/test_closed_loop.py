@@ -7,7 +7,6 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.signal import StateSpace as ScipyStateSpace
 from scipy.signal import step as scipy_step
 
@@ -18,6 +17,7 @@ from chladni.models.structures.closed_loop import close_loop
 from chladni.models.structures.controller import Controller
 from chladni.models.structures.limiter import limiter
 from chladni.models.structures.structure_model import StructureModel
+from chladni.signals.arrays import Complex
 from chladni.signals.channel import Channel
 from chladni.signals.errors import ModelError
 from chladni.signals.time_series import TimeSeries
@@ -67,7 +67,7 @@ LAWS: dict[str, tuple[dict[str, Any], Any, Any]] = {
 }  # fmt: skip
 
 
-def value(transfer: Any) -> NDArray[np.complex128]:
+def value(transfer: Any) -> Complex:
     """An oracle's transfer function on the axis; numbers are constant."""
     return transfer(S) if callable(transfer) else np.full(S.shape, transfer, dtype=complex)
 

@@ -1,10 +1,10 @@
 """Loops in time: a limit that acts, against SciPy on equations written out, and a loop that runs away."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from chladni.models.integrator.simulate import simulate
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 from tests.models.structures.made_models import GAIN, KP, KV, LIMIT, MASS, VISCOUS, axis
@@ -18,10 +18,10 @@ def command(*, samples: int, pulse_v: float = 0.0) -> TimeSeries:
     return TimeSeries(values=values, sample_rate_hz=RATE_HZ, channels=channels)
 
 
-def written_out(samples: int, pulse_v: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def written_out(samples: int, pulse_v: float) -> tuple[Real, Real]:
     """Position and force of the limited loop, by an independent solver."""
 
-    def force(state: NDArray[np.float64]) -> NDArray[np.float64]:
+    def force(state: Real) -> Real:
         wanted = KV * (KP * (STEP_M - state[0]) - state[1]) + pulse_v
         return np.asarray(GAIN * np.clip(wanted, -LIMIT, LIMIT))
 

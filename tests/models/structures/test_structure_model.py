@@ -6,13 +6,13 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from chladni.models.structures.robot_arm import robot_arm
 from chladni.models.structures.structure import Body, Joint, Structure
 from chladni.models.structures.structure_input import StructureInput
 from chladni.models.structures.structure_model import StructureModel
 from chladni.models.structures.structure_output import StructureOutput
+from chladni.signals.arrays import Complex
 from chladni.signals.errors import ModelError
 from tests.models.structures.made_models import axis, tree
 
@@ -22,7 +22,7 @@ S = 2j * pi * FREQUENCY_HZ
 RTOL = 1e-9
 
 
-def response(model: StructureModel, output: str, source: str) -> NDArray[np.complex128]:
+def response(model: StructureModel, output: str, source: str) -> Complex:
     compiled = model.compile()
     row = [terminal.name for terminal in compiled.outputs].index(output)
     column = [terminal.name for terminal in compiled.inputs].index(source)
