@@ -10,7 +10,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import chladni
-from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
+from chladni.modal.experimental.polyreference import PolyReferenceLeastSquares
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
 from tests.modal import truth

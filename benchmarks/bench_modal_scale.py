@@ -6,8 +6,8 @@ import time
 import numpy as np
 from random_modes import RandomModes, accelerances, random_modes
 
-from chladni.modal.functions.plscf import polyreference_poles
-from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
+from chladni.modal.experimental.plscf import polyreference_poles
+from chladni.modal.experimental.polyreference import PolyReferenceLeastSquares
 from chladni.signals.frequency_response import FrequencyResponse
 
 RESPONSES, REFERENCES, LINES, ORDER, MODES, TOP_HZ, NOISE = 300, 5, 4096, 100, 40, 2048.0, 0.01

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import chladni
-from chladni.modal.responses.subspace import CovarianceDrivenSubspace
+from chladni.modal.operational.subspace import CovarianceDrivenSubspace
 from chladni.signals.channel import Channel
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.time_series import TimeSeries

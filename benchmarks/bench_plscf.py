@@ -16,8 +16,8 @@ from statistics import median
 import numpy as np
 from random_modes import RandomModes, accelerances, random_modes
 
+from chladni.modal.experimental.plscf import polyreference_poles
 from chladni.modal.fit.lsfd import least_squares_frequency_domain
-from chladni.modal.functions.plscf import polyreference_poles
 from chladni.modal.poles.pole_selection import select_poles
 from chladni.modal.poles.stabilisation import pole_status
 from chladni.signals.frequency_response import FrequencyResponse

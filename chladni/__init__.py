@@ -35,12 +35,12 @@ _HOME = {
     "mac": "chladni.modal.shapes.mac",
     "relative_motion": "chladni.modal.shapes.relative_motion",
     "validate": "chladni.modal.shapes.validation",
-    "CircleFit": "chladni.modal.functions.circle_fit",
-    "CovarianceDrivenSubspace": "chladni.modal.responses.subspace",
-    "EnhancedFrequencyDomainDecomposition": "chladni.modal.responses.efdd",
-    "FrequencyDomainDecomposition": "chladni.modal.responses.fdd",
-    "HalfPower": "chladni.modal.functions.half_power",
-    "PolyReferenceLeastSquares": "chladni.modal.functions.polyreference",
+    "CircleFit": "chladni.modal.experimental.circle_fit",
+    "CovarianceDrivenSubspace": "chladni.modal.operational.subspace",
+    "EnhancedFrequencyDomainDecomposition": "chladni.modal.operational.efdd",
+    "FrequencyDomainDecomposition": "chladni.modal.operational.fdd",
+    "HalfPower": "chladni.modal.experimental.half_power",
+    "PolyReferenceLeastSquares": "chladni.modal.experimental.polyreference",
     "attached": "chladni.models.effects.attached_effect",
     "influence": "chladni.models.analysis.influence",
     "load_model": "chladni.models.files.model_file",
@@ -125,12 +125,12 @@ if TYPE_CHECKING:
     from chladni.io.log import open, open_log  # noqa: A004  # as chladni.open
     from chladni.io.mcap.writer import write_mcap
     from chladni.io.setup import load_setup
-    from chladni.modal.functions.circle_fit import CircleFit
-    from chladni.modal.functions.half_power import HalfPower
-    from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
-    from chladni.modal.responses.efdd import EnhancedFrequencyDomainDecomposition
-    from chladni.modal.responses.fdd import FrequencyDomainDecomposition
-    from chladni.modal.responses.subspace import CovarianceDrivenSubspace
+    from chladni.modal.experimental.circle_fit import CircleFit
+    from chladni.modal.experimental.half_power import HalfPower
+    from chladni.modal.experimental.polyreference import PolyReferenceLeastSquares
+    from chladni.modal.operational.efdd import EnhancedFrequencyDomainDecomposition
+    from chladni.modal.operational.fdd import FrequencyDomainDecomposition
+    from chladni.modal.operational.subspace import CovarianceDrivenSubspace
     from chladni.modal.shapes.mac import mac
     from chladni.modal.shapes.relative_motion import relative_motion
     from chladni.modal.shapes.validation import validate

@@ -13,12 +13,12 @@ from chladni.apps.spectra import Averaging
 from chladni.io.log import Log
 from chladni.modal.checks.driving_point import check_driving_point
 from chladni.modal.checks.reciprocity import check_reciprocity
-from chladni.modal.functions.circle_fit import CircleFit
-from chladni.modal.functions.half_power import HalfPower
-from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
-from chladni.modal.responses.efdd import EnhancedFrequencyDomainDecomposition
-from chladni.modal.responses.fdd import FrequencyDomainDecomposition
-from chladni.modal.responses.subspace import CovarianceDrivenSubspace
+from chladni.modal.experimental.circle_fit import CircleFit
+from chladni.modal.experimental.half_power import HalfPower
+from chladni.modal.experimental.polyreference import PolyReferenceLeastSquares
+from chladni.modal.operational.efdd import EnhancedFrequencyDomainDecomposition
+from chladni.modal.operational.fdd import FrequencyDomainDecomposition
+from chladni.modal.operational.subspace import CovarianceDrivenSubspace
 from chladni.modal.shapes.relative_motion import relative_motion
 from chladni.modal.shapes.shape_transmissibility import ShapeTransmissibility, shape_transmissibility
 from chladni.modal.shapes.summary import summarise

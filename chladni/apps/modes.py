@@ -14,16 +14,20 @@ from chladni.apps.spectra import Averaging, transfer
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.modal.checks.roving import over_hit_points
-from chladni.modal.functions.bands import join_bands
-from chladni.modal.functions.circle_fit import CircleFit
-from chladni.modal.functions.half_power import HalfPower
-from chladni.modal.functions.line_spacing import longest_modal_segment_s
-from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
-from chladni.modal.responses.efdd import EnhancedFrequencyDomainDecomposition
-from chladni.modal.responses.fdd import FrequencyDomainDecomposition
-from chladni.modal.responses.harmonics import LONGEST_SEGMENT_SHARE, SHORTEST_SEGMENT, machine_harmonics
-from chladni.modal.responses.machine_lines import without_machines
-from chladni.modal.responses.subspace import CovarianceDrivenSubspace
+from chladni.modal.experimental.bands import join_bands
+from chladni.modal.experimental.circle_fit import CircleFit
+from chladni.modal.experimental.half_power import HalfPower
+from chladni.modal.experimental.line_spacing import longest_modal_segment_s
+from chladni.modal.experimental.polyreference import PolyReferenceLeastSquares
+from chladni.modal.operational.efdd import EnhancedFrequencyDomainDecomposition
+from chladni.modal.operational.fdd import FrequencyDomainDecomposition
+from chladni.modal.operational.harmonics import (
+    LONGEST_SEGMENT_SHARE,
+    SHORTEST_SEGMENT,
+    machine_harmonics,
+    without_machines,
+)
+from chladni.modal.operational.subspace import CovarianceDrivenSubspace
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse

@@ -6,10 +6,10 @@ import pytest
 from chladni.apps.modes import identify_modes
 from chladni.apps.spectra import frf
 from chladni.io.log import open_log
-from chladni.modal.functions.circle_fit import CircleFit
-from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
-from chladni.modal.responses.efdd import EnhancedFrequencyDomainDecomposition
-from chladni.modal.responses.subspace import CovarianceDrivenSubspace
+from chladni.modal.experimental.circle_fit import CircleFit
+from chladni.modal.experimental.polyreference import PolyReferenceLeastSquares
+from chladni.modal.operational.efdd import EnhancedFrequencyDomainDecomposition
+from chladni.modal.operational.subspace import CovarianceDrivenSubspace
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.cross_spectra import cross_spectra

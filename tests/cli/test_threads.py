@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 import chladni
 from chladni.cli.entry import THREADS
-from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
+from chladni.modal.experimental.polyreference import PolyReferenceLeastSquares
 from tests.arm import write_arm
 
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chladni.modal.responses.correlation import correlation_functions
-from chladni.modal.responses.narrow_band_kurtosis import narrow_bands
+from chladni.modal.operational.correlation import correlation_functions
+from chladni.modal.operational.narrow_band_kurtosis import narrow_bands
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries

@@ -7,7 +7,7 @@ import pytest
 
 from chladni.modal.checks.driving_point import driving_points
 from chladni.modal.checks.roving import join_references, over_hit_points, roving_hammer
-from chladni.modal.functions.half_power import HalfPower
+from chladni.modal.experimental.half_power import HalfPower
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.testing import assert_close

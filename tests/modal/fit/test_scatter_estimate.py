@@ -4,8 +4,8 @@ import numpy as np
 
 import chladni.modal.fit.scatter_estimate
 from chladni.apps.spectra import frf
+from chladni.modal.experimental.polyreference import PolyReferenceLeastSquares
 from chladni.modal.fit.fit_covariance import SIMPLE
-from chladni.modal.functions.polyreference import PolyReferenceLeastSquares
 from tests.modal import truth
 
 
