@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.clock.stray_stamps import find_strays
 from chladni.io.mcap.message_batch import MessageBatch
 from chladni.signals.arrays import Mask, Whole
-from chladni.signals.stray_stamps import find_strays
 
 #: Percentile of the steps forward that is the longest usual one, and the step over one lost message in its units.
 _MOST, _LOST = 90, 2

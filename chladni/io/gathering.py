@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.arrival import Arrivals, arrival_order, stored_late
-from chladni.io.clocks import Key, Stamped, StreamClock
+from chladni.io.clock.shared_clocks import Key, Stamped, StreamClock
+from chladni.io.clock.stamp_order import LEAP_NS, ClockSteps
+from chladni.io.clock.stray_stamps import SLACK_NS, untimed
+from chladni.io.clock.time_base import TimeBase
 from chladni.io.placement import Placement, StatedRate, place_stream, without_grid
 from chladni.io.publishers import at_once, count_by_stamps, evenly_in_turn, told_apart
 from chladni.io.repeats import digests_of
 from chladni.io.stream import Piece, Stream
-from chladni.io.untimed import SLACK_NS, untimed
 from chladni.signals.arrays import Whole
-from chladni.signals.clock_steps import LEAP_NS, ClockSteps
-from chladni.signals.time_base import TimeBase
 
 
 @dataclass(slots=True, kw_only=True)

@@ -4,13 +4,13 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from chladni.io.catalog import Catalog
 from chladni.io.channel_source import UNKNOWN_UNIT
+from chladni.io.clock.time_base import TimeBase
 from chladni.io.log_info import some_of, unread_sentences
 from chladni.io.loss import Loss
 from chladni.io.placement import Placement
 from chladni.io.sample_monitor import SampleMonitor
 from chladni.signals.channel import Channel
 from chladni.signals.sensor_quality import SensorFault, moments
-from chladni.signals.time_base import TimeBase
 from chladni.signals.wording import counted, shown
 
 MOST_LOSSES_TOLD = 3

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any, Final, Literal
 
+from chladni.io.clock.time_base import TimeBase
 from chladni.io.gathering import LostMessages
 from chladni.io.loss import Loss, Unread
 from chladni.io.stamps import StampKind
 from chladni.signals.channel import Channel
 from chladni.signals.frequency_response import FrequencyResponse
-from chladni.signals.time_base import TimeBase
 from chladni.signals.visible import visible
 from chladni.signals.wording import counted
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from chladni.io.clocks import Key, Stamped, StreamClock
+from chladni.io.clock.grid_index import NOWHERE
+from chladni.io.clock.shared_clocks import Key, Stamped, StreamClock
 from chladni.io.gathering import Gathering, LostMessages, gather, place_all, running_on, windowed
 from chladni.io.grid_blocks import BlockGrid, PlacedPiece, blocks_of, complete
 from chladni.io.grid_buffer import GridBuffer, grid_rows
@@ -19,7 +20,6 @@ from chladni.io.stream import Piece, Stream, read_pieces
 from chladni.signals.arrays import Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
-from chladni.signals.grid_index import NOWHERE
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import counted
 

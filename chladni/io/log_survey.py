@@ -6,7 +6,8 @@ from itertools import chain
 import numpy as np
 
 from chladni.io.catalog import Catalog
-from chladni.io.clocks import clocks_of
+from chladni.io.clock.shared_clocks import clocks_of
+from chladni.io.clock.time_base import TimeBase
 from chladni.io.files.contents import FileContents
 from chladni.io.gathering import Gathering, LostMessages, place_all, windowed
 from chladni.io.log_findings import fault_findings, log_findings, missing_sentence, together, unit_findings
@@ -17,7 +18,6 @@ from chladni.io.placement import Placement, StatedRate
 from chladni.io.sample_monitor import STRETCH_VALUES, Faults, SampleMonitor, clipped_samples, judge_samples
 from chladni.io.stream import read_pieces
 from chladni.signals.arrays import Real, Whole
-from chladni.signals.time_base import TimeBase
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 

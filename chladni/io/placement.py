@@ -7,14 +7,14 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.clock.grid_index import NOWHERE
+from chladni.io.clock.stamp_order import ClockSteps
+from chladni.io.clock.time_base import TimeBase, fit_batch_time_base, fit_time_base
+from chladni.io.clock.uniform import message_index
 from chladni.io.repeats import repeats_of
 from chladni.io.stream import Stream
 from chladni.signals.arrays import Whole
-from chladni.signals.clock_steps import ClockSteps
-from chladni.signals.grid_index import NOWHERE
-from chladni.signals.time_base import TimeBase, fit_batch_time_base, fit_time_base
 from chladni.signals.time_series import NS_PER_S
-from chladni.signals.uniform import message_index
 
 #: A rate that is stated is for stamps that tell it within this share.
 STATED_NEAR = 0.05

@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.clock.clock_count import SHORT
+from chladni.io.clock.clock_verdict import JITTERED
 from chladni.signals.arrays import Mask, Real, Whole
-from chladni.signals.clock_count import SHORT
-from chladni.signals.clock_verdict import JITTERED
 
 #: A message of another publisher comes between two of one, which are no further apart for it; one of the same source
 #: takes a place of its own, and doubles the step around it. This is half way.

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.clock.stamp_order import untangle
 from chladni.signals.arrays import Whole
-from chladni.signals.stamp_order import untangle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

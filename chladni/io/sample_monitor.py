@@ -7,13 +7,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.clock.stamp_order import arrival_order, untangle
 from chladni.io.gathering import Gathering
 from chladni.io.repeats import digests_of
 from chladni.io.stream import Piece
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.sensor_quality import SensorFault, sensor_quality
-from chladni.signals.stamp_order import arrival_order, untangle
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 STRETCH_VALUES: Final = 1 << 24

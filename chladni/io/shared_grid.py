@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.io.clock.grid_index import NOWHERE
+from chladni.io.clock.time_base import TimeBase
 from chladni.io.placement import Placement
 from chladni.signals.arrays import Real, Whole
-from chladni.signals.grid_index import NOWHERE
-from chladni.signals.time_base import TimeBase
 from chladni.signals.time_series import NS_PER_S
 
 #: Two grids are one when their points are never farther apart than this share of a period: 1.8 degrees at Nyquist.

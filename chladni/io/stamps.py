@@ -7,14 +7,13 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.clock.stray_stamps import find_strays, untimed
 from chladni.io.decoding.columns import Decoded
 from chladni.io.decoding.schema import FieldInfo
 from chladni.io.known_schemas import message_type
 from chladni.io.mcap.message_batch import MessageBatch
-from chladni.io.untimed import untimed
 from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.errors import LogError
-from chladni.signals.stray_stamps import find_strays
 
 StampKind = Literal["header", "publish", "log"]
 StampRequest = Literal["auto", "header", "publish", "log"]

@@ -10,11 +10,11 @@ from typing import Final
 import numpy as np
 
 from chladni.io.arrival import Arrivals, arrival_order, numbered
+from chladni.io.clock.stray_stamps import untimed
 from chladni.io.decoding import Decoded, Decoder, FieldInfo, definition_text, make_decoder
 from chladni.io.mcap.channel_registry import McapChannel
 from chladni.io.mcap.container import McapContainer
 from chladni.io.mcap.message_batch import MessageBatch
-from chladni.io.untimed import untimed
 from chladni.signals.errors import LogError
 
 HEAD_MESSAGES: Final = 64

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from chladni.io import log_clocks
-from chladni.io.clocks import Stamped, clocks_of
+from chladni.io.clock.shared_clocks import Stamped, clocks_of
+from chladni.io.clock.time_base import fit_time_base
 from chladni.io.convert import convert
 from chladni.io.log import Log, open_log
 from chladni.io.repeats import digests_of, repeats_of
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.testing import assert_close
-from chladni.signals.time_base import fit_time_base
+from tests.io.clock.stamp_makers import stamps
 from tests.io.test_log import together
 from tests.make_logs import START_NS, LogMaker, header, write_scalars, write_stored
-from tests.signals.stamp_makers import stamps
 
 SAMPLE = """std_msgs/Header header
 float64 x

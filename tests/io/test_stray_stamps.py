@@ -11,8 +11,8 @@ from chladni.cli.main import main
 from chladni.io.log import Log, open_log
 from chladni.io.log import open as open_any
 from chladni.signals.arrays import Whole
+from tests.io.clock.stamp_makers import stamps as stamps_of
 from tests.make_logs import IMU, START_NS, LogMaker, imu, write_numbers, write_stored
-from tests.signals.stamp_makers import stamps as stamps_of
 
 PERIOD_NS = 10_000_000
 #: Where a stamp may claim to be, in periods from the first one: early, at another's, between two, and outside.

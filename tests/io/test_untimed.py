@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.io.untimed import untimed
+from chladni.io.clock.stray_stamps import untimed
 from chladni.signals.arrays import Mask, Whole
 from tests.make_logs import START_NS
 

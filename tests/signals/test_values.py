@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from chladni.io.clock.time_base import TimeBase, fit_time_base
 from chladni.signals.channel import AXES, Channel, unit_direction
 from chladni.signals.coherence import Coherence
 from chladni.signals.cross_spectra import CrossSpectra
@@ -22,7 +23,6 @@ from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
 from chladni.signals.study import Study
 from chladni.signals.testing import assert_close
-from chladni.signals.time_base import TimeBase, fit_time_base
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.value import Value
 from chladni.signals.waterfall import Waterfall

@@ -15,9 +15,9 @@ from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
+    from chladni.io.clock.time_base import TimeBase
     from chladni.signals.frequency_response import FrequencyResponse
     from chladni.signals.mode_set import ModeSet
-    from chladni.signals.time_base import TimeBase
 
 # As for the topics of a log, see `chladni.io.shared_grid`: points of one grid are never farther apart than this share
 # of a period, and a grid isn't this many times as long as the samples on it.
@@ -146,8 +146,8 @@ def placed_rows(
     LogError
         When the times have no rate, or are too few to tell one.
     """
-    from chladni.signals.time_base import fit_time_base
-    from chladni.signals.uniform import place
+    from chladni.io.clock.time_base import fit_time_base
+    from chladni.io.clock.uniform import place
 
     # A record with a pretrigger begins before 0, which no clock does: the fit is about differences only.
     origin_ns = int(stamps_ns.min(initial=2**62))

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from chladni.io.clock.clock_verdict import round_rate
 from chladni.io.files.bounds import read_whole
 from chladni.io.files.columns import Column, distinct, parse_titles
 from chladni.io.files.contents import FileContents, with_notes
@@ -21,7 +22,6 @@ from chladni.io.files.csv_dialect import CsvDialect, split_cells
 from chladni.io.files.table import Part, series_of_parts
 from chladni.io.files.time_reading import NO_TIMES, NS_OF, UNIT_OF, TimeOptions, Times, spelled, times_of_numbers
 from chladni.io.files.time_text import read_time_text
-from chladni.signals.clock_verdict import round_rate
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.text_reading import lines_of, real_number
 from chladni.signals.time_series import NS_PER_S, is_sample_rate

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.clock.stray_stamps import untimed
 from chladni.io.files.columns import Column, channels_of, distinct, with_units
 from chladni.io.files.contents import FileContents, joined, placed_rows, series_of_rows
 from chladni.io.files.time_column import find_times, is_row_number, rises
 from chladni.io.files.time_reading import NO_TIMES, TimeOptions, Times
-from chladni.io.untimed import untimed
 from chladni.signals.arrays import Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import ChladniError, LogError, SetupError

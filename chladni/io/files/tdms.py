@@ -12,6 +12,7 @@ from typing import Any, BinaryIO, Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.clock.clock_verdict import round_rate
 from chladni.io.files.bounds import Budget
 from chladni.io.files.columns import Column
 from chladni.io.files.contents import FileContents, one_line, with_notes
@@ -19,7 +20,6 @@ from chladni.io.files.table import Part, series_of_parts
 from chladni.io.files.time_column import is_time_name
 from chladni.io.files.time_reading import NO_TIMES, NS_OF, UNIT_OF, TimeOptions, spelled
 from chladni.io.regular_file import open_regular
-from chladni.signals.clock_verdict import round_rate
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import NS_PER_S, is_sample_rate
 from chladni.signals.wording import counted

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from chladni.io.clock.clock_fit import HELD_UP, JITTERS, grid_agrees
+from chladni.io.clock.time_base import TimeBase, fit_batch_time_base, fit_time_base
+from chladni.io.clock.uniform import message_index
 from chladni.signals.arrays import Real
-from chladni.signals.clock_check import HELD_UP, JITTERS, grid_agrees
-from chladni.signals.time_base import TimeBase, fit_batch_time_base, fit_time_base
-from chladni.signals.uniform import message_index
-from tests.signals.stamp_makers import START_NS, grid, stamps
+from tests.io.clock.stamp_makers import START_NS, grid, stamps
 
 ONE_EACH = np.ones(1, dtype=np.int64)
 KINDS = ("scattered", "log-normal", "alternating", "bimodal", "events", "dropped", "two rates", "late")

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chladni.io.clock.clock_count import SHORT, Counted
+from chladni.io.clock.coarse_stamps import few_ticks, stamp_quantum
 from chladni.signals.arrays import Whole
-from chladni.signals.clock_count import SHORT, Counted
-from chladni.signals.coarse_stamps import few_ticks, stamp_quantum
 from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
-    from chladni.signals.time_base import TimeBase, Verdict
+    from chladni.io.clock.time_base import TimeBase, Verdict
 
 # Scatter, relative to the period, above which samples placed on a grid deserve a warning.
 JITTERED = 0.05

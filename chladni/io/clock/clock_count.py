@@ -6,14 +6,15 @@ from math import inf
 
 import numpy as np
 
+from chladni.io.clock.clock_fit import Clock, fit_clock
+from chladni.io.clock.coarse_stamps import count_by_ticks, count_ticks, few_ticks, phase_period, stamp_quantum
+from chladni.io.clock.sample_count import SAMPLE, Count, count_by_order, count_by_phase, count_even, order_fano
+from chladni.io.clock.stamp_order import Untangled, typical_period
 from chladni.signals.arrays import Whole
-from chladni.signals.clock_fit import Clock, fit_clock
-from chladni.signals.coarse_stamps import count_by_ticks, count_ticks, few_ticks, phase_period, stamp_quantum
-from chladni.signals.sample_count import SAMPLE, Count, count_by_order, count_by_phase, count_even, order_fano
-from chladni.signals.stamp_gaps import LEAP_S
-from chladni.signals.stamp_order import Untangled, typical_period
 from chladni.signals.time_series import NS_PER_S
 
+#: A pause longer than this, and than all that was recorded, may as well be a clock that was set.
+LEAP_S = 60.0
 #: Fewer messages than this can't show whether they are regular.
 SHORT = 8
 # Share of intervals under a quarter of the mean one that makes bursts; chance (Poisson) gives 0.22.

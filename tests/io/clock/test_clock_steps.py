@@ -5,13 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from chladni.io.clock.stamp_order import MAX_CANDIDATES, ClockSteps, arrival_order, find_clock_steps, untangle
+from chladni.io.clock.time_base import fit_batch_time_base, fit_time_base
+from chladni.io.clock.uniform import message_index, place
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel
-from chladni.signals.clock_steps import MAX_CANDIDATES, ClockSteps, find_clock_steps
-from chladni.signals.stamp_order import arrival_order, untangle
-from chladni.signals.time_base import fit_batch_time_base, fit_time_base
-from chladni.signals.uniform import message_index, place
-from tests.signals.stamp_makers import START_NS, grid, in_bursts, stamps
+from tests.io.clock.stamp_makers import START_NS, grid, in_bursts, stamps
 
 RATES_HZ = (1.0, 10.0, 250.0, 2000.0)
 

@@ -8,12 +8,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.clock.grid_index import NOWHERE, grid_index, side_by_side
+from chladni.io.clock.stamp_order import require_stamps
+from chladni.io.clock.time_base import TimeBase
 from chladni.signals.arrays import Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
-from chladni.signals.grid_index import NOWHERE, grid_index, side_by_side
-from chladni.signals.stamp_order import require_stamps
-from chladni.signals.time_base import TimeBase
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 
 _Clock = Callable[[Whole, Whole], Whole]
@@ -59,7 +59,7 @@ def place(
 
     Examples
     --------
-    >>> from chladni.signals.time_base import fit_time_base
+    >>> from chladni.io.clock.time_base import fit_time_base
     >>> stamps = np.array([0, 10, 20, 40, 50, 60, 70, 80, 90]) * 1_000_000
     >>> series = place(stamps, np.ones((1, 9)), fit_time_base(stamps), [Channel(name="a")])
     >>> series.values[0]

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.clock.stamp_order import ClockSteps
+from chladni.io.clock.time_base import TimeBase
 from chladni.signals.arrays import Real, Whole
-from chladni.signals.clock_steps import ClockSteps
-from chladni.signals.time_base import TimeBase
 from chladni.signals.time_series import NS_PER_S
 
 Key = tuple[str, ...]

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chladni.signals.clock_verdict import round_rate
+from chladni.io.clock.clock_verdict import round_rate
+from chladni.io.clock.grid_places import MAX_GAPS
+from chladni.io.clock.time_base import TimeBase, fit_batch_time_base, fit_time_base
 from chladni.signals.errors import EstimateError
-from chladni.signals.stamp_gaps import MAX_GAPS
-from chladni.signals.time_base import TimeBase, fit_batch_time_base, fit_time_base
-from tests.signals.stamp_makers import START_NS, grid, in_bursts, stamps
+from tests.io.clock.stamp_makers import START_NS, grid, in_bursts, stamps
 
 RATES_HZ = (51_200.0, 1000.123456, 610.35, 100.0, 1 / 3)
 # Five sigma: one false alarm in two million, per seed and case.

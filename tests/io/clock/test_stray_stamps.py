@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from chladni.io.clock.grid_index import NOWHERE
+from chladni.io.clock.stray_stamps import find_strays
+from chladni.io.clock.time_base import fit_batch_time_base, fit_time_base
+from chladni.io.clock.uniform import Placer, message_index, place
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel
-from chladni.signals.grid_index import NOWHERE
-from chladni.signals.stray_stamps import find_strays
-from chladni.signals.time_base import fit_batch_time_base, fit_time_base
-from chladni.signals.uniform import Placer, message_index, place
-from tests.signals.stamp_makers import START_NS
+from tests.io.clock.stamp_makers import START_NS
 
 STEP_NS = 10_000_000
 CHANNELS = [Channel(name="number")]

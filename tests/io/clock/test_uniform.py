@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from chladni.io.clock.time_base import TimeBase, fit_batch_time_base, fit_time_base
+from chladni.io.clock.uniform import Placer, message_index, place
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
-from chladni.signals.time_base import TimeBase, fit_batch_time_base, fit_time_base
 from chladni.signals.time_series import TimeSeries
-from chladni.signals.uniform import Placer, message_index, place
-from tests.signals.stamp_makers import START_NS, grid, in_bursts, stamps
+from tests.io.clock.stamp_makers import START_NS, grid, in_bursts, stamps
 
 CHANNELS = (Channel(name="number"), Channel(name="twice"))
 Case = tuple[Whole, Whole]

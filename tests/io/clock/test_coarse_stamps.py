@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from chladni.io.clock.coarse_stamps import count_ticks, phase_period, stamp_quantum
+from chladni.io.clock.stamp_order import typical_period, untangle
+from chladni.io.clock.time_base import TimeBase, fit_time_base
+from chladni.io.clock.uniform import message_index
 from chladni.signals.arrays import Real, Whole
-from chladni.signals.coarse_stamps import count_ticks, phase_period, stamp_quantum
-from chladni.signals.stamp_order import typical_period, untangle
-from chladni.signals.time_base import TimeBase, fit_time_base
-from chladni.signals.uniform import message_index
-from tests.signals.stamp_makers import START_NS, grid, in_bursts, stamps
+from tests.io.clock.stamp_makers import START_NS, grid, in_bursts, stamps
 
 
 def ticked(times_s: Real, tick_s: float) -> Whole:

@@ -8,12 +8,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.arrays import Real, Whole
-from chladni.signals.clock_check import grid_agrees
-from chladni.signals.clock_count import Counted, count_batches, count_messages, count_stated
-from chladni.signals.clock_fit import Clock, cut_by_one, fit_clock, measure_wander
-from chladni.signals.clock_steps import LONGEST_NS, ClockSteps
-from chladni.signals.clock_verdict import (
+from chladni.io.clock.clock_count import Counted, count_batches, count_messages, count_stated
+from chladni.io.clock.clock_fit import Clock, cut_by_one, fit_clock, grid_agrees, measure_wander
+from chladni.io.clock.clock_verdict import (
     EVENTS,
     advice,
     ticking,
@@ -23,11 +20,11 @@ from chladni.signals.clock_verdict import (
     with_round_rate,
     with_strays,
 )
+from chladni.io.clock.grid_places import place_by_phase, place_in_order, spans_between, straight_pieces
+from chladni.io.clock.stamp_order import LONGEST_NS, ClockSteps, Untangled, require_stamps, untangle
+from chladni.io.clock.stray_stamps import find_strays
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import EstimateError
-from chladni.signals.grid_places import place_by_phase, place_in_order, straight_pieces
-from chladni.signals.stamp_gaps import spans_between
-from chladni.signals.stamp_order import Untangled, require_stamps, untangle
-from chladni.signals.stray_stamps import find_strays
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.value import Value, require_shape
 
@@ -163,7 +160,7 @@ def fit_time_base(
     Messages with the same stamp are samples, as a clock makes them that ticks more slowly than they are taken, when
     that explains all of the stamps; else they are repeats. Who knows that they are repeats leaves them out.
 
-    A grid that would contradict the stamps is not given: see `chladni.signals.clock_check.grid_agrees`.
+    A grid that would contradict the stamps is not given: see `chladni.io.clock.clock_fit.grid_agrees`.
 
     Parameters
     ----------

@@ -5,10 +5,8 @@ from math import floor, lgamma, log
 
 import numpy as np
 
-from chladni.signals.arrays import Whole
-from chladni.signals.clock_check import HELD_UP
-from chladni.signals.clock_fit import Clock, fit_clock
-from chladni.signals.sample_count import (
+from chladni.io.clock.clock_fit import HELD_UP, Clock, fit_clock
+from chladni.io.clock.sample_count import (
     SAMPLE,
     WINDOW,
     Count,
@@ -16,7 +14,8 @@ from chladni.signals.sample_count import (
     count_in_stretches,
     refined_period,
 )
-from chladni.signals.stamp_order import Untangled
+from chladni.io.clock.stamp_order import Untangled
+from chladni.signals.arrays import Whole
 
 # Stamps of doubles and of whole microseconds are off their tick by as much.
 _ROUNDING_NS = 1000.0

@@ -1,0 +1,1 @@
+"""Clocks: what the stamps of messages say of when their samples were taken."""
