@@ -2,6 +2,8 @@
 
 from math import isfinite
 
+from chladni.signals.wording import with_sigma
+
 NOTHING = "-"
 
 
@@ -59,11 +61,4 @@ def with_error(value: float, std: float) -> str:
     >>> with_error(7.32441, 0.0021), with_error(0.258, float("inf")), with_error(24.7, 0.0)
     ('7.3244 ± 0.0021', '0.258 ± ?', '24.7')
     """
-    if std == 0:
-        return number(value, digits=6)
-    if not isfinite(std):
-        return f"{number(value)} ± ?"
-    # Two digits of the uncertainty, and the value to the same place.
-    rounded = f"{std:.2g}"
-    places = max(0, -int(f"{std:e}".split("e")[1]) + 1)
-    return f"{value:.{places}f} ± {float(rounded):.{places}f}" if places < 8 else f"{value:.4g} ± {rounded}"
+    return with_sigma(value, std, unknown=" ± ?")

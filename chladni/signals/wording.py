@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 from itertools import islice
-from math import floor, log10
+from math import floor, isfinite, log10
 from typing import Final
 
 MOST_SHOWN: Final = 60
@@ -12,6 +12,8 @@ MOST_SHOWN: Final = 60
 # A slip is one of a word that people write, among names that they can have in mind.
 _LONGEST_WORD: Final = 100
 _MOST_WORDS: Final = 1000
+# More are those of values without noise, from a model, and nobody reads them.
+_MOST_PLACES: Final = 9
 
 
 def counted(number: int, noun: str) -> str:
@@ -37,6 +39,41 @@ def rounded_up(bound: float, *, digits: int = 3) -> str:
     if not bound > 0 or float(told) >= bound:
         return told
     return f"{float(told) + 10.0 ** (floor(log10(bound)) + 1 - digits):.{digits}g}"
+
+
+def with_sigma(value: float, sigma: float, *, unknown: str = "", exact: str = "") -> str:
+    """Give a value and one sigma, of which two digits say something, and the value to the second one's place.
+
+    Parameters
+    ----------
+    value, sigma
+        In one unit; not finite or zero as sigma where it isn't known, or nothing scatters.
+    unknown, exact
+        What then stands in its place.
+
+    Examples
+    --------
+    >>> with_sigma(12.50312, 0.0213), with_sigma(1407.31, 122.0), with_sigma(0.258, float("inf"), unknown=" ± ?")
+    ('12.503 ± 0.021', '1407 ± 120', '0.258 ± ?')
+    >>> with_sigma(51.5, 2e-13), with_sigma(3.1e-7, 2e-8), with_sigma(1.5e12, 1e11)
+    ('51.5 ± 2e-13', '3.10e-07 ± 2.0e-08', '1.50e+12 ± 1.0e+11')
+    """
+    # No bound known: digits that suggest one would be a lie.
+    if not (isfinite(value) and isfinite(sigma)):
+        return f"{value:.4g}{unknown}"
+    if sigma <= 0:
+        return f"{value:.6g}{exact}"
+    power, places = _power(sigma), 1 - _power(sigma)
+    size = max(abs(value), sigma)
+    if places <= _MOST_PLACES and 1e-4 <= size < 1e6:
+        return f"{value:.{max(places, 0)}f} ± {float(f'{sigma:.1e}'):.{max(places, 0)}f}"
+    if 1e-4 <= size < 1e6:
+        return f"{value:.{_MOST_PLACES}g} ± {sigma:.1g}"
+    return f"{value:.{min(max(_power(size) - power + 1, 0), _MOST_PLACES)}e} ± {sigma:.1e}"
+
+
+def _power(number: float) -> int:
+    return int(f"{number:e}".split("e")[1])
 
 
 def shown(found: object) -> str:

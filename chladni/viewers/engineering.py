@@ -6,6 +6,7 @@ from math import floor, isfinite, log10
 import numpy as np
 
 from chladni.signals.arrays import Real
+from chladni.signals.wording import with_sigma
 from chladni.viewers.labels import printed_unit
 
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 3: "k", 6: "M", 9: "G", 12: "T"}
@@ -129,11 +130,7 @@ def _prefix(value: float, unit: str) -> tuple[float, str]:
 def _number(value: float, std: float | None) -> str:
     if std is None or not isfinite(std) or std <= 0:
         return _digits(value)
-    # Two digits of sigma, and the value to the same place.
-    places = 1 - floor(log10(std) + 1e-9)
-    if places < -3 or places > 6:
-        return f"{value:.3e} ± {std:.1e}"
-    return f"{value:.{max(places, 0)}f} ± {std:.{max(places, 0)}f}"
+    return with_sigma(value, std)
 
 
 def _digits(value: float) -> str:

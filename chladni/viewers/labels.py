@@ -142,26 +142,6 @@ def short_names(names: Iterable[str]) -> dict[str, str]:
     return labels
 
 
-def value_with_deviation(value: float, deviation: float) -> str:
-    """Print a value and one sigma with as many digits as sigma deserves.
-
-    Examples
-    --------
-    >>> value_with_deviation(12.50312, 0.0213)
-    '12.503 ± 0.021'
-    >>> value_with_deviation(0.25, float("nan"))
-    '0.25'
-    """
-    # No bound known: digits that suggest one would be a lie.
-    if not 0 < deviation < float("inf"):
-        return f"{value:.4g}"
-    if not 1e-4 <= abs(value) < 1e6:
-        return f"{value:.3e} ± {deviation:.1e}"
-    # Two significant digits of sigma; its exponent tells how many decimals that takes.
-    decimals = max(0, 1 - int(f"{deviation:e}".split("e")[1]))
-    return f"{value:.{decimals}f} ± {deviation:.{decimals}f}" if decimals <= 9 else f"{value:.6g} ± {deviation:.1e}"
-
-
 def _split(name: str) -> tuple[Sequence[str], Sequence[str]]:
     """Parts of the topic and fields after it; separators inside brackets, braces and quotes don't count."""
     pieces = _PIECE.findall(name)

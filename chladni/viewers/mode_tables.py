@@ -9,7 +9,8 @@ from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.relative_motion import RelativeMotion
 from chladni.signals.study import Study
-from chladni.viewers.labels import LONGEST_NAME, value_with_deviation
+from chladni.signals.wording import with_sigma
+from chladni.viewers.labels import LONGEST_NAME
 from chladni.viewers.style import Style
 
 Row = tuple[str, ...]
@@ -157,4 +158,4 @@ def _estimates(values: Real, deviations: Real) -> list[str]:
 
 
 def _estimate(value: float, deviation: float | None) -> str:
-    return value_with_deviation(value, deviation) if deviation is not None and isfinite(deviation) else f"{value:.4g}"
+    return with_sigma(value, deviation) if deviation is not None and isfinite(deviation) else f"{value:.4g}"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chladni.io import log_clocks
+from chladni.io import mcap_log
 from chladni.io.clock.shared_clocks import Stamped, clocks_of
 from chladni.io.clock.time_base import fit_time_base
 from chladni.io.convert import convert
@@ -146,7 +146,7 @@ def test_a_window_is_one_of_the_time_that_runs_on(tmp_path: Path, start_s: float
 def test_a_window_of_a_large_log_is_found_by_log_time_unless_a_clock_was_set(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(log_clocks, "READ_WHOLE_BYTES", 0)
+    monkeypatch.setattr(mcap_log, "READ_WHOLE_BYTES", 0)
     sound = episodes(100.0, [100.0])
     set_back = episodes(100.0, [20.0] * 5)
     for name, topic in (("sound", sound), ("set", set_back)):
@@ -357,7 +357,7 @@ def test_series_of_a_broken_log_survive_conversion(tmp_path: Path) -> None:
 def test_a_window_of_a_large_log_whose_own_clock_was_set_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(log_clocks, "READ_WHOLE_BYTES", 0)
+    monkeypatch.setattr(mcap_log, "READ_WHOLE_BYTES", 0)
     number = np.arange(8000)
     write_stored(tmp_path / "a.mcap", START_NS + number % 2000 * 10_000_000, number.astype(float), chunk_size=4096)
     with open_log(tmp_path / "a.mcap") as log:

@@ -1,7 +1,5 @@
 """Words on plots."""
 
-import math
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,7 +13,6 @@ from chladni.viewers.labels import (
     response_quantity,
     short_names,
     thinned,
-    value_with_deviation,
 )
 
 
@@ -55,24 +52,6 @@ def test_a_name_of_a_thousand_characters_becomes_a_label() -> None:
     labels = short_names(names)
     assert len(set(labels.values())) == 3
     assert all(len(label) <= LONGEST_NAME + 3 for label in labels.values())
-
-
-@pytest.mark.parametrize(
-    ("value", "deviation", "text"),
-    [
-        (12.50312, 0.0213, "12.503 ± 0.021"),
-        (2500.3, 599.4, "2500 ± 599"),
-        (0.258, 0.0042, "0.2580 ± 0.0042"),
-        (1.0, 0.0995, "1.000 ± 0.100"),
-        (3.1e-7, 2e-8, "3.100e-07 ± 2.0e-08"),
-        (7.25, 0.0, "7.25"),
-        (7.25, math.inf, "7.25"),
-        (7.25, math.nan, "7.25"),
-        (1.0, 1e-12, "1 ± 1.0e-12"),
-    ],
-)
-def test_a_value_has_the_digits_its_deviation_deserves(value: float, deviation: float, text: str) -> None:
-    assert value_with_deviation(value, deviation) == text
 
 
 def test_units_and_quantities_are_the_fields_own_words() -> None:

@@ -1,12 +1,8 @@
 """Modes and numbers with error bars, as sentences name them."""
 
 from collections.abc import Sequence
-from math import floor, isfinite, log10
 
 from chladni.signals.mode_set import ModeSet
-
-# More are those of functions without noise, from a model, and nobody reads them.
-_MOST_DECIMALS = 9
 
 
 def mode_name(modes: ModeSet, row: int) -> str:
@@ -47,25 +43,6 @@ def joined(words: Sequence[str], *, most: int = 6) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
-def with_std(number: float, std: float) -> str:
-    """Give a number as far as its error bar lets it be known, two digits of which are shown.
-
-    Examples
-    --------
-    >>> with_std(3.96214, 0.00372), with_std(1407.31, 12.0), with_std(2.5, float("nan")), with_std(51.5, 2e-13)
-    ('3.9621 ± 0.0037', '1407 ± 12', '2.5 (no error bar)', '51.5 ± 2e-13')
-    """
-    if not (isfinite(std) and isfinite(number)):
-        return f"{number:.4g} (no error bar)"
-    if std <= 0:
-        return f"{number:.6g} ± 0"
-    # The second digit of the error bar is the last that says anything about the number.
-    decimals = max(1 - floor(log10(std)), 0)
-    if decimals > _MOST_DECIMALS:
-        return f"{number:.{_MOST_DECIMALS}g} ± {std:.1g}"
-    return f"{number:.{decimals}f} ± {std:.{decimals}f}"
-
-
 def prefixed(number: float, unit: str) -> str:
     """Give a number of three digits with the prefix that keeps it short.
 
@@ -80,14 +57,3 @@ def prefixed(number: float, unit: str) -> str:
         if abs(rounded) >= factor:
             return f"{rounded / factor:.3g} {prefix}{unit}"
     return f"{rounded:.3g} {unit}"
-
-
-def percent_with_std(ratio: float, std: float) -> str:
-    """Give a ratio in percent with its error bar.
-
-    Examples
-    --------
-    >>> percent_with_std(0.0123, 0.0004)
-    '1.230 ± 0.040 %'
-    """
-    return f"{with_std(100 * ratio, 100 * std)} %"

@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from chladni.modal.shapes.joint_treatment import JointTreatment, treatments
-from chladni.modal.shapes.mode_words import capital, joined, mode_names, percent_with_std, with_std
+from chladni.modal.shapes.mode_words import capital, joined, mode_names
 from chladni.modal.shapes.neighbours import neighbour_note
 from chladni.signals.arrays import Real
 from chladni.signals.geometry import Geometry
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.relative_motion import RelativeMotion
-from chladni.signals.wording import counted
+from chladni.signals.wording import counted, with_sigma
 
 _MAIN_MODES = 6
 _GOOD_FIT = 0.05
@@ -63,12 +63,16 @@ def _main_modes(modes: ModeSet) -> list[str]:
     span = f" between {modes.frequency_hz[0]:.4g} and {modes.frequency_hz[-1]:.4g} Hz" if count > 1 else ""
     start = f"{capital(counted(count, 'mode'))}{span}, from {source} at {counted(len(modes.channels), 'channel')}"
     listed = [
-        f"{with_std(float(modes.frequency_hz[row]), float(modes.frequency_std_hz[row]))} Hz with "
-        f"{percent_with_std(float(modes.damping_ratio[row]), float(modes.damping_std[row]))} damping"
+        f"{_with_std(modes.frequency_hz[row], modes.frequency_std_hz[row])} Hz with "
+        f"{_with_std(100 * modes.damping_ratio[row], 100 * modes.damping_std[row])} % damping"
         for row in rows
     ]
     which = "the main ones at" if count > _MAIN_MODES else "at"
     return [f"{start}; {which} {joined(listed)} (± one sigma)."]
+
+
+def _with_std(value: float, std: float) -> str:
+    return with_sigma(float(value), float(std), unknown=" (no error bar)", exact=" ± 0")
 
 
 def _prominence(modes: ModeSet) -> Real:

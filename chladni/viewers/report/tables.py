@@ -6,7 +6,8 @@ from chladni.signals.channel import Channel
 from chladni.signals.peak import Peak
 from chladni.signals.provenance import Provenance
 from chladni.signals.study import Study
-from chladni.viewers.labels import printed_unit, value_with_deviation
+from chladni.signals.wording import with_sigma
+from chladni.viewers.labels import printed_unit
 from chladni.viewers.report.markup import element, escaped, table
 from chladni.viewers.style import Style
 
@@ -15,8 +16,8 @@ def peak_table(peaks: Sequence[Peak], style: Style, *, channels: str) -> str:
     """Tabulate peaks with one sigma, the last column under the heading `channels`; empty when there are none."""
     rows = [
         (
-            value_with_deviation(peak.frequency_hz, peak.frequency_std_hz),
-            value_with_deviation(peak.height, peak.height_std),
+            with_sigma(peak.frequency_hz, peak.frequency_std_hz),
+            with_sigma(peak.height, peak.height_std),
             printed_unit(peak.unit),
             ", ".join(style.labels.get(name, name) for name in peak.channels),
         )

@@ -9,7 +9,8 @@ import rerun.blueprint as rrb
 from chladni.signals.peak import Peak
 from chladni.signals.study import Study
 from chladni.signals.visible import visible
-from chladni.viewers.labels import printed_unit, value_with_deviation
+from chladni.signals.wording import with_sigma
+from chladni.viewers.labels import printed_unit
 from chladni.viewers.mode_tables import Row, mode_table
 from chladni.viewers.style import Style
 
@@ -74,8 +75,8 @@ def _peaks(title: str, peaks: Sequence[Peak], style: Style, *, channels: str) ->
     yield f"| Hz | height | unit | {channels} |"
     yield "|---|---|---|---|"
     for peak in peaks:
-        frequency = value_with_deviation(peak.frequency_hz, peak.frequency_std_hz)
-        height = value_with_deviation(peak.height, peak.height_std)
+        frequency = with_sigma(peak.frequency_hz, peak.frequency_std_hz)
+        height = with_sigma(peak.height, peak.height_std)
         names = ", ".join(escaped(style.labels.get(name, name)) for name in peak.channels)
         yield f"| {frequency} | {height} | {escaped(printed_unit(peak.unit))} | {names} |"
 
