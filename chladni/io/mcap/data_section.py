@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.io.mcap.chunk_search import find_chunk
 from chladni.io.mcap.damage import DamageList
 from chladni.io.mcap.limits import MIB, Limits
 from chladni.io.mcap.log_file import LogFile, Window
@@ -32,7 +31,7 @@ from chladni.io.mcap.records import (
     parse_message_index,
     record_name,
 )
-from chladni.io.mcap.stepping_stones import SteppingStones, agrees, lies_alike
+from chladni.io.mcap.stepping_stones import SteppingStones, agrees, find_chunk, lies_alike
 from chladni.io.mcap.summary import ChunkIndex, LogEnd
 from chladni.signals.arrays import Bytes
 

@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
+from isal import isal_zlib
+
 from chladni.io.mcap.channel_registry import ChannelRegistry
 from chladni.io.mcap.chunk import ChunkRules, OpenedChunk, chunk_content, open_chunk
 from chladni.io.mcap.damage import DamageList
-from chladni.io.mcap.data_crc import DataCrc
 from chladni.io.mcap.data_section import BareSegment, ChunkSegment, DataSection, Segment
 from chladni.io.mcap.decompress import BELIEVED_RATIO
 from chladni.io.mcap.limits import MIB, Limits
@@ -19,12 +20,13 @@ from chladni.io.mcap.records import ChunkHeader, MalformedRecordError, record_na
 from chladni.io.mcap.selection import Selection
 from chladni.io.mcap.stretch_content import StretchContent, fill_content
 from chladni.io.mcap.summary import LogEnd
+from chladni.signals.arrays import Bytes
 
 _MOST_THREADS = 4
 _BYTES_AHEAD = 64 * MIB
-
 # Finishes what was started in a thread.
 _Task = Callable[[], StretchContent]
+_BLOCK_BYTES = 1 << 20
 
 
 class LogPass:
@@ -291,3 +293,44 @@ def _listing(channel_ids: set[int] | frozenset[int]) -> str:
     """
     first = ", ".join(str(number) for number in sorted(channel_ids)[:3])
     return first if len(channel_ids) <= 3 else f"{first}, ..."
+
+
+class DataCrc:
+    """CRC-32 from the start of the log up to DataEnd, kept in step with the walk so that pages are read once.
+
+    Parameters
+    ----------
+    file, end
+        The log, and what its end tells.
+    """
+
+    def __init__(self, file: LogFile, end: LogEnd) -> None:
+        self._file = file
+        self._end = end
+        self._position = 0
+        self._crc = 0
+
+    @property
+    def wanted(self) -> bool:
+        """Whether the log carries such a checksum."""
+        return self._end.data_crc != 0
+
+    def take(self, offset: int, content: Bytes) -> None:
+        """Take in bytes that have been read already, and those of the file before them."""
+        self._read_to(offset)
+        if self._position == offset:
+            self._crc = isal_zlib.crc32(content.data, self._crc)
+            self._position += len(content)
+
+    def _read_to(self, offset: int) -> None:
+        while self._position < offset:
+            block = self._file.read(self._position, min(_BLOCK_BYTES, offset - self._position))
+            if not block:
+                return
+            self._crc = isal_zlib.crc32(block, self._crc)
+            self._position += len(block)
+
+    def is_right(self) -> bool:
+        """Take in the rest and compare."""
+        self._read_to(self._end.data_end)
+        return self._crc == self._end.data_crc

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chladni.io.mcap.chunk_search import find_chunk
 from chladni.io.mcap.log_file import LogFile
+from chladni.io.mcap.stepping_stones import find_chunk
 from tests.io.mcap import log_bytes as lb
 
 BLOCK_BYTES = 1 << 20
