@@ -11,7 +11,8 @@ from chladni.models.core.compiled_model import CompiledModel, DelayLine, IdealDe
 from chladni.models.core.port import Port, Terminal
 from chladni.models.schemes.block import Block
 from chladni.models.schemes.derivative_filter import FilteredEquations, filtered_derivatives, lag_names
-from chladni.models.schemes.equations import SchemeEquations, delay_of, solved_equations
+from chladni.models.schemes.descriptor import Reduced
+from chladni.models.schemes.equations import delay_of, solved_equations
 from chladni.models.schemes.points import Point, points_of
 from chladni.models.schemes.scheme_output import SchemeOutput
 from chladni.models.schemes.wiring import Wiring, wired
@@ -103,7 +104,7 @@ def _equations(
 ) -> CompiledModel:
     wiring = wired(blocks, inputs)
     places = _places(blocks)
-    equations, columns = _closed(blocks, wiring, places)
+    equations, states, columns = _closed(blocks, wiring, places)
     kept = [
         place
         for number, place in enumerate(places)
@@ -112,13 +113,13 @@ def _equations(
     if len(kept) < len(places):
         # A column less may need a derivative less elsewhere too, so the loops are closed again.
         places = kept
-        equations, columns = _closed(blocks, wiring, places)
+        equations, states, columns = _closed(blocks, wiring, places)
     points = points_of(blocks, outputs)
     fed = {place.block for place in places if place.delay_s}
     # Behind a dead time that feeds nothing the signal is only read later: exact for any signal, and no loop.
     offsets = [0.0 if point.before or point.block in fed else delay_of(blocks[point.block]) for point in points]
     rows = _stacked(_point_rows(points, wiring, columns), _port_rows(places, wiring, columns, len(inputs)))
-    compiled = _assembled(equations, rows, points, inputs, places, filter_time_s)
+    compiled = _assembled(equations, states, rows, points, inputs, places, filter_time_s)
     return replace(compiled, output_offsets_s=tuple(offsets))
 
 
@@ -151,7 +152,9 @@ def _places(blocks: Sequence[Block]) -> list[_Place]:
     return [*entering, *leaving, *late]
 
 
-def _closed(blocks: Sequence[Block], wiring: Wiring, places: Sequence[_Place]) -> tuple[SchemeEquations, _Columns]:
+def _closed(
+    blocks: Sequence[Block], wiring: Wiring, places: Sequence[_Place]
+) -> tuple[Reduced, tuple[str, ...], _Columns]:
     count = len(blocks)
     behind = np.zeros((count, wiring.inputs.shape[1] + len(places)))
     into = np.hstack([wiring.inputs, np.zeros((count, len(places)))])
@@ -159,7 +162,7 @@ def _closed(blocks: Sequence[Block], wiring: Wiring, places: Sequence[_Place]) -
         # What an input port adds enters the block; all else joins behind it, and reaches whom the block feeds.
         (into if place.port.kind == "input" else behind)[place.block, number] = 1.0
     columns = _Columns(into=into + wiring.blocks @ behind, behind=behind)
-    return solved_equations(blocks, wiring.blocks, columns.into), columns
+    return *solved_equations(blocks, wiring.blocks, columns.into), columns
 
 
 def _point_rows(points: Sequence[Point], wiring: Wiring, columns: _Columns) -> _Rows:
@@ -189,7 +192,8 @@ def _stacked(first: _Rows, second: _Rows) -> _Rows:
 
 
 def _assembled(
-    equations: SchemeEquations,
+    equations: Reduced,
+    states: Sequence[str],
     rows: _Rows,
     points: Sequence[Point],
     inputs: Sequence[Terminal],
@@ -216,7 +220,7 @@ def _assembled(
         velocity_port=np.zeros((len(ports), len(ports))),
         inputs=tuple(inputs),
         outputs=tuple(point.terminal for point in points),
-        states=(*equations.states, *lag_names(full.sources, full.orders, names)),
+        states=(*states, *lag_names(full.sources, full.orders, names)),
         ports=tuple(ports),
         delays=tuple(
             DelayLine(port=number, delay_s=place.delay_s) for number, place in enumerate(places) if place.delay_s

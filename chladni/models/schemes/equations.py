@@ -1,40 +1,18 @@
 """From blocks and sums to ordinary equations of the whole scheme."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
 from chladni.models.elements.element import Element
 from chladni.models.elements.realization import Realization, realize
 from chladni.models.schemes.block import Block
-from chladni.models.schemes.descriptor import Descriptor, reduced
+from chladni.models.schemes.descriptor import Descriptor, Reduced, reduced
 from chladni.models.schemes.loops import loops_of, require_well_posed
 from chladni.models.schemes.structural_inverse import total
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-from chladni.signals.value import Value
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SchemeEquations(Value):
-    """``z' = A z + B w`` and ``y = C z + sum_k D[k] w^(k)``, y what leaves each block before its dead time.
-
-    Attributes
-    ----------
-    a, b, c
-        ``[state, state]``, ``[state, column]``, ``[block, state]``.
-    d
-        ``[power, block, column]``; one power when every signal is proper.
-    states
-        Name of each state: ``plant.x1``, and ``regulator.derivative1`` where a block differentiates.
-    """
-
-    a: Real
-    b: Real
-    c: Real
-    d: Real
-    states: tuple[str, ...]
 
 
 def realization_of(block: Block) -> Realization:
@@ -50,8 +28,8 @@ def delay_of(block: Block) -> float:
     return block.acting.transfer.delay_s if isinstance(block.acting, Element) else 0.0
 
 
-def solved_equations(blocks: Sequence[Block], between: Real, columns: Real) -> SchemeEquations:
-    """Close all loops.
+def solved_equations(blocks: Sequence[Block], between: Real, columns: Real) -> tuple[Reduced, tuple[str, ...]]:
+    """Close all loops; rows of the rest are what leaves each block before its dead time.
 
     Parameters
     ----------
@@ -61,6 +39,13 @@ def solved_equations(blocks: Sequence[Block], between: Real, columns: Real) -> S
         K, see `Wiring`.
     columns
         ``[block, column]``: what each column of w adds to what goes into each block.
+
+    Returns
+    -------
+    equations
+        One power of D when every signal is proper.
+    states
+        Name of each state: ``plant.x1``, and ``regulator.derivative1`` where a block differentiates.
 
     Raises
     ------
@@ -84,13 +69,8 @@ def solved_equations(blocks: Sequence[Block], between: Real, columns: Real) -> S
         f"{name}.x{number + 1}" for name, form in zip(names, forms, strict=True) for number in range(form.b.size)
     ]
     rest = _rest_names(names, forms)
-    return SchemeEquations(
-        a=solution.a,
-        b=solution.b,
-        c=solution.c[-len(blocks) :],
-        d=_without_empty_powers(solution.d[:, -len(blocks) :]),
-        states=(*states, *(rest[place] for place in solution.kept)),
-    )
+    left = replace(solution, c=solution.c[-len(blocks) :], d=_without_empty_powers(solution.d[:, -len(blocks) :]))
+    return left, (*states, *(rest[place] for place in solution.kept))
 
 
 def _descriptor(forms: Sequence[Realization], between: Real, columns: Real) -> Descriptor:
