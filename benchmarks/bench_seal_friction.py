@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from chladni.models.core.port_law import PortLaw
-from chladni.models.integrator.known_motion import force_along_motion
 from chladni.models.drives.seal_friction import seal_friction_force
 from chladni.models.effects.hysteresis import bouc_wen
+from chladni.models.integrator.known_motion import force_along_motion
 from chladni.signals.arrays import Mask, Real, Whole
 
 PRESSURES_BAR = (1, 4, 7)

@@ -1,12 +1,11 @@
 """How large an oscillation is, as it goes through a record."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
-def amplitude(signal: Matrix, length: int) -> Matrix:
+def amplitude(signal: Real, length: int) -> Real:
     """``[sample]`` amplitude of an oscillation ``[sample]``: of a sine that is as large over `length` samples.
 
     The mean over the same samples is left out, since a load or a travel is no oscillation. At the ends of the record
@@ -21,7 +20,7 @@ def amplitude(signal: Matrix, length: int) -> Matrix:
     return np.pad(found, (before, signal.size - found.size - before), mode="edge")
 
 
-def _running_mean(signal: Matrix, length: int) -> Matrix:
+def _running_mean(signal: Real, length: int) -> Real:
     """``[sample]`` means over each whole stretch of a length."""
     sums = np.concatenate([[0.0], np.cumsum(signal)])
     return np.asarray((sums[length:] - sums[:-length]) / length, dtype=np.float64)

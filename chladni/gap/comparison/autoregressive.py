@@ -1,13 +1,11 @@
 """Noise as an autoregressive process, from its power spectrum."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 from scipy.linalg import solve_toeplitz
 
 from chladni.gap.records.noise_floor import NoiseFloor
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Mask, Real
 
 HIGHEST_ORDER = 12
 # Share of the power added to lag 0: keeps the equations solvable where a spectrum has (next to) empty bands.
@@ -19,13 +17,13 @@ TINY = 1e-100
 
 
 def noise_floor_of(
-    spectrum: Matrix,
+    spectrum: Real,
     *,
     samples: int,
-    freedom: Matrix,
+    freedom: Real,
     method: tuple[str, ...],
-    upper_bound: NDArray[np.bool_],
-    scale: Matrix,
+    upper_bound: Mask,
+    scale: Real,
 ) -> NoiseFloor:
     """Fit an autoregressive model to each output's noise spectrum.
 
@@ -64,7 +62,7 @@ def noise_floor_of(
     )
 
 
-def _lowest_aic(covariance: Matrix, samples: int) -> tuple[Matrix, float]:
+def _lowest_aic(covariance: Real, samples: int) -> tuple[Real, float]:
     """Give the whitening filter, and the innovation variance, of the order that Akaike's criterion chooses."""
     loaded = covariance.copy()
     loaded[0] *= 1 + LOADING
@@ -74,7 +72,7 @@ def _lowest_aic(covariance: Matrix, samples: int) -> tuple[Matrix, float]:
     return models[int(np.argmin(criterion))]
 
 
-def _yule_walker(covariance: Matrix, order: int) -> tuple[Matrix, float]:
+def _yule_walker(covariance: Real, order: int) -> tuple[Real, float]:
     if order == 0:
         return np.ones(1), float(covariance[0])
     past = solve_toeplitz(covariance[:order], covariance[1 : order + 1])

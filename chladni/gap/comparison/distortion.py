@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from chladni.gap.comparison.linear_approximation import moving_inputs, period_spectra
@@ -11,13 +10,10 @@ from chladni.gap.comparison.local_rational import POLES, TERMS, output_error
 from chladni.gap.comparison.periodicity import periods_of
 from chladni.gap.records.diagnosis import DistortionShare
 from chladni.gap.records.measurement import Measurement
+from chladni.signals.arrays import Complex, Index, Mask, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value
 from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
-
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Mask = NDArray[np.bool_]
 
 # Fewer detection lines within the excited band scatter too much to speak for the excited ones.
 FEWEST_DETECTION = 4
@@ -45,9 +41,9 @@ class Distortion(Value):
 
     shares: tuple[DistortionShare, ...]
     output_names: tuple[str, ...]
-    linear: Matrix
-    nonlinear: Matrix
-    noise: Matrix
+    linear: Real
+    nonlinear: Real
+    noise: Real
     remarks: tuple[str, ...]
 
     def __post_init__(self) -> None:
@@ -122,12 +118,12 @@ class _Split:
         return power / total if total > 0 else 0.0
 
 
-def _steady(signals: Matrix, measurement: Measurement) -> Matrix:
+def _steady(signals: Real, measurement: Measurement) -> Real:
     """``[signal, period, sample]`` after the transient periods."""
     return periods_of(signals, measurement.period_samples or 1)[:, measurement.transient_periods :]
 
 
-def _spectra(signals: Matrix) -> Complex:
+def _spectra(signals: Real) -> Complex:
     """``[..., line]`` of ``[..., sample]``; the square of a line is its power, 0 Hz left out."""
     samples = signals.shape[-1]
     lines = fft.rfft(signals, axis=-1) * (np.sqrt(2) / samples)
@@ -137,7 +133,7 @@ def _spectra(signals: Matrix) -> Complex:
     return np.asarray(lines)
 
 
-def _split(u: Complex, periods: Matrix, excited: Mask, *, odd_only: bool) -> _Split:
+def _split(u: Complex, periods: Real, excited: Mask, *, odd_only: bool) -> _Split:
     """Split one output ``[period, sample]``; with `odd_only` its even lines are no detection lines for odd ones."""
     count = len(periods)
     spectra = _spectra(periods)
@@ -164,7 +160,7 @@ def _split(u: Complex, periods: Matrix, excited: Mask, *, odd_only: bool) -> _Sp
     )
 
 
-def _detected(repeated: Matrix, excited: Mask, *, step: int) -> float | None:
+def _detected(repeated: Real, excited: Mask, *, step: int) -> float | None:
     """Power on the excited lines as their nearest detection lines have it; None with few of those."""
     lines = np.flatnonzero(excited)
     # Outside of the band the machine answers differently; those lines say nothing of the excited ones.
@@ -178,7 +174,7 @@ def _detected(repeated: Matrix, excited: Mask, *, step: int) -> float | None:
     return float(np.sum(sums[first + near] - sums[first]) / near)
 
 
-def _roughness(u: Complex, y: Complex, noise: Matrix, line: NDArray[np.intp]) -> float | None:
+def _roughness(u: Complex, y: Complex, noise: Real, line: Index) -> float | None:
     """Power by which the response to neighbouring excited lines scatters about a smooth one; None with few lines."""
     size = LINES_A_TERM * (TERMS + POLES)
     blocks = u.size // size

@@ -1,13 +1,10 @@
 """What no linear system explains of the outputs: a local rational fit of the spectra, without a model."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from chladni.gap.comparison.residual_spectra import ResidualSpectra
-
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 # Terms of each local polynomial: 1, r, r^2.
 TERMS = 3
@@ -18,7 +15,7 @@ LINES_A_TERM = 3
 WORTH_POLES = 0.7
 
 
-def local_fit(inputs: Matrix, outputs: Matrix) -> ResidualSpectra | None:
+def local_fit(inputs: Real, outputs: Real) -> ResidualSpectra | None:
     """Fit, block by block of lines, a rational function from the inputs to each output, and give the residual.
 
     Over the lines k + r of a block, with r scaled to -1..1,
@@ -71,7 +68,7 @@ def local_fit(inputs: Matrix, outputs: Matrix) -> ResidualSpectra | None:
     )
 
 
-def output_error(signals: Complex, y: Complex, r: Matrix) -> Complex:
+def output_error(signals: Complex, y: Complex, r: Real) -> Complex:
     """Residual ``[block, line]`` of one output with poles of its own.
 
     Parameters
@@ -90,13 +87,13 @@ def output_error(signals: Complex, y: Complex, r: Matrix) -> Complex:
     return np.asarray(unreached(regressors / denominator, target)[:, :, 0])
 
 
-def _regressors(signals: Complex, r: Matrix) -> Complex:
+def _regressors(signals: Complex, r: Real) -> Complex:
     """``[block, line, term]``: each signal times 1, r, r^2."""
     terms = signals[:, :, :, None] * _powers(r, 0, TERMS)[..., None, :]
     return np.asarray(terms.reshape(*signals.shape[:2], -1))
 
 
-def _powers(r: Matrix, first: int, end: int) -> Complex:
+def _powers(r: Real, first: int, end: int) -> Complex:
     """``[..., line, power]``."""
     return np.asarray(r[..., None] ** np.arange(first, end), dtype=np.complex128)
 

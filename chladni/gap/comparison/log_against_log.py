@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.comparison.distortion import Distortion, distortion_where_told
 from chladni.gap.comparison.log_regimes import log_regimes
@@ -15,10 +14,9 @@ from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.records.diagnosis import Where
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.arrays import Real
 from chladni.signals.errors import LogError
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 # Rates of two clocks agree to this; beyond, samples drift apart.
 SAME_RATE = 1e-6
@@ -48,13 +46,13 @@ class GapView(Value):
         Outputs that only one side holds; inputs that differ.
     """
 
-    residual: Matrix
+    residual: Real
     gap: float
     where: Where
     noise: NoiseFloor
-    map_time_s: Matrix
-    map_frequency_hz: Matrix
-    map_density: Matrix
+    map_time_s: Real
+    map_frequency_hz: Real
+    map_density: Real
     measured_split: Distortion | None = None
     simulated_split: Distortion | None = None
     remarks: tuple[str, ...] = ()
@@ -65,11 +63,11 @@ class GapView(Value):
 
 def view_gap(
     measured: Measurement,
-    simulated: Matrix,
+    simulated: Real,
     *,
     noise: NoiseFloor | None = None,
     modes_hz: Sequence[float] = (),
-    variables: Mapping[str, Matrix] | None = None,
+    variables: Mapping[str, Real] | None = None,
 ) -> GapView:
     """Say where measured and simulated outputs differ.
 
@@ -113,7 +111,7 @@ def view_gap(
 
 
 def compare_logs(
-    measured: Measurement, simulated: Measurement, *, variables: Mapping[str, Matrix] | None = None
+    measured: Measurement, simulated: Measurement, *, variables: Mapping[str, Real] | None = None
 ) -> GapView:
     """Compare a measured log with one that any simulator wrote, of the same experiment.
 

@@ -6,15 +6,13 @@ No joint's motion is known without a model; what the log itself holds of displac
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from chladni.gap.comparison.amplitude import amplitude
 from chladni.gap.comparison.shares import regime_shares
 from chladni.gap.records.diagnosis import RegimeShare
 from chladni.gap.records.measurement import Measurement
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 MOTION_UNITS = frozenset({"m", "rad", "m/s", "rad/s"})
 # Cycles of an output's mean frequency that its amplitude is taken over: fewer would follow the signal itself.
@@ -23,11 +21,11 @@ CYCLES = 4.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Variable:
-    values: Matrix
+    values: Real
     unit: str
 
 
-def log_regimes(residual: Matrix, measured: Measurement) -> tuple[RegimeShare, ...]:
+def log_regimes(residual: Real, measured: Measurement) -> tuple[RegimeShare, ...]:
     """Find the regimes in which the gap is larger than elsewhere, and by more than the motion itself.
 
     A gap that is the same share of each output at any time grows with the motion, so that large amplitudes would
@@ -50,7 +48,7 @@ def log_regimes(residual: Matrix, measured: Measurement) -> tuple[RegimeShare, .
     )
 
 
-def cycles_of(signal: Matrix, sample_rate_hz: float) -> int:
+def cycles_of(signal: Real, sample_rate_hz: float) -> int:
     """Give the samples of `CYCLES` cycles of a signal's mean frequency; all of one that stands still."""
     power = np.abs(fft.rfft(signal - signal.mean())) ** 2
     if not power.sum() > 0:

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.comparison.short_log import modes_of, shortness
 from chladni.gap.comparison.unstable_model import instability
@@ -14,6 +13,7 @@ from chladni.io.log_info import some_of
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
 from chladni.models.core.port import Terminal
+from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, ModelError, SetupError
 from chladni.signals.number_range import out_of_range
@@ -21,8 +21,6 @@ from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import si_factor
 from chladni.signals.visible import place_of
 from chladni.signals.wording import counted
-
-Matrix = NDArray[np.float64]
 
 # With fewer of the lowest mode an answer is possible, but poor.
 FEW_CYCLES = 5.0
@@ -234,7 +232,7 @@ def _span(recording: TimeSeries, row: int) -> str:
     return f"from {places[0] / rate_hz:g} to {(places[-1] + 1) / rate_hz:g} s"
 
 
-def _signals(matches: Sequence[_Match], recording: TimeSeries, stretch: slice, kind: str, log: str) -> Matrix:
+def _signals(matches: Sequence[_Match], recording: TimeSeries, stretch: slice, kind: str, log: str) -> Real:
     signals = np.zeros((len(matches), stretch.stop - stretch.start))
     for place, match in enumerate(matches):
         if match.row is not None:

@@ -1,21 +1,20 @@
 """Functions of one motion that a static nonlinearity is made of, even ones apart from odd ones."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 # Dead zones, over the RMS of the motion.
 ZONES = (1.0, 2.0)
 
 
-def even_functions(displacement: Matrix) -> Matrix:
+def even_functions(displacement: Real) -> Real:
     """``[function, ..., sample]`` of a displacement ``[..., sample]`` of about unit RMS: abs(d), d^2, dead zones."""
     size = np.abs(displacement)
     return np.array([size, displacement**2, *(np.maximum(size - zone, 0.0) for zone in ZONES)])
 
 
-def odd_functions(displacement: Matrix, velocity: Matrix) -> Matrix:
+def odd_functions(displacement: Real, velocity: Real) -> Real:
     """``[function, ..., sample]``: d abs(d), d^3, dead zones with the sign of d, and the sign of the velocity."""
     size, side = np.abs(displacement), np.sign(displacement)
     beyond = [side * np.maximum(size - zone, 0.0) for zone in ZONES]

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from chladni.gap.comparison.autoregressive import noise_floor_of
@@ -12,11 +11,9 @@ from chladni.gap.comparison.periodicity import periods_of
 from chladni.gap.comparison.residual_spectra import ResidualSpectra
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError
 from chladni.spectral.windows import window_samples
-
-Matrix = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 # Degrees of freedom wanted in a block of lines between periods; as many as a local fit has.
 BLOCK_FREEDOM = 24
@@ -76,7 +73,7 @@ def _of_periods_or_fit(measurement: Measurement) -> NoiseFloor:
     return chosen_floor(fitted.rms < MOVED * floor.rms, floor, fitted)
 
 
-def _stepped(outputs: Matrix, floor: NoiseFloor) -> Mask:
+def _stepped(outputs: Real, floor: NoiseFloor) -> Mask:
     """Whether coarse steps or held samples make up much of each floor; they look like noise, but a law gives them."""
     answers = []
     for row, rms in zip(outputs, floor.rms, strict=True):
@@ -99,7 +96,7 @@ def _of_fit(measurement: Measurement) -> NoiseFloor:
     return replace(floor, upper_bound=shared | _louder_than_quiet(spectra, outputs))
 
 
-def noise_of_residual(residual: Matrix, *, sample_rate_hz: float, method: str = "explained residual") -> NoiseFloor:
+def noise_of_residual(residual: Real, *, sample_rate_hz: float, method: str = "explained residual") -> NoiseFloor:
     """Estimate the noise from ``[output, sample]`` that a fitted model leaves; it's an upper bound.
 
     The spectrum is averaged over Hann segments of 512 samples (or an eighth of the record) with half overlap.
@@ -131,7 +128,7 @@ def noise_of_residual(residual: Matrix, *, sample_rate_hz: float, method: str = 
     )
 
 
-def _line_edges(length: int) -> Matrix:
+def _line_edges(length: int) -> Real:
     """Edges of the lines of a segment, halfway between neighbours."""
     inner = (np.arange(length // 2) + 0.5) / length
     return np.concatenate([[0.0], inner, [0.5]])
@@ -157,7 +154,7 @@ def chosen_floor(lower: Mask, first: NoiseFloor, second: NoiseFloor) -> NoiseFlo
     )
 
 
-def _steady_periods(measurement: Measurement) -> Matrix | None:
+def _steady_periods(measurement: Measurement) -> Real | None:
     """``[output, period, sample]`` after the transient ones; None with fewer than two."""
     if measurement.period_samples is None:
         return None
@@ -165,7 +162,7 @@ def _steady_periods(measurement: Measurement) -> Matrix | None:
     return steady if steady.shape[1] >= 2 else None
 
 
-def _between_periods(periods: Matrix) -> ResidualSpectra | None:
+def _between_periods(periods: Real) -> ResidualSpectra | None:
     """Spectra of what differs between periods; None when a period is too short for that."""
     count, samples = periods.shape[1:]
     about_mean = (periods - periods.mean(axis=1, keepdims=True)) * np.sqrt(count / (count - 1))
@@ -188,7 +185,7 @@ def _between_periods(periods: Matrix) -> ResidualSpectra | None:
     )
 
 
-def _floor(spectra: ResidualSpectra, outputs: Matrix, method: str, upper_bound: Mask) -> NoiseFloor:
+def _floor(spectra: ResidualSpectra, outputs: Real, method: str, upper_bound: Mask) -> NoiseFloor:
     whole, own = spectra.densities(), spectra.incoherent_densities()
     lower = own.mean(axis=1) < (1 - SHARED) ** 2 * whole.mean(axis=1)
     density = np.where(lower[:, None], own, whole)
@@ -206,14 +203,14 @@ def _floor(spectra: ResidualSpectra, outputs: Matrix, method: str, upper_bound: 
     )
 
 
-def _responses(spectra: ResidualSpectra, outputs: Matrix) -> Matrix:
+def _responses(spectra: ResidualSpectra, outputs: Real) -> Real:
     """``[output, block]`` power density of the outputs themselves."""
     blocks, lines = spectra.residual.shape[:2]
     power = np.abs(fft.rfft(outputs, axis=1)[:, 1 : 1 + blocks * lines]) ** 2 / outputs.shape[1]
     return np.asarray(power.reshape(len(outputs), blocks, lines).mean(axis=2))
 
 
-def _louder_than_quiet(spectra: ResidualSpectra, outputs: Matrix) -> Mask:
+def _louder_than_quiet(spectra: ResidualSpectra, outputs: Real) -> Mask:
     """Whether each residual is louder where the machine responds: then it may hold distortion."""
     left, own = spectra.densities(), spectra.incoherent_densities()
     answers = _responses(spectra, outputs) >= QUIET * left
@@ -225,7 +222,7 @@ def _louder_than_quiet(spectra: ResidualSpectra, outputs: Matrix) -> Mask:
     return verdict
 
 
-def _of_top_quarter(outputs: Matrix) -> NoiseFloor:
+def _of_top_quarter(outputs: Real) -> NoiseFloor:
     """Take the top quarter of the band for white noise: all that a very short log gives."""
     samples = outputs.shape[1]
     power = np.abs(fft.rfft(outputs - outputs.mean(axis=1, keepdims=True), axis=1)) ** 2 / samples
@@ -240,7 +237,7 @@ def _of_top_quarter(outputs: Matrix) -> NoiseFloor:
     )
 
 
-def _on_grid(density: Matrix, edges: Matrix) -> Matrix:
+def _on_grid(density: Real, edges: Real) -> Real:
     """Spread ``[output, block]`` over evenly spaced lines from 0 to half the rate; ends take the nearest block."""
     lines = np.linspace(0, 0.5, GRID + 1)
     block = np.clip(np.searchsorted(edges, lines, side="right") - 1, 0, density.shape[1] - 1)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from chladni.gap.comparison.linear_approximation import moving_inputs, period_spectra
@@ -13,11 +12,8 @@ from chladni.gap.comparison.local_rational import unreached
 from chladni.gap.comparison.motion_functions import even_functions, odd_functions
 from chladni.gap.comparison.periodicity import periods_of
 from chladni.gap.records.measurement import Measurement
+from chladni.signals.arrays import Complex, Index, Mask, Real
 from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
-
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Mask = NDArray[np.bool_]
 
 # Sums of three excited frequencies reach three times as far as the band.
 FARTHEST = 3.0
@@ -100,7 +96,7 @@ def products_outside(measurement: Measurement) -> ProductsOutside | None:
     return max(found, key=lambda one: one.both, default=None)
 
 
-def _blocks(excited: Mask) -> NDArray[np.intp] | None:
+def _blocks(excited: Mask) -> Index | None:
     """``[block, line]`` indices of the lines above the band; None where there are few."""
     highest = int(np.flatnonzero(excited)[-1]) if np.any(excited) else 0
     first = highest + 1
@@ -113,7 +109,7 @@ def _blocks(excited: Mask) -> NDArray[np.intp] | None:
 
 def _motions(
     measurement: Measurement, mean: Complex, excited: Mask, period: int
-) -> Iterator[tuple[tuple[str, ...], tuple[Matrix, Matrix]]]:
+) -> Iterator[tuple[tuple[str, ...], tuple[Real, Real]]]:
     """Displacement and velocity ``[sample]`` of outputs and of differences of two, of unit RMS."""
     # In radians a period; scaled to unit RMS later, so that the rate doesn't matter.
     omega = 2 * np.pi * np.arange(excited.size)
@@ -133,9 +129,7 @@ def _motions(
             yield name, (displacement / displacement.std(), velocity / velocity.std())
 
 
-def _explained(
-    name: tuple[str, ...], motion: tuple[Matrix, Matrix], mean: Complex, index: NDArray[np.intp]
-) -> ProductsOutside:
+def _explained(name: tuple[str, ...], motion: tuple[Real, Real], mean: Complex, index: Index) -> ProductsOutside:
     d, s = motion
     even, odd = (fft.rfft(one, axis=1) for one in (even_functions(d), odd_functions(d, s)))
     targets = mean[:, index].transpose(1, 2, 0)

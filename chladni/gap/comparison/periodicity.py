@@ -3,12 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from chladni.gap.records.measurement import Measurement
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 SHORTEST_PERIOD = 8
 FEWEST_PERIODS = 2
@@ -101,13 +99,13 @@ def with_period(measurement: Measurement) -> Measurement:
     return replace(measurement, period_samples=found.period_samples, transient_periods=found.transient_periods)
 
 
-def periods_of(signals: Matrix, period: int) -> Matrix:
+def periods_of(signals: Real, period: int) -> Real:
     """Cut ``[signal, sample]`` into ``[signal, period, sample]``; what's left behind the last one is dropped."""
     count = signals.shape[1] // period
     return signals[:, : count * period].reshape(len(signals), count, period)
 
 
-def transient_periods(signals: Matrix, period: int) -> int:
+def transient_periods(signals: Real, period: int) -> int:
     """Count leading periods that differ, in any of ``[signal, sample]``, from the next more than later ones do."""
     periods = periods_of(signals, period)
     if periods.shape[1] == FEWEST_PERIODS:
@@ -121,7 +119,7 @@ def transient_periods(signals: Matrix, period: int) -> int:
     return int(settled[0]) if settled.size else periods.shape[1] - 2
 
 
-def _fades(difference: Matrix, steady: Matrix) -> bool:
+def _fades(difference: Real, steady: Real) -> bool:
     """Whether the difference of two periods is larger at its begin than at its end."""
     samples = difference.shape[1] // FADING_PARTS
     parts = difference[:, : samples * FADING_PARTS].reshape(len(difference), FADING_PARTS, samples)
@@ -130,7 +128,7 @@ def _fades(difference: Matrix, steady: Matrix) -> bool:
     return bool(np.any(power[:, 0] > FADING_RATIO * power[:, -1] + floor))
 
 
-def _candidates(inputs: Matrix) -> list[int]:
+def _candidates(inputs: Real) -> list[int]:
     """Give lags at which all inputs together correlate with themselves, shortest first."""
     samples = inputs.shape[1]
     lags = samples // FEWEST_PERIODS + 1
@@ -148,7 +146,7 @@ def _candidates(inputs: Matrix) -> list[int]:
     return [int(lag) for lag in peaks]
 
 
-def _self_correlation(signal: Matrix, lags: int) -> Matrix:
+def _self_correlation(signal: Real, lags: int) -> Real:
     """Correlate a signal with itself at lags from 0, over the power of the parts compared."""
     size = fft.next_fast_len(signal.size + lags, real=True)
     spectrum = fft.rfft(signal, size)
@@ -159,7 +157,7 @@ def _self_correlation(signal: Matrix, lags: int) -> Matrix:
     return np.asarray(np.divide(products, norm, out=np.zeros(lags), where=norm > 0), dtype=np.float64)
 
 
-def _scatter(inputs: Matrix, lag: int) -> float:
+def _scatter(inputs: Real, lag: int) -> float:
     """Give what doesn't repeat over what does, of the worst input, without the first period where there are more."""
     periods = periods_of(inputs, lag)
     # A force that was measured feels the machine, so it settles with it.

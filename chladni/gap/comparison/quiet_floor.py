@@ -1,13 +1,11 @@
 """The level that an output's spectrum doesn't fall below: what is left of noise when distortion hides it."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.comparison.autoregressive import noise_floor_of
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 
-Matrix = NDArray[np.float64]
 #: Quantile of the lines that counts as quiet, and the share of the signal's power that is always granted to noise.
 _QUIET, _LEAST = 0.2, 1e-8
 _SEGMENT = 1024

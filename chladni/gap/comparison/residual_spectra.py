@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 # Below this freedom a regression on the other outputs explains by chance.
 LEAST_FREEDOM = 4.0
@@ -28,14 +26,14 @@ class ResidualSpectra:
     """
 
     residual: Complex
-    freedom: Matrix
-    edges: Matrix
+    freedom: Real
+    edges: Real
 
-    def densities(self) -> Matrix:
+    def densities(self) -> Real:
         """``[output, block]`` power density."""
         return np.asarray(np.sum(np.abs(self.residual) ** 2, axis=1).T)
 
-    def incoherent_densities(self) -> Matrix:
+    def incoherent_densities(self) -> Real:
         """``[output, block]`` power density of what the other outputs don't share.
 
         With S the cross-spectral matrix of the residuals, 1/[S^-1]_jj is what is left of output j after regression

@@ -3,18 +3,17 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.effects.wrong_unit import PREFIXES, is_apart, near, short
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Least correlation that says it's one signal.
 _ALIKE = 0.5
 #: A model's scale is only so near to a conversion, as a factor.
 _ROUGHLY = 2.0
 
 
-def scale_doubt(measured: Matrix, simulated: Matrix, output_names: Sequence[str]) -> str | None:
+def scale_doubt(measured: Real, simulated: Real, output_names: Sequence[str]) -> str | None:
     """Give a sentence on the output whose scale differs most, None where all agree within a factor of 30.
 
     A signal that the model gives in another shape tells nothing of its scale.

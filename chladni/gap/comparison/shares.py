@@ -9,16 +9,13 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 from scipy import fft
 
 from chladni.gap.records.diagnosis import BandShare, ChannelGap, RegimeShare
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 from chladni.spectral.windows import window_samples
-
-Matrix = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 BANDS = 10
 # Bands span the frequencies between which all but this share of measured power and gap lies, on either side.
@@ -49,7 +46,7 @@ class _Regime:
     inside: tuple[float, float]
 
 
-def relative_residual(residual: Matrix, measured: Matrix) -> Matrix:
+def relative_residual(residual: Real, measured: Real) -> Real:
     """Give ``[output, sample]`` residuals over the RMS of what was measured; an output of zero stays as it is."""
     if residual.shape != measured.shape:
         raise EstimateError(
@@ -58,19 +55,19 @@ def relative_residual(residual: Matrix, measured: Matrix) -> Matrix:
     return np.asarray(residual / _scale(measured))
 
 
-def _scale(measured: Matrix) -> Matrix:
+def _scale(measured: Real) -> Real:
     """``[output, 1]`` RMS of what was measured; 1 for an output of zero."""
     rms = np.sqrt(np.mean(measured**2, axis=1, keepdims=True))
     return np.asarray(np.where(rms > 0, rms, 1.0))
 
 
-def pooled_gap(residual: Matrix, measured: Matrix) -> float:
+def pooled_gap(residual: Real, measured: Real) -> float:
     """RMS of the residual over the RMS of what was measured, all outputs pooled after scaling each by its own."""
     return float(np.sqrt(np.mean(relative_residual(residual, measured) ** 2)))
 
 
 def channel_gaps(
-    residual: Matrix, measured: Matrix, noise: NoiseFloor, *, output_names: Sequence[str]
+    residual: Real, measured: Real, noise: NoiseFloor, *, output_names: Sequence[str]
 ) -> tuple[ChannelGap, ...]:
     """Give gap and noise of each output, over the RMS of what was measured; arrays are ``[output, sample]``."""
     gaps = np.sqrt(np.mean(relative_residual(residual, measured) ** 2, axis=1))
@@ -83,8 +80,8 @@ def channel_gaps(
 
 
 def band_shares(
-    residual: Matrix,
-    measured: Matrix,
+    residual: Real,
+    measured: Real,
     *,
     sample_rate_hz: float,
     modes_hz: Sequence[float] = (),
@@ -127,7 +124,7 @@ def band_shares(
 
 
 def regime_shares(
-    residual: Matrix, measured: Matrix, variables: Mapping[str, Matrix], *, beyond_motion: bool = False
+    residual: Real, measured: Real, variables: Mapping[str, Real], *, beyond_motion: bool = False
 ) -> tuple[RegimeShare, ...]:
     """Find the regimes of motion in which the gap is larger than elsewhere.
 
@@ -165,7 +162,7 @@ def regime_shares(
     return tuple(regime.told for regime in found[:MOST_REGIMES])
 
 
-def gap_map(residual: Matrix, measured: Matrix, sample_rate_hz: float) -> tuple[Matrix, Matrix, Matrix]:
+def gap_map(residual: Real, measured: Real, sample_rate_hz: float) -> tuple[Real, Real, Real]:
     """Give the gap's density over time and frequency.
 
     Hann segments with half overlap, about as many slices as lines.
@@ -193,7 +190,7 @@ def gap_map(residual: Matrix, measured: Matrix, sample_rate_hz: float) -> tuple[
     return time_s, fft.rfftfreq(length, 1 / sample_rate_hz), density
 
 
-def _line_power(scaled: Matrix) -> Matrix:
+def _line_power(scaled: Real) -> Real:
     """``[line]`` power of all outputs together, each line's twin at negative frequency included."""
     power = np.sum(np.abs(fft.rfft(scaled, axis=1)) ** 2, axis=0)
     power[1:] *= 2
@@ -203,7 +200,7 @@ def _line_power(scaled: Matrix) -> Matrix:
 
 
 def _noise_shares(
-    power: Matrix, noise: NoiseFloor, measured: Matrix, edges_hz: Matrix, sample_rate_hz: float
+    power: Real, noise: NoiseFloor, measured: Real, edges_hz: Real, sample_rate_hz: float
 ) -> list[float | None]:
     """How much of a gap's ``power [band]``, of `_line_power`, noise can be; None where there is no gap."""
     samples = measured.shape[1]
@@ -216,14 +213,14 @@ def _noise_shares(
     return [min(float(ours / whole), 1.0) if whole > 0 else None for ours, whole in zip(inside, power, strict=True)]
 
 
-def _mode_edges_hz(modes_hz: Sequence[float], frequency_hz: Matrix) -> Matrix:
+def _mode_edges_hz(modes_hz: Sequence[float], frequency_hz: Real) -> Real:
     modes = np.sort(np.asarray(modes_hz, dtype=np.float64))
     inner = np.sqrt(modes[:-1] * modes[1:])
     top_hz, apart_hz = float(frequency_hz[-1]), FEWEST_LINES * float(frequency_hz[1])
     return _spaced([*inner, *(2 * modes[-1:])], top_hz, apart_hz)
 
 
-def _log_edges_hz(gap: Matrix, whole: Matrix, frequency_hz: Matrix) -> Matrix:
+def _log_edges_hz(gap: Real, whole: Real, frequency_hz: Real) -> Real:
     power = sum((one[1:] / one[1:].sum() for one in (gap, whole) if one[1:].sum() > 0), np.zeros(gap.size - 1))
     if not power.any():
         return np.array([0.0, frequency_hz[-1]])
@@ -235,7 +232,7 @@ def _log_edges_hz(gap: Matrix, whole: Matrix, frequency_hz: Matrix) -> Matrix:
     return _spaced(np.geomspace(max(low_hz, apart_hz), max(high_hz, 2 * apart_hz), BANDS + 1), top_hz, apart_hz)
 
 
-def _spaced(inner_hz: Sequence[float] | Matrix, top_hz: float, apart_hz: float) -> Matrix:
+def _spaced(inner_hz: Sequence[float] | Real, top_hz: float, apart_hz: float) -> Real:
     """Put edges between 0 and the top, without those that would leave a band of less than some lines."""
     edges = [0.0]
     # Modes closer than some lines share a band.
@@ -245,7 +242,7 @@ def _spaced(inner_hz: Sequence[float] | Matrix, top_hz: float, apart_hz: float) 
     return np.array([*edges, top_hz])
 
 
-def _regimes(values: Matrix) -> list[tuple[float, float]]:
+def _regimes(values: Real) -> list[tuple[float, float]]:
     edges = np.unique(np.quantile(values, QUANTILES))
     near = float(np.quantile(np.abs(values), AROUND_ZERO))
     bins = [(float(low), float(high)) for low, high in pairwise(edges)]
@@ -253,14 +250,14 @@ def _regimes(values: Matrix) -> list[tuple[float, float]]:
     return [*bins, (-near, near)] if near > 0 and values.min() < 0 < values.max() else bins
 
 
-def _power_of_motion(residual: Matrix, measured: Matrix) -> Matrix:
+def _power_of_motion(residual: Real, measured: Real) -> Real:
     """``[sample]`` power of a gap that is the same share of each output at any time, over its sum."""
     gaps = np.mean(relative_residual(residual, measured) ** 2, axis=1)
     power = gaps @ relative_residual(measured, measured) ** 2
     return np.asarray(power / power.sum() if power.sum() > 0 else power)
 
 
-def _regime(name: str, values: Matrix, power: Matrix, expected: Matrix, edges: tuple[float, float]) -> _Regime:
+def _regime(name: str, values: Real, power: Real, expected: Real, edges: tuple[float, float]) -> _Regime:
     """Weigh one regime; `power` of the gap, and the one that it must exceed too."""
     low, high = edges
     inside = (values >= low) & (values <= high)

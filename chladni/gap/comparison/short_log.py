@@ -1,12 +1,11 @@
 """Whether a log is long enough for an answer to mean anything."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.compiled_model import CompiledModel
+from chladni.signals.arrays import Complex, Real
 
-Matrix = NDArray[np.float64]
 #: With fewer, every fit of a few numbers follows.
 FEW_SAMPLES = 200
 #: Cycles of the lowest mode, or times of the slowest decay, that show what a model does of itself.
@@ -40,7 +39,7 @@ def shortness(compiled: CompiledModel, measurement: Measurement) -> str | None:
     )
 
 
-def modes_of(compiled: CompiledModel) -> Matrix:
+def modes_of(compiled: CompiledModel) -> Real:
     """Natural frequencies of the model's vibrating modes in Hz, one for each pair of poles."""
     poles = _poles(compiled)
     vibrating = poles.imag > _AT_REST * float(np.abs(poles).max(initial=0.0))
@@ -59,5 +58,5 @@ def _shown_s(compiled: CompiledModel) -> float:
     return min(_OF_INERTIA_S, _SHOWN / slowest) if np.isfinite(slowest) else _OF_INERTIA_S
 
 
-def _poles(compiled: CompiledModel) -> NDArray[np.complex128]:
+def _poles(compiled: CompiledModel) -> Complex:
     return np.asarray(np.linalg.eigvals(compiled.a) if compiled.states else [], dtype=np.complex128)

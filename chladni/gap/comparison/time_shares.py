@@ -3,12 +3,10 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.comparison.shares import LEAST_EXCESS, relative_residual
 from chladni.gap.records.diagnosis import TimeShare
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 # Ends of a stretch are told to this part of the record, of a short one to so many samples.
 PIECES = 64
@@ -22,7 +20,7 @@ FLOOR = 1e-9
 MEDIAN_DIFFERENCE = 0.6745 * np.sqrt(2)
 
 
-def time_shares(residual: Matrix, measured: Matrix, *, sample_rate_hz: float) -> tuple[TimeShare, ...]:
+def time_shares(residual: Real, measured: Real, *, sample_rate_hz: float) -> tuple[TimeShare, ...]:
     """Find the stretches of the record in which the gap is larger than in the rest.
 
     The record is cut into 64 pieces of equal length, fewer when it's short. The stretch of neighbouring pieces told
@@ -70,12 +68,12 @@ def time_shares(residual: Matrix, measured: Matrix, *, sample_rate_hz: float) ->
     return tuple(sorted(found, key=lambda one: -one.share)[:MOST_TIMES])
 
 
-def _scatter(level: Matrix) -> float:
+def _scatter(level: Real) -> float:
     """Standard deviation of a piece's level, from neighbours: a gap that comes and goes changes few of them."""
     return float(np.median(np.abs(np.diff(level))) / MEDIAN_DIFFERENCE)
 
 
-def _stretches(gain: Matrix, first: int, stop: int) -> Iterator[tuple[int, int]]:
+def _stretches(gain: Real, first: int, stop: int) -> Iterator[tuple[int, int]]:
     """Stretches of largest sum: of the whole, then of what lies before and behind it, and so on."""
     if first >= stop:
         return
@@ -89,5 +87,5 @@ def _stretches(gain: Matrix, first: int, stop: int) -> Iterator[tuple[int, int]]
         yield from _stretches(gain, end, stop)
 
 
-def _stands_out(shares: Matrix, times: Matrix, scatter: float) -> bool:
+def _stands_out(shares: Real, times: Real, scatter: float) -> bool:
     return bool(np.log(shares.sum() / times.sum()) > LEAST_SIGMAS * scatter / np.sqrt(shares.size))

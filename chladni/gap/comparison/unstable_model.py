@@ -1,10 +1,10 @@
 """Whether a model runs away by itself: poles that grow."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.stability import growing_poles
+from chladni.signals.arrays import Complex
 
 #: Poles that are listed.
 _LISTED = 4
@@ -38,7 +38,7 @@ def instability_found(nominal: CompiledModel, found: CompiledModel) -> str | Non
     return None
 
 
-def _told(poles: NDArray[np.complex128]) -> str:
+def _told(poles: Complex) -> str:
     """Poles from the fastest growing one on, and how fast that is."""
     ordered = poles[np.argsort(-poles.real)]
     listed = ", ".join(_pole(pole) for pole in ordered[:_LISTED])

@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from math import ceil, floor
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import counted
-
-Mask = NDArray[np.bool_]
 
 # With fewer samples nothing can be told apart from noise at all.
 FEWEST_SAMPLES = 32

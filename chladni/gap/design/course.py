@@ -5,7 +5,6 @@ from copy import copy
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.design.experiment import Experiment
 from chladni.gap.design.imitation import Part, sums_of
@@ -14,8 +13,7 @@ from chladni.gap.explanation.contest import SLACK
 from chladni.gap.plant.free_run import FreeRun, Windows
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 class Course:
@@ -47,7 +45,7 @@ class Course:
     ) -> None:
         self.experiment, self._rivals = experiment, rivals
         self._run = FreeRun(experiment.model, replace(measurement, inputs=experiment.inputs), windows=windows)
-        self._kept: dict[tuple[int, int], Matrix] = {}
+        self._kept: dict[tuple[int, int], Real] = {}
         #: Of each candidate.
         self.predictions: list[Prediction] = [one.predicted(self._run, self._initial(one)) for one in rivals]
 
@@ -58,17 +56,17 @@ class Course:
         return same
 
     @property
-    def outputs(self) -> Matrix:
+    def outputs(self) -> Real:
         """``[output, sample]`` as the first candidate predicts them."""
         return self.predictions[0].outputs
 
     def part(
         self,
         noise: NoiseFloor,
-        detail: Matrix,
+        detail: Real,
         chosen: Sequence[int],
         pair: tuple[int, int],
-        at: Matrix | None = None,
+        at: Real | None = None,
     ) -> Part:
         """Give the record of this experiment that one candidate makes and the other imitates.
 
@@ -96,18 +94,18 @@ class Course:
         sums = self._sums(noise, pair) if at is None else self._sums_at(noise, pair, at)
         return Part(gain * sums[:, rows], 1.0 + SLACK + gain * detail[rows] * power, wanted.shape[-1])
 
-    def _sums(self, noise: NoiseFloor, pair: tuple[int, int]) -> Matrix:
+    def _sums(self, noise: NoiseFloor, pair: tuple[int, int]) -> Real:
         if pair not in self._kept:
             wanted, prediction = (self.predictions[one] for one in pair)
             self._kept[pair] = sums_of(wanted.outputs, prediction, noise, self._run.windows)
         return self._kept[pair]
 
-    def _sums_at(self, noise: NoiseFloor, pair: tuple[int, int], at: Matrix) -> Matrix:
+    def _sums_at(self, noise: NoiseFloor, pair: tuple[int, int], at: Real) -> Real:
         rival = self._rivals[pair[1]]
         prediction = rival.predicted(self._run, self._initial(rival), at)
         return sums_of(self.predictions[pair[0]].outputs, prediction, noise, self._run.windows)
 
-    def _initial(self, rival: Rival) -> Matrix:
+    def _initial(self, rival: Rival) -> Real:
         # Of a long log only the first windows are simulated.
         initial = rival.contestant.fit.initial[: len(self._run.windows)]
         return np.asarray(self.experiment.start * initial, dtype=np.float64)

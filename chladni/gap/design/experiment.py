@@ -3,13 +3,10 @@
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.models.core.model import Model
+from chladni.signals.arrays import Real
 from chladni.signals.value import Value
 
-Matrix = NDArray[np.float64]
 Change = Literal["nothing", "level", "repeats", "band", "sweep", "slow", "sensor", "position"]
 #: What changes ask of people, from a knob that is turned to a machine that is rebuilt.
 EFFORT: dict[Change, float] = {
@@ -51,7 +48,7 @@ class Experiment(Value):
     change: Change
     words: str
     model: Model
-    inputs: Matrix
+    inputs: Real
     level: float | None = None
     start: float = 0.0
     repeats: int = 1

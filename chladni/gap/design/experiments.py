@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.design.experiment import Change, Experiment
 from chladni.gap.plant.windows import windows_for
@@ -13,9 +12,9 @@ from chladni.models.core.model import Model
 from chladni.models.excitations.random_noise import RandomNoise
 from chladni.models.excitations.swept_sine import SweptSine
 from chladni.models.structures.structure_model import StructureModel
+from chladni.signals.arrays import Real
 from chladni.signals.unit_text import with_unit
 
-Matrix = NDArray[np.float64]
 Band = tuple[float, float]
 #: Levels that are tried, the nearest first; four times what the log holds is as far as it's safe to ask for.
 LEVELS = (2.0, 0.5, 4.0, 0.25)
@@ -53,11 +52,11 @@ class Reach:
     seed: int
 
     @property
-    def rms(self) -> Matrix:
+    def rms(self) -> Real:
         """``[input]`` RMS."""
         return np.asarray(np.sqrt(np.mean(self.measurement.inputs**2, axis=1)), dtype=np.float64)
 
-    def experiment(self, change: Change, words: str, inputs: Matrix, *, level: float | None = None) -> Experiment:
+    def experiment(self, change: Change, words: str, inputs: Real, *, level: float | None = None) -> Experiment:
         """Give an experiment on the model as it is."""
         start = level if level is not None and self.begins_with_log else 0.0
         return Experiment(change=change, words=words, model=self.model, inputs=inputs, level=level, start=start)
@@ -149,7 +148,7 @@ class Reach:
         words = f"Drive {self._driven()} with a slow sine of {frequency_hz:.3g} Hz{told}"
         yield self.experiment("slow", words, self._driven_by(sines))
 
-    def _driven_by(self, excitations: Sequence[RandomNoise | SweptSine]) -> Matrix:
+    def _driven_by(self, excitations: Sequence[RandomNoise | SweptSine]) -> Real:
         rng = np.random.default_rng(self.seed)
         samples, rate = self.measurement.samples, self.measurement.sample_rate_hz
         return np.stack(
@@ -176,7 +175,7 @@ class Reach:
         names = [name for name, rms in zip(self.measurement.input_names, self.rms, strict=True) if rms > 0]
         return " and ".join(names) or "the start"
 
-    def _told(self, sizes: Matrix, word: str = "RMS") -> str:
+    def _told(self, sizes: Real, word: str = "RMS") -> str:
         units = [one.unit for one in self.model.compile().inputs]
         told = [
             with_unit(f"{size:.3g}", unit) for size, unit, rms in zip(sizes, units, self.rms, strict=True) if rms > 0

@@ -4,13 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.design.rival import Prediction, Rival
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.bounded_step import bounded_step
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Rounds of reweighing: an output that can't be imitated must not rule over those that can.
 _ROUNDS = 6
 #: Keeps equations of initial states regular that no sensor sees.
@@ -31,12 +30,12 @@ class Part:
         Of the record.
     """
 
-    sums: Matrix
-    scale: Matrix
+    sums: Real
+    scale: Real
     samples: int
 
 
-def sums_of(wanted: Matrix, prediction: Prediction, noise: NoiseFloor, windows: Sequence[tuple[int, int]]) -> Matrix:
+def sums_of(wanted: Real, prediction: Prediction, noise: NoiseFloor, windows: Sequence[tuple[int, int]]) -> Real:
     """Sum products over the samples of each window, ``[window, output, column, column]``.
 
     Columns are the whitened difference ``[output, sample]`` of what is wanted and predicted, the slopes by the
@@ -51,7 +50,7 @@ def sums_of(wanted: Matrix, prediction: Prediction, noise: NoiseFloor, windows: 
     return np.stack([one @ np.swapaxes(one, 1, 2) for one in parts])
 
 
-def imitated(rival: Rival, at: Matrix, parts: Sequence[Part]) -> tuple[Matrix, list[Matrix]]:
+def imitated(rival: Rival, at: Real, parts: Sequence[Part]) -> tuple[Real, list[Real]]:
     """Refit a candidate by one linear step to what another one predicts, to all records at once.
 
     The step makes ``sum_j N_j/2 ln(v_j + delta_j) + z.z/2`` least, with v_j the scale of output j, N_j its samples,
@@ -87,7 +86,7 @@ def imitated(rival: Rival, at: Matrix, parts: Sequence[Part]) -> tuple[Matrix, l
     return at + step, left
 
 
-def _solved(rival: Rival, at: Matrix, sums: Matrix) -> tuple[Matrix, Matrix]:
+def _solved(rival: Rival, at: Real, sums: Real) -> tuple[Real, Real]:
     """Best step and initial states ``[window, state]`` from weighed sums ``[window, column, column]``."""
     known = rival.unknowns
     per = _eliminated(sums, known)
@@ -100,7 +99,7 @@ def _solved(rival: Rival, at: Matrix, sums: Matrix) -> tuple[Matrix, Matrix]:
     return step, per[:, :, 0] - per[:, :, 1:] @ step
 
 
-def _eliminated(sums: Matrix, known: int) -> Matrix:
+def _eliminated(sums: Real, known: int) -> Real:
     """Best initial states for the difference and for each unknown, ``[window, state, 1 + unknown]``."""
     local, cross = sums[:, known + 1 :, known + 1 :], sums[:, known + 1 :, : known + 1]
     size = np.einsum("wkk->wk", local)

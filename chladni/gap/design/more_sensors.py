@@ -4,15 +4,14 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
 from chladni.models.structures.structure_model import StructureModel
 from chladni.models.structures.structure_output import Measure, StructureOutput
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 _WORDS: dict[Measure, str] = {
     "acceleration": "an accelerometer at",
     "displacement": "an encoder across",
@@ -65,7 +64,7 @@ def with_sensors(model: Model, sensors: Sequence[MoreSensor]) -> Model:
     return replace(model, outputs=(*model.outputs, *(one.output for one in sensors)))
 
 
-def with_noise_of(noise: NoiseFloor, units: Sequence[str], more_units: Sequence[str], signals: Matrix) -> NoiseFloor:
+def with_noise_of(noise: NoiseFloor, units: Sequence[str], more_units: Sequence[str], signals: Real) -> NoiseFloor:
     """Give the noise of the log's outputs and of sensors that would be as good.
 
     A sensor of a unit that the log holds is as noisy as those in the middle; another one as noisy for its signal.

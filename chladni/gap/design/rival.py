@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
@@ -12,8 +11,8 @@ from chladni.gap.plant.law_run import can_run
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.tuning.decay import decay
 from chladni.gap.tuning.effect_scale import EffectNumber, effect_numbers, with_numbers
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Hard bound on parameters that stay within their tolerance, in sigmas.
 _LIMIT = 3.0
 #: How far an effect's parameter may go in one linear step, in factors of e.
@@ -38,10 +37,10 @@ class Prediction:
         ``[unknown]`` where.
     """
 
-    outputs: Matrix
-    own: Matrix
-    starts: Matrix
-    at: Matrix
+    outputs: Real
+    own: Real
+    starts: Real
+    at: Real
 
 
 class Rival:
@@ -74,7 +73,7 @@ class Rival:
         own = [0.0 if name in hypothesis.wide else 1.0 for name in tunables.names]
         self.sure = np.concatenate([own, np.zeros(len(low))])
 
-    def paid(self, at: Matrix) -> float:
+    def paid(self, at: Real) -> float:
         """Nats that the parameters pay to go from the fit to ``at [unknown]``."""
         there, here = at - self.believed, -self.believed
         return float(0.5 * np.sum(self.sure * (there**2 - here**2)))
@@ -84,7 +83,7 @@ class Rival:
         """How many numbers a refit would move."""
         return int(self.low.size)
 
-    def predicted(self, run: FreeRun, initial: Matrix, at: Matrix | None = None) -> Prediction:
+    def predicted(self, run: FreeRun, initial: Real, at: Real | None = None) -> Prediction:
         """Predict an experiment.
 
         Parameters
@@ -120,10 +119,10 @@ class Rival:
         starts = np.concatenate([longest[..., : stop - start] for start, stop in run.windows], axis=-1)
         return Prediction(outputs, own, starts, x)
 
-    def _setting(self, x: Matrix) -> Setting:
+    def _setting(self, x: Real) -> Setting:
         count = self._z.size
         return Setting(self._z + x[:count], with_numbers(self._effects, self._numbers, x[count:]))
 
-    def _steps(self, x: Matrix) -> Matrix:
+    def _steps(self, x: Real) -> Real:
         steps = np.concatenate([_APART / self._tolerance, np.full(len(self._numbers), _APART)])
         return np.asarray(np.where(x + steps > self.high, -steps, steps))

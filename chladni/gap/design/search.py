@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.design.course import Course
 from chladni.gap.design.design import Design
@@ -20,9 +19,9 @@ from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError, ModelError
 
-Matrix = NDArray[np.float64]
 #: Samples that are simulated of each experiment.
 _SAMPLES = 6000
 #: Share of a stretch from the middle of a log over which its inputs are faded in.
@@ -167,7 +166,7 @@ class Search:
         )
 
 
-def _details(best: Contestant, noise: NoiseFloor, outputs: Matrix) -> Matrix:
+def _details(best: Contestant, noise: NoiseFloor, outputs: Real) -> Real:
     """``[output]`` share of its power that the best candidate leaves beyond noise."""
     power = np.maximum(np.mean(noise.whitened(outputs) ** 2, axis=-1), np.finfo(np.float64).tiny)
     count = best.held.size

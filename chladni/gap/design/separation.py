@@ -4,16 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.design.course import Course
 from chladni.gap.design.imitation import imitated
 from chladni.gap.design.rival import Rival
 from chladni.gap.explanation.contest import EFFECTIVE_SAMPLES
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 #: An experiment with the rows of the outputs that are measured in it.
 Record = tuple[Course, tuple[int, ...]]
 
@@ -34,9 +33,9 @@ class Separation:
 
     rivals: Sequence[Rival]
     noise: NoiseFloor
-    detail: Matrix
+    detail: Real
 
-    def nats(self, records: Sequence[Record], *, passes: int = 1) -> Matrix:
+    def nats(self, records: Sequence[Record], *, passes: int = 1) -> Real:
         """Give ``[rival]`` against the first candidate, of records that are explained together.
 
         The mean of the log evidence that is expected when the one is true and when the other is (Box & Hill 1967),

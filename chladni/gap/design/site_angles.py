@@ -3,13 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 
-def angles_deg(patterns: Spectrum, chosen: Sequence[int]) -> Matrix:
+def angles_deg(patterns: Complex, chosen: Sequence[int]) -> Real:
     """Angle between the patterns of each two sites on some outputs, ``[site, site]``, 0 to 90 degrees.
 
     A force of any shape is free on every line, so only the direction over the outputs tells: with one output all

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.design.experiments import excited_band_hz
 from chladni.gap.design.more_sensors import MoreSensor, more_sensors, with_noise_of, with_sensors
@@ -16,9 +15,9 @@ from chladni.gap.plant.record_lines import RecordLines
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 #: Cycles of the lowest mode that tell its frequency within a percent or so.
 CYCLES = 20.0
 #: Noise over signal above which little can be said of anything.
@@ -134,7 +133,7 @@ def _best_sensor(
 
 def _patterns(
     model: Model, measurement: Measurement, noise: NoiseFloor, sensors: Sequence[MoreSensor], names: Sequence[str]
-) -> tuple[NDArray[np.complex128], list[Site]]:
+) -> tuple[Complex, list[Site]]:
     """Patterns of the likeliest sites over the log's sensors and those that may be added."""
     more = with_sensors(model, sensors)
     compiled = more.compile()
@@ -174,7 +173,7 @@ def _lines(measurement: Measurement) -> RecordLines:
     return RecordLines(index=index, samples=measurement.samples, sample_rate_hz=measurement.sample_rate_hz)
 
 
-def _least(angles: Matrix) -> tuple[float, float]:
+def _least(angles: Real) -> tuple[float, float]:
     """Smallest and mean angle between different sites."""
     apart = angles[np.triu_indices(len(angles), 1)]
     return float(apart.min()), float(apart.mean())

@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from chladni.gap.diagnosis.completeness import COMPLETE, completeness, completeness_among, known_share
@@ -36,8 +35,8 @@ from chladni.gap.explanation.known_states import KnownStates
 from chladni.gap.location.locate import Located
 from chladni.gap.records.diagnosis import Candidate, Verdict
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 Step = Callable[[float], None]
 #: Nats within which a log can't tell two candidates apart.
 CLOSE = 2.0
@@ -201,7 +200,7 @@ def _detailed(study: Study, ranked: Sequence[Contestant], best: Contestant) -> l
     return [detailed(study, one) for one in best_forms(alike)]
 
 
-def _leaves_another(study: Study, best: Contestant, nothing: Contestant, floor: Matrix) -> bool:
+def _leaves_another(study: Study, best: Contestant, nothing: Contestant, floor: Real) -> bool:
     """Whether what the best cause leaves may be another one."""
     # Sensors that hear only noise, or whose floor is too high, must not hide the one that hears more.
     if best.most_left < ALONE:
@@ -268,7 +267,7 @@ def _distorted(study: Study, tuned: Contestant) -> tuple[str, ...]:
     return tuple(name for name, share in zip(study.measurement.output_names, shares, strict=True) if share > FOLLOWS)
 
 
-def _verdict(together: Sequence[Contestant], tuned: Contestant, best: Contestant, floor: Matrix) -> Verdict:
+def _verdict(together: Sequence[Contestant], tuned: Contestant, best: Contestant, floor: Real) -> Verdict:
     if best is tuned:
         # With no candidate that pays: is there anything to explain?
         return "none" if tuned.chi < _CLEAN else "unknown"
@@ -280,7 +279,7 @@ def _verdict(together: Sequence[Contestant], tuned: Contestant, best: Contestant
     return "parameters" if best.chi < _CLEAN else "unknown"
 
 
-def _probabilities(contestants: Sequence[Contestant], tuned: Contestant, floor: Matrix, added: float) -> list[float]:
+def _probabilities(contestants: Sequence[Contestant], tuned: Contestant, floor: Real, added: float) -> list[float]:
     price = price_among(contestants, added)
     evidence = np.array([price.paid(one) for one in contestants])
     weight = np.exp(evidence - evidence.max())

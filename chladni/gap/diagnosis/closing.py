@@ -5,16 +5,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.explanation.contest import held_gap
 from chladni.gap.records.diagnosis import Closing, HeldOut
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.arrays import Mask, Real
 
-Matrix = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 _DRAWS = 400
 
 
@@ -80,7 +78,7 @@ def explained_power(left: float, tuned: float, after: float, *, noise: float) ->
     return float(np.clip(back / whole, 0.0, 1.0))
 
 
-def closing_of(yardstick: Yardstick, before: Matrix, tuned: Matrix, after: Matrix, *, seed: int) -> Closing:
+def closing_of(yardstick: Yardstick, before: Real, tuned: Real, after: Real, *, seed: int) -> Closing:
     """Compare three simulations with the measurement on held-out samples.
 
     Parameters
@@ -106,7 +104,7 @@ def closing_of(yardstick: Yardstick, before: Matrix, tuned: Matrix, after: Matri
     )
 
 
-def _interval(yardstick: Yardstick, before: Matrix, after: Matrix, seed: int) -> tuple[float, float] | None:
+def _interval(yardstick: Yardstick, before: Real, after: Real, seed: int) -> tuple[float, float] | None:
     """95 % interval by drawing held-out blocks with replacement (Kuensch 1989)."""
     measured = yardstick.measurement.outputs
     size = np.maximum(np.mean(measured[:, yardstick.held] ** 2, axis=1, keepdims=True), 1e-300)

@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import expit
 
 from chladni.gap.explanation.hypothesis import Contestant
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Share of the gap's RMS beyond the noise that a cause may leave at even odds, of laws with details and of those
 #: without; what it may leave over the noise's power without that being counted.
 _LEFT, _UNCOUNTED = (0.38, 0.16), 0.05
@@ -20,7 +19,7 @@ _SHARPNESS = 0.2
 _KNOWN, _FAINT = 0.95, 0.2
 
 
-def completeness(tuned: Contestant, found: Contestant, floor: Matrix) -> float:
+def completeness(tuned: Contestant, found: Contestant, floor: Real) -> float:
     """Probability that what a hypothesis leaves is noise and details of its laws, not another cause.
 
     Logistic in the share of the gap's RMS that is left on held-out samples, noise taken from both as power, root sum
@@ -38,7 +37,7 @@ def completeness(tuned: Contestant, found: Contestant, floor: Matrix) -> float:
     return completeness_of(tuned.held, found.held, floor, exact=exact)
 
 
-def completeness_of(tuned: Matrix, found: Matrix, floor: Matrix, *, exact: bool) -> float:
+def completeness_of(tuned: Real, found: Real, floor: Real, *, exact: bool) -> float:
     """Give the completeness of some words from ``[output]`` mean squares over noise, without and with them.
 
     Parameters
@@ -52,7 +51,7 @@ def completeness_of(tuned: Matrix, found: Matrix, floor: Matrix, *, exact: bool)
     return float(expit((1.0 - share / _LEFT[int(exact)]) / _SHARPNESS))
 
 
-def completeness_among(tuned: Contestant, found: Contestant, others: Sequence[Contestant], floor: Matrix) -> float:
+def completeness_among(tuned: Contestant, found: Contestant, others: Sequence[Contestant], floor: Real) -> float:
     """Give the completeness of a hypothesis, or of one among others that adds oscillators to its own.
 
     A cable or a bracket has more modes than the catalogue's oscillator: what its second mode does is a detail.
@@ -69,7 +68,7 @@ def _has_more_modes(other: Contestant, found: Contestant) -> bool:
     return {one.effect for one in more} == {effects[0].effect} and effects[0].site in {one.site for one in more}
 
 
-def known_share(tuned: Matrix, floor: Matrix) -> float:
+def known_share(tuned: Real, floor: Real) -> float:
     """Probability that a cause is one of those that took part, not one that they imitate.
 
     Of the names that were given with confidence to made machines, a tenth of which hid something else, about nineteen
@@ -84,6 +83,6 @@ def known_share(tuned: Matrix, floor: Matrix) -> float:
     return _KNOWN * (1.0 - _FAINT * float(np.exp(-np.linalg.norm(above))))
 
 
-def _beyond(held: Matrix) -> float:
+def _beyond(held: Real) -> float:
     """RMS beyond the noise, root sum square of all outputs, from ``[output]`` mean squares over noise."""
     return float(np.sqrt(np.sum(np.maximum(held - 1.0, 0.0))))

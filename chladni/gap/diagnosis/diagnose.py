@@ -4,9 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.gap.comparison.distortion import distortion_where_told
 from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.comparison.periodicity import with_period
@@ -43,10 +40,10 @@ from chladni.gap.records.measurement import Measurement
 from chladni.gap.tuning.output_error import fit_output_error
 from chladni.models.core.model import Model
 from chladni.models.effects.effect_kind import EffectKind
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError, ModelError
 from chladni.signals.linear_algebra import in_one_thread
 
-Matrix = NDArray[np.float64]
 StepProgress = Callable[[str, float], None]
 
 
@@ -154,7 +151,7 @@ def _yardstick(study: Study, causes: Causes) -> Yardstick:
     )
 
 
-def _nominal(study: Study) -> Matrix:
+def _nominal(study: Study) -> Real:
     """Free run of the nominal model from the initial state that suits it best."""
     run, contest = study.contest.run, study.contest
     try:
@@ -163,7 +160,7 @@ def _nominal(study: Study) -> Matrix:
         return run.outputs()
 
 
-def _where(study: Study, causes: Causes, simulated: Matrix, motions: JointMotions) -> Where:
+def _where(study: Study, causes: Causes, simulated: Real, motions: JointMotions) -> Where:
     measurement = study.measurement
     residual = measurement.outputs - simulated
     return Where(
@@ -194,7 +191,7 @@ def _pair(location: Location, forces: Located | None) -> PairShare | None:
     return PairShare(groups=(first.names, second.names), share=explained_share(location.tuned, forces.profile))
 
 
-def _regimes(residual: Matrix, measured: Matrix, motions: JointMotions) -> tuple[RegimeShare, ...]:
+def _regimes(residual: Real, measured: Real, motions: JointMotions) -> tuple[RegimeShare, ...]:
     found = regime_shares(residual, measured, motions.signals, beyond_motion=True)
     return tuple(replace(one, unit=motions.units[one.variable]) for one in found)
 
@@ -216,7 +213,7 @@ def _restoring(study: Study, causes: Causes, motion: Recovered) -> RestoringForc
     )
 
 
-def _law_force(study: Study, causes: Causes, motion: Recovered) -> Matrix | None:
+def _law_force(study: Study, causes: Causes, motion: Recovered) -> Real | None:
     fit = causes.best.fit
     try:
         return study.contest.run.motion(fit.z, fit.effects, fit.initial, site=motion.site.name).force
@@ -235,7 +232,7 @@ def _port(study: Study, site: Site) -> tuple[str, str]:
     return "1", "1"
 
 
-def _signals(study: Study, causes: Causes, before: Matrix, after: Matrix) -> GapSignals:
+def _signals(study: Study, causes: Causes, before: Real, after: Real) -> GapSignals:
     measurement = study.measurement
     time_s, frequency_hz, density = gap_map(
         measurement.outputs - before, measurement.outputs, measurement.sample_rate_hz

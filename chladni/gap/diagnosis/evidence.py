@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.study import Study
@@ -11,8 +10,7 @@ from chladni.gap.location.profile import profile_at
 from chladni.gap.location.recovered import Recovered, recovered
 from chladni.gap.plant.places import Place, Site
 from chladni.gap.records.diagnosis import PARAMETER, Cause
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 def evidence(study: Study, causes: Causes, said: Sequence[Cause]) -> tuple[Recovered, ...]:
@@ -60,7 +58,7 @@ def _port_name(cause: Cause) -> str:
     return cause.site.rpartition(".")[0] if cause.effect == PARAMETER else cause.site
 
 
-def _believed(study: Study, causes: Causes, site: Site) -> Matrix:
+def _believed(study: Study, causes: Causes, site: Site) -> Real:
     """``[parameter]`` with which a force is recovered; a wrong one is nominal, so that what it makes is lacking."""
     if causes.best is causes.tuned:
         alone = (one.profile for one in study.location.ranked if site in one.places[0].sites)

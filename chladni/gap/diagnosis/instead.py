@@ -4,7 +4,6 @@ from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.pairs import TWO_FORCES
 from chladni.gap.diagnosis.search import ALONE
@@ -19,6 +18,7 @@ from chladni.gap.location.recovered import Recovered, recovered
 from chladni.gap.plant.places import Site
 from chladni.gap.tuning.effect_scale import effect_numbers
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.signals.arrays import Real
 
 #: Of what the believed cause leaves beyond the noise's power: what leaves less than this share of it is better.
 _BETTER = 0.5
@@ -128,7 +128,7 @@ def _relaxing(location: Location, names: Container[str] | None = None) -> Relaxa
     return min((law for law in found if law is not None), key=lambda law: law.chi, default=None)
 
 
-def _brings_more(study: Study, relaxing: Relaxation, word: AttachedEffect, z: NDArray[np.float64]) -> bool:
+def _brings_more(study: Study, relaxing: Relaxation, word: AttachedEffect, z: Real) -> bool:
     """Whether a joint that relaxes is far likelier than a linear word, both fitted alike to the whole record."""
     if relaxing.chi > ALONE:
         return False

@@ -3,17 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.gap.comparison.amplitude import amplitude
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.location.locate import lowest_hz
 from chladni.gap.location.recovered import Recovered
 from chladni.gap.tuning.output_error import OutputErrorFit
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +24,7 @@ class JointMotions:
         By the same names.
     """
 
-    signals: Mapping[str, Matrix]
+    signals: Mapping[str, Real]
     units: Mapping[str, str]
 
 
@@ -49,7 +45,7 @@ def joint_motions(study: Study, fit: OutputErrorFit, known: Recovered | None) ->
     if known is not None and known.site.kind == "joint":
         moved[known.site.name] = known.displacement, known.velocity
     period = round(study.measurement.sample_rate_hz / lowest_hz(study.model, study.measurement))
-    signals: dict[str, Matrix] = {}
+    signals: dict[str, Real] = {}
     units: dict[str, str] = {}
     for port in study.contest.run.compiled().ports:
         if port.kind != "joint" or port.name not in moved:
@@ -66,7 +62,7 @@ def joint_motions(study: Study, fit: OutputErrorFit, known: Recovered | None) ->
     return JointMotions(signals=signals, units=units)
 
 
-def _of_run(study: Study, fit: OutputErrorFit) -> dict[str, tuple[Matrix, Matrix]]:
+def _of_run(study: Study, fit: OutputErrorFit) -> dict[str, tuple[Real, Real]]:
     """Displacement and velocity of each joint during a fitted model's run, by name."""
     try:
         found = study.contest.run.motions(fit.z, fit.effects, fit.initial)

@@ -2,9 +2,6 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
@@ -16,9 +13,8 @@ from chladni.gap.records.diagnosis import Closing
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.output_error import fit_output_error
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError, ModelError
-
-Matrix = NDArray[np.float64]
 
 
 def tried_elsewhere(
@@ -69,7 +65,7 @@ def closing_elsewhere(study: Study, causes: Causes, measurement: Measurement, *,
     return closing_of(yardstick, *runs, seed=seed)
 
 
-def _as_told(run: FreeRun, noise: NoiseFloor, training: NDArray[np.bool_], told: Contestant | None) -> Matrix:
+def _as_told(run: FreeRun, noise: NoiseFloor, training: Mask, told: Contestant | None) -> Real:
     """``[output, sample]`` of the nominal model (None), or of what a contestant says, from the best initial state."""
     effects = () if told is None else told.fit.effects
     return fit_output_error(

@@ -1,18 +1,17 @@
 """Whether what is left at a sensor follows the sensor's own signal: then it's no noise, however much it looks so."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.explanation.hats import hats
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Points of the function. Of a few thousand samples of noise it explains a few per cent.
 _POINTS = 60
 #: A residual of which a curve explains more is no noise.
 FOLLOWS = 0.2
 
 
-def share_of_own_signal(simulated: Matrix, residual: Matrix) -> Matrix:
+def share_of_own_signal(simulated: Real, residual: Real) -> Real:
     """Share of each residual's power that a curve over what the sensor should show explains, but for straight lines.
 
     A noise floor that comes from what no linear model explains holds a sensor's distortion and its steps too, and
@@ -34,7 +33,7 @@ def share_of_own_signal(simulated: Matrix, residual: Matrix) -> Matrix:
     return found
 
 
-def without_own_signal(simulated: Matrix, residual: Matrix) -> Matrix:
+def without_own_signal(simulated: Real, residual: Real) -> Real:
     """Give ``[output, sample]`` residuals without the curve over their own signal, where they follow one.
 
     What is left of the others is as it was: a curve through noise would take some of that.
@@ -44,10 +43,10 @@ def without_own_signal(simulated: Matrix, residual: Matrix) -> Matrix:
     return np.stack([_rest(hats(signal, _POINTS), left) if share > FOLLOWS else left for signal, left, share in rows])
 
 
-def _rest(functions: list[Matrix], target: Matrix) -> Matrix:
+def _rest(functions: list[Real], target: Real) -> Real:
     columns = np.stack(functions, axis=1)
     return np.asarray(target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0])
 
 
-def _power(row: Matrix) -> float:
+def _power(row: Real) -> float:
     return float(row @ row)

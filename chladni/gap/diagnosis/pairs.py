@@ -3,7 +3,6 @@
 from collections.abc import Collection, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.following import Entered, followed, is_lost_beside
 from chladni.gap.diagnosis.search import ALONE, least_left, near_places, sound
@@ -18,9 +17,9 @@ from chladni.gap.location.locate import Located, Location, locate, located_pairs
 from chladni.gap.tuning.law_error import with_law_error
 from chladni.models.core.model import Model
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 #: Fits of a second effect beside a first, and of each of two at once.
 _SECOND, _EACH = 4, 2
 #: Places at which a second effect is looked for; most of them, where others leave at most so many times what the best
@@ -121,7 +120,7 @@ def _second_trials(
     return [one for one in trials if one.trial.site.name not in taken]
 
 
-def _beside(found: Contestant, kept: tuple[AttachedEffect, ...], one: Hypothesis, z: Matrix) -> Hypothesis:
+def _beside(found: Contestant, kept: tuple[AttachedEffect, ...], one: Hypothesis, z: Real) -> Hypothesis:
     """Another effect beside those of a fit that are kept."""
     return hypothesis_of((*kept, *one.effects), z, screened=one.screened, initial=found.fit.initial)
 

@@ -3,9 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.gap.diagnosis.search import near_places
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.any_law import left_by_any_law
@@ -16,8 +13,8 @@ from chladni.gap.explanation.shaken_ground import predicted_by_others
 from chladni.gap.location.locate import Located
 from chladni.gap.plant.places import Site
 from chladni.gap.records.diagnosis import FittedNumber
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: How well the ground must explain, how nearly as well as the best place; and where another can't be told from it.
 _CHI, _BEST, _TIED = 1.5, 1.02, 1.1
 #: Most places that may be as good: the ground and the one joint on which a machine stands. Where forces inside the
@@ -39,7 +36,7 @@ class ShakenGround:
 
     effect: str
     group: tuple[str, ...]
-    predicted: Matrix
+    predicted: Real
     parameters: Mapping[str, FittedNumber]
 
 

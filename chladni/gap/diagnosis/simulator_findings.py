@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.comparison.shares import (
     band_shares,
@@ -38,8 +37,8 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.simulators.signal_model import SignalModel
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.files.site_units import compiled_site_units
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: A gap this close to the noise is none; explained is what closes this share of the rest.
 _NO_GAP, _EXPLAINED = 1.15, 0.9
 #: Nats by which parameters beyond their tolerance must beat those inside, and everything else.
@@ -272,7 +271,7 @@ class SimulatorFindings:
             rows.setdefault((effect, site), unfitted)
         return tuple(sorted(rows.values(), key=lambda each: -each.probability)[:_LISTED])
 
-    def where(self, simulated: Matrix) -> Where:
+    def where(self, simulated: Real) -> Where:
         """Say where the gap to a simulation lies."""
         runs, log = self.search.runs, self.search.runs.measurement
         residual = log.outputs - simulated

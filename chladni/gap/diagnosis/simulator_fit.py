@@ -5,16 +5,15 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.simulator_runs import EFFECTIVE_SAMPLES, SimulatorRuns, log_likelihood, weights
 from chladni.gap.tuning.bounded_step import bounded_step
 from chladni.gap.tuning.effect_scale import EffectNumber, effect_numbers
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
 
-Matrix = NDArray[np.float64]
 #: Beyond three sigma of its tolerance a parameter isn't what the model says.
 HARD_BOUND = 3.0
 #: Steps for numeric slopes: large against the jitter that friction leaves in a run.
@@ -49,12 +48,12 @@ class SimulatorFit(Value):
         Nats.
     """
 
-    z: Matrix
+    z: Real
     effects: tuple[AttachedEffect, ...]
-    covariance: Matrix
+    covariance: Real
     numbers: tuple[EffectNumber, ...]
-    outputs: Matrix
-    powers: Matrix
+    outputs: Real
+    powers: Real
     log_evidence: float
 
     def __post_init__(self) -> None:
@@ -76,7 +75,7 @@ class SimulatorFit(Value):
 
 
 def fitted(
-    runs: SimulatorRuns, z: Matrix, effects: Sequence[AttachedEffect], *, bound: float = HARD_BOUND
+    runs: SimulatorRuns, z: Real, effects: Sequence[AttachedEffect], *, bound: float = HARD_BOUND
 ) -> SimulatorFit | None:
     """Fit parameters and effects together, from these values.
 
@@ -112,8 +111,8 @@ def fitted(
 class _Point(Value):
     """Where a search stands: unknowns, what is missed there over the noise, and minus the log posterior, nats."""
 
-    x: Matrix
-    missed: Matrix
+    x: Real
+    missed: Real
     cost: float
 
     def __post_init__(self) -> None:
@@ -129,7 +128,7 @@ class _Search:
     numbers: tuple[EffectNumber, ...]
     z_count: int
 
-    def at(self, x: Matrix) -> tuple[Matrix, tuple[AttachedEffect, ...]]:
+    def at(self, x: Real) -> tuple[Real, tuple[AttachedEffect, ...]]:
         """Parameters in sigmas, and effects."""
         values = [dict(effect.values) for effect in self.effects]
         for number, one in zip(self.numbers, x[self.z_count :].tolist(), strict=True):
@@ -139,20 +138,20 @@ class _Search:
         ]
         return x[: self.z_count], tuple(found)
 
-    def missed(self, x: Matrix) -> Matrix | None:
+    def missed(self, x: Real) -> Real | None:
         """None where the values contradict each other or the simulation diverges."""
         try:
             return self.runs.missed(*self.at(x))
         except ModelError:
             return None
 
-    def point(self, x: Matrix, missed: Matrix) -> _Point:
+    def point(self, x: Real, missed: Real) -> _Point:
         """Judge unknowns on the training blocks."""
         z = x[: self.z_count]
         powers = self.runs.powers(missed, self.runs.training)
         return _Point(x=x, missed=missed, cost=0.5 * float(z @ z) - log_likelihood(powers))
 
-    def descended(self, point: _Point, low: Matrix, high: Matrix) -> tuple[_Point, Matrix]:
+    def descended(self, point: _Point, low: Real, high: Real) -> tuple[_Point, Real]:
         """Levenberg & Marquardt with Broyden's updates of the slopes: a run costs far more than algebra.
 
         Returns the last point and the slopes there ``[unknown, output, sample]``.
@@ -174,14 +173,14 @@ class _Search:
                 break
         return point, slopes
 
-    def tried(self, point: _Point, slopes: Matrix, low: Matrix, high: Matrix, damping: float) -> _Point | None:
+    def tried(self, point: _Point, slopes: Real, low: Real, high: Real, damping: float) -> _Point | None:
         """Make Gauss-Newton's step for the log posterior, inside the bounds; None where the simulation diverges."""
         curvature, gradient = self.quadratic(point, slopes)
         x = point.x + bounded_step(curvature, gradient, low - point.x, high - point.x, damping=damping)
         missed = self.missed(x)
         return None if missed is None else self.point(x, missed)
 
-    def slopes(self, point: _Point, high: Matrix) -> Matrix:
+    def slopes(self, point: _Point, high: Real) -> Real:
         """``[unknown, output, sample]`` change of what is missed; none where the simulation would diverge."""
         slopes = np.zeros((point.x.size, *point.missed.shape))
         for place, value in enumerate(point.x):
@@ -195,7 +194,7 @@ class _Search:
                 slopes[place] = (missed - point.missed) / nudge
         return slopes
 
-    def quadratic(self, point: _Point, slopes: Matrix) -> tuple[Matrix, Matrix]:
+    def quadratic(self, point: _Point, slopes: Real) -> tuple[Real, Real]:
         """Curvature and gradient of minus the log posterior, each output weighing as what is missed there does."""
         training = self.runs.training
         scale = weights(self.runs.powers(point.missed, training), int(training.sum()))[:, None]
@@ -205,7 +204,7 @@ class _Search:
         gradient = rows @ (point.missed[:, training] * scale).ravel() + prior * point.x
         return rows @ rows.T + np.diag(prior), gradient
 
-    def judged(self, found: tuple[_Point, Matrix]) -> SimulatorFit:
+    def judged(self, found: tuple[_Point, Real]) -> SimulatorFit:
         """Judge the end of a search on the blocks that it didn't see."""
         point, slopes = found
         z, effects = self.at(point.x)
@@ -225,7 +224,7 @@ class _Search:
         )
 
 
-def _updated(slopes: Matrix, before: _Point, after: _Point) -> Matrix:
+def _updated(slopes: Real, before: _Point, after: _Point) -> Real:
     """Give slopes that agree with the step just made (Broyden 1965)."""
     moved = after.x - before.x
     change = after.missed - before.missed - np.tensordot(moved, slopes, axes=1)

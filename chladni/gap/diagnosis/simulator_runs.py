@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.plant.tunable import Tunables
@@ -14,10 +13,9 @@ from chladni.gap.simulators.simulator import Simulator
 from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
 from chladni.models.core.simulation import PortMotion
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError, ModelError
 
-Matrix = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 #: Blocks that alternate between fitting and judging: long against a cycle, short against drift.
 BLOCK_S = 0.75
 #: Independent samples that a channel's mean square counts for: what a law misses is correlated over long stretches.
@@ -48,7 +46,7 @@ class SimulatorRuns:
 
     wrapped: WrappedSimulator
     measurement: Measurement
-    floor: Matrix
+    floor: Real
     tunables: Tunables
 
     @classmethod
@@ -84,24 +82,24 @@ class SimulatorRuns:
         names = [each.name for each in self.wrapped.simulator.outputs]
         return [names.index(name) for name in self.measurement.output_names]
 
-    def simulated(self, z: Matrix, effects: Sequence[AttachedEffect]) -> Matrix:
+    def simulated(self, z: Real, effects: Sequence[AttachedEffect]) -> Real:
         """``[output, sample]`` of the outputs that the log holds, with parameters at z sigmas; may diverge."""
         return self.outputs_of(self.true_outputs(z, effects), effects)
 
-    def true_outputs(self, z: Matrix, effects: Sequence[AttachedEffect]) -> Matrix:
+    def true_outputs(self, z: Real, effects: Sequence[AttachedEffect]) -> Real:
         """``[simulator's output, sample]`` before effects at outputs."""
         outputs = self.wrapped.sites("output")
         inside = [effect for effect in effects if effect.site not in outputs]
         model = self.wrapped.with_values(self.tunables.values(z)).with_effects(inside)
         return model.respond(self.measurement.inputs, self.measurement.sample_rate_hz).outputs
 
-    def outputs_of(self, true: Matrix, effects: Sequence[AttachedEffect]) -> Matrix:
+    def outputs_of(self, true: Real, effects: Sequence[AttachedEffect]) -> Real:
         """``[output, sample]`` that sensors record of true outputs."""
         outputs = self.wrapped.sites("output")
         sensors = self.wrapped.with_effects([effect for effect in effects if effect.site in outputs])
         return sensors.recorded(true, self.measurement.sample_rate_hz)[self.rows()]
 
-    def motions(self, z: Matrix, effects: Sequence[AttachedEffect]) -> tuple[PortMotion, ...]:
+    def motions(self, z: Real, effects: Sequence[AttachedEffect]) -> tuple[PortMotion, ...]:
         """Motion at every joint."""
         from chladni.gap.simulators.effects_around import joint_law
 
@@ -115,15 +113,15 @@ class SimulatorRuns:
         found = simulator.respond(inputs, self.measurement.sample_rate_hz, values=model.values, joint_laws=laws)
         return found.motions
 
-    def missed(self, z: Matrix, effects: Sequence[AttachedEffect]) -> Matrix:
+    def missed(self, z: Real, effects: Sequence[AttachedEffect]) -> Real:
         """``[output, sample]`` of measured minus simulated, over the noise."""
         return self.over_noise(self.measurement.outputs - self.simulated(z, effects))
 
-    def over_noise(self, signals: Matrix) -> Matrix:
+    def over_noise(self, signals: Real) -> Real:
         """Signals in the outputs' units, divided by each output's noise."""
         return np.asarray(signals / self.floor[:, None])
 
-    def slopes(self, z: Matrix, effects: Sequence[AttachedEffect], base: Matrix) -> Matrix:
+    def slopes(self, z: Real, effects: Sequence[AttachedEffect], base: Real) -> Real:
         """``[parameter, output, sample]``: change over the noise for a sigma of each parameter."""
         found = np.zeros((z.size, *base.shape))
         for place in range(z.size):
@@ -134,18 +132,18 @@ class SimulatorRuns:
             found[place] = self.over_noise(self.simulated(moved, effects) - base) / step
         return found
 
-    def gap(self, outputs: Matrix) -> float:
+    def gap(self, outputs: Real) -> float:
         """Gap of simulated outputs ``[output, sample]`` on held-out blocks, over the RMS of what was measured."""
         held_out = ~self.training
         measured = self.measurement.outputs[:, held_out]
         return pooled_gap(measured - outputs[:, held_out], measured)
 
-    def powers(self, missed: Matrix, samples: Mask) -> Matrix:
+    def powers(self, missed: Real, samples: Mask) -> Real:
         """``[output]`` mean square over the noise's power, on these samples."""
         return np.asarray(np.mean(missed[:, samples] ** 2, axis=1))
 
 
-def _quietest(outputs: Matrix, noise: NoiseFloor) -> Matrix:
+def _quietest(outputs: Real, noise: NoiseFloor) -> Real:
     """``[output]`` RMS; where an estimate may hold distortion, no more than the top quarter of the band says."""
     window = np.hanning(outputs.shape[1])
     power = np.abs(np.fft.rfft(outputs * window, axis=1)) ** 2 / np.sum(window**2)
@@ -153,7 +151,7 @@ def _quietest(outputs: Matrix, noise: NoiseFloor) -> Matrix:
     return np.asarray(np.where(noise.upper_bound, np.minimum(noise.rms, quiet), noise.rms))
 
 
-def log_likelihood(powers: Matrix) -> float:
+def log_likelihood(powers: Real) -> float:
     """What the mean squares of what is missed (over the noise's) say for a hypothesis, nats.
 
     The noise's size and what the law lacks besides it are unknown, and integrated out channel by channel:
@@ -162,7 +160,7 @@ def log_likelihood(powers: Matrix) -> float:
     return float(-0.5 * EFFECTIVE_SAMPLES * np.sum(np.log(powers + _SOFT)))
 
 
-def weights(powers: Matrix, samples: int) -> Matrix:
+def weights(powers: Real, samples: int) -> Real:
     """``[output]`` factor on what is missed, whose sum of squares then has the slope of `-2 log_likelihood`."""
     return np.asarray(np.sqrt(EFFECTIVE_SAMPLES / (samples * (powers + _SOFT))))
 

@@ -5,17 +5,16 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.simulator_runs import EFFECTIVE_SAMPLES, SimulatorRuns, can_act, weights
 from chladni.gap.diagnosis.simulator_starts import SiteScales, starts
 from chladni.models.effects.attached_effect import AttachedEffect, attached
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.effects.effect_kind import EffectKind
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
 
-Matrix = NDArray[np.float64]
 #: How far beyond the run's own strength the regression may follow its straight line.
 _LARGEST_FACTOR = 4.0
 #: Friction for the first runs: as a share of the largest input, then until it changes the outputs visibly.
@@ -69,7 +68,7 @@ class Screening(Value):
 def screen(
     runs: SimulatorRuns,
     kinds: Sequence[EffectKind],
-    z: Matrix,
+    z: Real,
     known: Sequence[AttachedEffect] = (),
     *,
     progress: Callable[[float], None],
@@ -106,7 +105,7 @@ def screen(
 
 
 def site_scales(
-    runs: SimulatorRuns, z: Matrix, known: Sequence[AttachedEffect], missed: Matrix, only: str | None = None
+    runs: SimulatorRuns, z: Real, known: Sequence[AttachedEffect], missed: Real, only: str | None = None
 ) -> tuple[SiteScales, ...]:
     """Give what is large and small at each site."""
     simulator, log = runs.wrapped.simulator, runs.measurement
@@ -138,7 +137,7 @@ def site_scales(
     return tuple(each for each in found if each.amplitude > 0)
 
 
-def _signal_scales(runs: SimulatorRuns, kind: str, name: str, row: Matrix) -> SiteScales:
+def _signal_scales(runs: SimulatorRuns, kind: str, name: str, row: Real) -> SiteScales:
     rate_hz = runs.measurement.sample_rate_hz
     return SiteScales(
         name=name,
@@ -152,13 +151,13 @@ def _signal_scales(runs: SimulatorRuns, kind: str, name: str, row: Matrix) -> Si
     )
 
 
-def _strongest_hz(row: Matrix, rate_hz: float) -> float:
+def _strongest_hz(row: Real, rate_hz: float) -> float:
     power = np.abs(np.fft.rfft(row * np.hanning(row.size))) ** 2
     return float(np.fft.rfftfreq(row.size, 1 / rate_hz)[1 + int(np.argmax(power[1:]))])
 
 
 def _visible_force(
-    runs: SimulatorRuns, z: Matrix, known: Sequence[AttachedEffect], missed: Matrix, site: SiteScales
+    runs: SimulatorRuns, z: Real, known: Sequence[AttachedEffect], missed: Real, site: SiteScales
 ) -> float:
     """Friction that changes the outputs by about half of what is missed (and by more than the noise)."""
     base = runs.simulated(z, known)
@@ -196,12 +195,12 @@ def _tries(
 
 def _change(
     runs: SimulatorRuns,
-    z: Matrix,
+    z: Real,
     known: Sequence[AttachedEffect],
     effect: AttachedEffect,
-    true: Matrix,
-    base: Matrix,
-) -> Matrix | None:
+    true: Real,
+    base: Real,
+) -> Real | None:
     """``[output, sample]`` over the noise; None where the simulation diverges or nothing changes."""
     effects = [*known, effect]
     try:
@@ -233,13 +232,13 @@ class _Regression:
         ``[row]`` what no parameter explains of what is missed.
     """
 
-    weight: Matrix
-    basis: Matrix
-    prior: Matrix
-    missed: Matrix
+    weight: Real
+    basis: Real
+    prior: Real
+    missed: Real
 
     @classmethod
-    def of(cls, missed: Matrix, slopes: Matrix, z: Matrix) -> "_Regression":
+    def of(cls, missed: Real, slopes: Real, z: Real) -> "_Regression":
         weight = weights(np.mean(missed**2, axis=1), missed.shape[1])[:, None]
         stacked = np.vstack([(weight * slopes).reshape(z.size, -1).T, np.eye(z.size)])
         basis = np.linalg.qr(stacked)[0] if z.size else np.zeros((missed.size, 0))
@@ -247,7 +246,7 @@ class _Regression:
         rows = np.concatenate([(weight * missed).ravel(), -z])
         return cls(weight=weight, basis=basis, prior=z, missed=rows - basis @ (basis.T @ rows))
 
-    def projected(self, change: Matrix) -> Matrix:
+    def projected(self, change: Real) -> Real:
         """``[row]`` of a change that no parameter could make."""
         rows = np.concatenate([(self.weight * change).ravel(), np.zeros(self.prior.size)])
         return np.asarray(rows - self.basis @ (self.basis.T @ rows))
@@ -260,7 +259,7 @@ class _Regression:
         return 0.5 * EFFECTIVE_SAMPLES * channels * float(np.log(before / left)) if before > 0 else 0.0
 
 
-_Found = Sequence[tuple[AttachedEffect, Matrix]]
+_Found = Sequence[tuple[AttachedEffect, Real]]
 
 
 def _singles(regression: _Regression, found: _Found) -> tuple[Screened, ...]:

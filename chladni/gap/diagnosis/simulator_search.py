@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.diagnosis.simulator_fit import SimulatorFit, fitted
 from chladni.gap.diagnosis.simulator_runs import SimulatorRuns, can_act, log_likelihood
@@ -13,9 +12,9 @@ from chladni.gap.diagnosis.simulator_screen import Screened, screen
 from chladni.gap.diagnosis.simulator_starts import SiteScales, starts
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.effects.effect_kind import EffectKind
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 #: How many of the screen's best are fitted, alone and in pairs.
 _SINGLES, _PAIRS, _SIBLINGS, _FURTHER = 6, 4, 3, 3
@@ -52,7 +51,7 @@ class SimulatorSearch:
     """
 
     runs: SimulatorRuns
-    nominal: Matrix
+    nominal: Real
     tuned: SimulatorFit
     loose: SimulatorFit
     best: SimulatorFit
@@ -105,7 +104,7 @@ def _left(runs: SimulatorRuns, tuned: SimulatorFit, fit: SimulatorFit) -> float:
 
 def _result(
     runs: SimulatorRuns,
-    nominal: Matrix,
+    nominal: Real,
     tuned: SimulatorFit,
     loose: SimulatorFit,
     fits: tuple[SimulatorFit, ...],
@@ -132,7 +131,7 @@ def _loosened(runs: SimulatorRuns, tuned: SimulatorFit) -> SimulatorFit:
     return _best([tuned, *(fit for fit in fits if fit is not None)])
 
 
-def _likelihood(runs: SimulatorRuns, z: Matrix) -> float:
+def _likelihood(runs: SimulatorRuns, z: Real) -> float:
     try:
         return log_likelihood(runs.powers(runs.missed(z, ()), runs.training))
     except ModelError:

@@ -7,14 +7,10 @@ from itertools import product
 from math import pi
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.models.core.parameter import Parameter
 from chladni.models.effects.attached_effect import AttachedEffect, attached_if_possible
 from chladni.models.effects.effect_kind import EffectKind, Variant
 
-Matrix = NDArray[np.float64]
 SiteKind = Literal["input", "output", "joint"]
 _UNIT = re.compile(r"(N|m|s|rad|kg)(?:\^(\d))?")
 

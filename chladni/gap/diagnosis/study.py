@@ -4,7 +4,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
@@ -23,12 +22,12 @@ from chladni.models.core.model import Model
 from chladni.models.effects.catalogue import taking_part
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.models.effects.lattice import Lattice
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, ModelError
 from chladni.signals.sensor_quality import sensor_quality
 from chladni.signals.time_series import TimeSeries
 
-Matrix = NDArray[np.float64]
 #: Misfit over noise with which a record is followed from its start to its end.
 _FOLLOWS = 3.0
 #: Most e-folds that an error may grow by from one sample to the next: every window begins with one.
@@ -69,7 +68,7 @@ class Study:
     kinds: tuple[EffectKind, ...]
 
     @property
-    def held(self) -> NDArray[np.bool_]:
+    def held(self) -> Mask:
         """``[sample]`` that no fit sees."""
         return ~self.contest.training
 
@@ -157,7 +156,7 @@ def recovered_states(problem: LinearProblem, located: Located | None) -> KnownSt
     return KnownStates(names=problem.model.compile().states, values=motion.states(problem))
 
 
-def training_of(measurement: Measurement, windows: Sequence[tuple[int, int]] | None) -> NDArray[np.bool_]:
+def training_of(measurement: Measurement, windows: Sequence[tuple[int, int]] | None) -> Mask:
     """Give ``[sample]``: True where fits may look, in one free run or over windows."""
     if windows is None:
         return training_mask(measurement.samples, measurement.sample_rate_hz, measurement.period_samples)
@@ -218,7 +217,7 @@ def _repeating(measurement: Measurement) -> tuple[str, ...]:
     return tuple(name for name in names if name in often | long)
 
 
-def _values_held(signal: Matrix) -> int:
+def _values_held(signal: Real) -> int:
     """How many different values a signal repeats at once."""
     return int(np.unique(signal[1:][np.diff(signal) == 0]).size)
 
@@ -240,7 +239,7 @@ def _coarse(measurement: Measurement, lattices: Mapping[str, Lattice]) -> frozen
     return frozenset(name for name, row in rows if name in lattices and lattices[name].step > np.std(row))
 
 
-def _simulated(model: Model, measurement: Measurement) -> list[tuple[str, Matrix, Matrix]]:
+def _simulated(model: Model, measurement: Measurement) -> list[tuple[str, Real, Real]]:
     """Name, measured and simulated signal of each output by the nominal model; nothing where that diverges."""
     try:
         simulated = FreeRun(model, measurement).outputs()
@@ -249,7 +248,7 @@ def _simulated(model: Model, measurement: Measurement) -> list[tuple[str, Matrix
     return list(zip(measurement.output_names, measurement.outputs, simulated, strict=True))
 
 
-def _rounded_off(simulated: Matrix, measured: Matrix, step: float) -> float:
+def _rounded_off(simulated: Real, measured: Real, step: float) -> float:
     """RMS of what rounding takes from a signal like the simulated one: all of it where it stays below a step."""
     rounded = [step * np.round(simulated / step), step * np.floor(simulated / step)]
     nearest = min(rounded, key=lambda row: float(np.std(row - measured)))

@@ -4,14 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.location.locate import Location, tuned_stepwise
 from chladni.gap.plant.further_numbers import with_further
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.models.core.compiled_model import CompiledModel
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 _Pair = tuple[str, str]
 #: Of the damping that would make a body's own oscillation critical: a step of a coefficient.
 _STEP = 0.05
@@ -116,14 +115,14 @@ def _coupled(problem: LinearProblem, steps: Mapping[_Pair, float]) -> LinearProb
     bodies = list(dict.fromkeys(one for one, _ in steps))
     size = np.array(list(steps.values()))
 
-    def make(parameters: Mapping[str, float], numbers: Matrix) -> CompiledModel:
+    def make(parameters: Mapping[str, float], numbers: Real) -> CompiledModel:
         compiled = problem.model.with_values(parameters).compile()
         return _with_forces(compiled, bodies, (size * numbers).reshape(len(bodies), len(bodies)))
 
     return with_further(problem, len(steps), make)
 
 
-def _with_forces(compiled: CompiledModel, bodies: Sequence[str], matrix: Matrix) -> CompiledModel:
+def _with_forces(compiled: CompiledModel, bodies: Sequence[str], matrix: Real) -> CompiledModel:
     """Let velocities of bodies push each other."""
     at = [compiled.port_index(name, "body") for name in bodies]
     state, column = matrix @ compiled.velocity_state[at], matrix @ compiled.velocity_column[at]

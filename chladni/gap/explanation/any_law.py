@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from chladni.gap.explanation.followed import followed
@@ -15,8 +14,8 @@ from chladni.gap.location.recovered import Recovered, recovered
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.models.effects.trial import Force, Trial
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Points of a law of the way, and of one of the pace beside it; of a law of both along each; samples of a filter.
 _WAY, _PACE, _BOTH, _FILTER = 60, 16, 8, 24
 #: Lines that a tone must stand out of; the first that is one and no drift.
@@ -62,11 +61,11 @@ def _forces(problem: LinearProblem, motion: Recovered) -> Iterator[Force]:
     yield _force(motion, delayed)
 
 
-def _both(way: Matrix, pace: Matrix) -> list[Matrix]:
+def _both(way: Real, pace: Real) -> list[Real]:
     return [one * other for one in hats(way, _BOTH) for other in hats(pace, _BOTH)]
 
 
-def _tones(motion: Recovered) -> list[Matrix]:
+def _tones(motion: Recovered) -> list[Real]:
     """Cosine and sine, and their octave's, of the tone that stands out of force times displacement."""
     count = motion.force.size
     product = motion.force * motion.displacement
@@ -83,7 +82,7 @@ def _tones(motion: Recovered) -> list[Matrix]:
     return [np.cos(angle), np.sin(angle), np.cos(2.0 * angle), np.sin(2.0 * angle)]
 
 
-def _force(motion: Recovered, parts: list[Matrix]) -> Force:
+def _force(motion: Recovered, parts: list[Real]) -> Force:
     return Force.of(*(motion.spectrum(one) for one in parts))
 
 

@@ -6,7 +6,6 @@ from functools import reduce
 from operator import add
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.location.locate import Located, Location, tuned_stepwise
@@ -16,9 +15,9 @@ from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.effects.linear_feedback import state, velocity, with_feedback, with_rate, with_states
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 #: Branches a decade of frequency: of closer ones only the sum can be told, since each loses over a decade.
 _A_DECADE = 2
 #: The lowest corner lies so many times below the band.
@@ -112,22 +111,22 @@ def any_relaxation(location: Location, located: Located, joint: Site) -> Relaxat
     )
 
 
-def _stiffness(branches: Matrix, corners: Matrix, frequency_hz: Matrix) -> NDArray[np.complex128]:
+def _stiffness(branches: Real, corners: Real, frequency_hz: Real) -> Complex:
     """``[frequency]`` complex stiffness of branches."""
     s = 2j * np.pi * frequency_hz[:, None]
     return np.asarray((s / (s + corners)) @ branches, dtype=np.complex128)
 
 
-def _relaxing(problem: LinearProblem, port: int, corners: Matrix, step: float) -> LinearProblem:
+def _relaxing(problem: LinearProblem, port: int, corners: Real, step: float) -> LinearProblem:
     """Give the problem with the branches' stiffnesses, in steps, behind its parameters."""
 
-    def make(parameters: Mapping[str, float], numbers: Matrix) -> CompiledModel:
+    def make(parameters: Mapping[str, float], numbers: Real) -> CompiledModel:
         return _with_branches(problem.model.with_values(parameters).compile(), port, corners, step * numbers)
 
     return with_further(problem, corners.size, make)
 
 
-def _with_branches(compiled: CompiledModel, port: int, corners: Matrix, stiffness: Matrix) -> CompiledModel:
+def _with_branches(compiled: CompiledModel, port: int, corners: Real, stiffness: Real) -> CompiledModel:
     """Let stretched springs creep back: ``z_i' = s - w_i z_i``, a force of ``k_i z_i`` that resists."""
     first = len(compiled.states)
     compiled = with_states(compiled, [f"relaxation {place}" for place in range(corners.size)])

@@ -5,7 +5,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
@@ -14,10 +13,9 @@ from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.side_by_side import side_by_side
 from chladni.gap.tuning.output_error import OutputErrorFit, fit_output_error, with_coloured_spread
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError, ModelError
 
-Matrix = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 #: Independent samples that a log is taken for, whatever its length: a model that is right but for details of its law
 #: must not be refuted by those details a million times over (see docs/methods/gap-explanation.md).
 EFFECTIVE_SAMPLES = 200.0
@@ -69,7 +67,7 @@ class Contest:
         *,
         max_iterations: int = 12,
         tune: bool = True,
-        initial: Matrix | None = None,
+        initial: Real | None = None,
         only_coarse: bool = False,
     ) -> Contestant | None:
         """Fit a hypothesis, from some initial states ``[window, state]``; None when its start already diverges."""
@@ -116,7 +114,7 @@ class Contest:
             return found
         return replace(found, fit=fit)
 
-    def _initial(self, hypothesis: Hypothesis) -> Matrix | None:
+    def _initial(self, hypothesis: Hypothesis) -> Real | None:
         """``[window, state]`` to begin a fit at; what effects add begins at rest."""
         if hypothesis.initial is not None:
             own = hypothesis.initial[:, : len(self.run.compiled().states)]
@@ -185,12 +183,12 @@ def _is_same(one: Contestant, other: Contestant) -> bool:
     return close and forms[0] == forms[1] and one.hypothesis.wide == other.hypothesis.wide
 
 
-def lowest(contestants: Sequence[Contestant]) -> Matrix:
+def lowest(contestants: Sequence[Contestant]) -> Real:
     """Give ``[output]`` what the best of contestants leave, over the noise's estimate; at most 1."""
     return np.asarray(np.minimum(np.min([one.held for one in contestants], axis=0), 1.0), dtype=np.float64)
 
 
-def log_evidence(held: Matrix, prior: float, freedom: int) -> float:
+def log_evidence(held: Real, prior: float, freedom: int) -> float:
     """Held-out predictive log likelihood in nats, with prior and a penalty for freedom (Schwarz 1978).
 
     ``-N/2 sum_j ln((m_j + slack)/(1 + slack)) - prior/2 - freedom/2 ln N`` with m_j the whitened mean square of
@@ -200,6 +198,6 @@ def log_evidence(held: Matrix, prior: float, freedom: int) -> float:
     return likelihood - 0.5 * prior - 0.5 * freedom * float(np.log(EFFECTIVE_SAMPLES))
 
 
-def held_gap(measured: Matrix, simulated: Matrix, held: Mask) -> float:
+def held_gap(measured: Real, simulated: Real, held: Mask) -> float:
     """RMS of the residual over RMS of what was measured on held-out samples, outputs pooled; 1 when nothing fits."""
     return pooled_gap((measured - simulated)[:, held], measured[:, held])

@@ -1,16 +1,14 @@
 """Effects that a fit drove to where they are something else: a yield that is never reached is a spring."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.effects.clues import FittedForm
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-
-Matrix = NDArray[np.float64]
 
 
 def is_degenerate(run: FreeRun, found: Contestant) -> bool:
@@ -36,7 +34,7 @@ def _degenerate(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool
         return True
 
 
-def _motion(run: FreeRun, found: Contestant, effect: AttachedEffect) -> tuple[Matrix, Matrix]:
+def _motion(run: FreeRun, found: Contestant, effect: AttachedEffect) -> tuple[Real, Real]:
     """Displacement and velocity that the effect's law saw, over the whole log."""
     compiled = run.compiled(found.fit.z, found.fit.effects)
     runs = run.integrations(found.fit.z, found.fit.effects, found.fit.initial)

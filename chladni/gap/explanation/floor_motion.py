@@ -2,20 +2,16 @@
 
 from collections.abc import Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.gap.location.profile import profile_at
 from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.gap.records.diagnosis import FittedNumber
 from chladni.models.effects.effect_kind import EffectKind
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 
-
-def floor_motion(problem: LinearProblem, ground: Site, z: Matrix, kind: EffectKind) -> Mapping[str, FittedNumber]:
+def floor_motion(problem: LinearProblem, ground: Site, z: Real, kind: EffectKind) -> Mapping[str, FittedNumber]:
     """Give the numbers of an effect at the ground that the sensors tell, without a standard deviation.
 
     Parameters

@@ -3,18 +3,17 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.explanation.held_site import HeldSite
 from chladni.gap.explanation.screen import Screen, Screened
 from chladni.gap.location.profile import Profile
+from chladni.signals.arrays import Real
 
 #: Parts of a step that are tried until one makes the misfit less.
 _SHARES = (1.0, 0.3, 0.09)
 #: A step that gains less than this share of the cost is the last.
 _TOLD = 0.01
 _Followed = tuple[Screened, Profile]
-Matrix = NDArray[np.float64]
 
 
 def followed(screen: Screen, start: Screened, *, iterations: int = 6) -> tuple[Screened, Screen] | None:
@@ -50,7 +49,7 @@ def _at(screen: Screen, found: _Followed) -> Screen:
     return Screen(screen.problem, found[1], screen.site, others=screen.others, limit=screen.limit)
 
 
-def _held(screen: Screen, start: Screened, z: Matrix) -> _Followed | None:
+def _held(screen: Screen, start: Screened, z: Real) -> _Followed | None:
     """Give a trial with its best amplitudes at held parameters; None when these make no such effect."""
     here = HeldSite(screen.problem, z, screen.site, screen.others)
     force = start.trial.form.build(start.shape)
@@ -62,7 +61,7 @@ def _held(screen: Screen, start: Screened, z: Matrix) -> _Followed | None:
     return replace(start, values=values, misfit=profile.misfit, z=z), profile
 
 
-def _searched(screen: Screen, start: Screened, best: _Followed, step: Matrix) -> _Followed | None:
+def _searched(screen: Screen, start: Screened, best: _Followed, step: Real) -> _Followed | None:
     """First part of a step that makes the cost less."""
     for share in _SHARES:
         found = _held(screen, start, best[0].z + share * step)

@@ -1,12 +1,11 @@
 """Hat functions: sums of them are any continuous function of a signal."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
-def hats(signal: Matrix, count: int) -> list[Matrix]:
+def hats(signal: Real, count: int) -> list[Real]:
     """Give hat functions of a signal ``[sample]``, one for each of `count` points with equally many samples between.
 
     Points that coincide, of a signal that rests, count once. The functions add up to one.

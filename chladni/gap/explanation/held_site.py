@@ -3,15 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.location.profile import Elimination, Profile
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.models.effects.trial import Force
-
-Matrix = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 
 class HeldSite:
@@ -29,7 +26,7 @@ class HeldSite:
         Sites whose force may be anything meanwhile.
     """
 
-    def __init__(self, problem: LinearProblem, z: Matrix, site: Site, others: Sequence[Site] = ()) -> None:
+    def __init__(self, problem: LinearProblem, z: Real, site: Site, others: Sequence[Site] = ()) -> None:
         view = problem.view(z)
         self.problem, self.z, self.site, self.others = problem, z, site, tuple(others)
         self.pattern = problem.pattern(view, site)
@@ -37,17 +34,17 @@ class HeldSite:
         self.residual = np.asarray((problem.measured - view.forced()) * problem.weight, dtype=np.complex128)
         self.rest = self.out.rest(self.residual)
 
-    def printed(self, spectra: Spectrum) -> Matrix:
+    def printed(self, spectra: Complex) -> Real:
         """``[signal, number]``: what forces of these spectra ``[signal, line]`` print, without transients."""
         if not len(spectra):
             return np.zeros((0, self.rest.size))
         return self.out.rest(np.asarray(self.pattern * spectra[:, None, None], dtype=np.complex128))
 
-    def unexplained(self, force: Force) -> Matrix:
+    def unexplained(self, force: Force) -> Real:
         """``[number]``: the residual without what has no free amplitude."""
         return self.rest if force.fixed is None else self.rest - self.printed(force.fixed[None])[0]
 
-    def amplitudes(self, force: Force) -> Matrix:
+    def amplitudes(self, force: Force) -> Real:
         """Best ``[amplitude]`` of a force by linear regression."""
         basis = self.printed(force.basis)
         size = np.linalg.norm(basis, axis=1)
@@ -55,7 +52,7 @@ class HeldSite:
         found = np.linalg.lstsq((basis / size[:, None]).T, self.unexplained(force), rcond=1e-10)[0]
         return np.asarray(found / size, dtype=np.float64)
 
-    def with_force(self, force: Force, amplitudes: Matrix) -> Profile:
+    def with_force(self, force: Force, amplitudes: Real) -> Profile:
         """Give the profile with a force of known amplitudes at the site; the others' and transients refitted."""
         spectrum = np.tensordot(amplitudes, force.basis, axes=1)
         spectrum = spectrum if force.fixed is None else spectrum + force.fixed

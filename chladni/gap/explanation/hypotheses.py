@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
@@ -18,9 +17,9 @@ from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.core.parameter import Parameter
 from chladni.models.effects.attached_effect import AttachedEffect, attached_if_possible
 from chladni.models.effects.clues import FittedForm
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 #: A parameter outside of this many sigmas is wrong, not uncertain.
 OUTSIDE = 3.0
 #: Misfit over another's up to which a screened form is as good, and how many of those are tried too.
@@ -60,7 +59,7 @@ def effect_hypotheses(screened: Sequence[Screened], *, count: int, margin: float
 
 
 def hypothesis_of(
-    effects: tuple[AttachedEffect, ...], z: Matrix, *, screened: float | None = None, initial: Matrix | None = None
+    effects: tuple[AttachedEffect, ...], z: Real, *, screened: float | None = None, initial: Real | None = None
 ) -> Hypothesis:
     """Give the hypothesis that these effects act."""
     fitted = tuple(effect.usually_fitted for effect in effects)
@@ -122,7 +121,7 @@ def _nested(found: Contestant, run: FreeRun, one: AttachedEffect) -> list[Attach
     if nested is None:
         return []
 
-    def motion() -> tuple[Matrix, Matrix]:
+    def motion() -> tuple[Real, Real]:
         there = run.motion(found.fit.z, found.fit.effects, site=one.site)
         return there.displacement, there.velocity
 

@@ -4,13 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.records.diagnosis import PARAMETER, Candidate
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.effects.attached_effect import AttachedEffect
-
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,9 +34,9 @@ class Hypothesis:
     effects: tuple[AttachedEffect, ...] = ()
     fitted: tuple[tuple[str, ...], ...] = ()
     wide: Mapping[str, float] = field(default_factory=dict)
-    start_z: Matrix
+    start_z: Real
     screened: float | None = None
-    initial: Matrix | None = None
+    initial: Real | None = None
 
     @property
     def named(self) -> tuple[Candidate, ...]:
@@ -75,7 +73,7 @@ class Contestant:
 
     hypothesis: Hypothesis
     fit: OutputErrorFit
-    held: Matrix
+    held: Real
     gap: float
     prior: float
     log_evidence: float = 0.0

@@ -5,7 +5,6 @@ from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.location.recovered import Recovered
 from chladni.gap.plant.free_run import FreeRun
@@ -15,9 +14,8 @@ from chladni.gap.records.measurement import Measurement
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.core.port import PortKind
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.signals.arrays import Real
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,9 +30,9 @@ class KnownEffect(Value):
         ``[sample]`` of ports likewise, by name and kind.
     """
 
-    outputs: Matrix
-    displacement: Mapping[tuple[str, PortKind], Matrix]
-    velocity: Mapping[tuple[str, PortKind], Matrix]
+    outputs: Real
+    displacement: Mapping[tuple[str, PortKind], Real]
+    velocity: Mapping[tuple[str, PortKind], Real]
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -68,7 +66,7 @@ class KnownEffect(Value):
         )
 
     @classmethod
-    def _of_forces(cls, run: FreeRun, fit: OutputErrorFit, forces: Mapping[tuple[str, PortKind], Matrix]) -> Self:
+    def _of_forces(cls, run: FreeRun, fit: OutputErrorFit, forces: Mapping[tuple[str, PortKind], Real]) -> Self:
         measurement, compiled = run.measurement, run.compiled(fit.z)
         lines = all_lines(measurement.samples, measurement.sample_rate_hz)
         view = LinearView(compiled, lines, np.zeros_like(measurement.inputs), tuple(run.rows.tolist()))

@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.plant.free_run import Windows
+from chladni.signals.arrays import Real
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -25,12 +23,12 @@ class KnownStates(Value):
     """
 
     names: tuple[str, ...]
-    values: Matrix
+    values: Real
 
     def __post_init__(self) -> None:
         self._freeze()
 
-    def at_starts(self, windows: Windows, names: Sequence[str]) -> Matrix:
+    def at_starts(self, windows: Windows, names: Sequence[str]) -> Real:
         """``[window, state]`` of the named states at the windows' first samples; those that aren't known are zero."""
         found = np.zeros((len(windows), len(names)))
         first = [start for start, _ in windows]

@@ -5,7 +5,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.explanation.hypotheses import OUTSIDE, effect_of, hypothesis_of
 from chladni.gap.explanation.hypothesis import Hypothesis
@@ -18,9 +17,9 @@ from chladni.gap.tuning.effect_scale import effect_numbers, with_numbers
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 #: Misfit over the best place's up to which a place is looked at.
 _PLAUSIBLE = 3.0
 #: Of the fitted ones the best that enter the contest.
@@ -47,7 +46,7 @@ class LinearFit:
     """
 
     effect: AttachedEffect
-    z: Matrix
+    z: Real
     chi: float
 
 
@@ -85,7 +84,7 @@ def _starts(effect: AttachedEffect) -> list[AttachedEffect]:
     ]
 
 
-def fitted_beside(model: Model, location: Location, effect: AttachedEffect, z: Matrix) -> LinearFit | None:
+def fitted_beside(model: Model, location: Location, effect: AttachedEffect, z: Real) -> LinearFit | None:
     """Fit from the start that is best over short segments; None where none converges."""
     numbers = effect_numbers((effect,))
     limit = np.repeat([OUTSIDE, _UNBOUNDED], [z.size, len(numbers)])
@@ -109,13 +108,13 @@ def fitted_beside(model: Model, location: Location, effect: AttachedEffect, z: M
 def _beside(problem: LinearProblem, model: Model, effect: AttachedEffect) -> LinearProblem:
     """Give the problem with the effect's numbers behind its parameters."""
 
-    def make(parameters: Mapping[str, float], further: Matrix) -> CompiledModel:
+    def make(parameters: Mapping[str, float], further: Real) -> CompiledModel:
         return model.with_values(parameters).with_effects((*model.effects, _moved(effect, further))).compile()
 
     return with_further(problem, len(effect_numbers((effect,))), make)
 
 
-def _moved(effect: AttachedEffect, further: Matrix) -> AttachedEffect:
+def _moved(effect: AttachedEffect, further: Real) -> AttachedEffect:
     """Give the effect with its numbers moved, within their possible ranges but for what rounding adds."""
     numbers = effect_numbers((effect,))
     low, high = np.array([one.low for one in numbers]), np.array([one.high for one in numbers])

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
@@ -15,8 +14,8 @@ from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.gap.side_by_side import side_by_side
 from chladni.models.effects.trial import Numbers, Shape
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Beyond this, whitened, a force is no force but a law that left the numbers; its square still is one.
 _RUNAWAY = 1e100
 #: Of the scaled normal matrix: twice as much as rounding makes of a matrix without full rank.
@@ -44,7 +43,7 @@ class Screened:
     values: Numbers
     misfit: float
     expected: float
-    z: Matrix
+    z: Real
 
     @property
     def chi(self) -> float:
@@ -110,7 +109,7 @@ class Screen:
         if not start.shape:
             return start
 
-        def cost(shape: Matrix) -> float:
+        def cost(shape: Real) -> float:
             found = self.weigh(start.trial, tuple(shape.tolist()))
             return found.cost if found is not None else 2 * abs(start.cost) + 1e6
 
@@ -138,7 +137,7 @@ class Screen:
         expected = float(self.problem.scale)
         return Screened(trial=trial, shape=shape, values=values, misfit=misfit, expected=expected, z=z)
 
-    def _solved(self, basis: Matrix, rest: Matrix) -> tuple[Matrix, float, Matrix]:
+    def _solved(self, basis: Real, rest: Real) -> tuple[Real, float, Real]:
         size = np.linalg.norm(basis, axis=1)
         unit = basis[size > 0] / size[size > 0, None]
         own, to_slopes, cross = unit @ rest, self._slopes @ rest - self.z / 2, self._slopes @ unit.T
@@ -152,14 +151,14 @@ class Screen:
         amplitudes[size > 0] = scaled / size[size > 0]
         return amplitudes, float(left @ left), self.z + step
 
-    def _eliminated(self, toward: Matrix) -> Matrix:
+    def _eliminated(self, toward: Real) -> Real:
         """Best step of the parameters toward ``[parameter]`` or ``[parameter, column]``."""
         if self._factor is None:
             return np.zeros_like(toward)
         scale = self._size if toward.ndim == 1 else self._size[:, None]
         return np.asarray(cho_solve(self._factor, toward / scale) / scale, dtype=np.float64)
 
-    def _bounded(self, unit: Matrix, rest: Matrix) -> tuple[Matrix, Matrix]:
+    def _bounded(self, unit: Real, rest: Real) -> tuple[Real, Real]:
         """Amplitudes and step of the parameters where these may not leave their tolerance."""
         both = np.vstack([unit, self._slopes])
         count, size = len(unit), len(self._slopes)

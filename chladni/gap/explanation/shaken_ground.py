@@ -1,19 +1,18 @@
 """A floor that shakes: no law can predict it, but the sensors can predict each other."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.location.profile import Profile
 from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.record_lines import all_lines
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Of a force's power the most that is taken for the force's own: none is told without noise.
 _SUREST = 1.0 - 1e-12
 
 
-def predicted_by_others(problem: LinearProblem, found: Profile) -> Matrix:
+def predicted_by_others(problem: LinearProblem, found: Profile) -> Real:
     """Give ``[output, sample]``: what each sensor should have read if the force that all others tell acts.
 
     The force is Wiener's estimate (Kay 1993, *Estimation theory*, section 12.7): the less it stands out of the noise

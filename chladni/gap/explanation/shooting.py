@@ -8,7 +8,6 @@ the state that the machine had there (Bock, in: Modelling of Chemical Reaction S
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.explanation.contest import Contest
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
@@ -18,9 +17,9 @@ from chladni.gap.plant.windows import nested_windows, training_in_windows
 from chladni.gap.tuning.law_error import with_law_error
 from chladni.gap.tuning.output_error import OutputErrorFit, fit_output_error
 from chladni.gap.tuning.residual import Whitening
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError, ModelError
 
-Matrix = NDArray[np.float64]
 #: A misfit that grows by more than this when windows grow says that the run parted from the log's.
 _PARTED = 10.0
 
@@ -93,7 +92,7 @@ class Shooting:
         run = self.contest.run
         return self.contest.enter(found.hypothesis, initial=_firsts(found.fit, self.levels[found.level], run.windows))
 
-    def _shot(self, hypothesis: Hypothesis, level: int, starts: Matrix) -> Shot | None:
+    def _shot(self, hypothesis: Hypothesis, level: int, starts: Real) -> Shot | None:
         run, windows = self.contest.run, self.levels[level]
         try:
             fit = fit_output_error(
@@ -111,7 +110,7 @@ class Shooting:
         return float(np.median([np.mean(power[slice(*window)]) for window in windows]))
 
 
-def _firsts(fit: OutputErrorFit, windows: Windows, longer: Windows) -> Matrix:
+def _firsts(fit: OutputErrorFit, windows: Windows, longer: Windows) -> Real:
     """``[window, state]`` at the starts of longer windows, which some of the shorter ones begin with too."""
     starts = [start for start, _ in windows]
     return fit.initial[[starts.index(start) for start, _ in longer]]

@@ -5,7 +5,6 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.comparison.outside_band import products_outside
 from chladni.gap.location.followed_motion import unseen_losses
@@ -14,10 +13,8 @@ from chladni.gap.location.modal_paths import ModalPaths, modal_paths
 from chladni.gap.location.printed_pattern import one_direction_share, pattern_losses
 from chladni.gap.location.sensor_location import SensorLocation, SensorSite
 from chladni.gap.records.measurement import Measurement
+from chladni.signals.arrays import Index, Mask, Real
 from chladni.signals.mode_set import ModeSet
-
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # A line tells something where the change has so many times the power of its noise.
 _LEAST_RATIO = 4.0
@@ -87,7 +84,7 @@ def locate_between_sensors(
 
 
 def _located(
-    whole: SensorLocation, change: LevelChange, paths: ModalPaths, told: NDArray[np.bool_], rng: np.random.Generator
+    whole: SensorLocation, change: LevelChange, paths: ModalPaths, told: Mask, rng: np.random.Generator
 ) -> SensorLocation:
     lines = change.change[:, :, told]
     weight = 1 / np.sqrt(np.sum(np.abs(lines) ** 2, axis=(0, 1)))
@@ -115,7 +112,7 @@ def _located(
 
 
 def _sites(
-    names: Sequence[tuple[str, ...]], motion: Sequence[Matrix], pattern: Sequence[float], rng: np.random.Generator
+    names: Sequence[tuple[str, ...]], motion: Sequence[Real], pattern: Sequence[float], rng: np.random.Generator
 ) -> list[SensorSite]:
     drawn = _draws(motion[0].size, rng)
     low, high = _interval(motion, drawn)
@@ -133,7 +130,7 @@ def _sites(
     ]
 
 
-def _places(outputs: Sequence[str]) -> list[tuple[tuple[str, ...], Matrix]]:
+def _places(outputs: Sequence[str]) -> list[tuple[tuple[str, ...], Real]]:
     """Names, and the direction over the sensors, of each sensor and of each two."""
     one = np.eye(len(outputs))
     single = [((name,), one[row]) for row, name in enumerate(outputs)]
@@ -141,25 +138,25 @@ def _places(outputs: Sequence[str]) -> list[tuple[tuple[str, ...], Matrix]]:
     return [*single, *pairs]
 
 
-def _telling(change: LevelChange) -> NDArray[np.bool_]:
+def _telling(change: LevelChange) -> Mask:
     noise = np.sum(change.noise[1:] + change.noise[0], axis=(0, 1))
     return np.asarray(np.sum(np.abs(change.change) ** 2, axis=(0, 1)) > _LEAST_RATIO * noise)
 
 
-def _draws(lines: int, rng: np.random.Generator) -> NDArray[np.intp]:
+def _draws(lines: int, rng: np.random.Generator) -> Index:
     """``[draw, line]`` of whole blocks."""
     blocks = lines // _BLOCK
     first = rng.integers(0, blocks, (_DRAWS, blocks)) * _BLOCK
     return np.asarray((first[:, :, None] + np.arange(_BLOCK)).reshape(_DRAWS, -1))
 
 
-def _interval(losses: Sequence[Matrix], drawn: NDArray[np.intp]) -> tuple[Matrix, Matrix]:
+def _interval(losses: Sequence[Real], drawn: Index) -> tuple[Real, Real]:
     """Ends ``[place]`` of the 95 % interval of the share explained."""
     shares = np.array([1 - one[drawn].mean(axis=1) for one in losses])
     return np.percentile(shares, 2.5, axis=1), np.percentile(shares, 97.5, axis=1)
 
 
-def _rivals(losses: Sequence[Matrix], drawn: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _rivals(losses: Sequence[Real], drawn: Index) -> Mask:
     """Places that the draws can't tell from the best one, itself included."""
     means = np.array([one[drawn].mean(axis=1) for one in losses])
     best = means[int(np.argmin([one.mean() for one in losses]))]

@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 # Normal equations are loaded by this share of their mean: functions of one motion are alike.
 _LOADING = 1e-6
@@ -22,11 +20,11 @@ class _Products:
     ``gram [block, block', function, function']`` and ``right [block, function]``, real.
     """
 
-    gram: Matrix
-    right: Matrix
+    gram: Real
+    right: Real
 
 
-def unseen_losses(blocks: Complex, forces: Complex, change: Complex) -> Matrix:
+def unseen_losses(blocks: Complex, forces: Complex, change: Complex) -> Real:
     """Square of what a force that follows a motion leaves of a change, on lines that the fit hasn't seen.
 
     The model is ``change = sum_t p_t blocks_t  sum_f c_f forces_f`` with real p (the path) and c (the law), the same
@@ -57,7 +55,7 @@ def unseen_losses(blocks: Complex, forces: Complex, change: Complex) -> Matrix:
     return np.asarray(losses)
 
 
-def _printed(path: Matrix, law: Matrix, blocks: Complex, forces: Complex) -> Complex:
+def _printed(path: Real, law: Real, blocks: Complex, forces: Complex) -> Complex:
     """``[level, output, line]``."""
     force = np.einsum("f,lfk->lk", law, forces)
     return np.asarray(force[:, None] * np.tensordot(path, blocks, 1))
@@ -73,7 +71,7 @@ def _products(blocks: Complex, forces: Complex, change: Complex) -> _Products:
     return _Products(gram=gram.reshape(*along.shape[:2], *acting.shape[:2]), right=right)
 
 
-def _fitted(products: _Products) -> tuple[Matrix, Matrix]:
+def _fitted(products: _Products) -> tuple[Real, Real]:
     """Path and law whose product explains most: one after the other, from the best free product's first part."""
     gram, right = products.gram, products.right
     size = right.size
@@ -91,6 +89,6 @@ def _fitted(products: _Products) -> tuple[Matrix, Matrix]:
     return path, law
 
 
-def _solved(gram: Matrix, right: Matrix, *, loading: float = _LOADING) -> Matrix:
+def _solved(gram: Real, right: Real, *, loading: float = _LOADING) -> Real:
     loaded = gram + loading * (np.trace(gram) / len(gram) + np.finfo(float).tiny) * np.eye(len(gram))
     return np.asarray(np.linalg.solve(loaded, right))

@@ -4,21 +4,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from chladni.gap.comparison.linear_approximation import moving_inputs, period_spectra
 from chladni.gap.comparison.motion_functions import even_functions, odd_functions
 from chladni.gap.comparison.periodicity import periods_of
 from chladni.gap.records.measurement import Measurement
+from chladni.signals.arrays import Complex, Index, Mask, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value
 from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
 from chladni.spectral.forms import MOTION_ORDER
-
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Mask = NDArray[np.bool_]
 
 # Two levels nearer than this ratio aren't different levels.
 LEAST_RATIO = 1.1
@@ -51,12 +47,12 @@ class LevelChange(Value):
     outputs: tuple[str, ...]
     order: int
     force_name: str
-    level: Matrix
-    frequency_hz: Matrix
+    level: Real
+    frequency_hz: Real
     response: Complex
-    noise: Matrix
+    noise: Real
     force: Complex
-    lines: NDArray[np.intp]
+    lines: Index
     period_samples: int
     sample_rate_hz: float
 
@@ -68,7 +64,7 @@ class LevelChange(Value):
         """``[level, output, line]`` response of each higher level minus that of the lowest."""
         return np.asarray(self.response[1:] - self.response[0])
 
-    def forces_of(self, direction: Matrix) -> tuple[Complex, int]:
+    def forces_of(self, direction: Real) -> tuple[Complex, int]:
         """What functions of one motion would add to the input's share, level by level.
 
         With a law f(d) of the motion d at the place, the change is the path from there to the sensors times
@@ -101,7 +97,7 @@ class LevelChange(Value):
         used = rms > 0
         return added[:, used] / rms[used, None], int(used[: len(odd)].sum())
 
-    def _motion(self, direction: Matrix) -> tuple[Matrix, Matrix]:
+    def _motion(self, direction: Real) -> tuple[Real, Real]:
         """``[level, sample]`` displacement and velocity on the excited lines."""
         omega = 2 * np.pi * self.frequency_hz
         measured = np.einsum("o,lok->lk", direction, self.response) * self.force
@@ -199,7 +195,7 @@ def _excited(one: Measurement, name: str) -> Mask:
     return np.asarray(excited_lines(spectra, [name])[0] & (power > DYNAMIC_RANGE * power.max()))
 
 
-def _responses(one: Measurement, name: str, lines: NDArray[np.intp]) -> tuple[Complex, Matrix, Complex]:
+def _responses(one: Measurement, name: str, lines: Index) -> tuple[Complex, Real, Complex]:
     """Response and its variance ``[output, line]``, and the input's spectrum ``[line]``."""
     signals = np.concatenate([one.inputs[[one.input_names.index(name)]], one.outputs])
     periods = periods_of(signals, int(one.period_samples or 1))[:, one.transient_periods :]

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.location.noise_behind import noise_behind
 from chladni.gap.location.profile import Profile, profiled
@@ -17,8 +16,8 @@ from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.side_by_side import side_by_side
 from chladni.models.core.model import Model
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 _Rough = tuple[Profile, Place]
 #: Lengths of the segments on which parameters are found, in periods of the lowest mode, one after another: short
 #: ones forgive a resonance that lies elsewhere, long ones tell it exactly.
@@ -85,7 +84,7 @@ class Location:
 
 
 def locate(
-    model: Model, measurement: Measurement, noise: NoiseFloor, tunables: Scaled, start_z: Matrix | None = None
+    model: Model, measurement: Measurement, noise: NoiseFloor, tunables: Scaled, start_z: Real | None = None
 ) -> Location:
     """Profile an unknown force at every place of a model.
 
@@ -154,9 +153,7 @@ def located_pairs(location: Location, rough: int = 5) -> list[Located]:
     return sorted(found, key=lambda one: one.profile.chi)
 
 
-def _tuned_on_segments(
-    model: Model, whole: LinearProblem, start: Matrix
-) -> tuple[tuple[LinearProblem, ...], Profile]:
+def _tuned_on_segments(model: Model, whole: LinearProblem, start: Real) -> tuple[tuple[LinearProblem, ...], Profile]:
     measurement = whole.measurement
     period = measurement.sample_rate_hz / lowest_hz(model, measurement)
     problems = []
@@ -169,7 +166,7 @@ def _tuned_on_segments(
     return tuple(problems), tuned_stepwise(problems, start)
 
 
-def tuned_stepwise(problems: Sequence[LinearProblem], z: Matrix, limit: float | Matrix = 3.0) -> Profile:
+def tuned_stepwise(problems: Sequence[LinearProblem], z: Real, limit: float | Real = 3.0) -> Profile:
     """Fit the parameters alone on one problem after another, each starting where the one before ended."""
     found = profiled(problems[0], (), z, iterations=8, limit=limit)
     for problem in problems[1:]:
@@ -185,9 +182,7 @@ def lowest_hz(model: Model, measurement: Measurement) -> float:
     return float(heard.min()) if heard.size else 20.0 / measurement.duration_s
 
 
-def _roughly(
-    problems: Sequence[LinearProblem], plain: Profile, places: Sequence[Place], start: Matrix
-) -> list[_Rough]:
+def _roughly(problems: Sequence[LinearProblem], plain: Profile, places: Sequence[Place], start: Real) -> list[_Rough]:
     """Profile every place in a few steps; by rising misfit on the whole record, the last of the problems.
 
     An effect may have led a tuning without it far from the right parameters, so each place finds its own, on segments
@@ -199,7 +194,7 @@ def _roughly(
     return sorted(found, key=lambda one: one[0].chi)
 
 
-def _rough_profile(problems: Sequence[LinearProblem], plain: Profile, place: Place, start: Matrix) -> Profile:
+def _rough_profile(problems: Sequence[LinearProblem], plain: Profile, place: Place, start: Real) -> Profile:
     sites, z = (place.sites[0],), start
     for problem in problems[:-1]:
         z = profiled(problem, sites, z, iterations=4).z

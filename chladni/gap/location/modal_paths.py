@@ -3,14 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Mask, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,20 +32,20 @@ class ModalPaths(Value):
     outside: Complex
     measured: Complex
     driving: int
-    shapes: Matrix
-    shape_std: Matrix
+    shapes: Real
+    shape_std: Real
 
     def __post_init__(self) -> None:
         self._freeze()
 
-    def weights(self, direction: Matrix) -> tuple[Matrix, Matrix]:
+    def weights(self, direction: Real) -> tuple[Real, Real]:
         """``[mode]`` weights of a force with this direction ``[output]`` over the sensors, and one sigma of each.
 
         By reciprocity a force drives a mode as much as its own place moves in it: psi . direction.
         """
         return self.shapes @ direction, np.sqrt(self.shape_std**2 @ direction**2)
 
-    def outside_of(self, direction: Matrix) -> tuple[Complex, Complex]:
+    def outside_of(self, direction: Real) -> tuple[Complex, Complex]:
         """Give what modes outside the band print of a force with this direction: the known part, and free terms.
 
         The sensor at the applied force answers this one as this one's places answered that (reciprocity). Of the
@@ -69,7 +66,7 @@ class ModalPaths(Value):
         # Two terms a sensor, in their order.
         return known, self.outside[np.repeat(others, 2)]
 
-    def on(self, lines: NDArray[np.bool_]) -> "ModalPaths":
+    def on(self, lines: Mask) -> "ModalPaths":
         """Give some of the lines."""
         return replace(
             self,
@@ -84,7 +81,7 @@ class ModalPaths(Value):
 
 
 def modal_paths(
-    modes: ModeSet, frequency_hz: Matrix, *, outputs: tuple[str, ...], driving_point: str, order: int
+    modes: ModeSet, frequency_hz: Real, *, outputs: tuple[str, ...], driving_point: str, order: int
 ) -> ModalPaths:
     """Turn modes that were identified from one force into paths from a force anywhere.
 

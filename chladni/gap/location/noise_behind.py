@@ -3,7 +3,6 @@
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from chladni.gap.comparison.autoregressive import noise_floor_of
@@ -12,7 +11,6 @@ from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.record_lines import all_lines
 from chladni.gap.records.noise_floor import NoiseFloor
 
-Matrix = NDArray[np.float64]
 #: Bands over which the noise of a sensor is taken for flat.
 _BANDS = 24
 #: A floor is lowered at most to this share of what it was estimated as.

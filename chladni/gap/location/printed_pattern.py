@@ -1,13 +1,10 @@
 """What a force of any shape at one place could print of a change, by reciprocity of a modal model."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from chladni.gap.location.modal_paths import ModalPaths
-
-Matrix = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 # Weights of a pattern may lie this many sigma from what the modal model says.
 _SIGMAS = 2.0
@@ -15,7 +12,7 @@ _SIGMAS = 2.0
 _LEAST_SPREAD = 1e-3
 
 
-def pattern_losses(paths: ModalPaths, direction: Matrix, change: Complex) -> Matrix:
+def pattern_losses(paths: ModalPaths, direction: Real, change: Complex) -> Real:
     """Square ``[line]`` of what forces of any shape, one number a line and level, leave of a change.
 
     The pattern is ``sum_r c_r modal_r + known + sum_t u_t outside_t`` with c within two sigma of what reciprocity
@@ -50,7 +47,7 @@ def pattern_losses(paths: ModalPaths, direction: Matrix, change: Complex) -> Mat
     return np.asarray(np.sum(np.abs(_off(pattern, change)) ** 2, axis=(0, 1)))
 
 
-def _missed(weights: Matrix, centre: Complex, steps: Complex, products: Complex) -> tuple[float, Matrix]:
+def _missed(weights: Real, centre: Complex, steps: Complex, products: Complex) -> tuple[float, Real]:
     """Mean over lines of what a pattern misses, ``tr C - g^H C g/(g^H g)``, and its slope over the weights."""
     g = centre + np.tensordot(weights, steps, 1)
     size = np.sum(np.abs(g) ** 2, axis=0) + np.finfo(float).tiny

@@ -4,15 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 from scipy.optimize import lsq_linear
 
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
+from chladni.signals.arrays import Complex, Real
 
-Matrix = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
 _TOLD = 1e-3
 #: Of the largest singular value: below it columns are the same but for rounding.
 _RANK = 1e-10
@@ -43,9 +41,9 @@ class Profile:
     """
 
     sites: tuple[Site, ...]
-    z: Matrix
-    transient: Matrix
-    forces: tuple[Spectrum, ...]
+    z: Real
+    transient: Real
+    forces: tuple[Complex, ...]
     misfit: float
     expected: float
     prior: float
@@ -70,10 +68,10 @@ class Projection:
         ``[output, 1, line]`` of each site.
     """
 
-    def __init__(self, patterns: Sequence[Spectrum]) -> None:
+    def __init__(self, patterns: Sequence[Complex]) -> None:
         self._unit = _orthonormal(patterns)
 
-    def away(self, spectra: Spectrum) -> Spectrum:
+    def away(self, spectra: Complex) -> Complex:
         """Take the forces from ``[..., output, segment, line]``."""
         for known in self._unit:
             share = np.einsum("ol,...osl->...sl", known[:, 0].conj(), spectra)
@@ -94,7 +92,7 @@ class Elimination(Projection):
         ``[state, output, 1, line]``.
     """
 
-    def __init__(self, patterns: Sequence[Spectrum], transients: Spectrum) -> None:
+    def __init__(self, patterns: Sequence[Complex], transients: Complex) -> None:
         super().__init__(patterns)
         self._patterns = np.asarray(patterns, dtype=np.complex128)
         self._transients = transients
@@ -109,14 +107,14 @@ class Elimination(Projection):
         kept = left[:, : values.size][:, values > _RANK * max(values.max(initial=0.0), 1e-300)]
         self._kept = kept @ kept.T
 
-    def rest(self, spectra: Spectrum) -> Matrix:
+    def rest(self, spectra: Complex) -> Real:
         """Take forces and transients; give real numbers ``[..., number]``."""
         real = _real(self.away(spectra))
         printed = (real @ self._basis @ self._kept) @ self._basis.T
         left = np.subtract(real, printed, out=printed)
         return np.asarray(left.reshape(*spectra.shape[:-3], -1), dtype=np.float64)
 
-    def unknowns(self, residual: Spectrum) -> tuple[Matrix, list[Spectrum]]:
+    def unknowns(self, residual: Complex) -> tuple[Real, list[Complex]]:
         """Best transients ``[state, segment]`` and forces ``[segment, line]`` for a residual."""
         # What a force could print as well (a blow at the very start) is left to the force: of a transient that is
         # told by a thousandth of itself, noise would make almost anything.
@@ -138,10 +136,10 @@ class _Fit:
 
     profile: Profile
     out: Elimination
-    residual: Spectrum
+    residual: Complex
 
 
-def _forces(patterns: Spectrum, left: Spectrum) -> Spectrum:
+def _forces(patterns: Complex, left: Complex) -> Complex:
     """Least squares ``[site, segment, line]`` of ``left [output, segment, line]`` along the patterns."""
     flat = patterns[:, :, 0]
     gram = np.einsum("aol,bol->lab", flat.conj(), flat)
@@ -152,9 +150,9 @@ def _forces(patterns: Spectrum, left: Spectrum) -> Spectrum:
     return np.asarray(np.moveaxis(found, 0, -1), dtype=np.complex128)
 
 
-def _orthonormal(patterns: Sequence[Spectrum]) -> list[Spectrum]:
+def _orthonormal(patterns: Sequence[Complex]) -> list[Complex]:
     """One small basis a line (Gram and Schmidt, twice is enough for two patterns)."""
-    basis: list[Spectrum] = []
+    basis: list[Complex] = []
     for pattern in patterns:
         rest = pattern
         for _ in range(2):
@@ -169,10 +167,10 @@ def _orthonormal(patterns: Sequence[Spectrum]) -> list[Spectrum]:
 def profiled(
     problem: LinearProblem,
     sites: Sequence[Site],
-    start: Matrix,
+    start: Real,
     *,
     iterations: int = 8,
-    limit: float | Matrix = 3.0,
+    limit: float | Real = 3.0,
 ) -> Profile:
     """Refit the parameters and the transient while forces at `sites` may be anything.
 
@@ -195,7 +193,7 @@ def profiled(
     return best.profile
 
 
-def _step(problem: LinearProblem, fit: _Fit, limit: float | Matrix) -> tuple[Matrix, float]:
+def _step(problem: LinearProblem, fit: _Fit, limit: float | Real) -> tuple[Real, float]:
     """Solve the linearised problem within the bounds; give the step in z and the misfit that it promises."""
     here = fit.profile
     z = here.z
@@ -207,7 +205,7 @@ def _step(problem: LinearProblem, fit: _Fit, limit: float | Matrix) -> tuple[Mat
     return moved, float(np.sum((right - moved @ matrix) ** 2))
 
 
-def bounded_minimum(normal: Matrix, toward: Matrix, low: Matrix, high: Matrix) -> Matrix:
+def bounded_minimum(normal: Real, toward: Real, low: Real, high: Real) -> Real:
     """Minimise ``x'Nx/2 - x't`` within bounds."""
     if not toward.size:
         return toward
@@ -221,9 +219,9 @@ def bounded_minimum(normal: Matrix, toward: Matrix, low: Matrix, high: Matrix) -
     return np.asarray(lsq_linear(root.T, right, bounds=bounds, method="bvls").x / size, dtype=np.float64)
 
 
-def _root(normal: Matrix) -> tuple[Matrix, Matrix]:
+def _root(normal: Real) -> tuple[Real, Real]:
     """Factorise in units of each unknown's own curvature; give the lower factor and the units."""
-    size: Matrix = np.sqrt(np.diag(normal))
+    size: Real = np.sqrt(np.diag(normal))
     scaled = normal / size / size[:, None]
     try:
         root = np.linalg.cholesky(scaled)
@@ -233,7 +231,7 @@ def _root(normal: Matrix) -> tuple[Matrix, Matrix]:
     return np.asarray(root, dtype=np.float64), size
 
 
-def _searched(problem: LinearProblem, best: Profile, step: Matrix) -> _Fit | None:
+def _searched(problem: LinearProblem, best: Profile, step: Real) -> _Fit | None:
     share = 1.0
     for _ in range(4):
         found = _fitted(problem, best.sites, best.z + share * step)
@@ -243,12 +241,12 @@ def _searched(problem: LinearProblem, best: Profile, step: Matrix) -> _Fit | Non
     return None
 
 
-def profile_at(problem: LinearProblem, sites: Sequence[Site], z: Matrix) -> Profile:
+def profile_at(problem: LinearProblem, sites: Sequence[Site], z: Real) -> Profile:
     """Profile at given parameters: only the forces and the transients are free."""
     return _fitted(problem, sites, z).profile
 
 
-def _fitted(problem: LinearProblem, sites: Sequence[Site], z: Matrix) -> _Fit:
+def _fitted(problem: LinearProblem, sites: Sequence[Site], z: Real) -> _Fit:
     view = problem.view(z)
     out = Elimination([problem.pattern(view, site) for site in sites], problem.transients(view))
     residual = np.asarray((problem.measured - view.forced()) * problem.weight, dtype=np.complex128)
@@ -266,7 +264,7 @@ def _fitted(problem: LinearProblem, sites: Sequence[Site], z: Matrix) -> _Fit:
     return _Fit(profile=profile, out=out, residual=residual)
 
 
-def _real(spectra: Spectrum) -> Matrix:
+def _real(spectra: Complex) -> Real:
     """``[..., segment, number]`` real and imaginary parts of ``[..., output, segment, line]``."""
     flat = np.ascontiguousarray(np.swapaxes(spectra, -2, -3), dtype=np.complex128)
     return flat.reshape(*flat.shape[:-2], flat.shape[-2] * flat.shape[-1]).view(np.float64)

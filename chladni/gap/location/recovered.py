@@ -4,17 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.location.profile import Profile, Projection
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.linear_view import LinearView, Way
 from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import RecordLines, all_lines
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.value import Value
 
-Matrix = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
 #: Lines over which the power of an unknown force is taken for the same.
 _SMOOTH = 31
 #: Power over that of the lines that tell the force well, beyond which a line is believed only when it's so many times
@@ -46,51 +44,51 @@ class Recovered(Value):
 
     site: Site
     lines: RecordLines
-    force: Matrix
-    displacement: Matrix
-    velocity: Matrix
-    reliable: Matrix
-    z: Matrix
-    transient: Matrix
-    beside: tuple[tuple[Site, Matrix], ...] = ()
+    force: Real
+    displacement: Real
+    velocity: Real
+    reliable: Real
+    z: Real
+    transient: Real
+    beside: tuple[tuple[Site, Real], ...] = ()
 
     def __post_init__(self) -> None:
         self._freeze()
 
     @property
-    def time_s(self) -> Matrix:
+    def time_s(self) -> Real:
         """``[sample]`` from the start of the record."""
         return np.asarray(np.arange(self.force.size) / self.lines.sample_rate_hz, dtype=np.float64)
 
     @property
-    def s(self) -> Spectrum:
+    def s(self) -> Complex:
         """``[line]`` j omega."""
         return np.asarray(2j * np.pi * self.lines.frequency_hz, dtype=np.complex128)
 
     @property
-    def believed(self) -> Matrix:
+    def believed(self) -> Real:
         """``[line]`` of `lines`: share of the force's power that is no noise."""
         return np.asarray(self.reliable[self.lines.index - 1], dtype=np.float64)
 
-    def position_at(self, problem: LinearProblem, port: int) -> Matrix:
+    def position_at(self, problem: LinearProblem, port: int) -> Real:
         """``[sample]`` displacement at another port, under the same forces."""
         view, acting = self._acting(problem)
         motion = view.motion(port, self.transient, acting)
         return np.asarray(view.lines.signal(motion[0])[0], dtype=np.float64)
 
-    def states(self, problem: LinearProblem) -> Matrix:
+    def states(self, problem: LinearProblem) -> Real:
         """``[state, sample]`` of the linear part under the same forces, in the order of the compiled model's."""
         view, acting = self._acting(problem)
         found = view.states(self.transient, acting)
         return np.asarray(view.lines.signal(found)[:, 0], dtype=np.float64)
 
-    def _acting(self, problem: LinearProblem) -> tuple[LinearView, list[tuple[Way, Spectrum]]]:
+    def _acting(self, problem: LinearProblem) -> tuple[LinearView, list[tuple[Way, Complex]]]:
         """Give the model on all lines, and the forces on it with the ways that they take in."""
         whole = problem.on(all_lines(problem.measurement.samples, problem.measurement.sample_rate_hz))
         view, forces = whole.view(self.z), ((self.site, self.force), *self.beside)
         return view, [(whole.way(view, site), whole.lines.spectrum(force)) for site, force in forces]
 
-    def spectrum(self, signal: Matrix) -> Spectrum:
+    def spectrum(self, signal: Real) -> Complex:
         """``[line]`` of a signal ``[sample]``."""
         return np.asarray(self.lines.spectrum(signal)[0], dtype=np.complex128)
 
@@ -150,13 +148,13 @@ def recovered(problem: LinearProblem, found: Profile, site: Site, others: Sequen
 class _Unknown:
     """A force ``[line]``, how far it's believed, and the transients ``[state, 1]`` beside it."""
 
-    force: Spectrum
-    reliable: Matrix
-    transient: Matrix
+    force: Complex
+    reliable: Real
+    transient: Real
 
 
 def _unknown(
-    pattern: Spectrum, beside: Sequence[Spectrum], residual: Spectrum, transients: Spectrum, transient: Matrix
+    pattern: Complex, beside: Sequence[Complex], residual: Complex, transients: Complex, transient: Real
 ) -> _Unknown:
     """Recover the force along a pattern ``[output, line]`` with what lies along those beside it taken away."""
     away = Projection([one[:, None] for one in beside]).away
@@ -182,7 +180,7 @@ def _unknown(
     return _Unknown(force=np.asarray(reliable * plain, dtype=np.complex128), reliable=reliable, transient=transient)
 
 
-def _transient(transients: Spectrum, pattern: Spectrum, residual: Spectrum, held: Matrix) -> Matrix:
+def _transient(transients: Complex, pattern: Complex, residual: Complex, held: Real) -> Real:
     """Best transients ``[state, 1]`` when the force is random with a known power, by weighted least squares.
 
     Parameters
@@ -201,13 +199,13 @@ def _transient(transients: Spectrum, pattern: Spectrum, residual: Spectrum, held
     return np.asarray(scaled / size, dtype=np.float64)[:, None]
 
 
-def _told(power: Matrix, noise: Matrix) -> float:
+def _told(power: Real, noise: Real) -> float:
     """Mean power of a force ``[line]``, each line counted by how well it tells it."""
     say = power / noise
     return float(say @ power / max(float(np.sum(say)), 1e-300))
 
 
-def _smooth(power: Matrix) -> Matrix:
+def _smooth(power: Real) -> Real:
     if power.size < _SMOOTH:
         return np.full_like(power, power.mean())
     padded = np.pad(power, _SMOOTH // 2, mode="reflect")

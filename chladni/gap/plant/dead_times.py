@@ -3,13 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.integrator.machine_code import inlined_code, part_code
 from chladni.models.integrator.port_plan import PortPlan
+from chladni.signals.arrays import Real, Whole
 
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
 #: Displacements that a cubic goes through.
 _NODES = 4
 
@@ -27,9 +25,9 @@ class DeadTimes(NamedTuple):
         ``[delay, 4]`` of each, the latest first.
     """
 
-    port: Integers
-    ago: Integers
-    share: Matrix
+    port: Whole
+    ago: Whole
+    share: Real
 
 
 def dead_times(plan: PortPlan, step_rate_hz: float) -> DeadTimes:
@@ -45,7 +43,7 @@ def dead_times(plan: PortPlan, step_rate_hz: float) -> DeadTimes:
 
 
 @part_code
-def begin_dead_times(delays: DeadTimes, lagged: Matrix, now: Matrix) -> None:
+def begin_dead_times(delays: DeadTimes, lagged: Real, now: Real) -> None:
     """At the start of a window nothing is behind: all that acts ``[port]`` is the displacement that is missing."""
     for port in range(now.size):
         lagged[port] = now[port] = 0.0
@@ -54,7 +52,7 @@ def begin_dead_times(delays: DeadTimes, lagged: Matrix, now: Matrix) -> None:
 
 
 @part_code
-def see_own_step(delays: DeadTimes, now: Matrix) -> None:
+def see_own_step(delays: DeadTimes, now: Real) -> None:
     """After the start, a dead time below two steps sees the displacement ``[port]`` at the end of its own."""
     for delay in range(delays.port.size):
         if delays.ago[delay] == 0:
@@ -62,7 +60,7 @@ def see_own_step(delays: DeadTimes, now: Matrix) -> None:
 
 
 @inlined_code
-def look_back(delays: DeadTimes, delay: int, motion: Matrix, step: int, latest: int) -> float:
+def look_back(delays: DeadTimes, delay: int, motion: Real, step: int, latest: int) -> float:
     """Displacement that comes at a step, of those up to the latest in ``motion [step, port]``; 0 before the start."""
     total = 0.0
     for node in range(delays.share.shape[1]):

@@ -1,16 +1,15 @@
 """What only the inputs can have driven: signals less all that the starts of windows could give."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.plant.free_run import FreeRun
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Of the largest pattern of a start, all scaled to one: what is smaller than that is rounding.
 _ROUNDING = 1e-9
 
 
-def driven_parts(run: FreeRun) -> tuple[Matrix, Matrix]:
+def driven_parts(run: FreeRun) -> tuple[Real, Real]:
     """Give ``[output, sample]`` of the log, and of the linear model from rest, without what a start can give.
 
     A free axis is where it began to be: most of its position is its start. What is left of both signals, once every
@@ -31,7 +30,7 @@ def driven_parts(run: FreeRun) -> tuple[Matrix, Matrix]:
     return _without(run.measurement.outputs, patterns, run.windows), _without(driven, patterns, run.windows)
 
 
-def _without(signals: Matrix, patterns: list[Matrix], windows: tuple[tuple[int, int], ...]) -> Matrix:
+def _without(signals: Real, patterns: list[Real], windows: tuple[tuple[int, int], ...]) -> Real:
     left = signals.copy()
     for start, stop in windows:
         for row, signal in enumerate(left[:, start:stop]):
@@ -40,7 +39,7 @@ def _without(signals: Matrix, patterns: list[Matrix], windows: tuple[tuple[int, 
     return left
 
 
-def _basis(patterns: Matrix) -> Matrix:
+def _basis(patterns: Real) -> Real:
     """Orthonormal ``[sample, direction]`` of ``[pattern, sample]``, whatever their sizes."""
     size = np.linalg.norm(patterns, axis=1, keepdims=True)
     shapes = np.divide(patterns, size, out=np.zeros_like(patterns), where=size > 0)

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.laid_inputs import LaidInputs
@@ -20,10 +19,10 @@ from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.hold import hold_of
 from chladni.models.integrator.input_rows import input_rows
 from chladni.models.integrator.integrator import Integration, Integrator
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
 
-Matrix = NDArray[np.float64]
 Windows = Sequence[tuple[int, int]]
 #: Integrators kept; a fit asks for the same model again when it draws, never for more than a few.
 _KEPT = 8
@@ -39,9 +38,9 @@ class SiteMotion(Value):
     """
 
     site: str
-    displacement: Matrix
-    velocity: Matrix
-    force: Matrix
+    displacement: Real
+    velocity: Real
+    force: Real
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -86,7 +85,7 @@ class FreeRun:
         self._linear = LinearRuns(self.inputs)
         self._integrators: Kept[Integrator] = Kept(_KEPT)
 
-    def compiled(self, z: Matrix | None = None, effects: Sequence[Effect] = ()) -> CompiledModel:
+    def compiled(self, z: Real | None = None, effects: Sequence[Effect] = ()) -> CompiledModel:
         """Equations of the model at some parameters, with these effects behind those that it has."""
         model = self.model
         if z is not None and np.any(z):
@@ -96,8 +95,8 @@ class FreeRun:
         return model.compile()
 
     def outputs(
-        self, z: Matrix | None = None, effects: Sequence[AttachedEffect] = (), initial: Matrix | None = None
-    ) -> Matrix:
+        self, z: Real | None = None, effects: Sequence[AttachedEffect] = (), initial: Real | None = None
+    ) -> Real:
         """Give ``[output, sample]`` of the measured outputs as the model would have them.
 
         Parameters
@@ -123,11 +122,11 @@ class FreeRun:
         read = self._run(in_time, ("in time", _key(z, effects)), initial)
         return mapped_outputs(compiled, self.rows, read_late(read, late_s, rate), rate)
 
-    def late_s(self, compiled: CompiledModel) -> Matrix:
+    def late_s(self, compiled: CompiledModel) -> Real:
         """``[output]`` how late the clocks of the measured outputs are."""
         return np.asarray(compiled.output_offsets_s, dtype=np.float64)[self.rows]
 
-    def _run(self, compiled: CompiledModel, key: object, initial: Matrix | None) -> Matrix:
+    def _run(self, compiled: CompiledModel, key: object, initial: Real | None) -> Real:
         rate = self.measurement.sample_rate_hz
         if is_plain(compiled):
             starts = initial_states(initial, len(self.windows), len(compiled.states))
@@ -139,11 +138,11 @@ class FreeRun:
         parts = [integration.outputs[self.rows] for _, integration in self._integrations(compiled, key, initial)]
         return parts[0] if len(parts) == 1 else np.hstack(parts)
 
-    def marched(self, z: Matrix | None, effects: Sequence[AttachedEffect], initial: Matrix | None) -> Marched | None:
+    def marched(self, z: Real | None, effects: Sequence[AttachedEffect], initial: Real | None) -> Marched | None:
         """Windows of a model with laws, outputs before clocks and maps; None where `integrations` does it better."""
         return self._marched(self.compiled(z, effects), initial)
 
-    def _marched(self, compiled: CompiledModel, initial: Matrix | None) -> Marched | None:
+    def _marched(self, compiled: CompiledModel, initial: Real | None) -> Marched | None:
         rate = self.measurement.sample_rate_hz
         hold = hold_of(compiled, rate)
         # An integrator counts time from the start of its own window; a law may want the log's.
@@ -157,9 +156,9 @@ class FreeRun:
 
     def motion(
         self,
-        z: Matrix | None = None,
+        z: Real | None = None,
         effects: Sequence[AttachedEffect] = (),
-        initial: Matrix | None = None,
+        initial: Real | None = None,
         *,
         site: str,
     ) -> SiteMotion:
@@ -173,7 +172,7 @@ class FreeRun:
         return self._motions(z, effects, initial, [self.compiled(z, effects).port_index(site)])[0]
 
     def motions(
-        self, z: Matrix | None = None, effects: Sequence[AttachedEffect] = (), initial: Matrix | None = None
+        self, z: Real | None = None, effects: Sequence[AttachedEffect] = (), initial: Real | None = None
     ) -> dict[tuple[str, PortKind], SiteMotion]:
         """Motion at every port of the model during one run, by name and kind; see `outputs`."""
         ports = self.compiled(z, effects).ports
@@ -181,7 +180,7 @@ class FreeRun:
         return {(port.name, port.kind): motion for port, motion in zip(ports, found, strict=True)}
 
     def _motions(
-        self, z: Matrix | None, effects: Sequence[AttachedEffect], initial: Matrix | None, ports: Sequence[int]
+        self, z: Real | None, effects: Sequence[AttachedEffect], initial: Real | None, ports: Sequence[int]
     ) -> list[SiteMotion]:
         compiled, runs = self.compiled(z, effects), self.integrations(z, effects, initial)
         columns = [self._columns(compiled, window) for window, _ in runs]
@@ -194,13 +193,13 @@ class FreeRun:
         return found
 
     def integrations(
-        self, z: Matrix | None, effects: Sequence[AttachedEffect], initial: Matrix | None
+        self, z: Real | None, effects: Sequence[AttachedEffect], initial: Real | None
     ) -> list[tuple[tuple[int, int], Integration]]:
         """Give each window with its run; arguments and errors are those of `outputs`."""
         return self._integrations(self.compiled(z, effects), _key(z, effects), initial)
 
     def _integrations(
-        self, compiled: CompiledModel, key: object, initial: Matrix | None
+        self, compiled: CompiledModel, key: object, initial: Real | None
     ) -> list[tuple[tuple[int, int], Integration]]:
         # For this run alone: an integrator's tables grow while it runs.
         integrator = self._integrators.take(
@@ -215,7 +214,7 @@ class FreeRun:
         finally:
             self._integrators.put(key, integrator)
 
-    def _columns(self, compiled: CompiledModel, window: tuple[int, int]) -> Matrix:
+    def _columns(self, compiled: CompiledModel, window: tuple[int, int]) -> Real:
         """``[sample, column]`` of the compiled model's u in a window."""
         rate = self.measurement.sample_rate_hz
         hold = hold_of(compiled, rate)
@@ -227,9 +226,7 @@ class FreeRun:
         return columns
 
 
-def mapped_outputs(
-    compiled: CompiledModel, rows: NDArray[np.int64], outputs: Matrix, sample_rate_hz: float
-) -> Matrix:
+def mapped_outputs(compiled: CompiledModel, rows: Whole, outputs: Real, sample_rate_hz: float) -> Real:
     """``[output, sample]`` of the outputs `rows` behind the model's maps of samples."""
     if not compiled.output_maps:
         return outputs
@@ -240,7 +237,7 @@ def mapped_outputs(
     return mapped
 
 
-def _key(z: Matrix | None, effects: Sequence[AttachedEffect]) -> object:
+def _key(z: Real | None, effects: Sequence[AttachedEffect]) -> object:
     """What tells one run's integrator from another's."""
     return None if z is None else np.asarray(z).tobytes(), tuple(effect_key(effect) for effect in effects)
 
@@ -250,7 +247,7 @@ def effect_key(effect: AttachedEffect) -> tuple[object, ...]:
     return effect.effect, effect.site, effect.variant, effect.source, tuple(sorted(effect.values.items()))
 
 
-def initial_states(initial: Matrix | None, windows: int, states: int) -> Matrix:
+def initial_states(initial: Real | None, windows: int, states: int) -> Real:
     """``[window, state]`` from what a caller gave; `ModelError` when the shape doesn't fit."""
     if initial is None:
         return np.zeros((windows, states))
@@ -275,7 +272,7 @@ def _checked(windows: Windows | None, samples: int) -> tuple[tuple[int, int], ..
     return tuple((int(start), int(stop)) for start, stop in windows)
 
 
-def _rows(compiled: CompiledModel, measurement: Measurement) -> NDArray[np.int64]:
+def _rows(compiled: CompiledModel, measurement: Measurement) -> Whole:
     """Rows of the measured outputs among the model's."""
     inputs = tuple(terminal.name for terminal in compiled.inputs)
     if measurement.input_names != inputs:
@@ -290,7 +287,7 @@ def _rows(compiled: CompiledModel, measurement: Measurement) -> NDArray[np.int64
     return np.array([names.index(name) for name in measurement.output_names], dtype=np.int64)
 
 
-def _port_motion(compiled: CompiledModel, port: int, integration: Integration, columns: Matrix) -> Matrix:
+def _port_motion(compiled: CompiledModel, port: int, integration: Integration, columns: Real) -> Real:
     """``[displacement, velocity, force; sample]`` at any port, whether a law acts there or not."""
     active = list(integration.ports)
     found = []

@@ -5,16 +5,15 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.neighbours import Scaled
 from chladni.models.core.compiled_model import CompiledModel
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 Values = Mapping[str, float]
 #: ``make(parameters, numbers)``: equations at values of parameters, SI, and ``[number]`` further ones.
-Make = Callable[[Values, Matrix], CompiledModel]
+Make = Callable[[Values, Real], CompiledModel]
 
 
 def with_further(problem: LinearProblem, count: int, make: Make) -> LinearProblem:
@@ -42,7 +41,7 @@ class _Numbers:
     def names(self) -> tuple[str, ...]:
         return (*self.tunables.names, *self.further)
 
-    def values(self, z: Matrix) -> dict[str, float]:
+    def values(self, z: Real) -> dict[str, float]:
         own = len(self.tunables.names)
         return {**self.tunables.values(z[:own]), **dict(zip(self.further, z[own:].tolist(), strict=True))}
 

@@ -3,14 +3,13 @@
 from threading import Lock
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.hold import Hold
 from chladni.models.integrator.input_rows import input_rows
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 #: Ways that are kept: a fit asks for one, and for one more for each number of an actuator that it moves.
 _KEPT = 6
 
@@ -26,12 +25,12 @@ class LaidInputs:
         Of the log.
     """
 
-    def __init__(self, signals: Matrix, sample_rate_hz: float) -> None:
+    def __init__(self, signals: Real, sample_rate_hz: float) -> None:
         self._signals, self.sample_rate_hz = signals, sample_rate_hz
-        self._kept: list[tuple[object, Matrix]] = []
+        self._kept: list[tuple[object, Real]] = []
         self._lock = Lock()
 
-    def rows(self, compiled: CompiledModel, hold: Hold, parts: int = 1) -> Matrix:
+    def rows(self, compiled: CompiledModel, hold: Hold, parts: int = 1) -> Real:
         """Give ``[step, width]``; the same array for models that take the inputs alike.
 
         Parameters
@@ -60,7 +59,7 @@ class LaidInputs:
         return made
 
 
-def _finer(rows: Matrix, hold: Hold, parts: int) -> Matrix:
+def _finer(rows: Real, hold: Hold, parts: int) -> Real:
     """Rows of steps that are a part of the interval between samples."""
     if parts == 1:
         return rows

@@ -1,12 +1,11 @@
 """What clocks that are late or early read of outputs."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
+from chladni.signals.arrays import Real
 
 
-def read_late(outputs: Matrix, offsets_s: Matrix, sample_rate_hz: float) -> Matrix:
+def read_late(outputs: Real, offsets_s: Real, sample_rate_hz: float) -> Real:
     """Give ``[..., output, sample]`` as read by clocks that are late by ``offsets_s [output]``.
 
     By cubic splines between samples; before the start as at the start, after the end as at the end. What isn't finite

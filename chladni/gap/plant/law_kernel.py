@@ -10,14 +10,10 @@ from collections.abc import Callable
 from math import expm1
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.gap.plant.dead_times import DeadTimes, begin_dead_times, look_back, see_own_step
 from chladni.models.integrator.machine_code import call_law, inlined_code, machine_code, part_code
+from chladni.signals.arrays import Real, Whole
 
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
 # In a kernel it takes no context.
 _CALL: Callable[..., float] = call_law
 _ITERATIONS = 40
@@ -52,15 +48,15 @@ class Laws(NamedTuple):
         ``[port]`` what dead times give of steps before, and their share of the displacement after the step itself.
     """
 
-    table: Integers
-    counts: Integers
-    first: Integers
-    trial: Matrix
-    rates: Matrix
-    address: Integers
-    scale: Matrix
-    lagged: Matrix
-    now: Matrix
+    table: Whole
+    counts: Whole
+    first: Whole
+    trial: Real
+    rates: Real
+    address: Whole
+    scale: Real
+    lagged: Real
+    now: Real
 
 
 class Room(NamedTuple):
@@ -79,15 +75,15 @@ class Room(NamedTuple):
         Of Newton's iteration.
     """
 
-    given: Matrix
-    state: Matrix
-    force: Matrix
-    base: Matrix
-    missed: Matrix
-    tried: Matrix
-    slope: Matrix
-    matrix: Matrix
-    inverse: Matrix
+    given: Real
+    state: Real
+    force: Real
+    base: Real
+    missed: Real
+    tried: Real
+    slope: Real
+    matrix: Real
+    inverse: Real
 
 
 class March(NamedTuple):
@@ -107,15 +103,15 @@ class March(NamedTuple):
         ``[step, ...]`` states, motions and forces at the ports, law states; of x and state the first row is given.
     """
 
-    table: Matrix
-    ends: Matrix
-    start: Matrix
-    through: Matrix
-    rows: Matrix
-    x: Matrix
-    motion: Matrix
-    force: Matrix
-    state: Matrix
+    table: Real
+    ends: Real
+    start: Real
+    through: Real
+    rows: Real
+    x: Real
+    motion: Real
+    force: Real
+    state: Real
 
 
 @inlined_code
@@ -160,7 +156,7 @@ def force_of(laws: Laws, room: Room, port: int, h: float, t: float) -> float:
 
 
 @part_code
-def missed_by(laws: Laws, room: Room, through: Matrix, force: Matrix, h: float, t: float) -> float:
+def missed_by(laws: Laws, room: Room, through: Real, force: Real, h: float, t: float) -> float:
     """Largest difference between the forces and what the laws say of the motion that they make."""
     p = room.force.size
     for row in range(2 * p):
@@ -187,7 +183,7 @@ def slope_of(laws: Laws, room: Room, port: int, argument: int, here: float, h: f
 
 
 @inlined_code
-def equations(room: Room, through: Matrix) -> None:
+def equations(room: Room, through: Real) -> None:
     """Matrix of ``df - slope dm``, m moved by the forces themselves."""
     p = room.force.size
     for row in range(p):
@@ -218,7 +214,7 @@ def invert(room: Room) -> None:
 
 
 @inlined_code
-def _newton_change(laws: Laws, room: Room, through: Matrix, h: float, t: float) -> None:
+def _newton_change(laws: Laws, room: Room, through: Real, h: float, t: float) -> None:
     """Newton's change of the forces, in `slope`."""
     p = room.force.size
     for port in range(p):
@@ -235,7 +231,7 @@ def _newton_change(laws: Laws, room: Room, through: Matrix, h: float, t: float) 
 
 
 @part_code
-def meet(laws: Laws, room: Room, through: Matrix, h: float, t: float, size: float) -> int:
+def meet(laws: Laws, room: Room, through: Real, h: float, t: float, size: float) -> int:
     """Forces at the end of the step that agree with the laws: Newton, halved while it makes things worse."""
     p = room.force.size
     missed = missed_by(laws, room, through, room.force, h, t)

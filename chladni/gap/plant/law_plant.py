@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.plant.free_run import PARTS, FreeRun, initial_states, mapped_outputs
 from chladni.gap.plant.late_clock import read_late
@@ -13,8 +12,8 @@ from chladni.gap.plant.law_run import Equations, equations, new_record, run_laws
 from chladni.gap.plant.law_sensitivity import recorded, sensitivities
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Relative change at which a map of samples (a sensor that clips) is told by differences.
 _MAP_CHANGE = 1e-6
 
@@ -23,7 +22,7 @@ _MAP_CHANGE = 1e-6
 class Setting:
     """Parameters and effects of one run."""
 
-    z: Matrix
+    z: Real
     effects: tuple[AttachedEffect, ...]
 
 
@@ -34,16 +33,16 @@ class LawRunResult:
     What its slopes need is beside them.
     """
 
-    outputs: Matrix
-    before_maps: Matrix
-    in_time: Matrix
+    outputs: Real
+    before_maps: Real
+    in_time: Real
     setting: Setting
     compiled: CompiledModel
     equation: Equations
     records: tuple[March, ...]
 
 
-def coarse_run(run: FreeRun, setting: Setting, initial: Matrix) -> LawRunResult:
+def coarse_run(run: FreeRun, setting: Setting, initial: Real) -> LawRunResult:
     """Run with one step a sample: wrong by about a per cent, in a tenth of the time."""
     compiled = run.compiled(setting.z, setting.effects)
     equation = _equations(run, compiled)
@@ -52,7 +51,7 @@ def coarse_run(run: FreeRun, setting: Setting, initial: Matrix) -> LawRunResult:
     return _read(run, setting, compiled, equation, marched.outputs, marched.records)
 
 
-def fine_run(run: FreeRun, setting: Setting, initial: Matrix) -> LawRunResult:
+def fine_run(run: FreeRun, setting: Setting, initial: Real) -> LawRunResult:
     """Run as `FreeRun` does."""
     compiled = run.compiled(setting.z, setting.effects)
     equation = _equations(run, compiled)
@@ -76,7 +75,7 @@ def fine_run(run: FreeRun, setting: Setting, initial: Matrix) -> LawRunResult:
 
 
 def _read(
-    run: FreeRun, setting: Setting, compiled: CompiledModel, equation: Equations, in_time: Matrix,
+    run: FreeRun, setting: Setting, compiled: CompiledModel, equation: Equations, in_time: Real,
     records: tuple[March, ...],
 ) -> LawRunResult:  # fmt: skip
     before = read_late(in_time, run.late_s(compiled), run.measurement.sample_rate_hz)
@@ -93,7 +92,7 @@ def _at_samples(equation: Equations, window: tuple[int, int], record: March) -> 
     )
 
 
-def slopes_of(run: FreeRun, result: LawRunResult, changed: Sequence[tuple[Setting, float]]) -> tuple[Matrix, Matrix]:
+def slopes_of(run: FreeRun, result: LawRunResult, changed: Sequence[tuple[Setting, float]]) -> tuple[Real, Real]:
     """Slopes of the outputs, ``[parameter, output, sample]`` and ``[state, output, sample]``."""
     others = [run.compiled(setting.z, setting.effects) for setting, _ in changed]
     tables = [(_equations(run, other), by) for other, (_, by) in zip(others, changed, strict=True)]
@@ -115,7 +114,7 @@ def slopes_of(run: FreeRun, result: LawRunResult, changed: Sequence[tuple[Settin
     return own, starts
 
 
-def _mapped(run: FreeRun, compiled: CompiledModel, outputs: Matrix) -> Matrix:
+def _mapped(run: FreeRun, compiled: CompiledModel, outputs: Real) -> Real:
     return mapped_outputs(compiled, run.rows, outputs, run.measurement.sample_rate_hz)
 
 

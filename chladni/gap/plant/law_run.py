@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.plant.dead_times import DeadTimes, dead_times
 from chladni.gap.plant.laid_inputs import LaidInputs
@@ -14,9 +13,9 @@ from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import responses
 from chladni.models.integrator.hold import hold_of
 from chladni.models.integrator.port_plan import LawTable, PortPlan, law_table, port_plan
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 Windows = Sequence[tuple[int, int]]
 #: Share of steps whose forces may miss their laws.
 _MAY_FAIL = 1e-3
@@ -42,12 +41,12 @@ class Equations:
         Steps between samples.
     """
 
-    step: Matrix
-    ends: Matrix
-    start: Matrix
-    through: Matrix
-    output: Matrix
-    rows: Matrix
+    step: Real
+    ends: Real
+    start: Real
+    through: Real
+    output: Real
+    rows: Real
     laws: LawTable
     delays: DeadTimes
     plan: PortPlan
@@ -62,7 +61,7 @@ def can_run(compiled: CompiledModel) -> bool:
     return not is_plain(compiled)
 
 
-def equations(compiled: CompiledModel, inputs: LaidInputs, rows: NDArray[np.int64], parts: int) -> Equations:
+def equations(compiled: CompiledModel, inputs: LaidInputs, rows: Whole, parts: int) -> Equations:
     """Make the tables of a compiled model.
 
     Parameters
@@ -107,10 +106,10 @@ class Marched:
     """What a march gives: the records of each window, and outputs ``[output, sample]``."""
 
     records: tuple[March, ...]
-    outputs: Matrix
+    outputs: Real
 
 
-def run_laws(equation: Equations, windows: Windows, initial: Matrix, sample_rate_hz: float) -> Marched:
+def run_laws(equation: Equations, windows: Windows, initial: Real, sample_rate_hz: float) -> Marched:
     """March through all windows.
 
     Raises
@@ -138,7 +137,7 @@ def run_laws(equation: Equations, windows: Windows, initial: Matrix, sample_rate
     return Marched(tuple(records), parts[0] if len(parts) == 1 else np.hstack(parts))
 
 
-def _outputs(equation: Equations, record: March) -> Matrix:
+def _outputs(equation: Equations, record: March) -> Real:
     every = slice(None, None, equation.parts)
     n, width = record.x.shape[1], record.rows.shape[1]
     output = equation.output
@@ -146,7 +145,7 @@ def _outputs(equation: Equations, record: March) -> Matrix:
     return np.asarray(found + output[:, n + width :] @ record.force[every].T)
 
 
-def new_record(equation: Equations, start: int, stop: int, first: Matrix) -> March:
+def new_record(equation: Equations, start: int, stop: int, first: Real) -> March:
     """Room for the march through one window from its first state."""
     steps = (stop - start - 1) * equation.parts + 1
     rows = equation.rows[start * equation.parts :][:steps]

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.plant.dead_times import DeadTimes
 from chladni.gap.plant.law_kernel import March
@@ -11,10 +10,9 @@ from chladni.gap.plant.law_run import Equations, Windows, kernel_laws, kernel_ro
 from chladni.gap.plant.law_slopes import Change, Unknowns, law_slopes
 from chladni.models.core.balance import balance
 from chladni.models.integrator.integrator import Integration
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
 #: Modal coordinates worse conditioned than this (a double integrator has none) are not taken.
 _CONDITION = 1e7
 
@@ -39,7 +37,7 @@ def recorded(equation: Equations, windows: Windows, runs: Sequence[Integration])
 def sensitivities(
     equation: Equations, records: Sequence[March], windows: Windows, changed: Sequence[tuple[Equations, float]],
     sample_rate_hz: float,
-) -> tuple[Matrix, Matrix]:  # fmt: skip
+) -> tuple[Real, Real]:  # fmt: skip
     """Slopes of the outputs along a run.
 
     The linear part is carried in modal coordinates, where a step costs two products a state.
@@ -87,7 +85,7 @@ def sensitivities(
     return slopes[: len(changed)], slopes[len(changed) :]
 
 
-def modal_coordinates(matrix: Matrix) -> tuple[Matrix, Matrix]:
+def modal_coordinates(matrix: Real) -> tuple[Real, Real]:
     """``(T^-1, T)`` with ``T^-1 matrix T`` in real blocks of one or two; the identity where there are none."""
     if not matrix.size:
         return matrix, matrix
@@ -107,7 +105,7 @@ def modal_coordinates(matrix: Matrix) -> tuple[Matrix, Matrix]:
 
 
 def _fixed(
-    equation: Equations, changed: Sequence[tuple[Equations, float]], to_modal: Matrix, from_modal: Matrix
+    equation: Equations, changed: Sequence[tuple[Equations, float]], to_modal: Real, from_modal: Real
 ) -> Unknowns:
     """What doesn't depend on the window."""
     n, width = len(to_modal), equation.rows.shape[1]
@@ -134,7 +132,7 @@ def _fixed(
     )  # fmt: skip
 
 
-def _other_lines(equation: Equations, changed: Sequence[tuple[Equations, float]]) -> tuple[Integers, DeadTimes]:
+def _other_lines(equation: Equations, changed: Sequence[tuple[Equations, float]]) -> tuple[Whole, DeadTimes]:
     """``[changed dead time, 2]`` parameter and dead time, and how those are then."""
     mine = equation.plan.delay_s
     found = [
@@ -150,8 +148,8 @@ def _other_lines(equation: Equations, changed: Sequence[tuple[Equations, float]]
 
 
 def _leads(
-    equation: Equations, record: March, changed: Sequence[tuple[Equations, float]], start: int, to_modal: Matrix
-) -> tuple[Matrix, Matrix, Matrix]:
+    equation: Equations, record: March, changed: Sequence[tuple[Equations, float]], start: int, to_modal: Real
+) -> tuple[Real, Real, Real]:
     """What changed tables and inputs add: to each step, to the start, to the outputs; the parameter last."""
     n, width, q = len(to_modal), equation.rows.shape[1], len(changed)
     steps = len(record.x)

@@ -2,9 +2,6 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.gap.plant.dead_times import DeadTimes, begin_dead_times, look_back, see_own_step
 from chladni.gap.plant.law_kernel import (
     FINE,
@@ -18,9 +15,7 @@ from chladni.gap.plant.law_kernel import (
     slope_of,
 )
 from chladni.models.integrator.machine_code import inlined_code, machine_code, part_code
-
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from chladni.signals.arrays import Real, Whole
 
 
 class Unknowns(NamedTuple):
@@ -49,20 +44,20 @@ class Unknowns(NamedTuple):
         `line_by` that change.
     """
 
-    table: Matrix
-    ends: Matrix
-    start: Matrix
-    through: Matrix
-    output: Matrix
-    force_output: Matrix
-    lead: Matrix
-    lead_start: Matrix
-    initial: Matrix
-    other: Integers
-    by: Matrix
-    line: Integers
+    table: Real
+    ends: Real
+    start: Real
+    through: Real
+    output: Real
+    force_output: Real
+    lead: Real
+    lead_start: Real
+    initial: Real
+    other: Whole
+    by: Real
+    line: Whole
     lines: DeadTimes
-    line_by: Matrix
+    line_by: Real
 
 
 class Change(NamedTuple):
@@ -86,17 +81,17 @@ class Change(NamedTuple):
         ``[step, delay]`` displacements at the ports of dead times.
     """
 
-    x: Matrix
-    next: Matrix
-    given: Matrix
-    force: Matrix
-    fresh: Matrix
-    own: Matrix
-    own_state: Matrix
-    slope: Matrix
-    bend: Matrix
-    level: Matrix
-    past: NDArray[np.float64]
+    x: Real
+    next: Real
+    given: Real
+    force: Real
+    fresh: Real
+    own: Real
+    own_state: Real
+    slope: Real
+    bend: Real
+    level: Real
+    past: Real
 
 
 @part_code
@@ -187,14 +182,14 @@ def _keep(delays: DeadTimes, change: Change, step: int) -> None:
 
 
 @inlined_code
-def _clear(matrix: Matrix) -> None:
+def _clear(matrix: Real) -> None:
     for row in range(matrix.shape[0]):
         for unknown in range(matrix.shape[1]):
             matrix[row, unknown] = 0.0
 
 
 @inlined_code
-def _add(target: Matrix, row: int, share: float, source: Matrix, place: int) -> None:
+def _add(target: Real, row: int, share: float, source: Real, place: int) -> None:
     """Add a share of the changes of one quantity to those of another."""
     if share != 0.0:
         for unknown in range(target.shape[1]):
@@ -202,13 +197,13 @@ def _add(target: Matrix, row: int, share: float, source: Matrix, place: int) -> 
 
 
 @inlined_code
-def _copy(target: Matrix, row: int, source: Matrix, place: int) -> None:
+def _copy(target: Real, row: int, source: Real, place: int) -> None:
     for unknown in range(target.shape[1]):
         target[row, unknown] = source[place, unknown]
 
 
 @part_code
-def _settle(room: Room, change: Change, through: Matrix, first: int) -> None:
+def _settle(room: Room, change: Change, through: Real, first: int) -> None:
     """Changes of forces, motions and law states after a step, from those of the motions without these forces."""
     p, count = room.force.size, room.state.size
     for port in range(p):
@@ -260,7 +255,7 @@ def _carry(change: Change, unknowns: Unknowns, step: int) -> None:
 
 
 @part_code
-def _write(change: Change, unknowns: Unknowns, found: Matrix, step: int) -> None:
+def _write(change: Change, unknowns: Unknowns, found: Real, step: int) -> None:
     """Add the changes of the outputs at a sample."""
     q = change.x.shape[1]
     for row in range(found.shape[1]):
@@ -298,7 +293,7 @@ def _open(march: March, laws: Laws, room: Room, change: Change, unknowns: Unknow
 
 @machine_code
 def law_slopes(
-    march: March, laws: Laws, delays: DeadTimes, room: Room, change: Change, unknowns: Unknowns, found: Matrix,
+    march: March, laws: Laws, delays: DeadTimes, room: Room, change: Change, unknowns: Unknowns, found: Real,
     h: float, begin_s: float,
 ) -> None:  # fmt: skip
     """Add to ``found [sample, output, unknown]`` what changes along a march that was made.

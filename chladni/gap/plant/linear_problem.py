@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.linear_view import LinearView, Way
@@ -13,9 +12,8 @@ from chladni.gap.plant.record_lines import RecordLines
 from chladni.gap.plant.view_slopes import same_frame, view_slopes
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.arrays import Complex, Real
 
-Matrix = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
 #: Of a tunable's sigma: small against curvature, large against rounding of responses.
 _RESPONSE_STEP = 1e-4
 #: Complex numbers that slopes of some parameters at once may need beside their result: 64 MB.
@@ -48,7 +46,7 @@ class LinearProblem:
         self.model, self.measurement, self.tunables, self.lines = model, measurement, tunables, lines
         self.noise = noise
         self._neighbours = Neighbours(model, tunables) if neighbours is None else neighbours
-        self._inputs: dict[tuple[float, ...], Spectrum] = {}
+        self._inputs: dict[tuple[float, ...], Complex] = {}
         self._views: Kept[LinearView] = Kept(_VIEWS)
         compiled = model.compile()
         names = [terminal.name for terminal in compiled.outputs]
@@ -73,12 +71,12 @@ class LinearProblem:
             self.model, self.measurement, noise, self.tunables, self.lines, neighbours=self._neighbours
         )
 
-    def view(self, z: Matrix) -> LinearView:
+    def view(self, z: Real) -> LinearView:
         """Give the linear part at parameters z."""
         # What is profiled at some parameters is linearised there next.
         return self._views.get(z.tobytes(), lambda: self._linear(z))
 
-    def _linear(self, z: Matrix) -> LinearView:
+    def _linear(self, z: Real) -> LinearView:
         equations = self._neighbours.at(z)
         return LinearView(equations, self.lines, self.measurement.inputs, self.rows, known=self._inputs)
 
@@ -86,21 +84,21 @@ class LinearProblem:
         """How a force at a site enters the equations of a view."""
         return way_to(view, site, self.measurement.output_names)
 
-    def pattern(self, view: LinearView, site: Site) -> Spectrum:
+    def pattern(self, view: LinearView, site: Site) -> Complex:
         """Whitened ``[output, 1, line]`` of a force at a site."""
         return view.pattern(self.way(view, site))[:, None] * self.weight
 
-    def transients(self, view: LinearView) -> Spectrum:
+    def transients(self, view: LinearView) -> Complex:
         """Whitened ``[state, output, 1, line]``, see `LinearView.transients`: each segment has its own."""
         return view.transients()[:, :, None] * self.weight
 
-    def response(self, z: Matrix, transient: Matrix, forces: Sequence[tuple[Site, Spectrum]]) -> Spectrum:
+    def response(self, z: Real, transient: Real, forces: Sequence[tuple[Site, Complex]]) -> Complex:
         """Whitened ``[output, segment, line]`` response at parameters z to inputs, transients and forces."""
         view = self.view(z)
         ways = [(self.way(view, site), force) for site, force in forces]
         return np.asarray(view.response(transient, ways) * self.weight, dtype=np.complex128)
 
-    def slopes(self, z: Matrix, transient: Matrix, forces: Sequence[tuple[Site, Spectrum]]) -> Spectrum:
+    def slopes(self, z: Real, transient: Real, forces: Sequence[tuple[Site, Complex]]) -> Complex:
         """``[tunable, output, segment, line]``: derivatives of `response` with all else held."""
         if not z.size:
             return np.zeros((0, *self.measured.shape), dtype=np.complex128)
@@ -119,9 +117,7 @@ class LinearProblem:
                 found[place] = self._difference(z, place, transient, forces)
         return found
 
-    def _difference(
-        self, z: Matrix, place: int, transient: Matrix, forces: Sequence[tuple[Site, Spectrum]]
-    ) -> Spectrum:
+    def _difference(self, z: Real, place: int, transient: Real, forces: Sequence[tuple[Site, Complex]]) -> Complex:
         """Slope along a parameter that moves a dead time, which isn't in the equations."""
         here = self.response(z, transient, forces)
         moved = z + _RESPONSE_STEP * np.eye(z.size)[place]

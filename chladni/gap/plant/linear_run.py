@@ -3,16 +3,14 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.plant.laid_inputs import LaidInputs
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import responses
 from chladni.models.integrator.hold import hold_of
 from chladni.models.integrator.linear_kernel import linear_march
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
-
-Matrix = NDArray[np.float64]
 
 
 def is_plain(compiled: CompiledModel) -> bool:
@@ -33,8 +31,8 @@ class LinearRuns:
         self._inputs, self._rate_hz = inputs, inputs.sample_rate_hz
 
     def outputs(
-        self, compiled: CompiledModel, rows: NDArray[np.int64], windows: Sequence[tuple[int, int]], initial: Matrix
-    ) -> Matrix:
+        self, compiled: CompiledModel, rows: Whole, windows: Sequence[tuple[int, int]], initial: Real
+    ) -> Real:
         """Give ``[output, sample]`` of the outputs `rows`, before maps of samples.
 
         Parameters

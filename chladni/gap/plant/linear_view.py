@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import schur
 
 from chladni.gap.plant.record_lines import RecordLines
@@ -13,9 +12,7 @@ from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import responses
 from chladni.models.integrator.hold import hold_of
 from chladni.models.integrator.input_rows import input_rows
-
-Matrix = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,8 +31,8 @@ class Way:
         Column of u of an input's own samples, None for all else.
     """
 
-    states: Spectrum
-    outputs: Spectrum
+    states: Complex
+    outputs: Complex
     port: int | None = None
     column: int | None = None
 
@@ -66,10 +63,10 @@ class LinearView:
         self,
         compiled: CompiledModel,
         lines: RecordLines,
-        signals: Matrix,
+        signals: Real,
         rows: tuple[int, ...],
         *,
-        known: dict[tuple[float, ...], Spectrum] | None = None,
+        known: dict[tuple[float, ...], Complex] | None = None,
     ) -> None:
         self.compiled, self.lines, self.rows = compiled, lines, list(rows)
         self.hold = hold_of(compiled, lines.sample_rate_hz)
@@ -84,14 +81,14 @@ class LinearView:
         )
         self._kick = self._z / np.sqrt(lines.samples)
         self._signals = signals
-        self._known: dict[tuple[float, ...], Spectrum] = {} if known is None else known
-        self._forces: dict[int, Matrix] = {}
+        self._known: dict[tuple[float, ...], Complex] = {} if known is None else known
+        self._forces: dict[int, Real] = {}
 
-    def forced(self) -> Spectrum:
+    def forced(self) -> Complex:
         """``[output, segment, line]`` response to the log's inputs, but for the transients of the segments."""
         return self.response(None, ())
 
-    def response(self, transient: Matrix | None, forces: Sequence[tuple[Way, Spectrum]]) -> Spectrum:
+    def response(self, transient: Real | None, forces: Sequence[tuple[Way, Complex]]) -> Complex:
         """``[output, segment, line]`` response to the log's inputs, transients and forces.
 
         Parameters
@@ -110,11 +107,11 @@ class LinearView:
         outputs += np.einsum("nol,nsl->osl", self.printed, self._drive(transient, forces))
         return np.asarray(outputs * self.shift[:, None], dtype=np.complex128)
 
-    def states(self, transient: Matrix | None, forces: Sequence[tuple[Way, Spectrum]]) -> Spectrum:
+    def states(self, transient: Real | None, forces: Sequence[tuple[Way, Complex]]) -> Complex:
         """``[state, segment, line]`` under the same as `response`."""
         return self._solved(self._drive(transient, forces))
 
-    def transients(self) -> Spectrum:
+    def transients(self) -> Complex:
         """``[state, output, line]``: what one of each state more at the start (or less at the end) prints."""
         return np.asarray(self.printed * (self._kick * self.shift), dtype=np.complex128)
 
@@ -139,14 +136,14 @@ class LinearView:
         through[place] = 1.0 / self.shift[place]
         return Way(states=np.zeros((len(self._triangle), count), dtype=np.complex128), outputs=through)
 
-    def pattern(self, way: Way) -> Spectrum:
+    def pattern(self, way: Way) -> Complex:
         """``[output, line]`` that a force of one prints."""
         found = np.einsum("nol,nl->ol", self.printed, way.states) + way.outputs
         return np.asarray(found * self.shift, dtype=np.complex128)
 
     def motion(
-        self, port: int, transient: Matrix | None, forces: Sequence[tuple[Way, Spectrum]]
-    ) -> tuple[Spectrum, Spectrum]:
+        self, port: int, transient: Real | None, forces: Sequence[tuple[Way, Complex]]
+    ) -> tuple[Complex, Complex]:
         """Displacement and velocity ``[segment, line]`` at a port, under the same as `response`."""
         compiled, spectrum = self.compiled, self.inputs()
         state = np.stack([compiled.displacement_state[port], compiled.velocity_state[port]])
@@ -159,7 +156,7 @@ class LinearView:
         found = found + along(state, self.states(transient, forces))
         return found[0], found[1]
 
-    def inputs(self) -> Spectrum:
+    def inputs(self) -> Complex:
         """``[internal column, segment, line]`` of the rows that drive each step."""
         key = self.compiled.input_delays_s
         if key not in self._known:
@@ -167,7 +164,7 @@ class LinearView:
             self._known[key] = self.lines.spectrum(np.ascontiguousarray(rows[:-1].T))
         return self._known[key]
 
-    def force(self, port: int) -> Matrix:
+    def force(self, port: int) -> Real:
         """``[start or rise, state]``: what a force at a port does to the states within a step."""
         # Asked for port by port: few are ever looked at, and each makes the exponential larger.
         if port not in self._forces:
@@ -180,7 +177,7 @@ class LinearView:
         return inner, self.hold.columns + int(np.flatnonzero(self.hold.straight == inner)[0])
 
     @cached_property
-    def printed(self) -> Spectrum:
+    def printed(self) -> Complex:
         """``[state, output, line]``: ``C (z I - Phi)^-1``, what a kick of each state prints, by substitution."""
         upper, outputs = self._triangle, len(self.rows)
         wanted = self.compiled.c[self.rows] @ self._unitary
@@ -191,7 +188,7 @@ class LinearView:
             found[place] = (wanted[:, place, None] + ahead) / (self._z - upper[place, place])
         return along(self._unitary.conj(), found)
 
-    def _step(self, g: Matrix) -> tuple[Matrix, Matrix]:
+    def _step(self, g: Real) -> tuple[Real, Real]:
         """One step of the states, and of what ports do to them."""
         found = responses(
             self.compiled.a,
@@ -204,7 +201,7 @@ class LinearView:
         )[0]
         return found.state, found.force
 
-    def _drive(self, transient: Matrix | None, forces: Sequence[tuple[Way, Spectrum]]) -> Spectrum:
+    def _drive(self, transient: Real | None, forces: Sequence[tuple[Way, Complex]]) -> Complex:
         """``[state, segment, line]`` of all that drives the states."""
         drive = along(self._gamma, self.inputs())
         if transient is not None:
@@ -213,10 +210,10 @@ class LinearView:
             drive += way.states[:, None] * force
         return drive
 
-    def _constant(self, through: Matrix) -> Spectrum:
+    def _constant(self, through: Real) -> Complex:
         return np.asarray(np.repeat(through[:, None], self._z.size, axis=1), dtype=np.complex128)
 
-    def _solved(self, drive: Spectrum) -> Spectrum:
+    def _solved(self, drive: Complex) -> Complex:
         """``(z I - Phi)^-1 drive`` for ``[state, ..., line]``, by substitution in the triangular form."""
         upper = self._triangle
         wanted = along(self._unitary.conj().T, drive)
@@ -227,7 +224,7 @@ class LinearView:
         return along(self._unitary, found)
 
 
-def along(matrix: Matrix | Spectrum, spectra: Spectrum) -> Spectrum:
+def along(matrix: Real | Complex, spectra: Complex) -> Complex:
     """``matrix @ spectra`` over the first axis of ``[row, ...]``; much faster on a flat array."""
     rows = np.ascontiguousarray(spectra).reshape(len(spectra), int(np.prod(spectra.shape[1:])))
     if np.isrealobj(matrix):

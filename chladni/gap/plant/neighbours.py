@@ -3,14 +3,11 @@
 from collections.abc import Mapping
 from typing import Protocol, Self
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.gap.plant.kept import Kept
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.effects.pair import with_pairs
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Of a tunable's sigma: small against curvature, large against rounding of equations.
 STEP = 1e-5
 #: Settings that are kept: places are profiled one after another, each from the same start.
@@ -24,7 +21,7 @@ class Scaled(Protocol):
     def names(self) -> tuple[str, ...]:
         """Names."""
 
-    def values(self, z: Matrix) -> Mapping[str, float]:
+    def values(self, z: Real) -> Mapping[str, float]:
         """Values ``nominal exp(tolerance z)`` by name."""
 
 
@@ -52,18 +49,18 @@ class Neighbours:
         self._at: Kept[CompiledModel] = Kept(_KEPT)
         self._changed: Kept[tuple[CompiledModel, ...]] = Kept(_KEPT)
 
-    def at(self, z: Matrix) -> CompiledModel:
+    def at(self, z: Real) -> CompiledModel:
         """Give the equations at ``z [parameter]``, in units of their tolerance."""
         return self._at.get(z.tobytes(), lambda: with_pairs(self._set(z).compile()))
 
-    def changed(self, z: Matrix) -> tuple[CompiledModel, ...]:
+    def changed(self, z: Real) -> tuple[CompiledModel, ...]:
         """``[parameter]``: equations with each parameter `STEP` further than at z."""
         return self._changed.get(z.tobytes(), lambda: self._steps(z))
 
-    def _set(self, z: Matrix) -> Varied:
+    def _set(self, z: Real) -> Varied:
         return self._model.with_values(self._tunables.values(z)) if z.size else self._model
 
-    def _steps(self, z: Matrix) -> tuple[CompiledModel, ...]:
+    def _steps(self, z: Real) -> tuple[CompiledModel, ...]:
         # From the model at z each takes one new number.
         base, there = self._set(z), self._tunables.values(z + STEP)
         return tuple(with_pairs(base.with_values({name: there[name]}).compile()) for name in self._tunables.names)

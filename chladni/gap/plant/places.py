@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.plant.linear_view import LinearView, Way
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import PortKind
+from chladni.signals.arrays import Complex
 
-Spectrum = NDArray[np.complex128]
 #: Patterns that differ by less than this share of their power are the same but for rounding.
 _SAME = 1e-9
 
@@ -74,7 +73,7 @@ def way_to(view: LinearView, site: Site, outputs: Sequence[str]) -> Way:
     return view.way_of_port(view.compiled.port_index(site.name, site.kind))
 
 
-def printed_patterns(view: LinearView, sites: Sequence[Site], outputs: Sequence[str], noise: NoiseFloor) -> Spectrum:
+def printed_patterns(view: LinearView, sites: Sequence[Site], outputs: Sequence[str], noise: NoiseFloor) -> Complex:
     """``[site, output, line]`` that a force of one (a change of an input, an error) at each site prints, over noise.
 
     Parameters
@@ -102,7 +101,7 @@ def placed(view: LinearView, sites: Sequence[Site], outputs: Sequence[str], nois
         metres has a million times its numbers.
     """
     acting = [site for site in sites if not _is_motion(view.compiled, site)]
-    found: list[tuple[list[Site], Spectrum]] = []
+    found: list[tuple[list[Site], Complex]] = []
     for site, printed in zip(acting, printed_patterns(view, acting, outputs, noise), strict=True):
         size = np.sqrt(np.sum(np.abs(printed) ** 2, axis=0))
         if not np.any(size > 0):

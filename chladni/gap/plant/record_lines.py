@@ -3,12 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Complex, Real, Whole
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -27,7 +24,7 @@ class RecordLines(Value):
         First sample of each segment.
     """
 
-    index: NDArray[np.int64]
+    index: Whole
     samples: int
     sample_rate_hz: float
     starts: tuple[int, ...] = (0,)
@@ -36,27 +33,27 @@ class RecordLines(Value):
         self._freeze()
 
     @property
-    def cycles(self) -> Matrix:
+    def cycles(self) -> Real:
         """``[line]`` cycles a sample."""
         return np.asarray(self.index / self.samples, dtype=np.float64)
 
     @property
-    def frequency_hz(self) -> Matrix:
+    def frequency_hz(self) -> Real:
         """``[line]``."""
         return np.asarray(self.cycles * self.sample_rate_hz, dtype=np.float64)
 
     @property
-    def z(self) -> Spectrum:
+    def z(self) -> Complex:
         """``[line]`` points of the unit circle."""
         return np.asarray(np.exp(2j * np.pi * self.cycles), dtype=np.complex128)
 
-    def spectrum(self, signals: Matrix) -> Spectrum:
+    def spectrum(self, signals: Real) -> Complex:
         """Give ``[..., segment, line]`` of signals ``[..., sample]``; white noise keeps its variance."""
         parts = np.stack([signals[..., start : start + self.samples] for start in self.starts], axis=-2)
         found = np.fft.rfft(parts, axis=-1)[..., self.index]
         return np.asarray(found / np.sqrt(self.samples), dtype=np.complex128)
 
-    def signal(self, spectrum: Spectrum) -> Matrix:
+    def signal(self, spectrum: Complex) -> Real:
         """Give ``[..., segment, sample]`` of spectra ``[..., segment, line]``; lines left out are zero."""
         whole = np.zeros((*spectrum.shape[:-1], self.samples // 2 + 1), dtype=np.complex128)
         whole[..., self.index] = spectrum * np.sqrt(self.samples)
@@ -78,7 +75,7 @@ def segment_lines(segment: int, *, samples: int, sample_rate_hz: float, count: i
     return RecordLines(index=index, samples=segment, sample_rate_hz=sample_rate_hz, starts=starts)
 
 
-def telling_lines(power: Matrix, *, samples: int, sample_rate_hz: float, count: int = 4000) -> RecordLines:
+def telling_lines(power: Real, *, samples: int, sample_rate_hz: float, count: int = 4000) -> RecordLines:
     """Choose about `count` lines: half where the power is highest, half spread evenly over the rest.
 
     Parameters

@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.model import Model
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value, require_shape
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,8 +32,8 @@ class Tunables(Value):
     """
 
     names: tuple[str, ...]
-    nominal: Matrix
-    tolerance: Matrix
+    nominal: Real
+    tolerance: Real
     units: tuple[str, ...]
 
     def __post_init__(self) -> None:
@@ -54,7 +52,7 @@ class Tunables(Value):
             units=tuple(one.unit for one in moving),
         )
 
-    def values(self, z: Matrix) -> dict[str, float]:
+    def values(self, z: Real) -> dict[str, float]:
         """Value of each parameter by name, SI.
 
         Parameters
@@ -66,7 +64,7 @@ class Tunables(Value):
         numbers = self.nominal * np.exp(self.tolerance * z)
         return dict(zip(self.names, numbers.tolist(), strict=True))
 
-    def z(self, values: Mapping[str, float]) -> Matrix:
+    def z(self, values: Mapping[str, float]) -> Real:
         """``[parameter]`` from values by name; those that are missing stay nominal.
 
         Raises

@@ -3,14 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.plant.linear_view import LinearView, Way, along
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import Response, response_slopes
-
-Matrix = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
+from chladni.signals.arrays import Complex, Real
 
 
 def same_frame(here: CompiledModel, there: CompiledModel) -> bool:
@@ -29,9 +26,9 @@ def view_slopes(
     view: LinearView,
     changed: Sequence[CompiledModel],
     step: float,
-    transient: Matrix,
-    forces: Sequence[tuple[Way, Spectrum]],
-) -> Spectrum:
+    transient: Real,
+    forces: Sequence[tuple[Way, Complex]],
+) -> Complex:
     """``[change, output, segment, line]``: derivatives of `LinearView.response`.
 
     With ``z X = Phi X + Gamma R + ...`` the states move by ``(z I - Phi)^-1 (dPhi X + dGamma R + ...)``, of which
@@ -64,8 +61,8 @@ def view_slopes(
 
 
 def _coefficients(
-    view: LinearView, changed: Sequence[CompiledModel], step: float, forces: Sequence[tuple[Way, Spectrum]]
-) -> tuple[Matrix, Matrix]:
+    view: LinearView, changed: Sequence[CompiledModel], step: float, forces: Sequence[tuple[Way, Complex]]
+) -> tuple[Real, Real]:
     """``[change, state, signal]`` and ``[change, output, signal]``: what each signal adds to states and outputs."""
     here, hold, rows = view.compiled, view.hold, view.rows
     ways = [way for way, _ in forces if way.port is not None or way.column is not None]

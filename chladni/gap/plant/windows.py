@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.model import Model
+from chladni.signals.arrays import Complex, Mask
 
 #: How many of its slowest times a window lasts.
 _TIMES = 3.0
@@ -88,7 +88,7 @@ def nested_windows(
     return found
 
 
-def training_in_windows(windows: Sequence[tuple[int, int]]) -> NDArray[np.bool_]:
+def training_in_windows(windows: Sequence[tuple[int, int]]) -> Mask:
     """Give ``[sample]``: True where fits may look, False in the middle third of every window.
 
     Each window begins at a state of its own, which only its own samples tell. A window that a fit hardly sees would
@@ -106,11 +106,11 @@ def training_in_windows(windows: Sequence[tuple[int, int]]) -> NDArray[np.bool_]
     return training
 
 
-def _poles(model: Model) -> NDArray[np.complex128]:
+def _poles(model: Model) -> Complex:
     return np.asarray(np.linalg.eigvals(model.compile().a), dtype=np.complex128)
 
 
-def _lasting(poles: NDArray[np.complex128], duration_s: float) -> NDArray[np.bool_]:
+def _lasting(poles: Complex, duration_s: float) -> Mask:
     """Poles that stay still within the record, or grow; a mode that rings as long is damped all the same."""
     slow = np.abs(poles) * duration_s < 1.0
     grows = poles.real > 1e-9 * np.maximum(np.abs(poles), 1.0 / duration_s)
@@ -123,7 +123,7 @@ def _longest_s(model: Model, measurement: Measurement) -> float:
     return _horizon_s(poles, _lasting(poles, measurement.duration_s))
 
 
-def _horizon_s(poles: NDArray[np.complex128], lasting: NDArray[np.bool_]) -> float:
+def _horizon_s(poles: Complex, lasting: Mask) -> float:
     own = poles[~lasting]
     times = np.maximum(-1.0 / np.minimum(own.real, -1e-300), 0.0)
     # Of what oscillates a few cycles show all there is, however long it rings.

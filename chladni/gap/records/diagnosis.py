@@ -4,13 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.gap.records.log_use import LogUse
+from chladni.signals.arrays import Real
 from chladni.signals.value import Value, require_shape
 
-Matrix = NDArray[np.float64]
 Verdict = Literal["none", "parameters", "effect", "unknown"]
 
 
@@ -32,7 +29,7 @@ class Correlation(Value):
     """
 
     names: tuple[str, ...]
-    matrix: Matrix
+    matrix: Real
 
     def __post_init__(self) -> None:
         require_shape("matrix", self.matrix, (len(self.names), len(self.names)), "the parameters")
@@ -254,11 +251,11 @@ class RestoringForce(Value):
     """
 
     site: str
-    time_s: Matrix
-    displacement: Matrix
-    velocity: Matrix
-    force: Matrix
-    law_force: Matrix | None = None
+    time_s: Real
+    displacement: Real
+    velocity: Real
+    force: Real
+    law_force: Real | None = None
     force_unit: str = "N"
     displacement_unit: str = "m"
 
@@ -291,15 +288,15 @@ class GapSignals(Value):
     sample_rate_hz: float
     output_names: tuple[str, ...]
     output_units: tuple[str, ...]
-    measured: Matrix
-    before: Matrix
-    after: Matrix
-    noise_rms: Matrix
-    noise_density: Matrix
-    map_time_s: Matrix
-    map_frequency_hz: Matrix
-    gap_map: Matrix
-    gap_map_after: Matrix
+    measured: Real
+    before: Real
+    after: Real
+    noise_rms: Real
+    noise_density: Real
+    map_time_s: Real
+    map_frequency_hz: Real
+    gap_map: Real
+    gap_map_after: Real
     window_starts: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:

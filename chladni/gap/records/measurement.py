@@ -3,14 +3,10 @@
 from dataclasses import dataclass
 from math import isfinite
 
-import numpy as np
-from numpy.typing import NDArray
-
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import largest_magnitudes, out_of_range
 from chladni.signals.value import Value, require_shape
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,8 +37,8 @@ class Measurement(Value):
 
     log: str
     sample_rate_hz: float
-    inputs: Matrix
-    outputs: Matrix
+    inputs: Real
+    outputs: Real
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
     output_units: tuple[str, ...]
@@ -68,7 +64,7 @@ class Measurement(Value):
         return self.samples / self.sample_rate_hz
 
 
-def _require_in_range(log: str, names: tuple[str, ...], signals: Matrix) -> None:
+def _require_in_range(log: str, names: tuple[str, ...], signals: Real) -> None:
     for name, largest in zip(names, largest_magnitudes(signals).tolist(), strict=True):
         fault = out_of_range(largest) if isfinite(largest) else "holds values that aren't finite; leave it out"
         if fault is not None:

@@ -3,11 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 # Of a spectrum for pictures: finer than any that is drawn beside it.
 LINES = 4097
@@ -36,22 +34,22 @@ class NoiseFloor(Value):
         ``[output]`` whether distortion can be in the estimate too, so that the true floor lies lower.
     """
 
-    rms: Matrix
-    whitening: Matrix
-    innovation_rms: Matrix
+    rms: Real
+    whitening: Real
+    innovation_rms: Real
     method: tuple[str, ...]
-    std: Matrix
-    upper_bound: NDArray[np.bool_]
+    std: Real
+    upper_bound: Mask
 
     def __post_init__(self) -> None:
         self._freeze()
 
-    def lowered(self, share: Matrix) -> "NoiseFloor":
+    def lowered(self, share: Real) -> "NoiseFloor":
         """Give the floor with ``share [output]`` of its power left; shares above 1 change nothing."""
         factor = np.sqrt(np.minimum(share, 1.0))
         return replace(self, rms=self.rms * factor, innovation_rms=self.innovation_rms * factor)
 
-    def raised(self, rms: Matrix) -> "NoiseFloor":
+    def raised(self, rms: Real) -> "NoiseFloor":
         """Give the floor with white noise of ``rms [output]`` where that is more than it was."""
         louder = rms > self.rms
         white = np.zeros_like(self.whitening)
@@ -63,17 +61,17 @@ class NoiseFloor(Value):
             whitening=np.where(louder[:, None], white, self.whitening),
         )
 
-    def density(self, cycles: Matrix) -> Matrix:
+    def density(self, cycles: Real) -> Real:
         """Give ``[output, line]`` power density at `cycles` a sample, unit^2; over 0..1 its mean is rms^2."""
         lags = np.arange(self.whitening.shape[1])
         response = self.whitening @ np.exp(-2j * np.pi * np.multiply.outer(lags, cycles))
         return np.asarray(self.innovation_rms[:, None] ** 2 / np.abs(response) ** 2, dtype=np.float64)
 
-    def one_sided(self, sample_rate_hz: float) -> Matrix:
+    def one_sided(self, sample_rate_hz: float) -> Real:
         """Give ``[output, line]`` power density from 0 to half the sample rate, unit^2/Hz; it adds up to rms^2."""
         return 2 / sample_rate_hz * self.density(np.linspace(0.0, 0.5, LINES))
 
-    def whitened(self, residual: Matrix) -> Matrix:
+    def whitened(self, residual: Real) -> Real:
         """Give ``[..., output, sample]`` residuals as white noise of unit variance, were they noise alone."""
         from scipy.signal import lfilter
 

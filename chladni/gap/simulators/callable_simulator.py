@@ -5,16 +5,14 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.simulators.joint_law import JointLaw, RunningLaw
 from chladni.gap.simulators.simulator import SimulatorResponse
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Port, Terminal
 from chladni.models.core.simulation import PortMotion
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-
-Matrix = NDArray[np.float64]
 
 
 class SimulatorFunction(Protocol):
@@ -22,11 +20,11 @@ class SimulatorFunction(Protocol):
 
     def __call__(
         self,
-        inputs: Matrix,
+        inputs: Real,
         sample_rate_hz: float,
         values: Mapping[str, float],
         joint_laws: Mapping[str, RunningLaw],
-    ) -> Matrix:
+    ) -> Real:
         """Give ``[output, sample]`` for ``[input, sample]``; `values` holds every parameter, by name.
 
         At each of its steps the function asks each law ``law(d, s, t) -> force`` for the force that resists the
@@ -55,7 +53,7 @@ class CallableSimulator:
 
     def respond(
         self,
-        inputs: Matrix,
+        inputs: Real,
         sample_rate_hz: float,
         *,
         values: Mapping[str, float],
@@ -90,7 +88,7 @@ class CallableSimulator:
             motions=tuple(self._motion(name, law, times_s) for name, law in running.items()),
         )
 
-    def _motion(self, name: str, law: RunningLaw, times_s: Matrix) -> PortMotion:
+    def _motion(self, name: str, law: RunningLaw, times_s: Real) -> PortMotion:
         if not law.trace:
             raise ModelError(
                 f"simulator {self.name!r}: its function never asked the law at joint {name!r}; call "

@@ -4,26 +4,24 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.simulators.joint_law import JointLaw
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Port, Terminal
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 if TYPE_CHECKING:
     from chladni.models.effects.attached_effect import AttachedEffect
 
-Matrix = NDArray[np.float64]
-
 
 def with_signals_changed(
-    signals: Matrix,
+    signals: Real,
     sample_rate_hz: float,
     terminals: Sequence[Terminal],
     effects: Sequence["AttachedEffect"],
     kind: str,
-) -> Matrix:
+) -> Real:
     """Give the signals as effects at inputs (or outputs) leave them.
 
     Effects attach to the equations y = u, so that every one of the catalogue acts here as it does around a model.
@@ -99,7 +97,7 @@ def unconnected(inputs: Sequence[Terminal], outputs: Sequence[Terminal], joints:
 
 
 def _equations(
-    *, d: Matrix, inputs: tuple[Terminal, ...], outputs: tuple[Terminal, ...], ports: tuple[Port, ...]
+    *, d: Real, inputs: tuple[Terminal, ...], outputs: tuple[Terminal, ...], ports: tuple[Port, ...]
 ) -> CompiledModel:
     columns, rows, count = len(inputs), len(outputs), len(ports)
     return CompiledModel(

@@ -5,14 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from chladni.models.integrator.machine_code import call_law, caller, machine_code, part_code
-
-Numbers1 = NDArray[np.float64]
-Numbers2 = NDArray[np.float64]
-Integers1 = NDArray[np.int64]
-Integers2 = NDArray[np.int64]
+from chladni.signals.arrays import Real, Whole
 
 _WORD = types.int64
 # In a kernel it takes no context.
@@ -42,16 +37,16 @@ class Simulated(NamedTuple):
         ``[dof]`` work space: a unit force, and the accelerations that it makes.
     """
 
-    address: Integers1
-    command: Numbers1
-    velocity: Numbers1
-    position: Numbers1
-    applied: Numbers1
-    smooth: Numbers1
-    sensors: Numbers1
-    damping: Numbers1
-    unit: Numbers1
-    column: Numbers1
+    address: Whole
+    command: Real
+    velocity: Real
+    position: Real
+    applied: Real
+    smooth: Real
+    sensors: Real
+    damping: Real
+    unit: Real
+    column: Real
 
 
 class Laws(NamedTuple):
@@ -75,17 +70,17 @@ class Laws(NamedTuple):
         ``[3]`` of `trial`, `rates` and `nudged`.
     """
 
-    table: Integers2
-    first: Integers1
-    dof: Integers1
-    place: Integers1
-    rest: Numbers1
-    state: Numbers1
-    trial: Numbers1
-    rates: Numbers1
-    nudged: Numbers1
-    numbers: Numbers1
-    address: Integers1
+    table: Whole
+    first: Whole
+    dof: Whole
+    place: Whole
+    rest: Real
+    state: Real
+    trial: Real
+    rates: Real
+    nudged: Real
+    numbers: Real
+    address: Whole
 
 
 class Record(NamedTuple):
@@ -101,11 +96,11 @@ class Record(NamedTuple):
         ``[joint, sample]``.
     """
 
-    outputs: Numbers2
-    rows: Integers1
-    displacement: Numbers2
-    motion: Numbers2
-    force: Numbers2
+    outputs: Real
+    rows: Whole
+    displacement: Real
+    motion: Real
+    force: Real
 
 
 @part_code
@@ -256,9 +251,7 @@ def runs_away(mujoco: Simulated) -> bool:
 
 
 @machine_code
-def run(
-    mujoco: Simulated, laws: Laws, record: Record, inputs: Numbers2, rows: Integers1, steps: int, step_s: float
-) -> int:
+def run(mujoco: Simulated, laws: Laws, record: Record, inputs: Real, rows: Whole, steps: int, step_s: float) -> int:
     """Simulate sample by sample, each input held until the next; give the samples done, fewer when it runs away.
 
     Parameters

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.simulators.joint_law import JointLaw
 from chladni.gap.simulators.mujoco_numbers import index, names, parameter, set_number, turns
@@ -20,9 +19,9 @@ from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Port, Terminal
 from chladni.models.core.simulation import PortMotion
 from chladni.models.effects.wording import nearest
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 #: MuJoCo's integrators that step in two halves, between which laws can act.
 _INTEGRATORS = {0: "Euler", 2: "implicit", 3: "implicitfast"}
 #: MuJoCo takes larger numbers for a mistake, and begins anew.
@@ -70,7 +69,7 @@ class MujocoSimulator:
 
     def respond(
         self,
-        inputs: Matrix,
+        inputs: Real,
         sample_rate_hz: float,
         *,
         values: Mapping[str, float],
@@ -248,7 +247,7 @@ def _steps(step_s: float, sample_rate_hz: float) -> int:
     return round(steps)
 
 
-def _require_commands(simulator: MujocoSimulator, inputs: Matrix) -> None:
+def _require_commands(simulator: MujocoSimulator, inputs: Real) -> None:
     """Refuse what MuJoCo would take for zero, with a word on a file that nobody reads."""
     for terminal, row in zip(simulator.inputs, inputs, strict=True):
         if not np.all(np.abs(row) < _LARGEST):
@@ -262,7 +261,7 @@ def _run(
     simulator: MujocoSimulator,
     model: Any,
     data: Any,
-    inputs: Matrix,
+    inputs: Real,
     steps: int,
     joint_laws: Mapping[str, JointLaw],
 ) -> SimulatorResponse:

@@ -4,16 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, Self, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.gap.simulators.joint_law import JointLaw
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Port, Terminal
 from chladni.models.core.simulation import PortMotion
+from chladni.signals.arrays import Real
 from chladni.signals.value import Value
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -28,7 +24,7 @@ class SimulatorResponse(Value):
         Displacement, velocity and force at each joint that carried a law, sample by sample.
     """
 
-    outputs: Matrix
+    outputs: Real
     motions: tuple[PortMotion, ...] = ()
 
     def __post_init__(self) -> None:
@@ -63,7 +59,7 @@ class Simulator(Protocol):
 
     def respond(
         self,
-        inputs: Matrix,
+        inputs: Real,
         sample_rate_hz: float,
         *,
         values: Mapping[str, float],

@@ -4,18 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Self
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chladni.gap.simulators.effects_around import joint_law, with_signals_changed
 from chladni.gap.simulators.simulator import Simulator, SimulatorResponse
 from chladni.models.effects.wording import nearest
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 if TYPE_CHECKING:
     from chladni.models.effects.attached_effect import AttachedEffect
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +61,7 @@ class WrappedSimulator:
         """Give the same with these effects in place of those it has."""
         return replace(self, effects=tuple(effects))
 
-    def respond(self, inputs: Matrix, sample_rate_hz: float) -> SimulatorResponse:
+    def respond(self, inputs: Real, sample_rate_hz: float) -> SimulatorResponse:
         """Simulate from the start of the log.
 
         Parameters
@@ -91,7 +87,7 @@ class WrappedSimulator:
         response = self.simulator.respond(acting, sample_rate_hz, values=self.values, joint_laws=laws)
         return replace(response, outputs=self.recorded(response.outputs, sample_rate_hz))
 
-    def recorded(self, outputs: Matrix, sample_rate_hz: float) -> Matrix:
+    def recorded(self, outputs: Real, sample_rate_hz: float) -> Real:
         """Give what sensors record of true outputs."""
         return with_signals_changed(outputs, sample_rate_hz, self.simulator.outputs, self._at("output"), "output")
 

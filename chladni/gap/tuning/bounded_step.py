@@ -1,16 +1,15 @@
 """Step of a least-squares fit inside bounds."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 
-Matrix = NDArray[np.float64]
 #: Added to the curvature of each unknown, relative: what a log doesn't show at all must not make it singular.
 _RIDGE = 1e-15
 
 
-def bounded_step(curvature: Matrix, gradient: Matrix, low: Matrix, high: Matrix, *, damping: float) -> Matrix:
+def bounded_step(curvature: Real, gradient: Real, low: Real, high: Real, *, damping: float) -> Real:
     """Minimise ``gradient.p + p.(H + damping diag H) p / 2`` for ``low <= p <= high``.
 
     Levenberg and Marquardt's step, with bounds as a linear least-squares problem (Stark & Parker 1995).

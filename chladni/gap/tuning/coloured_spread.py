@@ -1,18 +1,17 @@
 """Spread of what a fit found when its residual is no white noise: what a law leaves is nowhere near that."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from chladni.gap.tuning.fit_problem import Evaluation, FitProblem, Slopes
 from chladni.gap.tuning.residual import weights
+from chladni.signals.arrays import Mask, Real
 
-Matrix = NDArray[np.float64]
 #: Of the record: autocorrelations over longer lags are told by too few products.
 _LAGS = 0.1
 
 
-def coloured_information(problem: FitProblem, here: Evaluation, slopes: Slopes) -> Matrix:
+def coloured_information(problem: FitProblem, here: Evaluation, slopes: Slopes) -> Real:
     """Variance ``[unknown, unknown]`` of a cost's slope at its least, whatever the residual's colour.
 
     Were the residual white it would be the curvature M of the cost, and the unknowns' covariance its inverse. With a
@@ -34,14 +33,14 @@ def coloured_information(problem: FitProblem, here: Evaluation, slopes: Slopes) 
     return found
 
 
-def _spread_out(kept: Matrix, problem: FitProblem) -> Matrix:
+def _spread_out(kept: Real, problem: FitProblem) -> Real:
     """``[..., sample]`` of all samples from training samples, 0 elsewhere."""
     whole = np.zeros((*kept.shape[:-1], problem.training.size))
     whole[..., problem.training] = kept
     return whole
 
 
-def _through(columns: Matrix, residual: Matrix, seen: NDArray[np.bool_]) -> Matrix:
+def _through(columns: Real, residual: Real, seen: Mask) -> Real:
     """``C R C'`` with the autocovariance of a residual that is 0 where it isn't seen."""
     size = fft.next_fast_len(2 * residual.size, real=True)
     lags = max(int(_LAGS * residual.size), 1)
@@ -59,6 +58,6 @@ def _through(columns: Matrix, residual: Matrix, seen: NDArray[np.bool_]) -> Matr
     return np.asarray(columns @ filtered.T, dtype=np.float64)
 
 
-def _products(signal: Matrix, size: int) -> Matrix:
+def _products(signal: Real, size: int) -> Real:
     """Sum of products ``[lag]`` of a signal with itself."""
     return np.asarray(fft.irfft(np.abs(fft.rfft(signal, size)) ** 2, size), dtype=np.float64)

@@ -1,15 +1,13 @@
 """How a linear model's outputs follow from where it starts."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.balance import balance
 from chladni.models.core.compiled_model import CompiledModel
+from chladni.signals.arrays import Real, Whole
 
-Matrix = NDArray[np.float64]
 
-
-def decay(compiled: CompiledModel, rows: NDArray[np.int64], sample_rate_hz: float, count: int) -> Matrix:
+def decay(compiled: CompiledModel, rows: Whole, sample_rate_hz: float, count: int) -> Real:
     """Give ``[state, output, sample]``: outputs `rows` of the linear part from a unit of each state, ``C e^(A t)``.
 
     By doubling: what follows after the first samples is the same from the state that is reached there.

@@ -4,13 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.models.core.parameter import Parameter
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-Matrix = NDArray[np.float64]
 #: Of the usual range, for a signed parameter that starts at zero.
 _SHARE_OF_RANGE = 0.02
 #: A positive parameter goes down to this share of its start: less does nothing that a log could show.
@@ -81,7 +80,7 @@ def effect_numbers(
 
 
 def with_numbers(
-    effects: Sequence[AttachedEffect], numbers: Sequence[EffectNumber], x: Matrix
+    effects: Sequence[AttachedEffect], numbers: Sequence[EffectNumber], x: Real
 ) -> tuple[AttachedEffect, ...]:
     """Give the effects with the parameters that `x` says."""
     values = [dict(effect.values) for effect in effects]

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.plant.free_run import FreeRun, initial_states
 from chladni.gap.plant.law_plant import LawRunResult, Setting, coarse_run, fine_run, slopes_of
@@ -14,9 +13,9 @@ from chladni.gap.tuning.effect_scale import EffectNumber, with_numbers
 from chladni.gap.tuning.residual import Residual, Whitening, likelihood_cost, weights
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.integrator import Integrator
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError
 
-Matrix = NDArray[np.float64]
 #: How far apart the two runs of a difference are, in ln(value) of a parameter.
 _APART = 1e-5
 #: Precision of an effect's parameter before a log is seen: none, but for what keeps the equations regular.
@@ -31,8 +30,8 @@ _WIDE = 10.0
 class Point:
     """Unknowns: ``x`` of the parameters and effects, ``initial [window, state]``."""
 
-    x: Matrix
-    initial: Matrix
+    x: Real
+    initial: Real
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +39,7 @@ class Evaluation:
     """A free run at a point, its residual, and the cost in nats; what its slopes need when the model has laws."""
 
     point: Point
-    outputs: Matrix
+    outputs: Real
     residual: Residual
     cost: float
     made: LawRunResult | None = None
@@ -58,11 +57,11 @@ class Slopes:
         For each window ``(constant [state], per unknown [state, unknown])``: step of its initial state.
     """
 
-    curvature: Matrix
-    gradient: Matrix
-    back: tuple[tuple[Matrix, Matrix], ...]
+    curvature: Real
+    gradient: Real
+    back: tuple[tuple[Real, Real], ...]
 
-    def initial_step(self, step: Matrix) -> Matrix:
+    def initial_step(self, step: Real) -> Real:
         """``[window, state]`` that goes with a step of the unknowns."""
         return np.array([constant - per @ step for constant, per in self.back])
 
@@ -94,13 +93,13 @@ class FitProblem:
         self,
         run: FreeRun,
         whitening: Whitening,
-        training: NDArray[np.bool_],
+        training: Mask,
         *,
         effects: Sequence[AttachedEffect],
         numbers: Sequence[EffectNumber],
         tune: bool,
         z_limit: float | Mapping[str, float],
-        start_z: Matrix,
+        start_z: Real,
     ) -> None:
         self.run, self.whitening, self.training = run, whitening, training
         self.effects, self.numbers = tuple(effects), tuple(numbers)
@@ -140,11 +139,11 @@ class FitProblem:
         step = self._equations(here, np.zeros((0, *outputs.shape)), self._local(start)).initial_step(np.zeros(0))
         return Point(start.x, step)
 
-    def z(self, x: Matrix) -> Matrix:
+    def z(self, x: Real) -> Real:
         """``[parameter]`` of the model."""
         return np.concatenate([x[: self.tuned], self.start_z[self.tuned :]])
 
-    def effects_at(self, x: Matrix) -> tuple[AttachedEffect, ...]:
+    def effects_at(self, x: Real) -> tuple[AttachedEffect, ...]:
         """Effects with their parameters."""
         return with_numbers(self.effects, self.numbers, x[self.tuned :])
 
@@ -182,7 +181,7 @@ class FitProblem:
             )
         return found
 
-    def followed(self, here: Evaluation, slopes: Slopes) -> Matrix:
+    def followed(self, here: Evaluation, slopes: Slopes) -> Real:
         """``[unknown, output, training sample]``: change of the whitened outputs with each unknown.
 
         What a fit finds beside the unknowns, initial states and constants, follows them as it does there.
@@ -204,11 +203,11 @@ class FitProblem:
             moved[:, place] -= share[:, None] * constant
         return moved
 
-    def prior_information(self, unknowns: int) -> Matrix:
+    def prior_information(self, unknowns: int) -> Real:
         """``[unknown, unknown]``: what is known of the first so many unknowns beforehand."""
         return np.diag(self._prior[:unknowns])
 
-    def _equations(self, here: Evaluation, own: Matrix, starts: Callable[[int, int], Matrix]) -> Slopes:
+    def _equations(self, here: Evaluation, own: Real, starts: Callable[[int, int], Real]) -> Slopes:
         root = np.sqrt(weights(here.residual.power))[:, None]
         residual = here.residual.white * root
         columns = np.concatenate([self.whitening.seen(own), self.whitening.constants()]) * root
@@ -237,11 +236,11 @@ class FitProblem:
             tuple((c - b[:, unknowns:] @ constant, b[:, :unknowns] - b[:, unknowns:] @ per) for c, b in back),
         )
 
-    def _outputs(self, x: Matrix, initial: Matrix) -> Matrix:
+    def _outputs(self, x: Real, initial: Real) -> Real:
         self.evaluations += 1
         return self.run.outputs(self.z(x), self.effects_at(x), initial)
 
-    def _columns(self, here: Evaluation) -> tuple[Matrix, Callable[[int, int], Matrix]]:
+    def _columns(self, here: Evaluation) -> tuple[Real, Callable[[int, int], Real]]:
         """Slopes ``[unknown, output, sample]``, and whitened ``[state, output, training sample]`` of each window."""
         if here.made is None:
             return self._differences(here), self._local(here.point)
@@ -251,10 +250,10 @@ class FitProblem:
         white = self.whitening.whitened(starts)
         return own, lambda start, stop: white[..., start:stop][..., self.training[start:stop]]
 
-    def _setting(self, x: Matrix) -> Setting:
+    def _setting(self, x: Real) -> Setting:
         return Setting(self.z(x), self.effects_at(x))
 
-    def _differences(self, here: Evaluation) -> Matrix:
+    def _differences(self, here: Evaluation) -> Real:
         """``[unknown, output, sample]``: change of the outputs, by differences."""
         columns = np.empty((here.point.x.size, *here.outputs.shape))
         for place, by in enumerate(self._steps(here.point.x)):
@@ -263,14 +262,14 @@ class FitProblem:
             columns[place] = (self._outputs(x, here.point.initial) - here.outputs) / by
         return columns
 
-    def _steps(self, x: Matrix) -> Matrix:
+    def _steps(self, x: Real) -> Real:
         """Steps of each unknown, away from the nearer bound."""
         steps = np.concatenate(
             [_APART / self.run.tunables.tolerance[: self.tuned], np.full(len(self.numbers), _APART)]
         )
         return np.asarray(np.where(x + steps > self.high, -steps, steps))
 
-    def _spread(self, point: Point) -> Matrix:
+    def _spread(self, point: Point) -> Real:
         """``[state]`` one sigma of an initial state, so wide that it only keeps the equations regular."""
         if not self._wide.size:
             with np.errstate(over="ignore"):
@@ -282,7 +281,7 @@ class FitProblem:
             self._wide = np.where(seen, _WIDE * np.sqrt(measured) / np.where(seen, alone, 1.0), 0.0)
         return self._wide
 
-    def _decays(self, point: Point) -> Matrix:
+    def _decays(self, point: Point) -> Real:
         """``[state, output, sample]`` whitened outputs from a unit of each state, as long as the longest window."""
         compiled = self.run.compiled(self.z(point.x), self.effects_at(point.x))
         longest = max(stop - start for start, stop in self.run.windows)
@@ -290,7 +289,7 @@ class FitProblem:
             found = decay(compiled, self.run.rows, self.run.measurement.sample_rate_hz, longest)
             return self.whitening.whitened(found)
 
-    def _local(self, point: Point) -> Callable[[int, int], Matrix]:
+    def _local(self, point: Point) -> Callable[[int, int], Real]:
         """Slopes of a window's outputs over its start, of the linear part."""
         # At this point: after many cycles a decay of slightly other parameters is out of phase.
         decays = self._decays(point)
@@ -302,14 +301,14 @@ class FitProblem:
         return slice(before, before + int(np.count_nonzero(self.training[start:stop])))
 
 
-def _products(left: Matrix, right: Matrix) -> Matrix:
+def _products(left: Real, right: Real) -> Real:
     """``[left, right]`` sums over outputs and samples."""
     # Lengths are written out: of nothing, none can be told from the size.
     size = int(np.prod(left.shape[1:]))
     return np.asarray(left.reshape(len(left), size) @ right.reshape(len(right), size).T, dtype=np.float64)
 
 
-def _eliminated(own: Matrix, cross: Matrix, slope: Matrix) -> tuple[Matrix, Matrix]:
+def _eliminated(own: Real, cross: Real, slope: Real) -> tuple[Real, Real]:
     """Best step of some unknowns, ``constant - per step``, from ``own p + cross step + slope = 0``."""
     if not len(own):
         return np.zeros(cross.shape), np.zeros(0)
@@ -321,7 +320,7 @@ def _eliminated(own: Matrix, cross: Matrix, slope: Matrix) -> tuple[Matrix, Matr
     return solved[:, :-1], -solved[:, -1]
 
 
-def _limits(names: Sequence[str], z_limit: float | Mapping[str, float]) -> Matrix:
+def _limits(names: Sequence[str], z_limit: float | Mapping[str, float]) -> Real:
     if isinstance(z_limit, Mapping):
         return np.array([z_limit.get(name, Z_LIMIT) for name in names], dtype=np.float64)
     return np.full(len(names), float(z_limit))

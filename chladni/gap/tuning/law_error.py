@@ -3,13 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 from scipy.linalg import solve_toeplitz
 
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.arrays import Real
 
-Matrix = NDArray[np.float64]
 #: Share of an output's RMS that no law of a catalogue is righter than. More would hide faint effects in the quiet
 #: bands of coloured noise: with 1 % two of fifty made cases turned wrong, with 0.3 % one.
 LAW_ERROR = 3e-3
@@ -17,7 +16,7 @@ LAW_ERROR = 3e-3
 _INTERVALS = 8192
 
 
-def with_law_error(noise: NoiseFloor, scale: Matrix) -> NoiseFloor:
+def with_law_error(noise: NoiseFloor, scale: Real) -> NoiseFloor:
     """Give the floor with the colour of noise and of an error of the law together.
 
     Where noise is faint in a band, an exact whitening makes a fit follow that band and give the others up: drift of
@@ -45,7 +44,7 @@ def with_law_error(noise: NoiseFloor, scale: Matrix) -> NoiseFloor:
     return replace(noise, whitening=whitening, innovation_rms=np.sqrt(level))
 
 
-def _filter(covariance: Matrix, error: float) -> Matrix:
+def _filter(covariance: Real, error: float) -> Real:
     """Whitening filter ``[lag]`` of noise with this autocovariance and a white error (Yule and Walker)."""
     first = covariance[:-1].copy()
     first[0] += error

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.records.noise_floor import NoiseFloor
@@ -16,10 +15,10 @@ from chladni.gap.tuning.fit_problem import Z_LIMIT, Evaluation, FitProblem, Poin
 from chladni.gap.tuning.law_error import with_law_error
 from chladni.gap.tuning.residual import Whitening
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError, ModelError
 from chladni.signals.value import Value, require_shape
 
-Matrix = NDArray[np.float64]
 #: A step that promises less than this, in nats, changes no decision.
 PRECISION = 0.1
 #: A fit that can't get what its slopes promise has still converged when that is less.
@@ -83,24 +82,24 @@ class OutputErrorFit(Value):
     """
 
     values: Mapping[str, float]
-    z: Matrix
-    parameter_std: Matrix
+    z: Real
+    parameter_std: Real
     effects: tuple[AttachedEffect, ...]
     effect_std: tuple[Mapping[str, float], ...]
-    initial: Matrix
-    offsets: Matrix
-    outputs: Matrix
+    initial: Real
+    offsets: Real
+    outputs: Real
     misfit: float
-    misfit_by_output: Matrix
+    misfit_by_output: Real
     held_misfit: float | None
-    held_by_output: Matrix
+    held_by_output: Real
     prior_cost: float
     cost: float
     converged: bool
     iterations: int
     evaluations: int
     undetermined: tuple[str, ...]
-    covariance: Matrix
+    covariance: Real
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -112,9 +111,9 @@ def fit_output_error(
     *,
     effects: Sequence[AttachedEffect] = (),
     fitted: Sequence[Sequence[str]] | None = None,
-    training: NDArray[np.bool_] | None = None,
-    start_z: Matrix | None = None,
-    start_initial: Matrix | None = None,
+    training: Mask | None = None,
+    start_z: Real | None = None,
+    start_initial: Real | None = None,
     z_limit: float | Mapping[str, float] = Z_LIMIT,
     tune: bool = True,
     offsets: bool = True,
@@ -189,7 +188,7 @@ def with_coloured_spread(
     fit: OutputErrorFit,
     *,
     fitted: Sequence[Sequence[str]] | None = None,
-    training: NDArray[np.bool_] | None = None,
+    training: Mask | None = None,
     tune: bool = True,
     offsets: bool = True,
 ) -> OutputErrorFit:
@@ -224,7 +223,7 @@ def with_coloured_spread(
     return replace(fit, covariance=covariance, **_spreads(problem, x, covariance))
 
 
-def _whitening(run: FreeRun, noise: NoiseFloor, training: NDArray[np.bool_], offsets: bool) -> Whitening:
+def _whitening(run: FreeRun, noise: NoiseFloor, training: Mask, offsets: bool) -> Whitening:
     seen = with_law_error(noise, np.std(run.measurement.outputs, axis=1))
     return Whitening(seen, training, offsets=offsets)
 
@@ -285,13 +284,13 @@ def _search(
     return None, promised, level
 
 
-def _step(problem: FitProblem, here: Evaluation, slopes: Slopes, damping: float) -> Matrix:
+def _step(problem: FitProblem, here: Evaluation, slopes: Slopes, damping: float) -> Real:
     low = np.minimum(np.maximum(problem.low - here.point.x, -_LONGEST), 0.0)
     high = np.maximum(np.minimum(problem.high - here.point.x, _LONGEST), 0.0)
     return bounded_step(slopes.curvature, slopes.gradient, low, high, damping=damping)
 
 
-def _expected(slopes: Slopes, step: Matrix) -> float:
+def _expected(slopes: Slopes, step: Real) -> float:
     """Nats that a step promises to gain."""
     return float(-(slopes.gradient @ step) - 0.5 * step @ slopes.curvature @ step)
 
@@ -331,12 +330,12 @@ def _report(
 class _Spreads(TypedDict):
     """What a covariance says of parameters and effects, see `OutputErrorFit`."""
 
-    parameter_std: Matrix
+    parameter_std: Real
     effect_std: tuple[Mapping[str, float], ...]
     undetermined: tuple[str, ...]
 
 
-def _spreads(problem: FitProblem, x: Matrix, covariance: Matrix) -> _Spreads:
+def _spreads(problem: FitProblem, x: Real, covariance: Real) -> _Spreads:
     tunables, z = problem.run.tunables, problem.z(x)
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     own = np.concatenate([std[: problem.tuned], np.zeros(z.size - problem.tuned)])
@@ -350,7 +349,7 @@ def _spreads(problem: FitProblem, x: Matrix, covariance: Matrix) -> _Spreads:
     )
 
 
-def _inverse(curvature: Matrix) -> Matrix:
+def _inverse(curvature: Real) -> Real:
     """Inverse of a matrix whose rows have very different units."""
     size = np.sqrt(np.maximum(np.diag(curvature), np.finfo(np.float64).tiny))
     values, vectors = np.linalg.eigh(curvature / size[:, None] / size)
@@ -359,7 +358,7 @@ def _inverse(curvature: Matrix) -> Matrix:
     return np.asarray((spread / np.maximum(values, _FLAT)) @ spread.T, dtype=np.float64)
 
 
-def _effect_std(problem: FitProblem, x: Matrix, std: Matrix) -> tuple[Mapping[str, float], ...]:
+def _effect_std(problem: FitProblem, x: Real, std: Real) -> tuple[Mapping[str, float], ...]:
     found: list[dict[str, float]] = [{} for _ in problem.effects]
     for number, at, spread in zip(problem.numbers, x[problem.tuned :], std[problem.tuned :], strict=True):
         # Nothing changes with it, so nothing tells it.

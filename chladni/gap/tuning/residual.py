@@ -3,13 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError
-
-Matrix = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +23,9 @@ class Residual:
         ``[output]`` constant that was taken out, in the output's unit.
     """
 
-    white: Matrix
-    power: Matrix
-    offsets: Matrix
+    white: Real
+    power: Real
+    offsets: Real
 
 
 class Whitening:
@@ -55,7 +52,7 @@ class Whitening:
         self._constant = self._kept(self.whitened(np.ones((noise.rms.size, training.size))))
         self._size = np.maximum(np.sum(self._constant**2, axis=1), np.finfo(np.float64).tiny)
 
-    def whitened(self, signals: Matrix) -> Matrix:
+    def whitened(self, signals: Real) -> Real:
         """``[..., output, sample]`` divided by the noise, its colour taken out."""
         filters = self._noise.whitening
         if not np.any(filters[:, 1:]):
@@ -69,11 +66,11 @@ class Whitening:
                 white[(*index, place)] = np.convolve(signals[(*index, place)], lags)[:count]
         return white
 
-    def seen(self, signals: Matrix) -> Matrix:
+    def seen(self, signals: Real) -> Real:
         """``[..., output, training sample]``: whitened."""
         return self._kept(self.whitened(signals))
 
-    def constants(self) -> Matrix:
+    def constants(self) -> Real:
         """``[constant, output, training sample]``: what an offset of each output adds; none without offsets."""
         count = len(self._constant) if self._offsets else 0
         columns = np.zeros((count, *self._constant.shape))
@@ -81,7 +78,7 @@ class Whitening:
         columns[places, places] = self._constant[places]
         return columns
 
-    def residual(self, missed: Matrix) -> Residual:
+    def residual(self, missed: Real) -> Residual:
         """Judge ``[output, sample]`` of measured minus simulated."""
         white = self._kept(self.whitened(missed))
         offsets = np.einsum("os,os->o", white, self._constant) / self._size * self._offsets
@@ -91,11 +88,11 @@ class Whitening:
             power = np.mean(white**2, axis=1)
         return Residual(white=white, power=power, offsets=offsets)
 
-    def _kept(self, white: Matrix) -> Matrix:
+    def _kept(self, white: Real) -> Real:
         return white if self._whole else np.take(white, self._places, axis=-1)
 
 
-def likelihood_cost(power: Matrix, samples: int) -> float:
+def likelihood_cost(power: Real, samples: int) -> float:
     """Negative log-likelihood of whitened residuals whose true variance is unknown, but at least 1.
 
     ``sum_j N/2 (v_j if v_j < 1 else 1 + ln v_j)``: the variance of each output is taken as what makes it most likely.
@@ -104,6 +101,6 @@ def likelihood_cost(power: Matrix, samples: int) -> float:
     return float(0.5 * samples * np.sum(np.where(power < 1.0, power, 1.0 + np.log(np.maximum(power, 1.0)))))
 
 
-def weights(power: Matrix) -> Matrix:
+def weights(power: Real) -> Real:
     """``[output]`` weight of squared residuals: slope of `likelihood_cost` over ``N v_j/2``."""
     return np.asarray(1.0 / np.maximum(power, 1.0))
