@@ -8,8 +8,7 @@ import numpy as np
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.laid_inputs import LaidInputs
 from chladni.gap.plant.late_clock import read_late
-from chladni.gap.plant.law_run import Marched, can_run, equations, run_laws
-from chladni.gap.plant.linear_run import LinearRuns, is_plain
+from chladni.gap.plant.linear_run import LinearRuns, can_run, is_plain
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.compiled_model import CompiledModel
@@ -19,6 +18,7 @@ from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.hold import hold_of
 from chladni.models.integrator.input_rows import input_rows
 from chladni.models.integrator.integrator import Integration, Integrator
+from chladni.models.integrator.trapezoid_march import Equations, Marched, equations, run_laws
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
@@ -150,9 +150,14 @@ class FreeRun:
             return None
         if compiled.delays or hold.kinked.size or np.any(hold.rate >= 0):
             return None
-        equation = equations(compiled, self.inputs, self.rows, PARTS)
         starts = initial_states(initial, len(self.windows), len(compiled.states))
-        return run_laws(equation, self.windows, starts, rate)
+        return run_laws(self.equations(compiled, PARTS), self.windows, starts, rate)
+
+    def equations(self, compiled: CompiledModel, parts: int) -> Equations:
+        """Equations of the march with so many steps between samples, for the measured outputs."""
+        rate = self.measurement.sample_rate_hz
+        inputs = self.inputs.rows(compiled, hold_of(compiled, rate), parts)
+        return equations(compiled, inputs, self.rows, rate, parts)
 
     def motion(
         self,

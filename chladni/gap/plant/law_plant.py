@@ -7,11 +7,11 @@ import numpy as np
 
 from chladni.gap.plant.free_run import PARTS, FreeRun, initial_states, mapped_outputs
 from chladni.gap.plant.late_clock import read_late
-from chladni.gap.plant.law_kernel import March
-from chladni.gap.plant.law_run import Equations, equations, new_record, run_laws
-from chladni.gap.plant.law_sensitivity import recorded, sensitivities
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.models.integrator.slopes import recorded, sensitivities
+from chladni.models.integrator.trapezoid_kernel import March
+from chladni.models.integrator.trapezoid_march import Equations, new_record, run_laws
 from chladni.signals.arrays import Real
 
 #: Relative change at which a map of samples (a sensor that clips) is told by differences.
@@ -45,7 +45,7 @@ class LawRunResult:
 def coarse_run(run: FreeRun, setting: Setting, initial: Real) -> LawRunResult:
     """Run with one step a sample: wrong by about a per cent, in a tenth of the time."""
     compiled = run.compiled(setting.z, setting.effects)
-    equation = _equations(run, compiled)
+    equation = run.equations(compiled, 1)
     starts = initial_states(initial, len(run.windows), len(compiled.states))
     marched = run_laws(equation, run.windows, starts, run.measurement.sample_rate_hz)
     return _read(run, setting, compiled, equation, marched.outputs, marched.records)
@@ -54,7 +54,7 @@ def coarse_run(run: FreeRun, setting: Setting, initial: Real) -> LawRunResult:
 def fine_run(run: FreeRun, setting: Setting, initial: Real) -> LawRunResult:
     """Run as `FreeRun` does."""
     compiled = run.compiled(setting.z, setting.effects)
-    equation = _equations(run, compiled)
+    equation = run.equations(compiled, 1)
     marched = run.marched(setting.z, setting.effects, initial)
     if marched is not None:
         pairs = zip(run.windows, marched.records, strict=True)
@@ -95,7 +95,7 @@ def _at_samples(equation: Equations, window: tuple[int, int], record: March) -> 
 def slopes_of(run: FreeRun, result: LawRunResult, changed: Sequence[tuple[Setting, float]]) -> tuple[Real, Real]:
     """Slopes of the outputs, ``[parameter, output, sample]`` and ``[state, output, sample]``."""
     others = [run.compiled(setting.z, setting.effects) for setting, _ in changed]
-    tables = [(_equations(run, other), by) for other, (_, by) in zip(others, changed, strict=True)]
+    tables = [(run.equations(other, 1), by) for other, (_, by) in zip(others, changed, strict=True)]
     rate = run.measurement.sample_rate_hz
     own, starts = sensitivities(result.equation, result.records, run.windows, tables, rate)
     late_s = run.late_s(result.compiled)
@@ -116,7 +116,3 @@ def slopes_of(run: FreeRun, result: LawRunResult, changed: Sequence[tuple[Settin
 
 def _mapped(run: FreeRun, compiled: CompiledModel, outputs: Real) -> Real:
     return mapped_outputs(compiled, run.rows, outputs, run.measurement.sample_rate_hz)
-
-
-def _equations(run: FreeRun, compiled: CompiledModel) -> Equations:
-    return equations(compiled, run.inputs, run.rows, 1)

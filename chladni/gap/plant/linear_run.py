@@ -18,6 +18,14 @@ def is_plain(compiled: CompiledModel) -> bool:
     return not (compiled.laws or compiled.delays or any(compiled.output_offsets_s))
 
 
+def can_run(compiled: CompiledModel) -> bool:
+    """Whether slopes along a run are worth it: there are laws, dead times in loops, clocks that read between samples.
+
+    All else is a recursion from sample to sample, whose runs cost less than slopes along them.
+    """
+    return not is_plain(compiled)
+
+
 class LinearRuns:
     """Linear free runs under the inputs of one log.
 

@@ -1,6 +1,5 @@
 """Kernel: MuJoCo's steps with laws at joints, called by the addresses of MuJoCo's own functions."""
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,8 +9,6 @@ from chladni.models.integrator.machine_code import call_law, caller, machine_cod
 from chladni.signals.arrays import Real, Whole
 
 _WORD = types.int64
-# In a kernel it takes no context.
-_LAW: Callable[..., float] = call_law
 _STEP: Any = caller(_WORD(_WORD, _WORD))
 _SOLVE: Any = caller(_WORD(_WORD, _WORD, _WORD, _WORD, types.int32))
 _ROOT_STEPS = 60
@@ -121,18 +118,18 @@ def advanced_force(laws: Laws, joint: int, d: float, s: float, t: float, step_s:
         for place in range(start, start + count):
             laws.trial[place] = laws.nudged[place] = laws.state[place]
         if count > 0:
-            _LAW(function, d, s, t, numbers, nudged, rates)
+            call_law(function, d, s, t, numbers, nudged, rates)
         for place in range(start, start + count):
             value, rate = laws.state[place], laws.rates[place]
             nudge = 1e-6 * max(abs(value), 1e-3)
             laws.nudged[place] = value + nudge
-            _LAW(function, d, s, t, numbers, nudged, rates)
+            call_law(function, d, s, t, numbers, nudged, rates)
             slope = min((laws.rates[place] - rate) / nudge, 0.0)
             laws.nudged[place] = value
             # Other states' rates are asked anew at the common starting point.
-            _LAW(function, d, s, t, numbers, nudged, rates)
+            call_law(function, d, s, t, numbers, nudged, rates)
             laws.trial[place] = value + step_s * rate / (1.0 - step_s * slope)
-        force += _LAW(function, d, s, t, numbers, trial, rates)
+        force += call_law(function, d, s, t, numbers, trial, rates)
     return force
 
 

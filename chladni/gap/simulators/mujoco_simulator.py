@@ -340,7 +340,7 @@ def _library() -> Path:
 
 
 def _laws(kind: Any, model: Any, joints: Sequence[str], joint_laws: Mapping[str, JointLaw]) -> Any:
-    from chladni.models.integrator.law_address import law_address
+    from chladni.models.integrator.machine_code import law_address
 
     for name in joint_laws:
         if name not in joints:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chladni.models.integrator.machine_code import machine_code, part_code
+from chladni.models.integrator.machine_code import ASK, kernel, part_code
 from chladni.models.integrator.plane import Integers1, Numbers1, Numbers3, opener
 from chladni.models.integrator.port_kernel import Ports, Stage
 
@@ -61,8 +61,9 @@ def _displacement(history: History, delay: int, t: float) -> float:
 _OPEN = opener(History, Ports)
 
 
-@machine_code
-def ask_delays(book: int, t: float) -> None:
+@kernel(ASK)
+def ask_delays(book: int, t: float, _: int) -> int:
     """`fill_lagged` at the start of a step, from outside of the kernels."""
     history, ports = _OPEN(book)
     fill_lagged(history, ports, np.int64(0), t)
+    return 0

@@ -13,7 +13,7 @@ from chladni.models.integrator.explicit_kernel import (
     place_stage,
 )  # fmt: skip
 from chladni.models.integrator.judge_kernel import Judge
-from chladni.models.integrator.machine_code import PART_SIGNATURE, caller, machine_code, part_code
+from chladni.models.integrator.machine_code import STEP, caller, kernel, part_code
 from chladni.models.integrator.march import EXPLICIT_RECORDS
 from chladni.models.integrator.plane import Integers1, Numbers1, Numbers2, Numbers3, opener
 from chladni.models.integrator.port_kernel import Ports, law_force, port_forces
@@ -65,10 +65,10 @@ class Newton(NamedTuple):
 #: What both marches keep in their book.
 IMPLICIT_RECORDS = (*EXPLICIT_RECORDS, SchemeTables, Newton)
 _OPEN = opener(*IMPLICIT_RECORDS)
-CALL_STEP = caller(PART_SIGNATURE)
+CALL_STEP = caller(STEP)
 
 
-@machine_code
+@kernel(STEP)
 def implicit_step(book: int, level: int, t: float, step_s: float) -> int:
     """Step from ``channels[0]`` to ``channels[4]``; the stages are in ``channels[1:4]``. 0 without a solution."""
     _, ports, stride, _, _, judge, tables, newton = _OPEN(book)

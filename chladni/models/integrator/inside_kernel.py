@@ -6,7 +6,8 @@ from chladni.models.integrator.delay_kernel import History, fill_lagged
 from chladni.models.integrator.dense_kernel import Dense, fill_powers, keep_history, keep_outputs
 from chladni.models.integrator.explicit_kernel import Stride
 from chladni.models.integrator.implicit_kernel import IMPLICIT_RECORDS
-from chladni.models.integrator.machine_code import machine_code, part_code
+from chladni.models.integrator.machine_code import INSIDE as INSIDE_SIGNATURE
+from chladni.models.integrator.machine_code import kernel, part_code
 from chladni.models.integrator.march import BEFORE, INSIDE, LEVEL, POSITION, SAMPLE, UNIT, Course
 from chladni.models.integrator.plane import opener
 from chladni.models.integrator.port_kernel import Ports, port_forces
@@ -18,7 +19,7 @@ ALL_RECORDS = (*IMPLICIT_RECORDS, DenseTables, History, Dense)
 _OPEN = opener(*ALL_RECORDS)
 
 
-@machine_code
+@kernel(INSIDE_SIGNATURE)
 def inside(book: int, moment: int, hard: int, t: float, length_s: float) -> int:
     """Do what is due at a moment of a step from `t`; 1 when the history has no room for the step."""
     _, ports, stride, _, course, _, _, _, tables, history, dense = _OPEN(book)

@@ -4,18 +4,12 @@ Much faster than a model with a prescribed displacement, and smooth in the law's
 both are what a fit needs.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from chladni.models.core.port_law import PortLaw
-from chladni.models.integrator.law_address import law_address
-from chladni.models.integrator.machine_code import call_law, machine_code, part_code
+from chladni.models.integrator.machine_code import call_law, law_address, machine_code, part_code
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
-
-# numba passes the context itself, which a type checker can't know.
-_CALL: Callable[..., float] = call_law
 
 
 def force_along_motion(law: PortLaw, displacement: Real, velocity: Real, times_s: Real, *, substeps: int = 4) -> Real:
@@ -95,4 +89,4 @@ def _advance(address: Whole, d: Real, v: Real, t: Real, sample: int, substeps: i
 @part_code
 def _asked(address: Whole, d: float, s: float, t: float, width: int, row: int) -> float:
     """Force of the law in the trial state; its rates go to a row of the work memory."""
-    return _CALL(address[0], d, s, t, address[1], address[2], address[2] + 8 * row * width)
+    return call_law(address[0], d, s, t, address[1], address[2], address[2] + 8 * row * width)

@@ -1,92 +1,129 @@
-"""How kernels are compiled, and how they call a law by its address."""
+"""Machine code: how kernels, their parts and laws are compiled, and how they call each other by address.
 
+All of it is numba's public interface: `njit`, `cfunc`, `numba.extending`.
+"""
+
+import ctypes
 from collections.abc import Callable
-from pathlib import Path
+from threading import Lock
 from typing import Any, TypeVar
 
 import numba as nb
 from llvmlite import ir
-from numba.core import config, types
+from numba import errors, types
 from numba.extending import intrinsic
 
+from chladni.models.core.port_law import LawFunction
 from chladni.models.integrator.cache_folder import CACHED
-from chladni.models.integrator.part_compiler import PartCompiler
+from chladni.models.integrator.plane import BOOK
+from chladni.signals.errors import ModelError
 
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
 # numba declares fewer options than it takes.
 _JIT: Any = nb.njit
 _TYPES: Any = types
-_CONFIG: Any = config
+_OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy"}
 _POINTER = _TYPES.CPointer(types.float64)
-#: Signature of a law in machine code.
-LAW_SIGNATURE = types.float64(types.float64, types.float64, types.float64, _POINTER, _POINTER, _POINTER)
-
 _WORD, _NUMBER = types.int64, types.float64
-#: Signatures of `march` and `march_implicit`, of `inside`, of `implicit_step`.
-MARCH_SIGNATURE = _WORD(_WORD, _NUMBER, _WORD, _WORD, _WORD, _WORD)
-INSIDE_SIGNATURE = _WORD(_WORD, _WORD, _WORD, _NUMBER, _NUMBER)
-PART_SIGNATURE = _WORD(_WORD, _WORD, _NUMBER, _NUMBER)
-
-_OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy", "_nrt": False}
-
-
-def _stamp(beside: Path) -> tuple[float, int]:
-    """Newest time and total size of the sources of these kernels, and of those beside another one."""
-    found = [path.stat() for folder in {Path(__file__).parent, beside} for path in folder.glob("*.py")]
-    return max(each.st_mtime for each in found), sum(each.st_size for each in found)
+_LAW = _NUMBER(_NUMBER, _NUMBER, _NUMBER, _POINTER, _POINTER, _POINTER)
+#: Signatures of kernels that march, that look inside a step, that make one, that march either way, that ask laws,
+#: that go along one window.
+MARCH = _WORD(BOOK, _NUMBER, _WORD, _WORD, _WORD, _WORD)
+INSIDE = _WORD(BOOK, _WORD, _WORD, _NUMBER, _NUMBER)
+STEP = _WORD(BOOK, _WORD, _NUMBER, _NUMBER)
+ALTERNATE = _WORD(BOOK, _WORD, _WORD, _WORD, *MARCH.args[1:])
+ASK = _WORD(BOOK, _NUMBER, _WORD)
+ALONG = _WORD(BOOK, _NUMBER, _NUMBER)
+_LOCK = Lock()
+# A compiled law must live as long as its address is in use.
+_LAWS: dict[LawFunction, Any] = {}
 
 
 def machine_code(function: FunctionT) -> FunctionT:
-    """Compile a kernel when it's first called; the result is kept on disk where that is possible.
-
-    Kernels allocate nothing, so they need no reference counts.
-    """
+    """Compile a function of arrays when it's first called; its parts stand in the same file, which numba looks at."""
     compiled: FunctionT = _JIT(cache=CACHED, **_OPTIONS)(function)
-    # numba looks at the file of a kernel only: a part that changed in another file would go on running as it was.
-    kept = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    if kept is not None:
-        vars(kept)["_source_stamp"] = _stamp(Path(function.__code__.co_filename).parent)
     return compiled
 
 
 def part_code(function: FunctionT) -> FunctionT:
-    """Compile a part that only kernels call, into each kernel that does; it's kept on disk with them alone."""
-    return _part(function, inline=False)
+    """Compile a part that only kernels call; it's kept on disk with them alone."""
+    compiled: FunctionT = _JIT(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
+    return compiled
 
 
 def inlined_code(function: FunctionT) -> FunctionT:
     """Compile a part in place of each of its calls: for what is done in every step, where a call takes its time."""
-    return _part(function, inline=True)
-
-
-def _part(function: FunctionT, *, inline: bool) -> FunctionT:
-    doors = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    compiled: FunctionT = _JIT(forceinline=inline, pipeline_class=PartCompiler, **doors, **_OPTIONS)(function)
+    compiled: FunctionT = _JIT(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
     return compiled
 
 
-def make_ready(kernel: Any, signature: Any) -> None:
-    """Compile a kernel for a signature unless it is, or load it from disk.
-
-    Without vector instructions: loops over a handful of states gain nothing, and they take a fifth of the time.
-    """
-    before = _CONFIG.LOOP_VECTORIZE
-    _CONFIG.LOOP_VECTORIZE = 0
-    try:
-        kernel.compile(signature.args)
-    finally:
-        _CONFIG.LOOP_VECTORIZE = before
-
-
-def address_of(kernel: Any, signature: Any) -> int:
-    """Address of a kernel for `caller`, compiled for a signature when it's first asked for.
+class Kernel:
+    """A function of a book, see `book`: compiled when it's first asked for, and called by its address.
 
     A part is optimised and emitted again inside every kernel that calls it; what is called by address, once.
     """
-    make_ready(kernel, signature)
-    made = kernel.overloads[signature.args]
-    return int(made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name))
+
+    def __init__(self, function: Callable[..., int | None], signature: Any) -> None:
+        self._function, self._signature = function, signature
+        self._call: Any = None
+        self._made: Any = None
+
+    @property
+    def address(self) -> int:
+        """Address of the machine code."""
+        with _LOCK:
+            if self._made is None:
+                self._made = nb.cfunc(self._signature, cache=CACHED, **_OPTIONS)(self._function)
+            return int(self._made.address)
+
+    def __call__(self, *arguments: float) -> int:
+        """Run the kernel: address of the book, and numbers."""
+        if self._call is None:
+            kinds = [ctypes.c_double if kind is types.float64 else ctypes.c_int64 for kind in self._signature.args]
+            self._call = ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(self.address)
+        return int(self._call(*arguments))
+
+
+def kernel(signature: Any) -> Callable[[Callable[..., int]], Kernel]:
+    """Make a function of a book a kernel."""
+    return lambda function: Kernel(function, signature)
+
+
+def law_address(function: LawFunction) -> int:
+    """Address of a law's machine code; compiles it when it's met for the first time.
+
+    Parameters
+    ----------
+    function
+        See `chladni.models.core.port_law.PortLaw`.
+
+    Raises
+    ------
+    ModelError
+        When the function isn't written in the subset of Python that can be compiled.
+    """
+    with _LOCK:
+        if function not in _LAWS:
+            _LAWS[function] = _compiled_law(function)
+        return int(_LAWS[function].address)
+
+
+def _compiled_law(function: LawFunction) -> Any:
+    name = getattr(function, "__name__", repr(function))
+    try:
+        if not CACHED:
+            return nb.cfunc(_LAW, error_model="numpy")(function)
+        try:
+            return nb.cfunc(_LAW, cache=True, error_model="numpy")(function)
+        except RuntimeError:
+            # numba finds no place for a law that was typed into a shell, or whose folder can't be written to.
+            return nb.cfunc(_LAW, error_model="numpy")(function)
+    except errors.NumbaError as error:
+        reason = " ".join(str(getattr(error, "msg", error)).split())[:200]
+        raise ModelError(
+            f"law {name!r} can't be compiled: {reason}; write it with math, arithmetic, branches, loops and indexing"
+        ) from error
 
 
 def caller(signature: Any) -> Callable[..., int]:
@@ -107,12 +144,6 @@ def caller(signature: Any) -> Callable[..., int]:
     return given
 
 
-def _typed_call(_context: Any, *_arguments: Any) -> tuple[Any, Callable[..., Any]]:
-    integer, number = types.int64, types.float64
-    signature = number(integer, number, number, number, integer, integer, integer)
-    return signature, _generate_call
-
-
 def _generate_call(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
     number = ir.DoubleType()
     pointer = number.as_pointer()
@@ -122,8 +153,11 @@ def _generate_call(_context: Any, builder: Any, _signature: Any, arguments: Any)
 
 
 @intrinsic
-def call_law(
-    context: Any, address: Any, d: Any, s: Any, t: Any, parameters: Any, state: Any, rates: Any
+def _call_law(
+    _context: Any, _address: Any, _d: Any, _s: Any, _t: Any, _parameters: Any, _state: Any, _rates: Any
 ) -> tuple[Any, Callable[..., Any]]:
-    """``call_law(address, d, s, t, parameters, state, rates) -> force``; the last three are addresses too."""
-    return _typed_call(context, address, d, s, t, parameters, state, rates)
+    return _NUMBER(_WORD, _NUMBER, _NUMBER, _NUMBER, _WORD, _WORD, _WORD), _generate_call
+
+
+#: In a kernel: ``call_law(address, d, s, t, parameters, state, rates) -> force``; the last three are addresses too.
+call_law: Callable[..., float] = _call_law

@@ -5,13 +5,8 @@ from typing import NamedTuple
 from chladni.models.integrator.drive_kernel import Drive, fill_inputs
 from chladni.models.integrator.explicit_kernel import Stride, explicit_step
 from chladni.models.integrator.judge_kernel import Judge, explicit_error, is_stiff, look_ahead, weigh
-from chladni.models.integrator.machine_code import (
-    INSIDE_SIGNATURE,
-    MARCH_SIGNATURE,
-    caller,
-    inlined_code,
-    machine_code,
-)
+from chladni.models.integrator.machine_code import INSIDE as INSIDE_SIGNATURE
+from chladni.models.integrator.machine_code import MARCH, caller, inlined_code, kernel
 from chladni.models.integrator.plane import Integers1, Numbers2, opener
 from chladni.models.integrator.port_kernel import Ports
 from chladni.models.integrator.step_tables import DEEPEST, SchemeTables
@@ -95,12 +90,12 @@ def move_on(cursor: Whole, error: float, tolerance: float) -> None:
 #: What a march keeps in its book.
 EXPLICIT_RECORDS = (SchemeTables, Ports, Stride, Drive, Course, Judge)
 _OPEN = opener(*EXPLICIT_RECORDS)
-CALL_MARCH, CALL_INSIDE = caller(MARCH_SIGNATURE), caller(INSIDE_SIGNATURE)
+CALL_MARCH, CALL_INSIDE = caller(MARCH), caller(INSIDE_SIGNATURE)
 #: Moments of a step.
 BEFORE, INSIDE, AFTER = range(3)
 
 
-@machine_code
+@kernel(MARCH)
 def march(book: int, step_s: float, stop: int, automatic: int, most: int, inside: int) -> int:
     """March up to sample `stop`; gives why it ended. What it left behind is enough to go on.
 

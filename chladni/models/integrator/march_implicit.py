@@ -11,7 +11,7 @@ from chladni.models.integrator.implicit_kernel import (
     least_stiffness,
 )
 from chladni.models.integrator.judge_kernel import Judge, look_ahead, weigh
-from chladni.models.integrator.machine_code import machine_code, part_code
+from chladni.models.integrator.machine_code import ALTERNATE, MARCH, kernel, part_code
 from chladni.models.integrator.march import (
     AFTER,
     BEFORE,
@@ -47,7 +47,7 @@ from chladni.models.integrator.turn_kernel import missed_at_turns
 _OPEN = opener(*IMPLICIT_RECORDS)
 
 
-@machine_code
+@kernel(MARCH)
 def march_implicit(book: int, step_s: float, stop: int, automatic: int, most: int, inside: int) -> int:
     """March up to sample `stop`; gives why it ended, see `march`."""
     explicit, ports, stride, drive, course, judge, tables, newton = _OPEN(book)
@@ -91,9 +91,9 @@ def march_implicit(book: int, step_s: float, stop: int, automatic: int, most: in
     return DONE
 
 
-@machine_code
+@kernel(ALTERNATE)
 def alternate(
-    soft: int, stiff: int, hard: int, book: int, step_s: float, stop: int, automatic: int, most: int, inside: int
+    book: int, soft: int, stiff: int, hard: int, step_s: float, stop: int, automatic: int, most: int, inside: int
 ) -> int:
     """March by whichever scheme the laws ask for: `soft` and `stiff` are addresses of the marches."""
     while True:

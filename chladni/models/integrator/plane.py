@@ -1,28 +1,25 @@
-"""Memory of the kernels: addresses and shapes in place of arrays, which take ten times as long to compile."""
+"""Memory of the kernels: addresses and shapes in place of arrays, all of them written down in one book."""
 
 import operator
 from collections.abc import Callable
 from functools import cache
+from hashlib import sha256
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 from llvmlite import ir
-from numba.core import cgutils, types
-from numba.core.imputils import lower_builtin, lower_getattr
-from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
-from numba.extending import intrinsic, models, register_model
+from numba import types
+from numba.extending import intrinsic, lower_builtin, make_attribute_wrapper, models, register_model, type_callable
 from numpy.typing import NDArray
 
 # numba declares few types.
 _TYPES: Any = types
 _LOWER: Any = lower_builtin
-_LOWER_ATTRIBUTE: Any = lower_getattr
-_TOOLS: Any = cgutils
 _MODEL: Any = register_model
 _INTRINSIC: Any = intrinsic
-_SIGNATURE: Any = signature
-_TEMPLATE: Any = infer_global
-_ATTRIBUTES: Any = infer_getattr
+_ATTRIBUTE: Any = make_attribute_wrapper
+_TYPED: Any = type_callable
 #: Arrays of a record, by their number of axes; kernels see them as planes.
 Numbers1 = Annotated[NDArray[np.float64], 1]
 Numbers2 = Annotated[NDArray[np.float64], 2]
@@ -45,44 +42,33 @@ class PlaneType(types.Type):
 @_MODEL(PlaneType)
 class _PlaneModel(models.StructModel):
     def __init__(self, manager: Any, kind: PlaneType) -> None:
-        members = [("data", _TYPES.CPointer(kind.number)), ("shape", _TYPES.UniTuple(types.intp, kind.axes))]
+        data, shape = _TYPES.CPointer(kind.number), _TYPES.UniTuple(types.intp, kind.axes)
         initialise: Any = super().__init__
-        initialise(manager, kind, members)
+        initialise(manager, kind, [("data", data), ("shape", shape), ("size", types.intp)])
 
 
-@_TEMPLATE(operator.getitem)
-class _Get(AbstractTemplate):
-    def generic(self, arguments: Any, _keywords: Any) -> Any:
-        plane, index = arguments
-        return _SIGNATURE(plane.number, plane, index) if _fits(plane, index) else None
+for _name in ("shape", "size"):
+    _ATTRIBUTE(PlaneType, _name, _name)
 
 
-@_TEMPLATE(operator.setitem)
-class _Set(AbstractTemplate):
-    def generic(self, arguments: Any, _keywords: Any) -> Any:
-        plane, index, _ = arguments
-        return _SIGNATURE(types.none, plane, index, plane.number) if _fits(plane, index) else None
+@_TYPED(operator.getitem)
+def _type_get(_context: Any) -> Callable[..., Any]:
+    return lambda plane, index: plane.number if _fits(plane, index) else None
+
+
+@_TYPED(operator.setitem)
+def _type_set(_context: Any) -> Callable[..., Any]:
+    return lambda plane, index, _value: types.none if _fits(plane, index) else None
 
 
 def _fits(plane: Any, index: Any) -> bool:
     return isinstance(plane, PlaneType) and plane.axes == (len(index) if isinstance(index, _TYPES.BaseTuple) else 1)
 
 
-@_ATTRIBUTES
-class _Attributes(AttributeTemplate):
-    key = PlaneType
-
-    def resolve_shape(self, plane: PlaneType) -> Any:
-        return _TYPES.UniTuple(types.intp, plane.axes)
-
-    def resolve_size(self, _plane: PlaneType) -> Any:
-        return types.intp
-
-
-def _place(context: Any, builder: Any, _plane: Any, index: Any, plane_value: Any, index_value: Any) -> Any:
+def _place(context: Any, builder: Any, index: Any, plane_value: Any, index_value: Any) -> Any:
     """Pointer to one number; no check of bounds, and no counting from the end."""
     if isinstance(index, _TYPES.BaseTuple):
-        parts = list(zip(index.types, _TOOLS.unpack_tuple(builder, index_value), strict=True))
+        parts = [(kind, builder.extract_value(index_value, place)) for place, kind in enumerate(index.types)]
     else:
         parts = [(index, index_value)]
     offset = None
@@ -96,31 +82,44 @@ def _place(context: Any, builder: Any, _plane: Any, index: Any, plane_value: Any
     return builder.gep(builder.extract_value(plane_value, 0), [offset], inbounds=True)
 
 
+@_LOWER(operator.getitem, PlaneType, _TYPES.Any)
 def _get(context: Any, builder: Any, called: Any, values: Any) -> Any:
-    return builder.load(_place(context, builder, *called.args, *values))
+    return builder.load(_place(context, builder, called.args[1], *values))
 
 
+@_LOWER(operator.setitem, PlaneType, _TYPES.Any, _TYPES.Any)
 def _set(context: Any, builder: Any, called: Any, values: Any) -> Any:
-    builder.store(values[2], _place(context, builder, *called.args[:2], *values[:2]))
+    plane, index, kind = called.args
+    number = context.cast(builder, values[2], kind, plane.number)
+    builder.store(number, _place(context, builder, index, *values[:2]))
     return context.get_dummy_value()
 
 
-def _shape(_context: Any, builder: Any, _kind: Any, value: Any) -> Any:
-    return builder.extract_value(value, 1)
+class BookType(types.Type):
+    """Address of a book, in the version of the kernels that read it.
+
+    numba keeps a kernel on disk by its types and its own file: with the digest of all sources of kernels in the type,
+    a part that has changed in another file doesn't go on running as it was.
+    """
+
+    def __init__(self, version: str) -> None:
+        initialise: Any = super().__init__
+        initialise(name=f"Book({version})")
 
 
-def _size(_context: Any, builder: Any, kind: PlaneType, value: Any) -> Any:
-    shape = builder.extract_value(value, 1)
-    size = builder.extract_value(shape, 0)
-    for axis in range(1, kind.axes):
-        size = builder.mul(size, builder.extract_value(shape, axis))
-    return size
+@_MODEL(BookType)
+class _BookModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: BookType) -> None:
+        initialise: Any = super().__init__
+        initialise(manager, kind, ir.IntType(64))
 
 
-_LOWER(operator.getitem, PlaneType, _TYPES.Any)(_get)
-_LOWER(operator.setitem, PlaneType, _TYPES.Any, _TYPES.Any)(_set)
-_LOWER_ATTRIBUTE(PlaneType, "shape")(_shape)
-_LOWER_ATTRIBUTE(PlaneType, "size")(_size)
+def _version() -> str:
+    sources = sorted(Path(__file__).parent.glob("*.py"))
+    return sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
+
+
+BOOK = BookType(_version())
 
 
 def book(*records: NamedTuple) -> NDArray[np.int64]:
@@ -153,8 +152,7 @@ def opener(*records: type) -> Callable[[int], Any]:
     result = _TYPES.Tuple(kinds)
 
     def generate(context: Any, builder: Any, _called: Any, values: Any) -> Any:
-        word = context.get_value_type(types.int64)
-        page = builder.inttoptr(values[0], word.as_pointer())
+        page = builder.inttoptr(values[0], ir.IntType(64).as_pointer())
         place, made = 0, []
         for kind in kinds:
             planes = []
@@ -165,18 +163,23 @@ def opener(*records: type) -> Callable[[int], Any]:
         return context.make_tuple(builder, result, made)
 
     def open_book(_context: Any, _address: Any) -> tuple[Any, Callable[..., Any]]:
-        return result(types.int64), generate
+        return result(BOOK), generate
 
     opened: Callable[[int], Any] = _INTRINSIC(open_book)
     return opened
 
 
 def _opened(context: Any, builder: Any, plane: PlaneType, page: Any, place: int) -> Any:
-    words = [
+    address, *shape = (
         builder.load(builder.gep(page, [context.get_constant(types.intp, place + shift)]))
         for shift in range(1 + plane.axes)
-    ]
-    data = builder.inttoptr(words[0], context.get_value_type(_TYPES.CPointer(plane.number)))
+    )
+    size = shape[0]
+    for length in shape[1:]:
+        size = builder.mul(size, length)
     whole = ir.Constant(context.get_value_type(plane), ir.Undefined)
-    whole = builder.insert_value(whole, data, 0)
-    return builder.insert_value(whole, _TOOLS.pack_array(builder, words[1:]), 1)
+    data = builder.inttoptr(address, context.get_value_type(_TYPES.CPointer(plane.number)))
+    whole = builder.insert_value(builder.insert_value(whole, data, 0), size, 2)
+    for axis, length in enumerate(shape):
+        whole = builder.insert_value(whole, length, [1, axis])
+    return whole

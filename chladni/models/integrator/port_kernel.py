@@ -1,19 +1,14 @@
 """Kernel: forces of the laws and delay lines at given motions of the ports."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from chladni.models.integrator.machine_code import call_law, machine_code, part_code
+from chladni.models.integrator.machine_code import ASK, call_law, kernel, part_code
 from chladni.models.integrator.plane import Integers1, Integers2, Numbers1, Numbers2, Numbers3, opener
 
 #: A number that numba must not take as part of the type: it would compile the kernel once for each.
 Stage = int | np.int64
-
-
-# In a kernel it takes no context.
-_CALL: Callable[..., float] = call_law
 
 
 class Ports(NamedTuple):
@@ -58,7 +53,7 @@ def law_force(ports: Ports, law: int, d: float, s: float, t: float, stage: Stage
     first = ports.table[law, 2]
     count = ports.first.size - 1
     rates = ports.address[1] + 8 * (stage * ports.channels.shape[1] + count + first)
-    return _CALL(ports.table[law, 0], d, s, t, ports.table[law, 1], ports.address[0] + 8 * first, rates)
+    return call_law(ports.table[law, 0], d, s, t, ports.table[law, 1], ports.address[0] + 8 * first, rates)
 
 
 @part_code
@@ -88,8 +83,9 @@ def port_forces(ports: Ports, t: float, stage: Stage, through: Stage) -> None:
 _OPEN = opener(Ports)
 
 
-@machine_code
-def ask_laws(book: int, t: float, through: int) -> None:
+@kernel(ASK)
+def ask_laws(book: int, t: float, through: int) -> int:
     """`port_forces` at the start of a step, from outside of the kernels."""
     (ports,) = _OPEN(book)
     port_forces(ports, t, np.int64(0), through)
+    return 0

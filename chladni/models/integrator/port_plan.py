@@ -7,7 +7,7 @@ import numpy as np
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port_law import PortLaw
 from chladni.models.integrator.hold import Hold
-from chladni.models.integrator.law_address import law_address
+from chladni.models.integrator.machine_code import law_address
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
 

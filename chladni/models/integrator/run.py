@@ -15,13 +15,6 @@ from chladni.models.integrator.hold import Hold
 from chladni.models.integrator.implicit_kernel import STAGES, Newton, implicit_step
 from chladni.models.integrator.inside_kernel import inside
 from chladni.models.integrator.judge_kernel import Judge
-from chladni.models.integrator.machine_code import (
-    INSIDE_SIGNATURE,
-    MARCH_SIGNATURE,
-    PART_SIGNATURE,
-    address_of,
-    make_ready,
-)
 from chladni.models.integrator.march import (
     AUTOMATIC,
     COARSEST,
@@ -146,7 +139,7 @@ class Run:
         ports.state[:] = stride.here[n : n + ports.state.size]
         if plan.delay_s.size:
             words = book(history, ports)
-            ask_delays(words.ctypes.data, t + 1e-9 / self._rate_hz)
+            ask_delays(words.ctypes.data, t + 1e-9 / self._rate_hz, 0)
         if plan.looped:
             self._solve_loop(base, t)
         else:
@@ -217,15 +210,14 @@ class Run:
             tables.dense, history, dense,
         )  # fmt: skip
         has_inside = self._plan.delay_s.size > 0 or tables.instants.size > 0
-        within = address_of(inside, INSIDE_SIGNATURE) if has_inside else 0
-        arguments = words.ctypes.data, step_s, stop, int(self._scheme == AUTOMATIC), most, within
+        within = inside.address if has_inside else 0
+        arguments = step_s, stop, int(self._scheme == AUTOMATIC), most, within
         # Most models need explicit steps alone: the other kernels are compiled when they're met.
         if self._soft:
-            make_ready(march, MARCH_SIGNATURE)
-            return march(*arguments)
-        self._newton.address[0] = address_of(implicit_step, PART_SIGNATURE)
-        soft, stiff = (address_of(kernel, MARCH_SIGNATURE) for kernel in (march, march_implicit))
-        return alternate(soft, stiff, int(course.cursor[HARD]), *arguments)
+            return march(words.ctypes.data, *arguments)
+        self._newton.address[0] = implicit_step.address
+        hard = int(course.cursor[HARD])
+        return alternate(words.ctypes.data, march.address, march_implicit.address, hard, *arguments)
 
     def _failure(self, course: Course, stride: Stride, status: int) -> ModelError:
         t = (course.cursor[SAMPLE] + course.cursor[POSITION] / UNIT) / self._rate_hz

@@ -7,9 +7,10 @@ import pytest
 
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.law_plant import Setting, coarse_run, fine_run, slopes_of
-from chladni.gap.plant.law_run import can_run, equations, run_laws
+from chladni.gap.plant.linear_run import can_run
 from chladni.models.effects.attached_effect import attached
 from chladni.models.integrator.integrator import Integrator
+from chladni.models.integrator.trapezoid_march import run_laws
 from chladni.models.structures.controller import Controller
 from chladni.models.structures.structure_output import StructureOutput
 from tests.gap.made_log import RATE_HZ, band_noise, measured, three_bodies
@@ -62,7 +63,7 @@ def test_the_march_converges_to_the_integrator(samples, laws, run):
     exact = Integrator(compiled, RATE_HZ, tolerance=1e-10).run(run.measurement.inputs).outputs
     errors = [
         far_off(run_laws(made, ((0, SAMPLES),), start, RATE_HZ).outputs, exact)
-        for made in (equations(compiled, run.inputs, np.arange(4), parts) for parts in (2, 8))
+        for made in (run.equations(compiled, parts) for parts in (2, 8))
     ]
     # Straight lines of force between steps have order 2: a sixteenth.
     assert errors[1] < errors[0] / 10

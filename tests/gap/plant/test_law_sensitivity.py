@@ -7,10 +7,11 @@ import pytest
 
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.law_plant import Setting, coarse_run, fine_run, slopes_of
-from chladni.gap.plant.law_run import can_run, equations, run_laws
-from chladni.gap.plant.law_sensitivity import modal_coordinates
+from chladni.gap.plant.linear_run import can_run
 from chladni.models.effects.attached_effect import attached
 from chladni.models.integrator.integrator import Integrator
+from chladni.models.integrator.slopes import modal_coordinates
+from chladni.models.integrator.trapezoid_march import run_laws
 from chladni.signals.errors import ModelError
 from tests.gap.made_log import RATE_HZ, band_noise, measured, three_bodies
 
@@ -47,7 +48,7 @@ def test_the_march_converges_to_the_integrator(name, run):
     exact = Integrator(compiled, RATE_HZ, tolerance=1e-10).run(run.measurement.inputs, initial=start[0]).outputs
     errors = []
     for parts in (2, 8):
-        equation = equations(compiled, run.inputs, np.arange(3), parts)
+        equation = run.equations(compiled, parts)
         found = run_laws(equation, ((0, SAMPLES),), start, RATE_HZ).outputs
         errors.append(np.sqrt(np.mean((found - exact) ** 2) / np.mean(exact**2)))
     # Straight lines between steps have order 2: a sixteenth. Contacts and sticking begin inside a step: order 1.
@@ -143,7 +144,7 @@ def test_a_double_integrator_has_no_modal_coordinates():
 
 def test_a_model_that_diverges_says_so(run):
     compiled = three_bodies().with_effects([LAWS["hardening"]]).compile()
-    equation = equations(compiled, run.inputs, np.arange(3), 1)
+    equation = run.equations(compiled, 1)
     with pytest.raises(ModelError, match=r"diverges|missed"):
         run_laws(equation, ((0, SAMPLES),), np.full((1, 6), 1e160), RATE_HZ)
 

@@ -6,7 +6,7 @@ import pytest
 
 from chladni.models.integrator import march as kernel
 from chladni.models.integrator.integrator import integrate
-from chladni.models.integrator.law_address import law_address
+from chladni.models.integrator.machine_code import law_address
 from chladni.signals.errors import ModelError
 from tests.models.integrator import systems
 from tests.models.integrator.systems import compiled_structure, law, oscillator
@@ -27,12 +27,14 @@ def test_a_law_is_compiled_once():
 
 
 def test_a_law_of_ones_own_does_not_compile_a_kernel_again():
+    known = set()
     for function in (systems.cubic, written_by_a_user):
         integrate(
             compiled_structure(oscillator(), force_at="body", laws=(law(0, function, 1e3, 0.1),)),
             two_tones(50, 500.0), 500.0,
         )  # fmt: skip
-    assert len(kernel.march.signatures) == 1
+        known.add(kernel.march.address)
+    assert len(known) == 1
 
 
 def test_a_law_typed_into_a_shell_works_too():

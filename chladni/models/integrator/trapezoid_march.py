@@ -5,20 +5,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.gap.plant.dead_times import DeadTimes, dead_times
-from chladni.gap.plant.laid_inputs import LaidInputs
-from chladni.gap.plant.law_kernel import Laws, March, Room, law_march
-from chladni.gap.plant.linear_run import is_plain
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import responses
 from chladni.models.integrator.hold import hold_of
+from chladni.models.integrator.plane import book
 from chladni.models.integrator.port_plan import LawTable, PortPlan, law_table, port_plan
+from chladni.models.integrator.trapezoid_kernel import DeadTimes, Laws, March, Room, law_march
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
 
 Windows = Sequence[tuple[int, int]]
 #: Share of steps whose forces may miss their laws.
 _MAY_FAIL = 1e-3
+#: Displacements that the cubic of a dead time goes through.
+_NODES = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,27 +53,18 @@ class Equations:
     parts: int
 
 
-def can_run(compiled: CompiledModel) -> bool:
-    """Whether a model is one for these kernels: laws, dead times in loops, clocks that read between samples.
-
-    All else is a recursion from sample to sample, whose runs cost less than slopes along them.
-    """
-    return not is_plain(compiled)
-
-
-def equations(compiled: CompiledModel, inputs: LaidInputs, rows: Whole, parts: int) -> Equations:
+def equations(compiled: CompiledModel, inputs: Real, rows: Whole, sample_rate_hz: float, parts: int) -> Equations:
     """Make the tables of a compiled model.
 
     Parameters
     ----------
     inputs
-        Of the whole record.
+        ``[step, width]`` of the whole record, see `Hold`.
     rows
         Outputs that are wanted.
     parts
         Steps between samples.
     """
-    sample_rate_hz = inputs.sample_rate_hz
     hold = hold_of(compiled, sample_rate_hz)
     plan = port_plan(compiled, hold)
     p, m = len(plan.ports), hold.columns
@@ -93,12 +84,24 @@ def equations(compiled: CompiledModel, inputs: LaidInputs, rows: Whole, parts: i
         start=np.hstack([plan.motion_state, plan.motion_column, padding, at_once]),
         through=np.ascontiguousarray(at_once),
         output=np.hstack([plan.c[rows], plan.d[rows], none, plan.h[rows]]),
-        rows=inputs.rows(compiled, hold, parts),
+        rows=inputs,
         laws=law_table(compiled, plan),
-        delays=dead_times(plan, sample_rate_hz * parts),
+        delays=_dead_times(plan, sample_rate_hz * parts),
         plan=plan,
         parts=parts,
     )
+
+
+def _dead_times(plan: PortPlan, step_rate_hz: float) -> DeadTimes:
+    """Lay out the dead times of a model for steps at a rate, two displacements on either side where there are two."""
+    steps = plan.delay_s * step_rate_hz
+    ago = np.maximum(np.floor(steps).astype(np.int64) - 1, 0)
+    nodes = np.arange(float(_NODES))
+    share = np.ones((steps.size, _NODES))
+    for place, node in enumerate(nodes):
+        others = nodes[nodes != node]
+        share[:, place] = np.prod((steps - ago)[:, None] - others, axis=1) / np.prod(node - others)
+    return DeadTimes(plan.delay_port.astype(np.int64), ago, share)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +126,8 @@ def run_laws(equation: Equations, windows: Windows, initial: Real, sample_rate_h
     records, failed = [], 0
     for (start, stop), first in zip(windows, initial, strict=True):
         record = new_record(equation, start, stop, first)
-        failed += law_march(record, laws, equation.delays, room, h, start / sample_rate_hz)
+        words = book(record, laws, equation.delays, room)
+        failed += law_march(words.ctypes.data, h, start / sample_rate_hz)
         if not np.all(np.isfinite(record.x[-1])):
             raise ModelError(f"the model diverges between {start / sample_rate_hz:g} and {stop / sample_rate_hz:g} s")
         records.append(record)

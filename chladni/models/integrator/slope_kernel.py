@@ -2,20 +2,25 @@
 
 from typing import NamedTuple
 
-from chladni.gap.plant.dead_times import DeadTimes, begin_dead_times, look_back, see_own_step
-from chladni.gap.plant.law_kernel import (
+from chladni.models.integrator.machine_code import ALONG, inlined_code, kernel, part_code
+from chladni.models.integrator.plane import Integers2, Numbers1, Numbers2, Numbers3, opener
+from chladni.models.integrator.trapezoid_kernel import (
     FINE,
+    MARCH_RECORDS,
+    DeadTimes,
     Laws,
     March,
     Room,
     begin,
+    begin_dead_times,
     equations,
     force_of,
     invert,
+    look_back,
+    see_own_step,
     slope_of,
-)
-from chladni.models.integrator.machine_code import inlined_code, machine_code, part_code
-from chladni.signals.arrays import Real, Whole
+)  # fmt: skip
+from chladni.signals.arrays import Real
 
 
 class Unknowns(NamedTuple):
@@ -40,24 +45,22 @@ class Unknowns(NamedTuple):
     by
         ``[which]`` that change.
     line
-        ``[changed dead time, 2]`` parameter and dead time; `lines` how it is when the parameter is changed, and
-        `line_by` that change.
+        ``[changed dead time, 2]`` parameter and dead time, and `line_by` that change.
     """
 
-    table: Real
-    ends: Real
-    start: Real
-    through: Real
-    output: Real
-    force_output: Real
-    lead: Real
-    lead_start: Real
-    initial: Real
-    other: Whole
-    by: Real
-    line: Whole
-    lines: DeadTimes
-    line_by: Real
+    table: Numbers2
+    ends: Numbers2
+    start: Numbers2
+    through: Numbers2
+    output: Numbers2
+    force_output: Numbers2
+    lead: Numbers3
+    lead_start: Numbers2
+    initial: Numbers2
+    other: Integers2
+    by: Numbers1
+    line: Integers2
+    line_by: Numbers1
 
 
 class Change(NamedTuple):
@@ -79,19 +82,25 @@ class Change(NamedTuple):
         ``[law state]`` the law states themselves.
     past
         ``[step, delay]`` displacements at the ports of dead times.
+    found
+        ``[sample, output]`` of the outputs: the result.
     """
 
-    x: Real
-    next: Real
-    given: Real
-    force: Real
-    fresh: Real
-    own: Real
-    own_state: Real
-    slope: Real
-    bend: Real
-    level: Real
-    past: Real
+    x: Numbers2
+    next: Numbers2
+    given: Numbers2
+    force: Numbers2
+    fresh: Numbers2
+    own: Numbers2
+    own_state: Numbers2
+    slope: Numbers2
+    bend: Numbers2
+    level: Numbers1
+    past: Numbers3
+    found: Numbers3
+
+
+_OPEN = opener(*MARCH_RECORDS, Change, Unknowns, DeadTimes)
 
 
 @part_code
@@ -161,16 +170,20 @@ def _own(laws: Laws, room: Room, change: Change, unknowns: Unknowns, h: float, t
 
 
 @part_code
-def _look_back(march: March, delays: DeadTimes, change: Change, unknowns: Unknowns, step: int) -> None:
+def _look_back(
+    march: March, delays: DeadTimes, change: Change, unknowns: Unknowns, lines: DeadTimes, step: int
+) -> None:
     """What dead times add to forces: displacements of steps before, and another dead time."""
     for delay in range(delays.port.size):
         for node in range(delays.share.shape[1]):
             past = step - delays.ago[delay] - node
             if 0 <= past < step:
-                _add(change.own, delays.port[delay], delays.share[delay, node], change.past[past], delay)
+                for unknown in range(change.past.shape[2]):
+                    share = delays.share[delay, node] * change.past[past, delay, unknown]
+                    change.own[delays.port[delay], unknown] += share
     for which in range(unknowns.line_by.size):
         unknown, delay = unknowns.line[which, 0], unknowns.line[which, 1]
-        there = look_back(unknowns.lines, which, march.motion, step, step)
+        there = look_back(lines, which, march.motion, step, step)
         here = look_back(delays, delay, march.motion, step, step)
         change.own[delays.port[delay], unknown] += (there - here) / unknowns.line_by[which]
 
@@ -178,7 +191,8 @@ def _look_back(march: March, delays: DeadTimes, change: Change, unknowns: Unknow
 @part_code
 def _keep(delays: DeadTimes, change: Change, step: int) -> None:
     for delay in range(delays.port.size):
-        _copy(change.past[step], delay, change.given, delays.port[delay])
+        for unknown in range(change.past.shape[2]):
+            change.past[step, delay, unknown] = change.given[delays.port[delay], unknown]
 
 
 @inlined_code
@@ -255,9 +269,9 @@ def _carry(change: Change, unknowns: Unknowns, step: int) -> None:
 
 
 @part_code
-def _write(change: Change, unknowns: Unknowns, found: Real, step: int) -> None:
+def _write(change: Change, unknowns: Unknowns, step: int) -> None:
     """Add the changes of the outputs at a sample."""
-    q = change.x.shape[1]
+    q, found = change.x.shape[1], change.found
     for row in range(found.shape[1]):
         for column in range(change.x.shape[0]):
             share = unknowns.output[row, column]
@@ -291,15 +305,13 @@ def _open(march: March, laws: Laws, room: Room, change: Change, unknowns: Unknow
     _settle(room, change, unknowns.through, 0)
 
 
-@machine_code
-def law_slopes(
-    march: March, laws: Laws, delays: DeadTimes, room: Room, change: Change, unknowns: Unknowns, found: Real,
-    h: float, begin_s: float,
-) -> None:  # fmt: skip
-    """Add to ``found [sample, output, unknown]`` what changes along a march that was made.
+@kernel(ALONG)
+def law_slopes(book: int, h: float, begin_s: float) -> int:
+    """Add to `Change.found` what changes along a march that was made.
 
     The march is differentiated as it was made, step by step, laws that switch included.
     """
+    march, laws, delays, room, change, unknowns, lines = _OPEN(book)
     n, p = change.x.shape[0], room.force.size
     begin_dead_times(delays, laws.lagged, laws.now)
     _open(march, laws, room, change, unknowns, begin_s)
@@ -307,7 +319,7 @@ def law_slopes(
     _keep(delays, change, 0)
     for step in range(march.rows.shape[0]):
         _pass_on(room, change)
-        _write(change, unknowns, found, step)
+        _write(change, unknowns, step)
         if step == march.rows.shape[0] - 1:
             break
         _carry(change, unknowns, step)
@@ -319,7 +331,7 @@ def law_slopes(
             room.given[4 * p + place] = room.state[place]
         _slopes(laws, room, change, h, t)
         _own(laws, room, change, unknowns, h, t)
-        _look_back(march, delays, change, unknowns, step + 1)
+        _look_back(march, delays, change, unknowns, lines, step + 1)
         _settle(room, change, unknowns.ends, n)
         _keep(delays, change, step + 1)
         for row in range(n):
@@ -327,3 +339,4 @@ def law_slopes(
                 change.x[row, unknown] = change.next[row, unknown]
             for port in range(p):
                 _add(change.x, row, unknowns.table[row, n + p + port], change.fresh, port)
+    return 0

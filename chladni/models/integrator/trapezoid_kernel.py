@@ -6,16 +6,13 @@ equation, linearised in themselves at the middle of the step, exactly: bristles 
 nor lag.
 """
 
-from collections.abc import Callable
 from math import expm1
 from typing import NamedTuple
 
-from chladni.gap.plant.dead_times import DeadTimes, begin_dead_times, look_back, see_own_step
-from chladni.models.integrator.machine_code import call_law, inlined_code, machine_code, part_code
-from chladni.signals.arrays import Real, Whole
+from chladni.models.integrator.machine_code import ALONG, call_law, inlined_code, kernel, part_code
+from chladni.models.integrator.plane import Integers1, Integers2, Numbers1, Numbers2, opener
+from chladni.signals.arrays import Real
 
-# In a kernel it takes no context.
-_CALL: Callable[..., float] = call_law
 _ITERATIONS = 40
 _HALVINGS = 12
 #: Forces agree with their laws to this share of the largest so far; a step that misses by more has failed.
@@ -48,15 +45,33 @@ class Laws(NamedTuple):
         ``[port]`` what dead times give of steps before, and their share of the displacement after the step itself.
     """
 
-    table: Whole
-    counts: Whole
-    first: Whole
-    trial: Real
-    rates: Real
-    address: Whole
-    scale: Real
-    lagged: Real
-    now: Real
+    table: Integers2
+    counts: Integers1
+    first: Integers1
+    trial: Numbers1
+    rates: Numbers1
+    address: Integers1
+    scale: Numbers1
+    lagged: Numbers1
+    now: Numbers1
+
+
+class DeadTimes(NamedTuple):
+    """Dead times at ports, ``f(t) = d(t - delay) - d(t)``.
+
+    Attributes
+    ----------
+    port
+        ``[delay]``.
+    ago
+        ``[delay]`` steps back to the latest of four displacements.
+    share
+        ``[delay, 4]`` of each, the latest first.
+    """
+
+    port: Integers1
+    ago: Integers1
+    share: Numbers2
 
 
 class Room(NamedTuple):
@@ -75,15 +90,15 @@ class Room(NamedTuple):
         Of Newton's iteration.
     """
 
-    given: Real
-    state: Real
-    force: Real
-    base: Real
-    missed: Real
-    tried: Real
-    slope: Real
-    matrix: Real
-    inverse: Real
+    given: Numbers1
+    state: Numbers1
+    force: Numbers1
+    base: Numbers1
+    missed: Numbers1
+    tried: Numbers1
+    slope: Numbers1
+    matrix: Numbers2
+    inverse: Numbers2
 
 
 class March(NamedTuple):
@@ -103,15 +118,20 @@ class March(NamedTuple):
         ``[step, ...]`` states, motions and forces at the ports, law states; of x and state the first row is given.
     """
 
-    table: Real
-    ends: Real
-    start: Real
-    through: Real
-    rows: Real
-    x: Real
-    motion: Real
-    force: Real
-    state: Real
+    table: Numbers2
+    ends: Numbers2
+    start: Numbers2
+    through: Numbers2
+    rows: Numbers2
+    x: Numbers2
+    motion: Numbers2
+    force: Numbers2
+    state: Numbers2
+
+
+#: What the march keeps in its book, and its slopes before what is their own.
+MARCH_RECORDS = (March, Laws, DeadTimes, Room)
+_OPEN = opener(*MARCH_RECORDS)
 
 
 @inlined_code
@@ -129,10 +149,10 @@ def _bend(laws: Laws, law: int, room: Room, port: int, h: float, t: float) -> No
         here = room.given[4 * p + place]
         by = _LARGE * (abs(here) + _SMALL)
         laws.trial[place] = here + by
-        _CALL(laws.table[law, 0], d, s, middle, parameters, trial, rates)
+        call_law(laws.table[law, 0], d, s, middle, parameters, trial, rates)
         there = laws.rates[place]
         laws.trial[place] = here
-        _CALL(laws.table[law, 0], d, s, middle, parameters, trial, rates)
+        call_law(laws.table[law, 0], d, s, middle, parameters, trial, rates)
         rate = laws.rates[place]
         e = min(h * (there - rate) / by, 30.0)
         share = expm1(e) / e if abs(e) > 1e-6 else 1.0 + 0.5 * e
@@ -148,7 +168,7 @@ def force_of(laws: Laws, room: Room, port: int, h: float, t: float) -> float:
         if laws.counts[law] > 0:
             _bend(laws, law, room, port, h, t)
         first = laws.table[law, 2]
-        total += _CALL(
+        total += call_law(
             laws.table[law, 0], room.given[port], room.given[p + port], t, laws.table[law, 1],
             laws.address[2] + 8 * first, laws.address[1] + 8 * first,
         )  # fmt: skip
@@ -310,9 +330,38 @@ def _advance(march: March, room: Room, step: int) -> None:
             room.base[row - n] = value
 
 
-@machine_code
-def law_march(march: March, laws: Laws, delays: DeadTimes, room: Room, h: float, begin_s: float) -> int:
+@part_code
+def begin_dead_times(delays: DeadTimes, lagged: Real, now: Real) -> None:
+    """At the start of a window nothing is behind: all that acts ``[port]`` is the displacement that is missing."""
+    for port in range(now.size):
+        lagged[port] = now[port] = 0.0
+    for delay in range(delays.port.size):
+        now[delays.port[delay]] -= 1.0
+
+
+@part_code
+def see_own_step(delays: DeadTimes, now: Real) -> None:
+    """After the start, a dead time below two steps sees the displacement ``[port]`` at the end of its own."""
+    for delay in range(delays.port.size):
+        if delays.ago[delay] == 0:
+            now[delays.port[delay]] += delays.share[delay, 0]
+
+
+@inlined_code
+def look_back(delays: DeadTimes, delay: int, motion: Real, step: int, latest: int) -> float:
+    """Displacement that comes at a step, of those up to the latest in ``motion [step, port]``; 0 before the start."""
+    total = 0.0
+    for node in range(delays.share.shape[1]):
+        past = step - delays.ago[delay] - node
+        if 0 <= past <= latest:
+            total += delays.share[delay, node] * motion[past, delays.port[delay]]
+    return total
+
+
+@kernel(ALONG)
+def law_march(book: int, h: float, begin_s: float) -> int:
     """March through one window; gives how many steps did not meet their laws."""
+    march, laws, delays, room = _OPEN(book)
     n, p, width = march.x.shape[1], room.force.size, march.rows.shape[1]
     begin_dead_times(delays, laws.lagged, laws.now)
     failed = begin(march, laws, room, begin_s)

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from chladni.gap.plant.dead_times import DeadTimes
-from chladni.gap.plant.law_kernel import March
-from chladni.gap.plant.law_run import Equations, Windows, kernel_laws, kernel_room, new_record
-from chladni.gap.plant.law_slopes import Change, Unknowns, law_slopes
 from chladni.models.core.balance import balance
 from chladni.models.integrator.integrator import Integration
+from chladni.models.integrator.plane import book
+from chladni.models.integrator.slope_kernel import Change, Unknowns, law_slopes
+from chladni.models.integrator.trapezoid_kernel import DeadTimes, March
+from chladni.models.integrator.trapezoid_march import Equations, Windows, kernel_laws, kernel_room, new_record
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
 
@@ -70,17 +70,17 @@ def sensitivities(
     for one, _ in changed:
         _require_same_form(equation, one)
     to_modal, from_modal = modal_coordinates(equation.step[: len(equation.plan.a), : len(equation.plan.a)])
-    fixed = _fixed(equation, changed, to_modal, from_modal)
+    line, lines = _other_lines(equation, changed)
+    fixed = _fixed(equation, changed, to_modal, from_modal, line)
     q = len(changed) + len(to_modal)
     found = np.zeros((windows[-1][1], equation.output.shape[0], q))
     for (start, stop), record in zip(windows, records, strict=True):
         lead, lead_start, outputs = _leads(equation, record, changed, start, to_modal)
         found[start:stop, :, : len(changed)] = outputs
         unknowns = fixed._replace(lead=lead, lead_start=lead_start)
-        law_slopes(
-            record, laws, equation.delays, room, _change(equation, q, len(record.x)), unknowns, found[start:stop],
-            1.0 / sample_rate_hz, start / sample_rate_hz,
-        )  # fmt: skip
+        change = _change(equation, found[start:stop])
+        words = book(record, laws, equation.delays, room, change, unknowns, lines)
+        law_slopes(words.ctypes.data, 1.0 / sample_rate_hz, start / sample_rate_hz)
     slopes = np.ascontiguousarray(found.transpose(2, 1, 0))
     return slopes[: len(changed)], slopes[len(changed) :]
 
@@ -105,7 +105,11 @@ def modal_coordinates(matrix: Real) -> tuple[Real, Real]:
 
 
 def _fixed(
-    equation: Equations, changed: Sequence[tuple[Equations, float]], to_modal: Real, from_modal: Real
+    equation: Equations,
+    changed: Sequence[tuple[Equations, float]],
+    to_modal: Real,
+    from_modal: Real,
+    line: Whole,
 ) -> Unknowns:
     """What doesn't depend on the window."""
     n, width = len(to_modal), equation.rows.shape[1]
@@ -119,7 +123,6 @@ def _fixed(
             if mine.parameters != its.parameters:
                 other.append((place, law, int(one.laws.table[law, 1])))
                 by.append(size)
-    line, lines = _other_lines(equation, changed)
     empty = np.zeros((1, 0, len(changed)))
     return Unknowns(
         table=np.ascontiguousarray(table), ends=equation.ends,
@@ -128,7 +131,7 @@ def _fixed(
         force_output=np.ascontiguousarray(equation.output[:, n + width :]),
         lead=empty, lead_start=empty[0], initial=to_modal,
         other=np.array(other, dtype=np.int64).reshape(-1, 3), by=np.array(by, dtype=np.float64),
-        line=line, lines=lines, line_by=np.array([changed[place][1] for place in line[:, 0]], dtype=np.float64),
+        line=line, line_by=np.array([changed[place][1] for place in line[:, 0]], dtype=np.float64),
     )  # fmt: skip
 
 
@@ -187,7 +190,8 @@ def _require_same_form(equation: Equations, other: Equations) -> None:
         raise ModelError("a small change of a parameter gives a model of another form; start from another value")
 
 
-def _change(equation: Equations, q: int, steps: int) -> Change:
+def _change(equation: Equations, found: Real) -> Change:
+    steps, _, q = found.shape
     n, p, count = len(equation.plan.a), len(equation.plan.ports), equation.laws.state.size
     arguments = 4 * p + count
     x, after, given, force, fresh, own, own_state = (
@@ -195,4 +199,4 @@ def _change(equation: Equations, q: int, steps: int) -> Change:
     )
     slope, bend, level = np.zeros((p, arguments)), np.zeros((count, arguments)), np.zeros(count)
     past = np.zeros((steps if equation.delays.port.size else 1, equation.delays.port.size, q))
-    return Change(x, after, given, force, fresh, own, own_state, slope, bend, level, past)
+    return Change(x, after, given, force, fresh, own, own_state, slope, bend, level, past, found)
