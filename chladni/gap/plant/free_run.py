@@ -7,7 +7,6 @@ import numpy as np
 
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.laid_inputs import LaidInputs
-from chladni.gap.plant.late_clock import read_late
 from chladni.gap.plant.linear_run import LinearRuns, can_run, is_plain
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
@@ -240,6 +239,28 @@ def mapped_outputs(compiled: CompiledModel, rows: Whole, outputs: Real, sample_r
         for row in np.flatnonzero(rows == place):
             mapped[row] = sample_map(mapped[row], sample_rate_hz)
     return mapped
+
+
+def read_late(outputs: Real, offsets_s: Real, sample_rate_hz: float) -> Real:
+    """Give ``[..., output, sample]`` as read by clocks that are late by ``offsets_s [output]``.
+
+    By cubic splines between samples; before the start as at the start, after the end as at the end. What isn't finite
+    somewhere is nowhere: a spline through it would have no numbers.
+    """
+    late = np.flatnonzero(offsets_s)
+    if not late.size:
+        return outputs
+    from scipy.interpolate import CubicSpline
+
+    times_s = np.arange(outputs.shape[-1]) / sample_rate_hz
+    read = outputs.copy()
+    for row in late:
+        asked = np.clip(times_s - offsets_s[row], 0.0, times_s[-1])
+        seen = outputs[..., row, :]
+        finite = np.isfinite(seen).all(axis=-1)
+        read[..., row, :] = np.nan
+        read[finite, row, :] = CubicSpline(times_s, seen[finite], axis=-1)(asked)
+    return read
 
 
 def _key(z: Real | None, effects: Sequence[AttachedEffect]) -> object:

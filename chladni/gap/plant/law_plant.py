@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from chladni.gap.plant.free_run import PARTS, FreeRun, initial_states, mapped_outputs
-from chladni.gap.plant.late_clock import read_late
+from chladni.gap.plant.free_run import PARTS, FreeRun, initial_states, mapped_outputs, read_late
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.slopes import recorded, sensitivities

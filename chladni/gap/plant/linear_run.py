@@ -8,7 +8,7 @@ from chladni.gap.plant.laid_inputs import LaidInputs
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import responses
 from chladni.models.integrator.hold import hold_of
-from chladni.models.integrator.linear_kernel import linear_march
+from chladni.models.integrator.march import linear_march
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
 

@@ -17,8 +17,7 @@ from chladni.models.integrator.machine_code import STEP, caller, kernel, part_co
 from chladni.models.integrator.march import EXPLICIT_RECORDS
 from chladni.models.integrator.plane import Integers1, Numbers1, Numbers2, Numbers3, opener
 from chladni.models.integrator.port_kernel import Ports, law_force, port_forces
-from chladni.models.integrator.radau import GAMMA, LAGRANGE, NODES, WEIGHTS
-from chladni.models.integrator.step_tables import SchemeTables
+from chladni.models.integrator.step_tables import GAMMA, LAGRANGE, NODES, WEIGHTS, SchemeTables
 from chladni.signals.arrays import Real
 
 STAGES = 3

@@ -10,7 +10,7 @@ from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port_law import PortLaw
 from chladni.models.integrator.hold import Hold, hold_of, split_delay
 from chladni.models.integrator.input_rows import input_rows
-from chladni.models.integrator.linear_kernel import linear_march
+from chladni.models.integrator.march import linear_march
 from chladni.models.integrator.port_plan import LawTable, PortPlan, law_table, port_plan
 from chladni.models.integrator.run import Run, RunResult
 from chladni.models.integrator.step_tables import StepTables

@@ -2,16 +2,21 @@
 
 from typing import NamedTuple
 
-from chladni.models.integrator.drive_kernel import Drive, fill_inputs
-from chladni.models.integrator.explicit_kernel import Stride, explicit_step
-from chladni.models.integrator.judge_kernel import Judge, explicit_error, is_stiff, look_ahead, weigh
+from chladni.models.integrator.explicit_kernel import Drive, Stride, explicit_step, fill_inputs
+from chladni.models.integrator.judge_kernel import (
+    Judge,
+    explicit_error,
+    explicit_error_at_turns,
+    is_stiff,
+    look_ahead,
+    weigh,
+)
 from chladni.models.integrator.machine_code import INSIDE as INSIDE_SIGNATURE
-from chladni.models.integrator.machine_code import MARCH, caller, inlined_code, kernel
+from chladni.models.integrator.machine_code import MARCH, caller, inlined_code, kernel, machine_code
 from chladni.models.integrator.plane import Integers1, Numbers2, opener
 from chladni.models.integrator.port_kernel import Ports
 from chladni.models.integrator.step_tables import DEEPEST, SchemeTables
-from chladni.models.integrator.turn_kernel import explicit_error_at_turns
-from chladni.signals.arrays import Whole
+from chladni.signals.arrays import Real, Whole
 
 #: Finest steps in a sample interval.
 UNIT = 1 << DEEPEST
@@ -147,3 +152,24 @@ def march(book: int, step_s: float, stop: int, automatic: int, most: int, inside
         else:
             cursor[LEVEL] += 1
     return DONE
+
+
+@machine_code
+def linear_march(advance: Real, rows: Real, state: Real) -> None:
+    """``x[k + 1] = Phi x[k] + Gamma row[k]``, exact for inputs that run between samples as `Hold` says.
+
+    Parameters
+    ----------
+    advance
+        ``[state + width, state]``.
+    rows
+        ``[sample, width]``.
+    state
+        ``[sample, state]``, the first row given.
+    """
+    n = state.shape[1]
+    for sample in range(state.shape[0] - 1):
+        for column in range(advance.shape[0]):
+            value = state[sample, column] if column < n else rows[sample, column - n]
+            for row in range(n):
+                state[sample + 1, row] += advance[column, row] * value

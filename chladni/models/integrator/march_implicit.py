@@ -1,7 +1,6 @@
 """Kernel: marches by implicit steps where laws are stiff, until they are soft again."""
 
-from chladni.models.integrator.drive_kernel import Drive, fill_inputs
-from chladni.models.integrator.explicit_kernel import Stride
+from chladni.models.integrator.explicit_kernel import Drive, Stride, fill_inputs
 from chladni.models.integrator.implicit_kernel import (
     CALL_STEP,
     IMPLICIT_RECORDS,
@@ -10,7 +9,7 @@ from chladni.models.integrator.implicit_kernel import (
     is_soft,
     least_stiffness,
 )
-from chladni.models.integrator.judge_kernel import Judge, look_ahead, weigh
+from chladni.models.integrator.judge_kernel import Judge, look_ahead, missed_at_turns, weigh
 from chladni.models.integrator.machine_code import ALTERNATE, MARCH, kernel, part_code
 from chladni.models.integrator.march import (
     AFTER,
@@ -40,9 +39,7 @@ from chladni.models.integrator.march import (
 )  # fmt: skip
 from chladni.models.integrator.plane import opener
 from chladni.models.integrator.port_kernel import Ports
-from chladni.models.integrator.radau import GAMMA, LAGRANGE
-from chladni.models.integrator.step_tables import DEEPEST, SchemeTables
-from chladni.models.integrator.turn_kernel import missed_at_turns
+from chladni.models.integrator.step_tables import DEEPEST, GAMMA, LAGRANGE, SchemeTables
 
 _OPEN = opener(*IMPLICIT_RECORDS)
 

@@ -1,4 +1,4 @@
-"""Kernel: forces of the laws and delay lines at given motions of the ports."""
+"""Kernel: forces of the laws and delay lines at given motions of the ports, and the history that delay lines read."""
 
 from typing import NamedTuple
 
@@ -88,4 +88,64 @@ def ask_laws(book: int, t: float, through: int) -> int:
     """`port_forces` at the start of a step, from outside of the kernels."""
     (ports,) = _OPEN(book)
     port_forces(ports, t, np.int64(0), through)
+    return 0
+
+
+class History(NamedTuple):
+    """Displacements at the ports of delay lines, step by step.
+
+    Attributes
+    ----------
+    begin, length
+        ``[step]`` seconds.
+    value
+        ``[step, delay, 5]`` at the start, the quarters and the end of the step.
+    hint
+        ``[delay + 1]`` step at which each line was last asked; the last is the number of steps kept.
+    """
+
+    begin: Numbers1
+    length: Numbers1
+    value: Numbers3
+    hint: Integers1
+
+
+@part_code
+def fill_lagged(history: History, ports: Ports, stage: Stage, t: float) -> None:
+    """Displacement of each delay line at `t` less its dead time; 0 before the start."""
+    for delay in range(ports.delay_s.size):
+        ports.lagged[stage, delay] = _displacement(history, delay, t - ports.delay_s[delay])
+
+
+@part_code
+def _displacement(history: History, delay: int, t: float) -> float:
+    count = history.hint[history.hint.size - 1]
+    if t < 0.0 or count == 0:
+        return 0.0
+    step = min(history.hint[delay], count - 1)
+    while step > 0 and history.begin[step] > t:
+        step -= 1
+    while step + 1 < count and history.begin[step + 1] <= t:
+        step += 1
+    history.hint[delay] = step
+    # Polynomial of degree 4 through the five values; never across the end of a step, where an input may have a kink.
+    x = 4.0 * (t - history.begin[step]) / history.length[step]
+    total = 0.0
+    for node in range(5):
+        factor = 1.0
+        for other in range(5):
+            if other != node:
+                factor *= (x - other) / (node - other)
+        total += factor * history.value[step, delay, node]
+    return total
+
+
+_OPEN_HISTORY = opener(History, Ports)
+
+
+@kernel(ASK)
+def ask_delays(book: int, t: float, _: int) -> int:
+    """`fill_lagged` at the start of a step, from outside of the kernels."""
+    history, ports = _OPEN_HISTORY(book)
+    fill_lagged(history, ports, np.int64(0), t)
     return 0

@@ -7,13 +7,10 @@ from math import ceil, log2
 import numpy as np
 
 from chladni.models.core.compiled_model import CompiledModel
-from chladni.models.integrator.delay_kernel import History, ask_delays
-from chladni.models.integrator.dense_kernel import Dense
-from chladni.models.integrator.drive_kernel import Drive
-from chladni.models.integrator.explicit_kernel import Stride
+from chladni.models.integrator.explicit_kernel import Drive, Stride
 from chladni.models.integrator.hold import Hold
 from chladni.models.integrator.implicit_kernel import STAGES, Newton, implicit_step
-from chladni.models.integrator.inside_kernel import inside
+from chladni.models.integrator.inside_kernel import Dense, inside
 from chladni.models.integrator.judge_kernel import Judge
 from chladni.models.integrator.march import (
     AUTOMATIC,
@@ -40,7 +37,7 @@ from chladni.models.integrator.march import (
 )  # fmt: skip
 from chladni.models.integrator.march_implicit import alternate, march_implicit
 from chladni.models.integrator.plane import book
-from chladni.models.integrator.port_kernel import Ports, ask_laws
+from chladni.models.integrator.port_kernel import History, Ports, ask_delays, ask_laws
 from chladni.models.integrator.port_plan import LawTable, PortPlan
 from chladni.models.integrator.step_tables import DEEPEST, StepTables
 from chladni.signals.arrays import Real

@@ -169,7 +169,7 @@ def _own(laws: Laws, room: Room, change: Change, unknowns: Unknowns, h: float, t
             room.state[place] = change.level[place]
 
 
-@part_code
+@inlined_code
 def _look_back(
     march: March, delays: DeadTimes, change: Change, unknowns: Unknowns, lines: DeadTimes, step: int
 ) -> None:
@@ -188,7 +188,7 @@ def _look_back(
         change.own[delays.port[delay], unknown] += (there - here) / unknowns.line_by[which]
 
 
-@part_code
+@inlined_code
 def _keep(delays: DeadTimes, change: Change, step: int) -> None:
     for delay in range(delays.port.size):
         for unknown in range(change.past.shape[2]):
@@ -241,7 +241,7 @@ def _settle(room: Room, change: Change, through: Real, first: int) -> None:
             _add(change.own_state, place, change.bend[place, argument], change.given, argument)
 
 
-@part_code
+@inlined_code
 def _pass_on(room: Room, change: Change) -> None:
     """What was after the step is before the next."""
     p = room.force.size
@@ -253,7 +253,7 @@ def _pass_on(room: Room, change: Change) -> None:
         _copy(change.force, port, change.fresh, port)
 
 
-@part_code
+@inlined_code
 def _carry(change: Change, unknowns: Unknowns, step: int) -> None:
     """Changes of states and motions after a step, without those of its last forces."""
     n, p, known = change.x.shape[0], change.force.shape[0], unknowns.lead.shape[2]
@@ -268,7 +268,7 @@ def _carry(change: Change, unknowns: Unknowns, step: int) -> None:
             _add(change.next, row, unknowns.table[row, n + port], change.force, port)
 
 
-@part_code
+@inlined_code
 def _write(change: Change, unknowns: Unknowns, step: int) -> None:
     """Add the changes of the outputs at a sample."""
     q, found = change.x.shape[1], change.found

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -10,13 +11,22 @@ from chladni.models.integrator.exponential import POWERS, Response, responses
 from chladni.models.integrator.hold import Hold
 from chladni.models.integrator.plane import Numbers2, Numbers3, Numbers4, Numbers5
 from chladni.models.integrator.port_plan import PortPlan
-from chladni.models.integrator.radau import LAGRANGE, NODES
 from chladni.signals.arrays import Real
 
 #: Steps are halved at most this often: a millisecond down to a nanosecond.
 DEEPEST = 20
 #: Inside a step, where the history of a delay line is kept.
 HISTORY_NODES = (0.25, 0.5, 0.75)
+
+# Radau IIA collocation with three stages: order 5, stiffly accurate (Hairer & Wanner 1996, section IV.5).
+#: Instants of the stages, as fractions of the step.
+NODES = np.array([(4 - sqrt(6)) / 10, (4 + sqrt(6)) / 10, 1.0])
+#: ``[power, stage]``: the polynomial of degree 2 through 1 at one node and 0 at the others.
+LAGRANGE = np.linalg.inv(np.vander(NODES, increasing=True))
+#: ``[stage, stage]``: integral of each of them up to each node.
+WEIGHTS = (NODES[:, None] ** np.arange(1, 4) / np.arange(1, 4)) @ LAGRANGE
+#: Reciprocal of the real eigenvalue of the inverse of WEIGHTS: the weight of the error estimate.
+GAMMA = float(1 / min(np.linalg.eigvals(np.linalg.inv(WEIGHTS)), key=lambda value: abs(value.imag)).real)
 
 
 class SchemeTables(NamedTuple):

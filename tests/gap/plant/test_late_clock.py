@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.gap.plant.free_run import FreeRun
-from chladni.gap.plant.late_clock import read_late
+from chladni.gap.plant.free_run import FreeRun, read_late
 from chladni.gap.plant.law_plant import Setting, coarse_run, fine_run, slopes_of
 from chladni.models.effects.attached_effect import attached
 from tests.gap.made_log import RATE_HZ, band_noise, measured, three_bodies
