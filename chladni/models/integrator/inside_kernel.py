@@ -7,7 +7,7 @@ import numpy as np
 from chladni.models.integrator.explicit_kernel import Stride
 from chladni.models.integrator.implicit_kernel import IMPLICIT_RECORDS
 from chladni.models.integrator.machine_code import INSIDE as INSIDE_SIGNATURE
-from chladni.models.integrator.machine_code import kernel, part_code
+from chladni.models.integrator.machine_code import inlined_code, kernel, part_code
 from chladni.models.integrator.march import BEFORE, INSIDE, LEVEL, POSITION, SAMPLE, UNIT, Course
 from chladni.models.integrator.plane import Integers1, Numbers1, Numbers2, Numbers3, opener
 from chladni.models.integrator.port_kernel import History, Ports, fill_lagged, port_forces
@@ -38,7 +38,7 @@ class Dense(NamedTuple):
     output: Numbers3
 
 
-@part_code
+@inlined_code
 def fill_powers(dense: Dense, ports: Ports, implicit: bool) -> None:
     """Polynomials through the forces and rates of the stages of the step just made."""
     q = ports.channels
@@ -74,7 +74,7 @@ def fill_row(tables: DenseTables, dense: Dense, ports: Ports, stride: Stride, le
                 dense.row[row] += tables.couple[level, instant, power, port, row] * value
 
 
-@part_code
+@inlined_code
 def keep_history(
     tables: DenseTables, dense: Dense, ports: Ports, stride: Stride, history: History,
     level: int, t: float, step_s: float,
@@ -100,7 +100,7 @@ def keep_history(
     history.hint[history.hint.size - 1] = step + 1
 
 
-@part_code
+@inlined_code
 def keep_outputs(
     tables: DenseTables, dense: Dense, ports: Ports, stride: Stride, history: History,
     level: int, instant: int, sample: int, t: float, step_s: float,
@@ -148,7 +148,7 @@ def inside(book: int, moment: int, hard: int, t: float, length_s: float) -> int:
     return 0
 
 
-@part_code
+@inlined_code
 def _fill_stage_lags(history: History, ports: Ports, hard: int, t: float, step_s: float) -> None:
     """What delay lines give at the stages of a step."""
     if ports.delay_s.size == 0:
@@ -162,7 +162,7 @@ def _fill_stage_lags(history: History, ports: Ports, hard: int, t: float, step_s
         fill_lagged(history, ports, stage, t + fraction * step_s * (1 - 1e-9))
 
 
-@part_code
+@inlined_code
 def _pass_jump(history: History, ports: Ports, stride: Stride, t: float, step_s: float) -> None:
     """Renew the forces at the start of the next step: a delayed jump may fall on this very instant."""
     if ports.delay_s.size == 0:
@@ -176,7 +176,7 @@ def _pass_jump(history: History, ports: Ports, stride: Stride, t: float, step_s:
     port_forces(ports, t, np.int64(0), np.int64(0))
 
 
-@part_code
+@inlined_code
 def _keep(
     tables: DenseTables, ports: Ports, stride: Stride, history: History, dense: Dense, course: Course,
     hard: int, length_s: float, t: float,

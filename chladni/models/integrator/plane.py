@@ -51,12 +51,10 @@ for _name in ("shape", "size"):
     _ATTRIBUTE(PlaneType, _name, _name)
 
 
-@_TYPED(operator.getitem)
 def _type_get(_context: Any) -> Callable[..., Any]:
     return lambda plane, index: plane.number if _fits(plane, index) else None
 
 
-@_TYPED(operator.setitem)
 def _type_set(_context: Any) -> Callable[..., Any]:
     return lambda plane, index, _value: types.none if _fits(plane, index) else None
 
@@ -82,17 +80,21 @@ def _place(context: Any, builder: Any, index: Any, plane_value: Any, index_value
     return builder.gep(builder.extract_value(plane_value, 0), [offset], inbounds=True)
 
 
-@_LOWER(operator.getitem, PlaneType, _TYPES.Any)
 def _get(context: Any, builder: Any, called: Any, values: Any) -> Any:
     return builder.load(_place(context, builder, called.args[1], *values))
 
 
-@_LOWER(operator.setitem, PlaneType, _TYPES.Any, _TYPES.Any)
 def _set(context: Any, builder: Any, called: Any, values: Any) -> Any:
     plane, index, kind = called.args
     number = context.cast(builder, values[2], kind, plane.number)
     builder.store(number, _place(context, builder, index, *values[:2]))
     return context.get_dummy_value()
+
+
+_TYPED(operator.getitem)(_type_get)
+_TYPED(operator.setitem)(_type_set)
+_LOWER(operator.getitem, PlaneType, _TYPES.Any)(_get)
+_LOWER(operator.setitem, PlaneType, _TYPES.Any, _TYPES.Any)(_set)
 
 
 class BookType(types.Type):

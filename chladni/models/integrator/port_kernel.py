@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chladni.models.integrator.machine_code import ASK, call_law, kernel, part_code
+from chladni.models.integrator.machine_code import ASK, call_law, inlined_code, kernel, part_code
 from chladni.models.integrator.plane import Integers1, Integers2, Numbers1, Numbers2, Numbers3, opener
+from chladni.models.integrator.port_plan import LawTable, PortPlan
 
 #: A number that numba must not take as part of the type: it would compile the kernel once for each.
 Stage = int | np.int64
@@ -47,7 +48,34 @@ class Ports(NamedTuple):
     lagged: Numbers2
 
 
-@part_code
+def ports_of(plan: PortPlan, laws: LawTable) -> Ports:
+    """Lay out the laws and delay lines of a model, with memory to ask them."""
+    count = len(plan.ports)
+    state = np.zeros(max(1, laws.state.size))[: laws.state.size]
+    channels = np.zeros((7, count + laws.state.size))
+    return Ports(
+        table=laws.table,
+        first=laws.first,
+        through=np.ascontiguousarray(plan.through),
+        motion=np.zeros(2 * count),
+        state=state,
+        channels=channels,
+        address=np.array([state.ctypes.data, channels.ctypes.data], dtype=np.int64),
+        delay_port=plan.delay_port,
+        delay_s=plan.delay_s,
+        looped=np.array([int(plan.looped)]),
+        lagged=np.zeros((6, plan.delay_s.size)),
+    )
+
+
+@inlined_code
+def end_of_states(ports: Ports, law: int) -> int:
+    """Place behind the last state of a law."""
+    last: int = ports.table[law + 1, 2] if law + 1 < ports.table.shape[0] else ports.state.size
+    return last
+
+
+@inlined_code
 def law_force(ports: Ports, law: int, d: float, s: float, t: float, stage: Stage) -> float:
     """Force of one law at one motion; writes its rates."""
     first = ports.table[law, 2]

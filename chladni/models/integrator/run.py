@@ -37,7 +37,7 @@ from chladni.models.integrator.march import (
 )  # fmt: skip
 from chladni.models.integrator.march_implicit import alternate, march_implicit
 from chladni.models.integrator.plane import book
-from chladni.models.integrator.port_kernel import History, Ports, ask_delays, ask_laws
+from chladni.models.integrator.port_kernel import History, ask_delays, ask_laws, ports_of
 from chladni.models.integrator.port_plan import LawTable, PortPlan
 from chladni.models.integrator.step_tables import DEEPEST, StepTables
 from chladni.signals.arrays import Real
@@ -81,7 +81,7 @@ class Run:
         # Laws in a loop can be met by Newton only.
         self._scheme = _SCHEMES["implicit" if plan.looped else scheme]
         self._coarsest = self._coarsest_level()
-        self._ports = _ports(plan, laws)
+        self._ports = ports_of(plan, laws)
         self._words = book(self._ports)
         self._newton = _newton(len(plan.ports), laws.state.size)
         self._soft = self._scheme != IMPLICIT
@@ -268,25 +268,6 @@ class Run:
             force_output=np.ascontiguousarray(self._plan.h),
             output=np.zeros((instants.size, outputs, count - 1)),
         )
-
-
-def _ports(plan: PortPlan, laws: LawTable) -> Ports:
-    count = len(plan.ports)
-    state = np.zeros(max(1, laws.state.size))[: laws.state.size]
-    channels = np.zeros((7, count + laws.state.size))
-    return Ports(
-        table=laws.table,
-        first=laws.first,
-        through=np.ascontiguousarray(plan.through),
-        motion=np.zeros(2 * count),
-        state=state,
-        channels=channels,
-        address=np.array([state.ctypes.data, channels.ctypes.data], dtype=np.int64),
-        delay_port=plan.delay_port,
-        delay_s=plan.delay_s,
-        looped=np.array([int(plan.looped)]),
-        lagged=np.zeros((6, plan.delay_s.size)),
-    )
 
 
 def _newton(count: int, states: int) -> Newton:

@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 from chladni.models.integrator.machine_code import ALONG, inlined_code, kernel, part_code
 from chladni.models.integrator.plane import Integers2, Numbers1, Numbers2, Numbers3, opener
+from chladni.models.integrator.port_kernel import Ports, end_of_states
 from chladni.models.integrator.trapezoid_kernel import (
     FINE,
     MARCH_RECORDS,
     DeadTimes,
-    Laws,
     March,
     Room,
     begin,
@@ -104,7 +104,7 @@ _OPEN = opener(*MARCH_RECORDS, Change, Unknowns, DeadTimes)
 
 
 @part_code
-def _slopes(laws: Laws, room: Room, change: Change, h: float, t: float) -> None:
+def _slopes(ports: Ports, room: Room, change: Change, h: float, t: float) -> None:
     """Slopes of all forces and law states over what they depend on."""
     p, count = room.force.size, room.state.size
     for port in range(p):
@@ -114,16 +114,16 @@ def _slopes(laws: Laws, room: Room, change: Change, h: float, t: float) -> None:
         for argument in range(4 * p + count):
             change.bend[place, argument] = 0.0
     for port in range(p):
-        here = force_of(laws, room, port, h, t)
-        low, high = _states_of(laws, port)
+        here = force_of(ports, room, port, h, t)
+        low, high = _states_of(ports, port)
         for place in range(low, high):
             change.level[place] = room.state[place]
         for argument in range(4 * p + count if high > low else 2 * p):
             mine = argument % p == port if argument < 4 * p else low <= argument - 4 * p < high
             if not mine:
                 continue
-            change.slope[port, argument] = slope_of(laws, room, port, argument, here, h, t)
-            by = FINE * max(abs(room.given[argument]), laws.scale[argument])
+            change.slope[port, argument] = slope_of(ports, room, port, argument, here, h, t)
+            by = FINE * max(abs(room.given[argument]), room.scale[argument])
             for place in range(low, high):
                 change.bend[place, argument] = (room.state[place] - change.level[place]) / by
         for place in range(low, high):
@@ -131,18 +131,18 @@ def _slopes(laws: Laws, room: Room, change: Change, h: float, t: float) -> None:
 
 
 @inlined_code
-def _states_of(laws: Laws, port: int) -> tuple[int, int]:
+def _states_of(ports: Ports, port: int) -> tuple[int, int]:
     low = high = 0
-    for law in range(laws.first[port], laws.first[port + 1]):
-        if laws.counts[law] > 0:
+    for law in range(ports.first[port], ports.first[port + 1]):
+        if end_of_states(ports, law) > ports.table[law, 2]:
             if high == low:
-                low = laws.table[law, 2]
-            high = laws.table[law, 2] + laws.counts[law]
+                low = ports.table[law, 2]
+            high = end_of_states(ports, law)
     return low, high
 
 
 @part_code
-def _own(laws: Laws, room: Room, change: Change, unknowns: Unknowns, h: float, t: float) -> None:
+def _own(ports: Ports, room: Room, change: Change, unknowns: Unknowns, h: float, t: float) -> None:
     """What the laws' own parameters add to forces and law states."""
     p, count, q = room.force.size, room.state.size, change.x.shape[1]
     for row in range(p):
@@ -154,16 +154,16 @@ def _own(laws: Laws, room: Room, change: Change, unknowns: Unknowns, h: float, t
     for which in range(unknowns.by.size):
         unknown, law, by = unknowns.other[which, 0], unknowns.other[which, 1], unknowns.by[which]
         port = 0
-        while laws.first[port + 1] <= law:
+        while ports.first[port + 1] <= law:
             port += 1
-        here = force_of(laws, room, port, h, t)
-        low, high = _states_of(laws, port)
+        here = force_of(ports, room, port, h, t)
+        low, high = _states_of(ports, port)
         for place in range(low, high):
             change.level[place] = room.state[place]
-        kept = laws.table[law, 1]
-        laws.table[law, 1] = unknowns.other[which, 2]
-        change.own[port, unknown] += (force_of(laws, room, port, h, t) - here) / by
-        laws.table[law, 1] = kept
+        kept = ports.table[law, 1]
+        ports.table[law, 1] = unknowns.other[which, 2]
+        change.own[port, unknown] += (force_of(ports, room, port, h, t) - here) / by
+        ports.table[law, 1] = kept
         for place in range(low, high):
             change.own_state[place, unknown] += (room.state[place] - change.level[place]) / by
             room.state[place] = change.level[place]
@@ -285,10 +285,10 @@ def _write(change: Change, unknowns: Unknowns, step: int) -> None:
 
 
 @part_code
-def _open(march: March, laws: Laws, room: Room, change: Change, unknowns: Unknowns, t: float) -> None:
+def _open(march: March, ports: Ports, room: Room, change: Change, unknowns: Unknowns, t: float) -> None:
     """Changes at the start of a window: of the state itself, and of the motions and forces that it makes at once."""
     n, p, known = change.x.shape[0], room.force.size, unknowns.lead.shape[2]
-    begin(march, laws, room, t)
+    begin(march, ports, room, t)
     _clear(change.x)
     _clear(change.next)
     _clear(change.given)
@@ -300,8 +300,8 @@ def _open(march: March, laws: Laws, room: Room, change: Change, unknowns: Unknow
             change.next[row, unknown] = unknowns.lead_start[row, unknown]
         for column in range(n):
             _add(change.next, row, unknowns.start[row, column], change.x, column)
-    _slopes(laws, room, change, 0.0, t)
-    _own(laws, room, change, unknowns, 0.0, t)
+    _slopes(ports, room, change, 0.0, t)
+    _own(ports, room, change, unknowns, 0.0, t)
     _settle(room, change, unknowns.through, 0)
 
 
@@ -311,11 +311,11 @@ def law_slopes(book: int, h: float, begin_s: float) -> int:
 
     The march is differentiated as it was made, step by step, laws that switch included.
     """
-    march, laws, delays, room, change, unknowns, lines = _OPEN(book)
+    march, ports, delays, room, change, unknowns, lines = _OPEN(book)
     n, p = change.x.shape[0], room.force.size
-    begin_dead_times(delays, laws.lagged, laws.now)
-    _open(march, laws, room, change, unknowns, begin_s)
-    see_own_step(delays, laws.now)
+    begin_dead_times(delays, room.lagged, room.now)
+    _open(march, ports, room, change, unknowns, begin_s)
+    see_own_step(delays, room.now)
     _keep(delays, change, 0)
     for step in range(march.rows.shape[0]):
         _pass_on(room, change)
@@ -329,8 +329,8 @@ def law_slopes(book: int, h: float, begin_s: float) -> int:
             room.given[row] = march.motion[step + 1, row]
         for place in range(room.state.size):
             room.given[4 * p + place] = room.state[place]
-        _slopes(laws, room, change, h, t)
-        _own(laws, room, change, unknowns, h, t)
+        _slopes(ports, room, change, h, t)
+        _own(ports, room, change, unknowns, h, t)
         _look_back(march, delays, change, unknowns, lines, step + 1)
         _settle(room, change, unknowns.ends, n)
         _keep(delays, change, step + 1)

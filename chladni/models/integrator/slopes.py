@@ -9,7 +9,7 @@ from chladni.models.integrator.integrator import Integration
 from chladni.models.integrator.plane import book
 from chladni.models.integrator.slope_kernel import Change, Unknowns, law_slopes
 from chladni.models.integrator.trapezoid_kernel import DeadTimes, March
-from chladni.models.integrator.trapezoid_march import Equations, Windows, kernel_laws, kernel_room, new_record
+from chladni.models.integrator.trapezoid_march import Equations, Windows, kernel_ports, kernel_room, new_record
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
 
@@ -62,11 +62,11 @@ def sensitivities(
         When a change gives equations of another form.
     """
     room = kernel_room(equation)
-    laws = kernel_laws(equation, room)
+    ports = kernel_ports(equation)
     for record in records:
         largest = 1e-2 * np.abs(record.motion).max(axis=0)
         size = 2 * largest.size
-        laws.scale[:size] = np.maximum(laws.scale[:size], np.tile(largest, 2))
+        room.scale[:size] = np.maximum(room.scale[:size], np.tile(largest, 2))
     for one, _ in changed:
         _require_same_form(equation, one)
     to_modal, from_modal = modal_coordinates(equation.step[: len(equation.plan.a), : len(equation.plan.a)])
@@ -79,7 +79,7 @@ def sensitivities(
         found[start:stop, :, : len(changed)] = outputs
         unknowns = fixed._replace(lead=lead, lead_start=lead_start)
         change = _change(equation, found[start:stop])
-        words = book(record, laws, equation.delays, room, change, unknowns, lines)
+        words = book(record, ports, equation.delays, room, change, unknowns, lines)
         law_slopes(words.ctypes.data, 1.0 / sample_rate_hz, start / sample_rate_hz)
     slopes = np.ascontiguousarray(found.transpose(2, 1, 0))
     return slopes[: len(changed)], slopes[len(changed) :]

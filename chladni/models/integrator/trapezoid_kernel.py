@@ -9,8 +9,11 @@ nor lag.
 from math import expm1
 from typing import NamedTuple
 
-from chladni.models.integrator.machine_code import ALONG, call_law, inlined_code, kernel, part_code
-from chladni.models.integrator.plane import Integers1, Integers2, Numbers1, Numbers2, opener
+import numpy as np
+
+from chladni.models.integrator.machine_code import ALONG, inlined_code, kernel, part_code
+from chladni.models.integrator.plane import Integers1, Numbers1, Numbers2, opener
+from chladni.models.integrator.port_kernel import Ports, end_of_states, law_force
 from chladni.signals.arrays import Real
 
 _ITERATIONS = 40
@@ -22,38 +25,6 @@ _NEARLY = 1e-6
 _SMALL = 1e-2
 #: Differences of motions for the slope of a force; of law states inside, whose own differences must be far below.
 FINE, _LARGE = 1e-6, 1e-3
-
-
-class Laws(NamedTuple):
-    """Laws as the kernels read them, and room to ask them.
-
-    Attributes
-    ----------
-    table
-        ``[law, 3]`` address of the function, address of its parameters, place of its first state.
-    counts
-        ``[law]`` states of each.
-    first
-        ``[port + 1]`` first law of each port.
-    trial, rates
-        ``[law state]`` where laws read states and write rates.
-    address
-        Of trial, of rates, of the states at the end.
-    scale
-        ``[4 port + law state]`` size of each argument, so that differences are taken on it.
-    lagged, now
-        ``[port]`` what dead times give of steps before, and their share of the displacement after the step itself.
-    """
-
-    table: Integers2
-    counts: Integers1
-    first: Integers1
-    trial: Numbers1
-    rates: Numbers1
-    address: Integers1
-    scale: Numbers1
-    lagged: Numbers1
-    now: Numbers1
 
 
 class DeadTimes(NamedTuple):
@@ -88,6 +59,10 @@ class Room(NamedTuple):
         ``[2 port]`` motions after it, without those forces.
     missed, tried, slope, matrix, inverse
         Of Newton's iteration.
+    scale
+        ``[4 port + law state]`` size of each argument, so that differences are taken on it.
+    lagged, now
+        ``[port]`` what dead times give of steps before, and their share of the displacement after the step itself.
     """
 
     given: Numbers1
@@ -99,6 +74,9 @@ class Room(NamedTuple):
     slope: Numbers1
     matrix: Numbers2
     inverse: Numbers2
+    scale: Numbers1
+    lagged: Numbers1
+    now: Numbers1
 
 
 class March(NamedTuple):
@@ -130,53 +108,50 @@ class March(NamedTuple):
 
 
 #: What the march keeps in its book, and its slopes before what is their own.
-MARCH_RECORDS = (March, Laws, DeadTimes, Room)
+MARCH_RECORDS = (March, Ports, DeadTimes, Room)
 _OPEN = opener(*MARCH_RECORDS)
 
 
 @inlined_code
-def _bend(laws: Laws, law: int, room: Room, port: int, h: float, t: float) -> None:
-    """States of a law at the end of the step."""
+def _bend(ports: Ports, law: int, room: Room, port: int, h: float, t: float) -> None:
+    """States of a law at the end of the step, where it's asked for its force."""
     p = room.force.size
-    first, parameters = laws.table[law, 2], laws.table[law, 1]
+    first, last = ports.table[law, 2], end_of_states(ports, law)
     d = 0.5 * (room.given[port] + room.given[2 * p + port])
     s = 0.5 * (room.given[p + port] + room.given[3 * p + port])
     middle = t - 0.5 * h
-    trial, rates = laws.address[0] + 8 * first, laws.address[1] + 8 * first
-    for place in range(first, first + laws.counts[law]):
-        laws.trial[place] = room.given[4 * p + place]
-    for place in range(first, first + laws.counts[law]):
+    for place in range(first, last):
+        ports.state[place] = room.given[4 * p + place]
+    for place in range(first, last):
         here = room.given[4 * p + place]
         by = _LARGE * (abs(here) + _SMALL)
-        laws.trial[place] = here + by
-        call_law(laws.table[law, 0], d, s, middle, parameters, trial, rates)
-        there = laws.rates[place]
-        laws.trial[place] = here
-        call_law(laws.table[law, 0], d, s, middle, parameters, trial, rates)
-        rate = laws.rates[place]
+        ports.state[place] = here + by
+        law_force(ports, law, d, s, middle, np.int64(0))
+        there = ports.channels[0, p + place]
+        ports.state[place] = here
+        law_force(ports, law, d, s, middle, np.int64(0))
+        rate = ports.channels[0, p + place]
         e = min(h * (there - rate) / by, 30.0)
         share = expm1(e) / e if abs(e) > 1e-6 else 1.0 + 0.5 * e
         room.state[place] = here + h * share * rate
+    for place in range(first, last):
+        ports.state[place] = room.state[place]
 
 
 @inlined_code
-def force_of(laws: Laws, room: Room, port: int, h: float, t: float) -> float:
+def force_of(ports: Ports, room: Room, port: int, h: float, t: float) -> float:
     """Force of all laws and dead times at a port, at the motion after the step; sets the states of laws."""
     p = room.force.size
-    total: float = laws.lagged[port] + laws.now[port] * room.given[port]
-    for law in range(laws.first[port], laws.first[port + 1]):
-        if laws.counts[law] > 0:
-            _bend(laws, law, room, port, h, t)
-        first = laws.table[law, 2]
-        total += call_law(
-            laws.table[law, 0], room.given[port], room.given[p + port], t, laws.table[law, 1],
-            laws.address[2] + 8 * first, laws.address[1] + 8 * first,
-        )  # fmt: skip
+    total: float = room.lagged[port] + room.now[port] * room.given[port]
+    for law in range(ports.first[port], ports.first[port + 1]):
+        if end_of_states(ports, law) > ports.table[law, 2]:
+            _bend(ports, law, room, port, h, t)
+        total += law_force(ports, law, room.given[port], room.given[p + port], t, np.int64(0))
     return total
 
 
 @part_code
-def missed_by(laws: Laws, room: Room, through: Real, force: Real, h: float, t: float) -> float:
+def missed_by(ports: Ports, room: Room, through: Real, force: Real, h: float, t: float) -> float:
     """Largest difference between the forces and what the laws say of the motion that they make."""
     p = room.force.size
     for row in range(2 * p):
@@ -186,18 +161,18 @@ def missed_by(laws: Laws, room: Room, through: Real, force: Real, h: float, t: f
         room.given[row] = value
     largest = 0.0
     for port in range(p):
-        room.missed[port] = force[port] - force_of(laws, room, port, h, t)
+        room.missed[port] = force[port] - force_of(ports, room, port, h, t)
         largest = max(largest, abs(room.missed[port]))
     return largest
 
 
 @part_code
-def slope_of(laws: Laws, room: Room, port: int, argument: int, here: float, h: float, t: float) -> float:
+def slope_of(ports: Ports, room: Room, port: int, argument: int, here: float, h: float, t: float) -> float:
     """Change of a port's force with one of its arguments; leaves the law states as they are there."""
     kept = room.given[argument]
-    by = FINE * max(abs(kept), laws.scale[argument])
+    by = FINE * max(abs(kept), room.scale[argument])
     room.given[argument] = kept + by
-    slope: float = (force_of(laws, room, port, h, t) - here) / by
+    slope: float = (force_of(ports, room, port, h, t) - here) / by
     room.given[argument] = kept
     return slope
 
@@ -234,13 +209,13 @@ def invert(room: Room) -> None:
 
 
 @inlined_code
-def _newton_change(laws: Laws, room: Room, through: Real, h: float, t: float) -> None:
+def _newton_change(ports: Ports, room: Room, through: Real, h: float, t: float) -> None:
     """Newton's change of the forces, in `slope`."""
     p = room.force.size
     for port in range(p):
-        here = force_of(laws, room, port, h, t)
+        here = force_of(ports, room, port, h, t)
         for row in (port, p + port):
-            room.slope[row] = slope_of(laws, room, port, row, here, h, t)
+            room.slope[row] = slope_of(ports, room, port, row, here, h, t)
     equations(room, through)
     invert(room)
     for row in range(p):
@@ -251,19 +226,19 @@ def _newton_change(laws: Laws, room: Room, through: Real, h: float, t: float) ->
 
 
 @part_code
-def meet(laws: Laws, room: Room, through: Real, h: float, t: float, size: float) -> int:
+def meet(ports: Ports, room: Room, through: Real, h: float, t: float, size: float) -> int:
     """Forces at the end of the step that agree with the laws: Newton, halved while it makes things worse."""
     p = room.force.size
-    missed = missed_by(laws, room, through, room.force, h, t)
+    missed = missed_by(ports, room, through, room.force, h, t)
     for _ in range(_ITERATIONS):
         if missed <= _MET * size:
             return 0
-        _newton_change(laws, room, through, h, t)
+        _newton_change(ports, room, through, h, t)
         share, best = 1.0, missed
         for _ in range(_HALVINGS):
             for row in range(p):
                 room.tried[row] = room.force[row] + share * room.slope[row]
-            best = missed_by(laws, room, through, room.tried, h, t)
+            best = missed_by(ports, room, through, room.tried, h, t)
             if best < missed:
                 break
             share *= 0.5
@@ -272,12 +247,12 @@ def meet(laws: Laws, room: Room, through: Real, h: float, t: float, size: float)
         missed = best
         for row in range(p):
             room.force[row] = room.tried[row]
-    missed = missed_by(laws, room, through, room.force, h, t)
+    missed = missed_by(ports, room, through, room.force, h, t)
     return 0 if missed <= _NEARLY * size else 1
 
 
 @part_code
-def begin(march: March, laws: Laws, room: Room, t: float) -> int:
+def begin(march: March, ports: Ports, room: Room, t: float) -> int:
     """Motions and forces at the start of a window, which make each other at once."""
     n, p = march.x.shape[1], room.force.size
     for row in range(2 * p):
@@ -292,18 +267,18 @@ def begin(march: March, laws: Laws, room: Room, t: float) -> int:
         room.given[4 * p + place] = march.state[0, place]
     for port in range(p):
         room.force[port] = 0.0
-    missed = missed_by(laws, room, march.through, room.force, 0.0, t)
-    return meet(laws, room, march.through, 0.0, t, max(missed, 1e-300))
+    missed = missed_by(ports, room, march.through, room.force, 0.0, t)
+    return meet(ports, room, march.through, 0.0, t, max(missed, 1e-300))
 
 
 @inlined_code
-def _record(march: March, laws: Laws, room: Room, step: int) -> None:
+def _record(march: March, room: Room, step: int) -> None:
     """Keep what a step ended with, and begin the next one from it."""
     p = room.force.size
     for row in range(2 * p):
         march.motion[step, row] = room.given[row]
-        laws.scale[row] = max(laws.scale[row], _SMALL * abs(room.given[row]))
-        laws.scale[2 * p + row] = laws.scale[row]
+        room.scale[row] = max(room.scale[row], _SMALL * abs(room.given[row]))
+        room.scale[2 * p + row] = room.scale[row]
         room.given[2 * p + row] = room.given[row]
     for place in range(room.state.size):
         march.state[step, place] = room.state[place]
@@ -361,24 +336,24 @@ def look_back(delays: DeadTimes, delay: int, motion: Real, step: int, latest: in
 @kernel(ALONG)
 def law_march(book: int, h: float, begin_s: float) -> int:
     """March through one window; gives how many steps did not meet their laws."""
-    march, laws, delays, room = _OPEN(book)
+    march, ports, delays, room = _OPEN(book)
     n, p, width = march.x.shape[1], room.force.size, march.rows.shape[1]
-    begin_dead_times(delays, laws.lagged, laws.now)
-    failed = begin(march, laws, room, begin_s)
-    see_own_step(delays, laws.now)
+    begin_dead_times(delays, room.lagged, room.now)
+    failed = begin(march, ports, room, begin_s)
+    see_own_step(delays, room.now)
     size = 1e-300
     for step in range(march.rows.shape[0]):
-        _record(march, laws, room, step)
+        _record(march, room, step)
         for port in range(p):
             size = max(size, abs(room.force[port]))
         if step == march.rows.shape[0] - 1:
             break
         _advance(march, room, step)
         for port in range(p):
-            laws.lagged[port] = 0.0
+            room.lagged[port] = 0.0
         for delay in range(delays.port.size):
-            laws.lagged[delays.port[delay]] += look_back(delays, delay, march.motion, step + 1, step)
-        failed += meet(laws, room, march.ends, h, begin_s + (step + 1) * h, size)
+            room.lagged[delays.port[delay]] += look_back(delays, delay, march.motion, step + 1, step)
+        failed += meet(ports, room, march.ends, h, begin_s + (step + 1) * h, size)
         for row in range(n):
             for port in range(p):
                 march.x[step + 1, row] += march.table[row, n + width + p + port] * room.force[port]

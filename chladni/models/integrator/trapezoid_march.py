@@ -9,8 +9,9 @@ from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import responses
 from chladni.models.integrator.hold import hold_of
 from chladni.models.integrator.plane import book
+from chladni.models.integrator.port_kernel import Ports, ports_of
 from chladni.models.integrator.port_plan import LawTable, PortPlan, law_table, port_plan
-from chladni.models.integrator.trapezoid_kernel import DeadTimes, Laws, March, Room, law_march
+from chladni.models.integrator.trapezoid_kernel import DeadTimes, March, Room, law_march
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
 
@@ -121,12 +122,12 @@ def run_laws(equation: Equations, windows: Windows, initial: Real, sample_rate_h
         When the model diverges, or laws can't be met by these steps.
     """
     room = kernel_room(equation)
-    laws = kernel_laws(equation, room)
+    ports = kernel_ports(equation)
     h = 1.0 / (sample_rate_hz * equation.parts)
     records, failed = [], 0
     for (start, stop), first in zip(windows, initial, strict=True):
         record = new_record(equation, start, stop, first)
-        words = book(record, laws, equation.delays, room)
+        words = book(record, ports, equation.delays, room)
         failed += law_march(words.ctypes.data, h, start / sample_rate_hz)
         if not np.all(np.isfinite(record.x[-1])):
             raise ModelError(f"the model diverges between {start / sample_rate_hz:g} and {stop / sample_rate_hz:g} s")
@@ -163,18 +164,10 @@ def new_record(equation: Equations, start: int, stop: int, first: Real) -> March
     )  # fmt: skip
 
 
-def kernel_laws(equation: Equations, room: Room) -> Laws:
-    """Laws for the kernels, which write their states into `room`."""
-    laws, p = equation.laws, len(equation.plan.ports)
-    count = laws.state.size
-    # A law without states is given an address too, which it doesn't read.
-    trial, rates = np.zeros(count + 1), np.zeros(count + 1)
-    address = np.array([trial.ctypes.data, rates.ctypes.data, room.state.ctypes.data], dtype=np.int64)
-    return Laws(
-        laws.table.copy(), np.array([len(law.state) for law in laws.laws], dtype=np.int64), laws.first,
-        trial, rates, address, np.concatenate([np.full(4 * p, 1e-300), np.full(count, 1e-3)]),
-        np.zeros(p), np.zeros(p),
-    )  # fmt: skip
+def kernel_ports(equation: Equations) -> Ports:
+    """Laws for the kernels; slopes exchange the parameters of one."""
+    ports = ports_of(equation.plan, equation.laws)
+    return ports._replace(table=ports.table.copy())
 
 
 def kernel_room(equation: Equations) -> Room:
@@ -183,4 +176,5 @@ def kernel_room(equation: Equations) -> Room:
     return Room(
         np.zeros(4 * p + count), np.zeros(count), np.zeros(p), np.zeros(2 * p),
         np.zeros(p), np.zeros(p), np.zeros(2 * p), np.zeros((p, p)), np.zeros((p, p)),
+        np.concatenate([np.full(4 * p, 1e-300), np.full(count, 1e-3)]), np.zeros(p), np.zeros(p),
     )  # fmt: skip
