@@ -139,7 +139,7 @@ def is_stiff(judge: Judge, ports: Ports) -> bool:
     return not again <= max(0.3 * first, judge.tolerance[0])
 
 
-@part_code
+@inlined_code
 def explicit_error_at_turns(judge: Judge, ports: Ports, stride: Stride, t: float, step_s: float) -> float:
     """`missed_at_turns` of an explicit step, at all ports."""
     total = 0.0
@@ -177,7 +177,7 @@ def missed_at_turns(
     return missed
 
 
-@part_code
+@inlined_code
 def _turn(start: float, first: float, end: float, last: float, length: float) -> float:
     """Where, from 0 to 1, the cubic through values and slopes at both ends has its only extremum."""
     mean = (end - start) / length
@@ -188,7 +188,7 @@ def _turn(start: float, first: float, end: float, last: float, length: float) ->
     return x if 0.0 <= x <= 1.0 else min(max(total / a, 0.0), 1.0)
 
 
-@part_code
+@inlined_code
 def _cubic(start: float, first: float, end: float, last: float, length: float, x: float) -> float:
     """Cubic through values and slopes at both ends of a length, at a share of it."""
     rise, rate, final = end - start, length * first, length * last

@@ -84,7 +84,7 @@ def law_force(ports: Ports, law: int, d: float, s: float, t: float, stage: Stage
     return call_law(ports.table[law, 0], d, s, t, ports.table[law, 1], ports.address[0] + 8 * first, rates)
 
 
-@part_code
+@inlined_code
 def port_forces(ports: Ports, t: float, stage: Stage, through: Stage) -> None:
     """Forces and rates of one stage from `motion` and `state`; port by port, so that earlier forces move later ports.
 

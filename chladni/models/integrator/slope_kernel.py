@@ -103,7 +103,7 @@ class Change(NamedTuple):
 _OPEN = opener(*MARCH_RECORDS, Change, Unknowns, DeadTimes)
 
 
-@part_code
+@inlined_code
 def _slopes(ports: Ports, room: Room, change: Change, h: float, t: float) -> None:
     """Slopes of all forces and law states over what they depend on."""
     p, count = room.force.size, room.state.size
@@ -141,7 +141,7 @@ def _states_of(ports: Ports, port: int) -> tuple[int, int]:
     return low, high
 
 
-@part_code
+@inlined_code
 def _own(ports: Ports, room: Room, change: Change, unknowns: Unknowns, h: float, t: float) -> None:
     """What the laws' own parameters add to forces and law states."""
     p, count, q = room.force.size, room.state.size, change.x.shape[1]
@@ -216,7 +216,7 @@ def _copy(target: Real, row: int, source: Real, place: int) -> None:
         target[row, unknown] = source[place, unknown]
 
 
-@part_code
+@inlined_code
 def _settle(room: Room, change: Change, through: Real, first: int) -> None:
     """Changes of forces, motions and law states after a step, from those of the motions without these forces."""
     p, count = room.force.size, room.state.size

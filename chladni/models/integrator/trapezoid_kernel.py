@@ -305,7 +305,7 @@ def _advance(march: March, room: Room, step: int) -> None:
             room.base[row - n] = value
 
 
-@part_code
+@inlined_code
 def begin_dead_times(delays: DeadTimes, lagged: Real, now: Real) -> None:
     """At the start of a window nothing is behind: all that acts ``[port]`` is the displacement that is missing."""
     for port in range(now.size):
@@ -314,7 +314,7 @@ def begin_dead_times(delays: DeadTimes, lagged: Real, now: Real) -> None:
         now[delays.port[delay]] -= 1.0
 
 
-@part_code
+@inlined_code
 def see_own_step(delays: DeadTimes, now: Real) -> None:
     """After the start, a dead time below two steps sees the displacement ``[port]`` at the end of its own."""
     for delay in range(delays.port.size):
