@@ -49,7 +49,7 @@ def test_what_the_model_alone_tells_better_than_other_sensors_is_no_floor(shaken
 def test_where_a_force_on_another_body_does_as_well_no_floor_is_told(shaken) -> None:
     study, tuned = shaken
     ground, joint, inside, *others = study.location.ranked
-    assert inside.places[0].names == ("b1",)
+    assert inside.places[0].names[0] == "b1"
     as_good = replace(inside, profile=replace(inside.profile, misfit=1.05 * ground.profile.misfit))
     location = replace(study.location, ranked=(ground, joint, as_good, *others))
     assert shaken_by(replace(study, location=location), tuned) is None
