@@ -5,7 +5,7 @@ from typing import Protocol, Self
 
 from chladni.gap.plant.kept import Kept
 from chladni.models.core.compiled_model import CompiledModel
-from chladni.models.effects.pair import with_pairs
+from chladni.models.effects.pair import unlinked_pairs, with_pair_ports
 from chladni.signals.arrays import Real
 
 #: Of a tunable's sigma: small against curvature, large against rounding of equations.
@@ -46,12 +46,14 @@ class Neighbours:
 
     def __init__(self, model: Varied, tunables: Scaled) -> None:
         self._model, self._tunables = model, tunables
+        # Where bodies share no joint the model may lack one. Which do is the same at all numbers.
+        self._pairs = unlinked_pairs(model.compile())
         self._at: Kept[CompiledModel] = Kept(_KEPT)
         self._changed: Kept[tuple[CompiledModel, ...]] = Kept(_KEPT)
 
     def at(self, z: Real) -> CompiledModel:
         """Give the equations at ``z [parameter]``, in units of their tolerance."""
-        return self._at.get(z.tobytes(), lambda: with_pairs(self._set(z).compile()))
+        return self._at.get(z.tobytes(), lambda: self._linked(self._set(z)))
 
     def changed(self, z: Real) -> tuple[CompiledModel, ...]:
         """``[parameter]``: equations with each parameter `STEP` further than at z."""
@@ -63,4 +65,7 @@ class Neighbours:
     def _steps(self, z: Real) -> tuple[CompiledModel, ...]:
         # From the model at z each takes one new number.
         base, there = self._set(z), self._tunables.values(z + STEP)
-        return tuple(with_pairs(base.with_values({name: there[name]}).compile()) for name in self._tunables.names)
+        return tuple(self._linked(base.with_values({name: there[name]})) for name in self._tunables.names)
+
+    def _linked(self, model: Varied) -> CompiledModel:
+        return with_pair_ports(model.compile(), self._pairs)

@@ -8,6 +8,7 @@ import numpy as np
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import Port, PortKind
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 #: Between the names of a pair: ``arm~hand``.
@@ -52,35 +53,73 @@ def with_pair_port(compiled: CompiledModel, name: str) -> tuple[CompiledModel, i
     for place, port in enumerate(compiled.ports):
         if (port.name, port.kind) == (name, "pair"):
             return compiled, place
-    pair = pair_of(compiled, name, "pair")
-    if pair is None:
-        members = ", ".join(members_of(compiled, "pair")) or "none"
-        raise ModelError(f"{name!r} is no pair of bodies; join two of: {members}")
-    weights = np.zeros(len(compiled.ports))
-    bodies = [(sign, compiled.port_index(one, "body")) for sign, one in zip((-1.0, 1.0), pair, strict=True)
-              if one != _GROUND]  # fmt: skip
-    for sign, place in bodies:
-        weights[place] = sign
-    shown = [compiled.ports[place] for _, place in bodies]
-    _require_alike(name, shown)
-    last = shown[-1]
-    port = Port(name=name, kind="pair", unit=last.unit, displacement_unit=last.displacement_unit)
+    return with_pair_ports(compiled, [name]), len(compiled.ports)
+
+
+def with_pair_ports(compiled: CompiledModel, names: Sequence[str]) -> CompiledModel:
+    """Give the model with a new port for each of some pairs of bodies; errors are those of `with_pair_port`."""
+    if not names:
+        return compiled
+    weights, ports = np.zeros((len(names), len(compiled.ports))), []
+    for row, name in enumerate(names):
+        ends = _ends(compiled, name)
+        for sign, place in ends:
+            weights[row, place] = sign
+        shown = [compiled.ports[place] for _, place in ends]
+        _require_alike(name, shown)
+        last = shown[-1]
+        ports.append(Port(name=name, kind="pair", unit=last.unit, displacement_unit=last.displacement_unit))
     # What acts at the pair acts at its bodies, against their displacements' signs.
-    to_displacement, to_velocity = -compiled.displacement_port @ weights, -compiled.velocity_port @ weights
-    displacement_port = np.column_stack([compiled.displacement_port, to_displacement])
-    velocity_port = np.column_stack([compiled.velocity_port, to_velocity])
+    displacement_port = np.column_stack([compiled.displacement_port, -compiled.displacement_port @ weights.T])
+    velocity_port = np.column_stack([compiled.velocity_port, -compiled.velocity_port @ weights.T])
     return replace(
         compiled,
-        g=np.column_stack([compiled.g, -compiled.g @ weights]),
-        h=np.column_stack([compiled.h, -compiled.h @ weights]),
+        g=np.column_stack([compiled.g, -compiled.g @ weights.T]),
+        h=np.column_stack([compiled.h, -compiled.h @ weights.T]),
         displacement_state=np.vstack([compiled.displacement_state, weights @ compiled.displacement_state]),
         displacement_column=np.vstack([compiled.displacement_column, weights @ compiled.displacement_column]),
         displacement_port=np.vstack([displacement_port, weights @ displacement_port]),
         velocity_state=np.vstack([compiled.velocity_state, weights @ compiled.velocity_state]),
         velocity_column=np.vstack([compiled.velocity_column, weights @ compiled.velocity_column]),
         velocity_port=np.vstack([velocity_port, weights @ velocity_port]),
-        ports=(*compiled.ports, port),
-    ), len(compiled.ports)
+        ports=(*compiled.ports, *ports),
+    )
+
+
+def unlinked_pairs(compiled: CompiledModel) -> tuple[str, ...]:
+    """Give the names of all pairs of bodies, and of a body and the ground, that move alike and share no joint."""
+    joints = [
+        (compiled.displacement_state[place], compiled.displacement_column[place])
+        for place, port in enumerate(compiled.ports)
+        if port.kind == "joint"
+    ]
+    found = []
+    for name in pairs_of(compiled, "pair"):
+        ends = _ends(compiled, name)
+        if len({compiled.ports[place].displacement_unit for _, place in ends}) > 1:
+            continue
+        state = sum(sign * compiled.displacement_state[place] for sign, place in ends)
+        column = sum(sign * compiled.displacement_column[place] for sign, place in ends)
+        if not any(_same(state, own) and _same(column, moved) for own, moved in joints):
+            found.append(name)
+    return tuple(found)
+
+
+def _same(one: Real, other: Real) -> bool:
+    return np.array_equal(one, other) or np.array_equal(one, -other)
+
+
+def _ends(compiled: CompiledModel, name: str) -> list[tuple[float, int]]:
+    """Sign and port of each body of a pair."""
+    pair = pair_of(compiled, name, "pair")
+    if pair is None:
+        members = ", ".join(members_of(compiled, "pair")) or "none"
+        raise ModelError(f"{name!r} is no pair of bodies; join two of: {members}")
+    return [
+        (sign, compiled.port_index(one, "body"))
+        for sign, one in zip((-1.0, 1.0), pair, strict=True)
+        if one != _GROUND
+    ]
 
 
 def _require_alike(name: str, bodies: Sequence[Port]) -> None:
@@ -88,22 +127,3 @@ def _require_alike(name: str, bodies: Sequence[Port]) -> None:
     if len(units) > 1:
         told = " and ".join(f"{port.name} in {port.displacement_unit}" for port in bodies)
         raise ModelError(f"{name!r}: {told} move in unlike ways; only two that both turn, or both don't, are a pair")
-
-
-def with_pairs(compiled: CompiledModel) -> CompiledModel:
-    """Give the model with a port for every two bodies, or ground and body, that could be linked and aren't."""
-    joints = [place for place, port in enumerate(compiled.ports) if port.kind == "joint"]
-    units = {port.name: port.displacement_unit for port in compiled.ports if port.kind == "body"}
-    for name in pairs_of(compiled, "pair"):
-        if len({units[one] for one in name.split(TILDE) if one in units}) > 1:
-            continue
-        linked, place = with_pair_port(compiled, name)
-        if not any(_moves_alike(linked, place, joint) for joint in joints):
-            compiled = linked
-    return compiled
-
-
-def _moves_alike(compiled: CompiledModel, place: int, other: int) -> bool:
-    """Whether the displacement at a port is that at another one, or its opposite."""
-    ways = (compiled.displacement_state, compiled.displacement_column)
-    return any(all(np.array_equal(way[place], sign * way[other]) for way in ways) for sign in (1.0, -1.0))

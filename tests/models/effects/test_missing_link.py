@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.models.effects.attached_effect import attached
-from chladni.models.effects.pair import pairs_of, with_pair_port, with_pairs
+from chladni.models.effects.pair import pairs_of, unlinked_pairs, with_pair_port, with_pair_ports
 from chladni.models.structures.structure import Body, Joint
 from chladni.signals.errors import ModelError
 from tests.models.effects.small_models import one_body
@@ -85,8 +85,16 @@ def test_what_turns_and_what_slides_are_no_pair() -> None:
 
 
 def test_what_a_joint_links_is_no_pair_to_look_at() -> None:
-    ports = with_pairs(tree().compile()).ports
-    assert [port.name for port in ports if port.kind == "pair"] == ["ground~left", "ground~right"]
-    assert [port.name for port in with_pairs(loose().compile()).ports if port.kind == "pair"] == [
-        "ground~left", "ground~right", "left~right",
-    ]  # fmt: skip
+    assert unlinked_pairs(tree().compile()) == ("ground~left", "ground~right")
+    assert unlinked_pairs(loose().compile()) == ("ground~left", "ground~right", "left~right")
+
+
+def test_pairs_get_their_ports_at_once_as_one_after_another() -> None:
+    compiled = loose().compile()
+    names = unlinked_pairs(compiled)
+    together, single = with_pair_ports(compiled, names), compiled
+    for name in names:
+        single, _ = with_pair_port(single, name)
+    assert together.ports == single.ports
+    for field in ("g", "h", "displacement_state", "displacement_port", "velocity_state", "velocity_port"):
+        np.testing.assert_allclose(getattr(together, field), getattr(single, field), atol=1e-15)
