@@ -9,7 +9,7 @@ import numpy as np
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.effects.attaching import pass_through
-from chladni.models.effects.clues import Clues
+from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.linear_filter import first_order, second_order
 from chladni.models.effects.trial import Trial, TrialMotion, numbers, shaped
@@ -17,6 +17,8 @@ from chladni.signals.arrays import Complex
 
 #: Hz; a filter as fast as that is none.
 _NONE_HZ = 1e9
+#: Share of its power, at the highest frequency that moved, that a filter must take to be told from a delay.
+_SEEN = 0.1
 
 
 def damping_ratios(order: int) -> list[float]:
@@ -47,6 +49,15 @@ def response(s: Complex, corner_hz: float, order: int) -> Complex:
     for damping_ratio in damping_ratios(order):
         gain = gain / (p**2 + 2 * damping_ratio * p + 1)
     return np.asarray(gain, dtype=np.complex128)
+
+
+def _is_late_only(corner_hz: float, order: float, highest_hz: float) -> bool:
+    """Whether all that moved passes: what such a filter does is a delay."""
+    return bool((highest_hz / corner_hz) ** (2 * order) < _SEEN)
+
+
+def _is_degenerate(fitted: FittedForm) -> bool:
+    return _is_late_only(fitted.values["corner"], fitted.values["order"], fitted.band_hz[1])
 
 
 def _trials(motion: TrialMotion) -> Iterator[Trial]:
@@ -88,7 +99,7 @@ ANTI_ALIAS = EffectKind(
     neutral={"corner": _NONE_HZ},
     linear=True,
     check=_check,
-    clues=Clues(trials=_trials),
+    clues=Clues(trials=_trials, is_degenerate=_is_degenerate),
     variants=(
         Variant(
             name="butterworth",

@@ -73,4 +73,4 @@ def test_nothing_new_is_told_where_nothing_was_named_or_only_noise_is_left(rubbi
 def test_another_round_is_held_over_the_floor_that_was_told(rubbing) -> None:
     finer = over_floor(rubbing, rubbing.contest.noise.lowered(np.array([1.0, 1.0, 0.01])))
     assert finer.contest.noise.rms[2] < 0.2 * rubbing.contest.noise.rms[2]
-    assert (finer.leave_out, finer.windows, finer.measurement.log) == (frozenset(), None, rubbing.measurement.log)
+    assert (finer.kinds, finer.windows, finer.measurement.log) == (rubbing.kinds, None, rubbing.measurement.log)

@@ -196,7 +196,7 @@ def test_an_effect_of_ones_own_takes_part():
 @pytest.mark.slow
 def test_what_no_effect_left_explains_is_unknown():
     log = log_of([chladni.attached("time_offset", "speed", {"offset": 0.02})], MOVED)
-    out = ("time_offset", "mounting_resonance", "cross_axis", "ac_coupling")
+    out = ("time_offset", "mounting_resonance", "cross_axis", "ac_coupling", "anti_alias", "clock_drift")
     found = diagnose_simulator(slide(), log, leave_out=out)
     assert (found.verdict, found.causes) == ("unknown", ())
     # What isn't explained is what tuning left, not what it began with.

@@ -4,6 +4,8 @@ from scipy.signal import butter, freqs
 
 from chladni.models.effects.anti_alias import response
 from chladni.models.effects.attached_effect import attached
+from chladni.models.effects.catalogue import CATALOGUE
+from chladni.models.effects.clues import FittedForm
 from chladni.signals.errors import ModelError
 from tests.models.effects.small_models import one_body, with_loop
 
@@ -37,3 +39,17 @@ def test_a_controller_sees_what_its_filtered_sensor_sees() -> None:
 def test_there_are_two_to_eight_poles(order: float, words: str) -> None:
     with pytest.raises(ModelError, match=words):
         attached("anti_alias", "acc", {"corner": 15.0, "order": order})
+
+
+@pytest.mark.parametrize(("corner", "degenerate"), [(50.0, False), (150.0, True)])
+def test_a_filter_that_lets_all_pass_is_a_delay(corner, degenerate):
+    judge = CATALOGUE["anti_alias"].clues.is_degenerate
+    # At 100 Hz one of order 4 takes 99.6 % of the power with its corner at 50 Hz, 3.8 % at 150 Hz.
+    fitted = FittedForm(
+        variant="butterworth",
+        values={"corner": corner, "order": 4.0},
+        duration_s=10.0,
+        band_hz=(1.0, 100.0),
+        motion=lambda: (np.zeros(0), np.zeros(0)),
+    )
+    assert judge(fitted) is degenerate
