@@ -32,8 +32,14 @@ def _chains() -> Generator:
     return CHAINS
 
 
+def _networks() -> Generator:
+    from chladni_withheld.networks.draw import DEFAULT, draw_case
+
+    return Generator(composition=DEFAULT, draws=partial(one_by_one, draw_case))
+
+
 #: Generators by name; each is imported when it's asked for.
-GENERATORS: Mapping[str, Callable[[], Generator]] = {"chains": _chains}
+GENERATORS: Mapping[str, Callable[[], Generator]] = {"chains": _chains, "networks": _networks}
 
 
 def generator_of(name: str) -> Generator:

@@ -27,4 +27,8 @@ OUTSIDE: Mapping[str, str] = {
     "position_dependent_gain": "actuator",
     "square_sensor": "sensor",
     "held_samples": "sensor",
+    "position_dependent_damping": "damping",
+    "fluid_coupling": "coupling",
+    "drifting_gain": "sensor",
+    "rectified_crosstalk": "sensor",
 }

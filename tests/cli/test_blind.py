@@ -121,7 +121,7 @@ def test_a_kind_that_there_is_not_is_one_line(run: Run, tmp_path: Path) -> None:
 def test_a_generator_that_there_is_not_is_one_line(run: Run, tmp_path: Path) -> None:
     done = run("blind", "make", tmp_path / "campaign", "--generator", "rust")
     assert (done.code, done.err.count("\n")) == (2, 1)
-    assert "'rust' is no generator of cases; there are chains" in done.err
+    assert "'rust' is no generator of cases; there are chains, networks" in done.err
     assert not (tmp_path / "campaign").exists()
 
 

@@ -146,7 +146,7 @@ def test_cases_of_another_generator_are_written_and_sealed_alike(tmp_path, monke
 
 
 def test_a_generator_that_there_is_not_is_one_line(tmp_path):
-    with pytest.raises(SetupError, match="'rust' is no generator of cases; there are chains"):
+    with pytest.raises(SetupError, match="'rust' is no generator of cases; there are chains, networks"):
         make_cases(tmp_path, count=1, seed=0, generator="rust")
 
 
