@@ -43,7 +43,9 @@ def make(
     *,
     count: Annotated[int, typer.Option(metavar="N", min=1, help="Number of cases.")] = 200,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of everything random in them.")] = 0,
-    generator: Annotated[str, typer.Option(metavar="NAME", help="What draws the machines: chains, networks.")] = "chains",
+    generator: Annotated[
+        str, typer.Option(metavar="NAME", help="What draws the machines: chains, networks.")
+    ] = "chains",
     kind: Kinds = None,
     jobs: Jobs = None,
     json: options.Json = None,

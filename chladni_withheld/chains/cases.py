@@ -20,8 +20,7 @@ from chladni_withheld.chains.plan import Bench, Hidden, Input, Output, model_tex
 from chladni_withheld.chains.scene import Scene
 from chladni_withheld.chains.severity import all_act, converted, left_after_tuning, sized
 from chladni_withheld.chains.simulation import measured, perform, pooled_change, rms, settled
-from chladni_withheld.chains.sites import DRAWN, draw_draft
-from chladni_withheld.vocabulary import OUTSIDE
+from chladni_withheld.chains.sites import DRAWN, OUTSIDE_DRAWN, draw_draft
 
 Matrix = NDArray[np.float64]
 _MOST_DRAWS = 200
@@ -135,7 +134,7 @@ def _words(kind: Kind, number: int, rng: np.random.Generator) -> list[tuple[str,
         return [_pair(place, rng) for place in range(number)]
     if kind == "three":
         return [_triple(rng) for _ in range(number)]
-    words = tuple(OUTSIDE) if kind == "outside" else DRAWN
+    words = OUTSIDE_DRAWN if kind == "outside" else DRAWN
     # A new order for each round, so that a short campaign doesn't always hold the same words.
     rounds = (str(word) for _ in cycle([0]) for word in rng.permutation(words))
     return [(word,) for word in islice(rounds, number)]

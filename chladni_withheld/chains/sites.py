@@ -83,6 +83,8 @@ DRAFTS: Mapping[str, Mapping[str, Drafter]] = {
 }  # fmt: skip
 #: Words of the vocabulary that are drawn, in its order.
 DRAWN = tuple(word for word in WORDS if any(word in drafts for drafts in DRAFTS.values()))
+#: What lies outside of it and is drawn.
+OUTSIDE_DRAWN = tuple(OUTSIDE_DRAFTS)
 
 
 def draw_draft(scene: Scene, word: str) -> Draft | None:

@@ -14,8 +14,7 @@ from chladni_withheld.chains.excitations import BEYOND, SensorNoise, draw_drive,
 from chladni_withheld.chains.scene import Scene
 from chladni_withheld.chains.severity import converted
 from chladni_withheld.chains.simulation import measured, perform, pooled_change, rms
-from chladni_withheld.chains.sites import DRAWN, draw_draft
-from chladni_withheld.vocabulary import OUTSIDE
+from chladni_withheld.chains.sites import DRAWN, OUTSIDE_DRAWN, draw_draft
 
 
 @pytest.fixture
@@ -58,13 +57,13 @@ def scene_for(word, footing):
 
 
 @pytest.mark.parametrize("footing", ["grounded", "loop", "drive"])
-@pytest.mark.parametrize("word", [*DRAWN, *OUTSIDE])
+@pytest.mark.parametrize("word", [*DRAWN, *OUTSIDE_DRAWN])
 def test_every_draft_moves_the_outputs_the_more_the_larger(word, footing):
     found = scene_for(word, footing)
     if found is None:
         # Only what needs springs, a ground or two equal sensors has no place in a drive.
         assert footing == "drive"
-        assert word in NEED_A_SPRING | {"base_vibration", "cross_axis"} | set(OUTSIDE)
+        assert word in NEED_A_SPRING | {"base_vibration", "cross_axis"} | set(OUTSIDE_DRAWN)
         return
     scene, drive, clean, draft = found
     bench, names = scene.bench, measured(scene.bench)
