@@ -160,9 +160,19 @@ def clear(scene: Scene, hidden: Hidden, every: tuple[Addition, ...], rest: tuple
 
     `every` and `rest`: all that is added, with and without it.
     """
+    hidden = distinct(scene, hidden, every, rest)
+    change, measure = _change(scene, every, rest)
+    # What is a wrong number by another name is told by tolerances alone.
+    tuned = measure.ratio(measure.tuned(change, 3.0 if hidden.draft.is_number else np.inf).left)
+    if tuned < CLEAR:
+        raise NotClearError(f"{hidden.draft.word}: tuned away")
+    return replace(hidden, ratio_tuned=tuned)
+
+
+def distinct(scene: Scene, hidden: Hidden, every: tuple[Addition, ...], rest: tuple[Addition, ...]) -> Hidden:
+    """Check that no force at another place, no filter of another word and no gain does the same; see `clear`."""
     draft = hidden.draft
-    after = logged(scene, every, filtered=False)
-    change, measure = after - logged(scene, rest, filtered=False), yardstick(scene, after)
+    change, measure = _change(scene, every, rest)
     hidden = replace(hidden, ratio=measure.ratio(change))
     nearest = [
         *_elsewhere(measure, draft, change), *_other_filter(scene, hidden), *_as_gain(scene, measure, draft, change)
@@ -170,11 +180,12 @@ def clear(scene: Scene, hidden: Hidden, every: tuple[Addition, ...], rest: tuple
     for name, left in nearest:
         if left < CLEAR:
             raise NotClearError(f"{draft.word}: like {_kind_of(scene, name)}")
-    # What is a wrong number by another name is told by tolerances alone.
-    tuned = measure.ratio(measure.tuned(change, 3.0 if draft.is_number else np.inf).left)
-    if tuned < CLEAR:
-        raise NotClearError(f"{draft.word}: tuned away")
-    return replace(hidden, ratio_tuned=tuned, nearest=min(nearest, key=lambda entry: entry[1]) if nearest else None)
+    return replace(hidden, nearest=min(nearest, key=lambda entry: entry[1]) if nearest else None)
+
+
+def _change(scene: Scene, every: tuple[Addition, ...], rest: tuple[Addition, ...]) -> tuple[Matrix, Yardstick]:
+    after = logged(scene, every, filtered=False)
+    return after - logged(scene, rest, filtered=False), yardstick(scene, after)
 
 
 def _kind_of(scene: Scene, name: str) -> str:

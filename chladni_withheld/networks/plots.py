@@ -16,6 +16,7 @@ from chladni_withheld.networks.hiding import (
     Hidden,
     RefusedError,
     clear,
+    distinct,
     draw_draft,
     hide,
     settle,
@@ -146,7 +147,8 @@ def _several(rng: Rng, seed: int, index: int, count: int) -> Plot:
     found: tuple[Hidden, ...] = ()
     for draft in drafts:
         among = tuple(hidden.made.addition for hidden in found)
-        found = (*found, settle(scene, draft, among, _wanted(rng, 25.0, 150.0), LEAST, MOST))
+        hidden = settle(scene, draft, among, _wanted(rng, 25.0, 150.0), LEAST, MOST)
+        found = (*found, distinct(scene, hidden, (*among, hidden.made.addition), among))
     return Plot(scene=scene, stated=scene.nominal, hidden=_each_clear(scene, found))
 
 
