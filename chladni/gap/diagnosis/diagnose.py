@@ -222,7 +222,8 @@ def _law_force(study: Study, causes: Causes, motion: Recovered) -> Real | None:
 
 
 def _port(study: Study, site: Site) -> tuple[str, str]:
-    compiled = study.contest.run.compiled()
+    # As it was located: two bodies that no joint links have a port there alone.
+    compiled = study.location.problem.view(study.location.tuned.z).compiled
     for port in compiled.ports:
         if (port.name, port.kind) == (site.name, site.kind):
             return port.unit, port.displacement_unit

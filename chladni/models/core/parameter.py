@@ -13,6 +13,23 @@ from chladni.signals.wording import near_words
 Role = Literal["construction", "function"]
 
 
+def not_workable(value: float, unit: str = "") -> str:
+    """Say of a finite number that equations can't hold it; an empty text when they can.
+
+    Examples
+    --------
+    >>> not_workable(2.0), not_workable(1e200, " kg")
+    ('', '1e+200 kg is too large to work with; give a size from 4e-103 to 2e+102, or 0')
+    """
+    if value == 0 or SMALLEST_OF_MODEL <= abs(value) <= LARGEST_OF_MODEL:
+        return ""
+    size = "large" if abs(value) > 1 else "small"
+    return (
+        f"{value:g}{unit} is too {size} to work with; "
+        f"give a size from {SMALLEST_OF_MODEL:.1g} to {LARGEST_OF_MODEL:.1g}, or 0"
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
     """One number of a model.
@@ -64,11 +81,8 @@ class Parameter:
         unit = "" if self.unit == "1" else f" {self.unit}"
         if not isfinite(self.value):
             raise ModelError(f"{self.name}: {self.value} is not finite; give a number{unit and f' in{unit}'}")
-        if not (self.value == 0 or SMALLEST_OF_MODEL <= abs(self.value) <= LARGEST_OF_MODEL):
-            raise ModelError(
-                f"{self.name}: {self.value:g}{unit} is too {'large' if abs(self.value) > 1 else 'small'} to work "
-                f"with; give a size from {SMALLEST_OF_MODEL:.1g} to {LARGEST_OF_MODEL:.1g}, or 0"
-            )
+        if wrong := not_workable(self.value, unit):
+            raise ModelError(f"{self.name}: {wrong}")
         if not self.minimum <= self.value <= self.maximum:
             raise ModelError(
                 f"{self.name}: {self.value:g}{unit} is not possible; "

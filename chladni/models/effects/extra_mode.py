@@ -84,12 +84,12 @@ def oscillator(shape: Shape, amplitudes: Real) -> Numbers | None:
 def _is_degenerate(fitted: FittedForm) -> bool:
     """Whether it never swings.
 
-    Resonant well above all that moved, it's a mass; one that doesn't swing once is a spring to where it stands; one
-    that is damped far too much to swing is a mass that a dashpot carries.
+    Resonant well above all that moved, it's a mass; as far below, or where it doesn't swing once, it stands still
+    and its mount is a spring to there; one that is damped far too much to swing is a mass that a dashpot carries.
     """
     swings = fitted.values["damping_ratio"] < _DASHPOT
-    highest_hz = STIFF_MOUNT * fitted.band_hz[1]
-    return not (swings and 1.0 / fitted.duration_s < fitted.values["frequency"] < highest_hz)
+    lowest_hz = max(1.0 / fitted.duration_s, fitted.band_hz[0] / STIFF_MOUNT)
+    return not (swings and lowest_hz < fitted.values["frequency"] < STIFF_MOUNT * fitted.band_hz[1])
 
 
 EXTRA_MODE = EffectKind(

@@ -5,12 +5,12 @@ from typing import Any, TypeVar
 
 from chladni.io.toml_reader import TomlMistakes, tables
 from chladni.models.core.model import Effect
-from chladni.models.core.parameter import Parameters
+from chladni.models.core.parameter import Parameters, not_workable
 from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.effects.wording import nearest
 from chladni.models.files.quantity import is_finite, number
-from chladni.models.files.site_units import SiteUnits, known_site, units_at
+from chladni.models.files.site_units import SiteUnits, known_site, sites_like, units_at
 from chladni.signals.errors import ModelError
 from chladni.signals.wording import shown
 
@@ -50,6 +50,14 @@ class FileReading:
         value = self.tried(loc, lambda: number(found, unit))
         if value is not None and at_least is not None and value < at_least:
             self.mistakes.add(loc, f"found {shown(found)}; must be {at_least:g} or more")
+            return None
+        return value
+
+    def parameter(self, loc: Loc, found: object, unit: str | None, *, at_least: float | None = None) -> float | None:
+        """Give a number in SI that equations can hold."""
+        value = self.number(loc, found, unit, at_least=at_least)
+        if value is not None and (wrong := not_workable(value, "" if unit in (None, "1") else f" {unit}")):
+            self.mistakes.add(loc, f"found {wrong}")
             return None
         return value
 
@@ -133,7 +141,9 @@ class FileReading:
         loc: Loc = ("effect", place)
         word, site, variant = (self.text(table, key) for key in ("effect", "site", "variant"))
         if site is not None and not known_site(site, sites):
-            self.mistakes.add((*loc, "site"), f"no site {site!r:.60}; {nearest(site, list(sites), 'sites')}")
+            self.mistakes.add(
+                (*loc, "site"), f"no site {site!r:.60}; {nearest(site, sites_like(site, sites), 'sites')}"
+            )
             site = None
         if word is not None and word not in CATALOGUE:
             self.mistakes.add(

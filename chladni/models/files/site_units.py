@@ -60,6 +60,20 @@ def known_site(site: str, sites: Mapping[str, SiteUnits | None]) -> bool:
     return site in sites or (bool(tilde) and first in sites and second in sites)
 
 
+def sites_like(site: str, sites: Mapping[str, SiteUnits | None]) -> list[str]:
+    """Give the names that a site which there is not may have meant: of a pair, pairs with the half that is known.
+
+    Examples
+    --------
+    >>> sites_like("arm~hnad", {"arm": None, "hand": None}), sites_like("hnad", {"arm": None, "hand": None})
+    (['arm~hand'], ['arm', 'hand'])
+    """
+    first, tilde, second = site.partition(TILDE)
+    pairs = [TILDE.join((first, one)) for one in sites if first in sites and one != first]
+    pairs += [TILDE.join((one, second)) for one in sites if second in sites and one != second]
+    return pairs if tilde and pairs else list(sites)
+
+
 def units_at(site: str, sites: Mapping[str, SiteUnits | None]) -> SiteUnits | None:
     """Give the units at a known site; of a pair those of its second, which both have but for the ground."""
     if site in sites:

@@ -90,7 +90,7 @@ class _StructureReading:
             self._mistakes.add(("body", place), "needs a mass in kg, or an inertia in kg m^2 for a body that rotates")
             return None
         key, unit = ("inertia", "kg m^2") if "inertia" in table else ("mass", "kg")
-        name, mass = self._file.text(table, "name"), self._file.number(("body", place, key), table[key], unit)
+        name, mass = self._file.text(table, "name"), self._file.parameter(("body", place, key), table[key], unit)
         position = self._position(place, table.get("position", [0.0, 0.0, 0.0]))
         if name is None or mass is None or position is None:
             return None
@@ -122,7 +122,7 @@ class _StructureReading:
         motion = self._motion_at(name or "") or "translation"
         # Not left to `Joint`, which would tell one of two wrong numbers.
         numbers = {
-            key: self._file.number(("joint", place, key), table.get(key), unit, at_least=0.0)
+            key: self._file.parameter(("joint", place, key), table.get(key), unit, at_least=0.0)
             for key, unit in (("stiffness", _STIFFNESS[motion]), ("damping", _DAMPING[motion]))
         }
         match numbers:

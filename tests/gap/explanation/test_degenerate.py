@@ -39,9 +39,16 @@ def ended_at(effect: AttachedEffect) -> Contestant:
 
 
 def test_an_oscillator_that_never_swings_in_a_log_is_a_spring_to_where_it_stands(run: FreeRun) -> None:
-    once_hz = 1.0 / run.measurement.duration_s
-    assert is_degenerate(run, hanging(0.5 * once_hz))
-    assert not is_degenerate(run, hanging(2.0 * once_hz))
+    lowest_hz = max(1.0 / run.measurement.duration_s, excited_band_hz(run.measurement)[0] / STIFF_MOUNT)
+    assert is_degenerate(run, hanging(0.9 * lowest_hz))
+    assert not is_degenerate(run, hanging(1.1 * lowest_hz))
+
+
+def test_an_oscillator_far_below_all_that_moved_is_a_spring_to_where_it_stands(run: FreeRun) -> None:
+    lowest_hz = excited_band_hz(run.measurement)[0]
+    # Long enough for it to swing: so it's the band alone that says it stands still.
+    assert 0.9 * lowest_hz / STIFF_MOUNT > 1.0 / run.measurement.duration_s
+    assert is_degenerate(run, hanging(0.9 * lowest_hz / STIFF_MOUNT))
 
 
 def test_what_is_damped_far_too_much_to_swing_is_a_mass_that_a_dashpot_carries(run: FreeRun) -> None:

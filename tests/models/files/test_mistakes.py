@@ -52,6 +52,7 @@ STRUCTURE_MISTAKES = [
     ('["column", "wrist"]', '@["column"]', "[[joint]] 2 between 2: is missing"),
     ('"0.6 kN/mm"', '@"3 kg"', "[[joint]] 2 stiffness: found '3 kg', which is in kg; must be a number in N/m"),
     ('"0.6 kN/mm"', "@-1.0", "[[joint]] 2 stiffness: found -1.0; must be 0 or more"),
+    ('"0.6 kN/mm"', "@1e300", "[[joint]] 2 stiffness: found 1e+300 N/m is too large to work with; give a size from"),
     ("damping = 90\n", "", "[[joint]] 2 damping: is missing, and is needed"),
     ('at = "wrist"\nchannel = "/hammer', '@at = "wirst"\nchannel = "/hammer', "'wirst' is no body or joint; did you"),
     ('at = "wrist"\nchannel = "/hammer', '@at = "ground"\nchannel = "/hammer', "use kind base_acceleration"),

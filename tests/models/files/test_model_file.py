@@ -330,3 +330,8 @@ def test_a_pair_is_a_site(tmp_path: Path) -> None:
 def test_a_pair_of_what_there_is_not_is_told(tmp_path: Path, site: str) -> None:
     with pytest.raises(ModelError, match=f"no site '{site}'"):
         structure(tmp_path, STRUCTURE + LINK.replace("ground~wrist", site))
+
+
+def test_a_pair_that_there_is_not_leads_to_the_nearest_pair(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="ground~wrist"):
+        structure(tmp_path, STRUCTURE + LINK.replace("ground~wrist", "ground~wirst"))
