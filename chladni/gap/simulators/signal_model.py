@@ -9,6 +9,7 @@ from chladni.gap.simulators.simulator import Simulator
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Effect, ModelKind
 from chladni.models.core.parameter import Parameters
+from chladni.models.core.port import HoldKind
 from chladni.models.core.simulation import Simulation
 
 
@@ -51,6 +52,10 @@ class SignalModel:
 
     def with_effects(self, effects: Sequence[Effect]) -> Self:  # noqa: ARG002 - what a model offers
         """Give the same: effects are wrapped around the simulator."""
+        return self
+
+    def with_holds(self, holds: Mapping[str, HoldKind]) -> Self:  # noqa: ARG002 - what a model offers
+        """Give the same: what happens between samples is the simulator's."""
         return self
 
     def compile(self) -> CompiledModel:

@@ -1,12 +1,13 @@
 """A model ready to simulate: linear equations, ports, and what is attached to them."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from math import pi
+from typing import Self
 
 import numpy as np
 
-from chladni.models.core.port import Port, PortKind, Terminal
+from chladni.models.core.port import HoldKind, Port, PortKind, Terminal, require_named
 from chladni.models.core.port_law import PortLaw
 from chladni.models.core.resolvent import resolvent
 from chladni.models.core.state_space import StateSpace
@@ -139,6 +140,20 @@ class CompiledModel(Value):
                 return column
             column += 1 + terminal.derivatives
         raise ModelError(f"no input {name!r}; inputs: {', '.join(terminal.name for terminal in self.inputs)}")
+
+    @property
+    def holds(self) -> tuple[HoldKind, ...]:
+        """How each input runs between its samples: straight where nobody has said."""
+        return tuple(terminal.hold or "foh" for terminal in self.inputs)
+
+    def with_holds(self, holds: Mapping[str, HoldKind]) -> Self:
+        """Give the model with other holds of the named inputs and outputs; `ModelError` when there's no such name."""
+        require_named(holds, (terminal.name for terminal in (*self.inputs, *self.outputs)))
+        inputs, outputs = (
+            tuple(replace(one, hold=holds.get(one.name, one.hold)) for one in terminals)
+            for terminals in (self.inputs, self.outputs)
+        )
+        return replace(self, inputs=inputs, outputs=outputs)
 
     def port_index(self, name: str, kind: PortKind | None = None) -> int:
         """Row of the named port; of the first that isn't an ``actuation`` when no kind is given.

@@ -5,6 +5,7 @@ from typing import Literal, Protocol, Self, runtime_checkable
 
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameters
+from chladni.models.core.port import HoldKind
 from chladni.models.core.simulation import Simulation
 
 ModelKind = Literal["structure", "drive", "scheme"]
@@ -71,6 +72,9 @@ class Model(Protocol):
 
     def with_effects(self, effects: Sequence[Effect]) -> Self:
         """Give the model with these effects in place of those it has."""
+
+    def with_holds(self, holds: Mapping[str, HoldKind]) -> Self:
+        """Give the model with other holds of the named inputs and outputs; `ModelError` when there's no such name."""
 
     def compile(self) -> CompiledModel:
         """Give the equations. Joints, bodies and ground first, then outputs, then loops are closed, then inputs."""

@@ -1,9 +1,16 @@
 """Terminals and ports: where signals enter and leave a compiled model, and where effects attach."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal, get_args
+
+from chladni.signals.errors import ModelError
+from chladni.signals.wording import near_words
 
 PortKind = Literal["joint", "body", "ground", "input", "actuation", "output", "pair", "output_pair"]
+#: What an input does between its samples: keeps the last one, runs straight to the next, is band-limited.
+HoldKind = Literal["zoh", "foh", "band_limited"]
+HOLDS: Final[tuple[HoldKind, ...]] = get_args(HoldKind)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,12 +28,16 @@ class Terminal:
     derivatives
         For inputs: how many time derivatives of the signal the equations need beside it. 2 for a prescribed
         displacement, whose velocity and acceleration act too; else 0.
+    hold
+        How the signal runs between its samples, None where nobody has said. Of an output: ``band_limited`` where an
+        anti-alias filter stood before its sampling; else a sample is the value at its stamp.
     """
 
     name: str
     unit: str
     channel: str | None = None
     derivatives: int = 0
+    hold: HoldKind | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,3 +82,13 @@ class Port:
     displacement_unit: str = "m"
     stiffness: float = 0.0
     damping: float = 0.0
+
+
+def require_named(holds: Mapping[str, HoldKind], known: Iterable[str]) -> None:
+    """Refuse holds of signals that there aren't; `ModelError` with the nearest name."""
+    names = list(known)
+    for name in holds:
+        if name not in names:
+            near = near_words(name, names)
+            wish = f"did you mean {near[0]!r}?" if near else f"there are: {', '.join(names) or 'none'}"
+            raise ModelError(f"no input or output {name[:60]!r}; {wish}")

@@ -7,7 +7,7 @@ from typing import Self
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Effect, ModelKind, flags_of_effects
 from chladni.models.core.parameter import Parameters
-from chladni.models.core.port import Terminal
+from chladni.models.core.port import HoldKind, Terminal, require_named
 from chladni.models.core.simulation import Simulation
 from chladni.models.drives.computed_output import computed_output
 from chladni.models.drives.drive_kind import DriveKind
@@ -67,6 +67,15 @@ class DriveModel:
     def with_effects(self, effects: Sequence[Effect]) -> Self:
         """Give the drive with these effects in place of those it has."""
         return replace(self, effects=tuple(effects))
+
+    def with_holds(self, holds: Mapping[str, HoldKind]) -> Self:
+        """Give the drive with other holds of the named signals that it shows; `ModelError` for another name."""
+        require_named(holds, [one.shown_as for one in (*self.inputs, *self.outputs)])
+        inputs, outputs = (
+            tuple(replace(one, hold=holds.get(one.shown_as, one.hold)) for one in chosen)
+            for chosen in (self.inputs, self.outputs)
+        )
+        return replace(self, inputs=inputs, outputs=outputs)
 
     def compile(self) -> CompiledModel:
         """Give the equations.

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from chladni.models.core.compiled_model import CompiledModel
-from chladni.models.core.port import Terminal
+from chladni.models.core.port import HoldKind, Terminal
 from chladni.signals.errors import ModelError
 
 
@@ -20,11 +20,14 @@ class ChosenSignal:
         Its name in the model, which is also its site; empty for the word itself.
     channel
         Channel of a log that holds it, or None.
+    hold
+        See `Terminal`.
     """
 
     signal: str
     name: str = ""
     channel: str | None = None
+    hold: HoldKind | None = None
 
     @property
     def shown_as(self) -> str:
@@ -103,5 +106,6 @@ def _with_channels(
     terminals: tuple[Terminal, ...], places: Sequence[int], chosen: Sequence[ChosenSignal]
 ) -> tuple[Terminal, ...]:
     return tuple(
-        replace(terminals[place], channel=choice.channel) for place, choice in zip(places, chosen, strict=True)
+        replace(terminals[place], channel=choice.channel, hold=choice.hold)
+        for place, choice in zip(places, chosen, strict=True)
     )

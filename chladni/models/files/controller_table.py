@@ -54,6 +54,7 @@ def read_controller(file: FileReading, place: int, table: Content, ends: Control
     return file.tried(loc, lambda: Controller(
         name=name, feedback=feedback, drives=drives, law=law, gains=gains, num=num, den=den,
         reference=file.text(table, "reference"),
+        hold=file.hold(table),
         rate_of="error" if table.get("rate_of") == "error" else "feedback",
         gain=gain.value if gain.value is not None else 1.0, gain_unit=gain.unit,
         limit=limit.value, limit_unit=limit.unit,

@@ -93,7 +93,7 @@ class _DriveReading:
                 self._mistakes.add((part, place, "signal"), f"{shown(signal)} is chosen twice; once is enough")
             else:
                 name, channel = self._file.text(table, "name") or "", self._file.text(table, "channel")
-                chosen.append(ChosenSignal(signal=signal, name=name, channel=channel))
+                chosen.append(ChosenSignal(signal=signal, name=name, channel=channel, hold=self._file.hold(table)))
         return chosen
 
     def _made(

@@ -33,4 +33,6 @@ def _signal(one: ChosenSignal) -> Table:
         table["name"] = one.name
     if one.channel is not None:
         table["channel"] = one.channel
+    if one.hold is not None:
+        table["hold"] = one.hold
     return table

@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 from chladni.io.toml_reader import TomlMistakes, tables
 from chladni.models.core.model import Effect
 from chladni.models.core.parameter import Parameters, not_workable
+from chladni.models.core.port import HOLDS, HoldKind
 from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.effects.wording import nearest
@@ -40,6 +41,10 @@ class FileReading:
         """Text of a key."""
         found = table.get(key)
         return found if isinstance(found, str) and found else None
+
+    def hold(self, table: Content) -> HoldKind | None:
+        """Word of the key ``hold``."""
+        return next((hold for hold in HOLDS if hold == table.get("hold")), None)
 
     def number(self, loc: Loc, found: object, unit: str | None, *, at_least: float | None = None) -> float | None:
         """Give a number in SI; a unit of None takes any."""

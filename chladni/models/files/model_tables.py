@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator
 
+from chladni.models.core.port import HoldKind
 from chladni.models.files.quantity import is_finite
 
 MAX_TABLES = 1000
@@ -43,6 +44,7 @@ Number = Annotated[float | str, PlainValidator(_number)]
 Text = Annotated[str, Field(strict=True, min_length=1, max_length=1000), AfterValidator(_printable)]
 Polynomial = Annotated[list[Number], Field(min_length=1, max_length=MAX_COEFFICIENTS)]
 Channel = Text | None
+Held = HoldKind | None
 
 
 class Table(BaseModel):
@@ -77,6 +79,7 @@ class InputTable(Table):
     at: Text | None = None
     joint: Text | None = None
     channel: Channel = None
+    hold: Held = None
 
 
 class OutputTable(Table):
@@ -87,6 +90,7 @@ class OutputTable(Table):
     at: Text | None = None
     joint: Text | None = None
     channel: Channel = None
+    hold: Held = None
 
 
 class ControllerTable(Table):
@@ -96,6 +100,7 @@ class ControllerTable(Table):
     feedback: Text
     drives: Text
     reference: Channel = None
+    hold: Held = None
     law: Literal["p", "pd", "pi", "pid", "p-p", "transfer-function"] | None = None
     gains: dict[str, Number] = {}
     num: Polynomial | None = None
@@ -148,6 +153,7 @@ class SignalTable(Table):
     signal: Text
     name: Text | None = None
     channel: Channel = None
+    hold: Held = None
 
 
 class DriveFile(ModelFile):

@@ -143,8 +143,8 @@ class _StructureReading:
             name, kind = self._file.text(table, "name"), table.get("kind", "force")
             at = self._site_of("input", place, table, GROUND if kind == "base_acceleration" else None)
             if name is not None and at is not None and kind in _INPUT_KINDS:
-                channel = self._file.text(table, "channel")
-                inputs[place] = StructureInput(name=name, at=at, kind=kind, channel=channel)
+                channel, hold = self._file.text(table, "channel"), self._file.hold(table)
+                inputs[place] = StructureInput(name=name, at=at, kind=kind, channel=channel, hold=hold)
         return inputs
 
     def _read_outputs(self) -> dict[int, StructureOutput]:
@@ -153,8 +153,8 @@ class _StructureReading:
             name, measures = self._file.text(table, "name"), table.get("measures")
             at = self._site_of("output", place, table, None)
             if name is not None and at is not None and measures in _MEASURES:
-                channel = self._file.text(table, "channel")
-                outputs[place] = StructureOutput(name=name, measures=measures, at=at, channel=channel)
+                channel, hold = self._file.text(table, "channel"), self._file.hold(table)
+                outputs[place] = StructureOutput(name=name, measures=measures, at=at, channel=channel, hold=hold)
         return outputs
 
     def _site_of(self, part: str, place: int, table: Content, default: str | None) -> str | None:

@@ -43,22 +43,20 @@ def _body(body: Body) -> Table:
 
 def _input(one: StructureInput, joints: set[str]) -> Table:
     table: Table = {"name": one.name, "kind": one.kind, "joint" if one.at in joints else "at": one.at}
-    return table | _channel(one.channel)
+    return table | _stated(channel=one.channel, hold=one.hold)
 
 
 def _output(one: StructureOutput, joints: set[str]) -> Table:
     table: Table = {"name": one.name, "measures": one.measures, "joint" if one.at in joints else "at": one.at}
-    return table | _channel(one.channel)
+    return table | _stated(channel=one.channel, hold=one.hold)
 
 
-def _channel(channel: str | None) -> Table:
-    return {} if channel is None else {"channel": channel}
+def _stated(**values: str | None) -> Table:
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def _controller(one: Controller) -> Table:
-    table: Table = {"name": one.name}
-    if one.reference is not None:
-        table["reference"] = one.reference
+    table: Table = {"name": one.name} | _stated(reference=one.reference, hold=one.hold)
     table |= {"feedback": one.feedback, "law": one.law}
     if one.gains:
         table["gains"] = dict(one.gains)

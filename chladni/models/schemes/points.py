@@ -33,7 +33,10 @@ def points_of(blocks: Sequence[Block], outputs: Sequence[SchemeOutput]) -> tuple
     declared = [
         Point(
             terminal=Terminal(
-                name=output.name, unit=output.unit or blocks[rows[output.at]].unit, channel=output.channel
+                name=output.name,
+                unit=output.unit or blocks[rows[output.at]].unit,
+                channel=output.channel,
+                hold=output.hold,
             ),
             block=rows[output.at],
         )

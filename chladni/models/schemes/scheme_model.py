@@ -12,7 +12,7 @@ import numpy as np
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Effect, ModelKind, flags_of_effects
 from chladni.models.core.parameter import Parameter, Parameters
-from chladni.models.core.port import Terminal
+from chladni.models.core.port import HoldKind, Terminal, require_named
 from chladni.models.core.simulation import Simulation
 from chladni.models.core.stability import growing_poles
 from chladni.models.elements.element import Element
@@ -138,6 +138,15 @@ class SchemeModel:
     def with_effects(self, effects: Sequence[Effect]) -> Self:
         """Give the scheme with these effects in place of those it has."""
         return replace(self, effects=tuple(effects))
+
+    def with_holds(self, holds: Mapping[str, HoldKind]) -> Self:
+        """Give the scheme with other holds of its inputs and declared outputs; `ModelError` for another name."""
+        require_named(holds, [one.name for one in (*self.inputs, *self.outputs)])
+        return replace(
+            self,
+            inputs=tuple(replace(one, hold=holds.get(one.name, one.hold)) for one in self.inputs),
+            outputs=tuple(replace(one, hold=holds.get(one.name, one.hold)) for one in self.outputs),
+        )
 
     def switched(self, switches: Mapping[str, bool]) -> Self:
         """Give the scheme with some blocks switched on or off.

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from chladni.models.core.port import HoldKind
 from chladni.models.schemes.block import require_name
 
 
@@ -19,12 +20,15 @@ class SchemeOutput:
         SI unit; the block's when not given.
     channel
         Channel of a log that measures it, or None.
+    hold
+        How it's sampled, see `Terminal`.
     """
 
     name: str
     at: str = ""
     unit: str = ""
     channel: str | None = None
+    hold: HoldKind | None = None
 
     def __post_init__(self) -> None:
         require_name(self.name, "output")

@@ -85,12 +85,18 @@ def scheme_tables(model: SchemeModel) -> dict[str, Any]:
     tables: dict[str, Any] = {
         "block": [_block_table(block) for block in model.blocks],
         "input": [
-            {"name": one.name, **_unless(unit=(one.unit, "1"), channel=(one.channel, None))} for one in model.inputs
+            {
+                "name": one.name,
+                **_unless(unit=(one.unit, "1"), channel=(one.channel, None), hold=(one.hold, None)),
+            }
+            for one in model.inputs
         ],
         "output": [
             {
                 "name": one.name,
-                **_unless(at=(one.at, one.name), unit=(one.unit, ""), channel=(one.channel, None)),
+                **_unless(
+                    at=(one.at, one.name), unit=(one.unit, ""), channel=(one.channel, None), hold=(one.hold, None)
+                ),
             }
             for one in model.outputs
         ],

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TypeVar
 
-from chladni.models.core.port import Terminal
+from chladni.models.core.port import HOLDS, HoldKind, Terminal
 from chladni.models.elements.catalogue import ELEMENTS, element_kind
 from chladni.models.elements.element import Element
 from chladni.models.elements.rational import rational
@@ -24,8 +24,8 @@ Loc = tuple[str | int, ...]
 Number = Callable[[float | str, str | None], float]
 
 BLOCK_KEYS = ("name", "kind", "parameters", "num", "den", "delay", "input", "on", "when_off", "unit", "input_unit")
-INPUT_KEYS = ("name", "unit", "channel")
-OUTPUT_KEYS = ("name", "at", "unit", "channel")
+INPUT_KEYS = ("name", "unit", "channel", "hold")
+OUTPUT_KEYS = ("name", "at", "unit", "channel", "hold")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,16 +105,16 @@ class TableReader:
         """``[[input]]``."""
         self.known_keys(loc, table, INPUT_KEYS)
         name, unit = self._name(loc, table), self._unit(loc, table, "unit") or "1"
-        channel = self._text((*loc, "channel"), table.get("channel"))
-        return None if name is None else Terminal(name=name, unit=unit, channel=channel)
+        channel, hold = self._text((*loc, "channel"), table.get("channel")), self._hold(loc, table)
+        return None if name is None else Terminal(name=name, unit=unit, channel=channel, hold=hold)
 
     def output(self, loc: Loc, table: Mapping[str, object]) -> SchemeOutput | None:
         """``[[output]]``."""
         self.known_keys(loc, table, OUTPUT_KEYS)
         name, unit = self._name(loc, table), self._unit(loc, table, "unit")
         at = self._text((*loc, "at"), table.get("at")) or ""
-        channel = self._text((*loc, "channel"), table.get("channel"))
-        return None if name is None else SchemeOutput(name=name, at=at, unit=unit, channel=channel)
+        channel, hold = self._text((*loc, "channel"), table.get("channel")), self._hold(loc, table)
+        return None if name is None else SchemeOutput(name=name, at=at, unit=unit, channel=channel, hold=hold)
 
     def block(self, loc: Loc, table: Mapping[str, object]) -> Block | None:
         """``[[block]]``."""
@@ -282,6 +282,13 @@ class TableReader:
             return value
         self._tell(loc, f"found {value!r:.60}; must be text in quotes")
         return None
+
+    def _hold(self, loc: Loc, table: Mapping[str, object]) -> HoldKind | None:
+        found = table.get("hold")
+        known = next((hold for hold in HOLDS if hold == found), None)
+        if found is not None and known is None:
+            self._tell((*loc, "hold"), f"found {found!r:.60}; must be one of {', '.join(HOLDS)}")
+        return known
 
     def _unit(self, loc: Loc, table: Mapping[str, object], key: str) -> str:
         """Unit of a signal, in SI; empty when it isn't given."""

@@ -59,6 +59,7 @@ class _Loop:
             unit=plant.outputs[self._feedback].unit,
             channel=controller.reference,
             derivatives=1 if self._law.uses_reference_rate else 0,
+            hold=controller.hold,
         )
         # Old ports keep their places, since laws name them by index; what is new comes behind them.
         self._n, self._m, self._q = len(plant.states), plant.columns, len(plant.ports)

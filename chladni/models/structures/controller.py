@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Final, Literal
 
+from chladni.models.core.port import HoldKind
 from chladni.signals.errors import ModelError
 from chladni.signals.units import quotient, si_factor
 
@@ -84,6 +85,8 @@ class Controller:
         Coefficients of the transfer function, highest power of s first.
     reference
         Channel of a log that holds the reference, or None. Either way it's an input, named like the controller.
+    hold
+        How the reference runs between its samples, see `Terminal`.
     rate_of
         ``feedback``: a step of the reference gives no impulse; ``error``: the textbook's PD, with the rate of the
         error.
@@ -110,6 +113,7 @@ class Controller:
     num: tuple[float, ...] = ()
     den: tuple[float, ...] = ()
     reference: str | None = None
+    hold: HoldKind | None = None
     rate_of: Literal["feedback", "error"] = "feedback"
     gain: float = 1.0
     gain_unit: str | None = None

@@ -76,13 +76,14 @@ def input_terminal(structure: Structure, one: StructureInput) -> Terminal:
         unit = measure_unit("acceleration", shaken_motion(structure))
     else:
         unit = measure_unit("force" if one.kind == "force" else "displacement", motion_at(structure, one.at))
-    return Terminal(name=one.name, unit=unit, channel=one.channel, derivatives=2 if one.kind == "displacement" else 0)
+    derivatives = 2 if one.kind == "displacement" else 0
+    return Terminal(name=one.name, unit=unit, channel=one.channel, derivatives=derivatives, hold=one.hold)
 
 
 def output_terminal(structure: Structure, one: StructureOutput) -> Terminal:
     """Name, unit and channel of an output."""
     unit = measure_unit(one.measures, motion_at(structure, one.at))
-    return Terminal(name=one.name, unit=unit, channel=one.channel)
+    return Terminal(name=one.name, unit=unit, channel=one.channel, hold=one.hold)
 
 
 # Fits and charts ask for one plant with thousands of numbers.

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from chladni.models.core.port import HoldKind
+
 InputKind = Literal["force", "base_acceleration", "displacement", "disturbance"]
 
 
@@ -30,9 +32,12 @@ class StructureInput:
         See the table.
     channel
         Channel of a log that holds it, or None.
+    hold
+        How it runs between its samples, see `Terminal`.
     """
 
     name: str
     at: str
     kind: InputKind = "force"
     channel: str | None = None
+    hold: HoldKind | None = None

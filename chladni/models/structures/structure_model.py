@@ -10,7 +10,7 @@ import numpy as np
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Effect, ModelKind, flags_of_effects
 from chladni.models.core.parameter import Parameters
-from chladni.models.core.port import Terminal
+from chladni.models.core.port import HoldKind, Terminal, require_named
 from chladni.models.core.simulation import Simulation
 from chladni.models.core.stability import growing_poles
 from chladni.models.effects.pair import TILDE
@@ -141,6 +141,22 @@ class StructureModel:
         """Give the model with these effects in place of those it has."""
         return replace(self, effects=tuple(effects))
 
+    def with_holds(self, holds: Mapping[str, HoldKind]) -> Self:
+        """Give the model with other holds of the named inputs and outputs, of a reference by its controller's name.
+
+        Raises
+        ------
+        ModelError
+            When there's no such name, or a prescribed motion can't run like that.
+        """
+        require_named(holds, [one.name for one in (*self.inputs, *self.outputs, *self.controllers)])
+        return replace(
+            self,
+            inputs=tuple(replace(one, hold=holds.get(one.name, one.hold)) for one in self.inputs),
+            outputs=tuple(replace(one, hold=holds.get(one.name, one.hold)) for one in self.outputs),
+            controllers=tuple(replace(one, hold=holds.get(one.name, one.hold)) for one in self.controllers),
+        )
+
     def compile(self) -> CompiledModel:
         """Give the equations: plant, effects at bodies, joints and ground, at outputs, loops, effects at inputs.
 
@@ -220,7 +236,7 @@ class StructureModel:
     def _disturbances(self, controller: Controller) -> list[Terminal]:
         unit = self._controller_units(controller)["command"]
         return [
-            Terminal(name=one.name, unit=unit, channel=one.channel)
+            Terminal(name=one.name, unit=unit, channel=one.channel, hold=one.hold)
             for one in self.inputs
             if one.kind == "disturbance" and one.at == controller.name
         ]

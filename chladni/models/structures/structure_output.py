@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from chladni.models.core.port import HoldKind
 from chladni.models.structures.structure import Motion
 
 Measure = Literal["acceleration", "velocity", "displacement", "force"]
@@ -36,9 +37,12 @@ class StructureOutput:
         A body or a joint.
     channel
         Channel of a log that holds it, or None.
+    hold
+        How it's sampled, see `Terminal`.
     """
 
     name: str
     measures: Measure
     at: str
     channel: str | None = None
+    hold: HoldKind | None = None

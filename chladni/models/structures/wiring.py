@@ -131,6 +131,11 @@ class _Rules:
             self._drivers.setdefault(controller.drives, controller.name)
 
     def of_input(self, one: StructureInput) -> Iterator[Told]:
+        if one.kind == "displacement" and one.hold == "zoh":
+            yield (
+                "hold",
+                "found 'zoh'; a motion that jumps has no velocity: foh (a spline) and band_limited run through",
+            )
         # Each kind acts at another kind of site, and the message says at which.
         if one.kind == "disturbance":
             if one.at not in self._controllers:
