@@ -147,7 +147,7 @@ class FreeRun:
         # An integrator counts time from the start of its own window; a law may want the log's.
         if len(self.windows) == 1 or not compiled.laws or not can_run(compiled):
             return None
-        if compiled.delays or hold.kinked.size or np.any(hold.rate >= 0):
+        if compiled.delays or hold.kinked.size or any(terminal.derivatives for terminal in compiled.inputs):
             return None
         starts = initial_states(initial, len(self.windows), len(compiled.states))
         return run_laws(self.equations(compiled, PARTS), self.windows, starts, rate)

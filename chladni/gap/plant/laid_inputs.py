@@ -1,5 +1,6 @@
 """Inputs of one log as rows of steps, laid out once for all models that take them alike."""
 
+from math import factorial
 from threading import Lock
 
 import numpy as np
@@ -43,7 +44,7 @@ class LaidInputs:
         Raises
         ------
         ModelError
-            When an input can't be late by less than nothing, or has rates or a kink that parts can't hold.
+            When an input can't be late by less than nothing, or has a kink that parts can't hold.
         """
         key = (
             compiled.inputs, compiled.input_maps, compiled.input_delays_s, compiled.generated, hold.width, parts,
@@ -53,22 +54,28 @@ class LaidInputs:
                 if known == key:
                     self._kept.append(self._kept.pop(place))
                     return rows
-        made = _finer(input_rows(compiled, hold, self._signals, self.sample_rate_hz, extra=0), hold, parts)
+        rows = input_rows(compiled, hold, self._signals, self.sample_rate_hz, extra=0)
+        made = _finer(rows, hold, parts, 1.0 / self.sample_rate_hz)
         with self._lock:
             self._kept = [*self._kept[1 - _KEPT :], (key, made)]
         return made
 
 
-def _finer(rows: Real, hold: Hold, parts: int) -> Real:
+def _finer(rows: Real, hold: Hold, parts: int, step_s: float) -> Real:
     """Rows of steps that are a part of the interval between samples."""
     if parts == 1:
         return rows
-    if np.any(hold.rate >= 0) or hold.kinked.size:
-        raise ModelError("an input with rates or a kink can't be divided")
-    m = hold.columns
+    if hold.kinked.size:
+        raise ModelError("an input with a kink can't be divided")
+    finer = np.repeat(rows, parts, axis=0).reshape(len(rows), parts, -1)
     share = np.arange(parts) / parts
-    finer = np.repeat(rows, parts, axis=0)
-    finer[:, hold.straight] += np.tile(share, len(rows))[:, None] * finer[:, m : m + hold.straight.size]
-    finer[:, m : m + hold.straight.size] /= parts
+    for column in range(hold.columns):
+        # Taylor's series along the rates up to the rise of the last: of a plain input it's a straight line.
+        *chain, rise = hold.places(column)
+        terms = [rows[:, place] * step_s**power / factorial(power) for power, place in enumerate(chain)]
+        terms.append(rows[:, rise] * step_s ** (len(chain) - 1) / factorial(len(chain)))
+        finer[:, :, column] = np.einsum("tn,ts->ns", terms, share ** np.arange(len(terms))[:, None])
+    finer = finer.reshape(len(rows) * parts, -1)
+    finer[:, hold.columns :] /= parts
     # The last row is the value at the end, with nothing after it.
     return finer[: (len(rows) - 1) * parts + 1]

@@ -46,7 +46,7 @@ class LinearProblem:
         self.model, self.measurement, self.tunables, self.lines = model, measurement, tunables, lines
         self.noise = noise
         self._neighbours = Neighbours(model, tunables) if neighbours is None else neighbours
-        self._inputs: dict[tuple[float, ...], Complex] = {}
+        self._inputs: dict[tuple[object, ...], Complex] = {}
         self._views: Kept[LinearView] = Kept(_VIEWS)
         compiled = model.compile()
         names = [terminal.name for terminal in compiled.outputs]

@@ -10,7 +10,7 @@ from scipy.linalg import schur
 from chladni.gap.plant.record_lines import RecordLines
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import responses
-from chladni.models.integrator.hold import hold_of
+from chladni.models.integrator.hold import Hold, free_hold, hold_of
 from chladni.models.integrator.input_rows import input_rows
 from chladni.signals.arrays import Complex, Real
 
@@ -25,6 +25,9 @@ class Way:
         ``[state, line]``.
     outputs
         ``[output, line]`` what passes at once.
+    carried
+        ``[place, line]``: what stands in the row of a step, see `Hold.places`, of a force (change) of one; no places
+        for an error of an output.
     port
         Index of the port, None for an input's or output's own samples.
     column
@@ -33,6 +36,7 @@ class Way:
 
     states: Complex
     outputs: Complex
+    carried: Complex
     port: int | None = None
     column: int | None = None
 
@@ -40,10 +44,12 @@ class Way:
 class LinearView:
     """Linear equations of a compiled model, sampled, on the lines of a record.
 
-    With ``x[k+1] = Phi x[k] + Gamma r[k]``, exact for inputs that run along straight lines, the transform of a
-    record of N samples satisfies ``z X = Phi X + Gamma R + z delta`` on every line, with ``delta = x[N] - x[0]``
-    negated: a start in motion and the cut-off end are n unknown numbers, not leakage (Pintelon and Schoukens,
-    *System Identification: A Frequency Domain Approach*, 2nd ed., section 6.3.2, in discrete time).
+    With ``x[k+1] = Phi x[k] + Gamma r[k]``, exact for inputs that run between samples as their holds say, the
+    transform of a record of N samples satisfies ``z X = Phi X + Gamma R + z delta`` on every line, with
+    ``delta = x[N] - x[0]`` negated: a start in motion and the cut-off end are n unknown numbers, not leakage
+    (Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., section 6.3.2, in discrete
+    time). Of a band-limited input the rows are such that ``(z I - Phi)^-1 Gamma R = (j omega I - A)^-1 B U`` (chapter
+    13), but for the polynomials' share, see `band_limited`: and a record needs no periods for it.
 
     Parameters
     ----------
@@ -56,7 +62,8 @@ class LinearView:
     rows
         Places of the outputs that are wanted.
     known
-        Spectra of the inputs by dead times, shared by views of one record: they are the same for all parameters.
+        Spectra of the inputs by dead times and holds, shared by views of one record: they are the same for all
+        parameters.
     """
 
     def __init__(
@@ -66,12 +73,12 @@ class LinearView:
         signals: Real,
         rows: tuple[int, ...],
         *,
-        known: dict[tuple[float, ...], Complex] | None = None,
+        known: dict[tuple[object, ...], Complex] | None = None,
     ) -> None:
         self.compiled, self.lines, self.rows = compiled, lines, list(rows)
         self.hold = hold_of(compiled, lines.sample_rate_hz)
         n = len(compiled.states)
-        step, _ = self._step(np.zeros((n, 0)))
+        step = self._step(self.hold.spread(compiled.b), self.hold)
         self._gamma = step[:, n:]
         # Triangular form once: then each line costs a substitution, defective matrices (a free body) included.
         self._triangle, self._unitary = schur(step[:, :n], output="complex")
@@ -81,7 +88,7 @@ class LinearView:
         )
         self._kick = self._z / np.sqrt(lines.samples)
         self._signals = signals
-        self._known: dict[tuple[float, ...], Complex] = {} if known is None else known
+        self._known: dict[tuple[object, ...], Complex] = {} if known is None else known
         self._forces: dict[int, Real] = {}
 
     def forced(self) -> Complex:
@@ -116,17 +123,18 @@ class LinearView:
         return np.asarray(self.printed * (self._kick * self.shift), dtype=np.complex128)
 
     def way_of_port(self, port: int) -> Way:
-        """Way of a force at a port that runs along straight lines between samples."""
-        start, rise = self.force(port)
-        drive = start[:, None] + (self._z - 1.0) * rise[:, None]
-        return Way(states=drive, outputs=self._constant(self.compiled.h[self.rows, port]), port=port)
+        """Way of a force at a port: band-limited, since nobody holds a force that a machine makes."""
+        carried = free_hold(1).carried(0, self.lines.cycles, self.lines.sample_rate_hz)
+        through = self._constant(self.compiled.h[self.rows, port])
+        return Way(states=along(self.force(port), carried), outputs=through, port=port, carried=carried)
 
     def way_of_input(self, name: str) -> Way:
-        """Way of a change of an input, straight between samples."""
+        """Way of a change of an input, which runs between samples as the input does."""
         column = self.compiled.column_of(name)
-        inner, straight = self.places(column)
-        drive = self._gamma[:, inner, None] + (self._z - 1.0) * self._gamma[:, straight, None]
-        return Way(states=drive, outputs=self._constant(self.compiled.d[self.rows, column]), column=column)
+        inner = self.hold.inner(column)
+        carried = self.hold.carried(inner, self.lines.cycles, self.lines.sample_rate_hz)
+        drive, through = self._gamma[:, self.hold.places(inner)], self._constant(self.compiled.d[self.rows, column])
+        return Way(states=along(drive, carried), outputs=through, column=column, carried=carried)
 
     def way_of_output(self, place: int) -> Way:
         """Way of an error of the sensor in row `place` of the outputs that are wanted."""
@@ -134,7 +142,8 @@ class LinearView:
         through = np.zeros((len(self.rows), count), dtype=np.complex128)
         # An error of what is recorded comes behind a clock that is late.
         through[place] = 1.0 / self.shift[place]
-        return Way(states=np.zeros((len(self._triangle), count), dtype=np.complex128), outputs=through)
+        still, none = (np.zeros((size, count), dtype=np.complex128) for size in (len(self._triangle), 0))
+        return Way(states=still, outputs=through, carried=none)
 
     def pattern(self, way: Way) -> Complex:
         """``[output, line]`` that a force of one prints."""
@@ -158,23 +167,19 @@ class LinearView:
 
     def inputs(self) -> Complex:
         """``[internal column, segment, line]`` of the rows that drive each step."""
-        key = self.compiled.input_delays_s
+        key = (self.compiled.input_delays_s, self.compiled.holds)
         if key not in self._known:
             rows = input_rows(self.compiled, self.hold, self._signals, self.lines.sample_rate_hz, 1)
             self._known[key] = self.lines.spectrum(np.ascontiguousarray(rows[:-1].T))
         return self._known[key]
 
     def force(self, port: int) -> Real:
-        """``[start or rise, state]``: what a force at a port does to the states within a step."""
+        """``[state, place]``: what a force at a port does to the states within a step, see `Way.carried`."""
         # Asked for port by port: few are ever looked at, and each makes the exponential larger.
         if port not in self._forces:
-            self._forces[port] = self._step(self.compiled.g[:, [port]])[1][:2, :, 0]
+            one = free_hold(1)
+            self._forces[port] = self._step(one.spread(self.compiled.g[:, [port]]), one)[:, len(self._triangle) :]
         return self._forces[port]
-
-    def places(self, column: int) -> tuple[int, int]:
-        """Places of a column of u and of its rise in the rows that drive each step."""
-        inner = int(np.flatnonzero(self.hold.source == column)[0])
-        return inner, self.hold.columns + int(np.flatnonzero(self.hold.straight == inner)[0])
 
     @cached_property
     def printed(self) -> Complex:
@@ -188,18 +193,17 @@ class LinearView:
             found[place] = (wanted[:, place, None] + ahead) / (self._z - upper[place, place])
         return along(self._unitary.conj(), found)
 
-    def _step(self, g: Real) -> tuple[Real, Real]:
-        """One step of the states, and of what ports do to them."""
-        found = responses(
+    def _step(self, b: Real, hold: Hold) -> Real:
+        """``[state, state + width]``: one step of the states under signals that enter by b."""
+        return responses(
             self.compiled.a,
-            self.hold.spread(self.compiled.b),
-            g,
-            self.hold,
+            b,
+            np.zeros((len(b), 0)),
+            hold,
             step_s=1.0 / self.lines.sample_rate_hz,
-            kink_at=self.hold.kink_at,
+            kink_at=hold.kink_at,
             fractions=np.ones(1),
-        )[0]
-        return found.state, found.force
+        )[0].state
 
     def _drive(self, transient: Real | None, forces: Sequence[tuple[Way, Complex]]) -> Complex:
         """``[state, segment, line]`` of all that drives the states."""

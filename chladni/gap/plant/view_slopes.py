@@ -6,7 +6,8 @@ import numpy as np
 
 from chladni.gap.plant.linear_view import LinearView, Way, along
 from chladni.models.core.compiled_model import CompiledModel
-from chladni.models.integrator.exponential import Response, response_slopes
+from chladni.models.integrator.exponential import response_slopes
+from chladni.models.integrator.hold import Hold, free_hold
 from chladni.signals.arrays import Complex, Real
 
 
@@ -46,8 +47,7 @@ def view_slopes(
     n, count = len(view.compiled.states), len(changed)
     signals = [view.states(transient, forces), view.inputs()]
     for way, force in forces:
-        if way.port is not None or way.column is not None:
-            signals.append(np.stack([force, (view.lines.z - 1.0) * force]))
+        signals.append(way.carried[:, None] * force)
     rows = np.concatenate(signals)
     by_step, through = _coefficients(view, changed, step, forces)
     drive = along(by_step.reshape(count * n, rows.shape[0]), rows).reshape(count, n, *rows.shape[1:])
@@ -65,44 +65,42 @@ def _coefficients(
 ) -> tuple[Real, Real]:
     """``[change, state, signal]`` and ``[change, output, signal]``: what each signal adds to states and outputs."""
     here, hold, rows = view.compiled, view.hold, view.rows
-    ways = [way for way, _ in forces if way.port is not None or way.column is not None]
-    ports = [way.port for way in ways if way.port is not None]
-    width = len(here.states) + hold.width
-    by_step = np.zeros((len(changed), len(here.states), width + 2 * len(ways)))
-    through = np.zeros((len(changed), len(rows), width + 2 * len(ways)))
-    for place, (one, moved) in enumerate(zip(changed, _moved(view, changed, step, ports), strict=True)):
-        by_step[place, :, :width] = moved.state
-        through[place, :, : len(here.states)] = (one.c - here.c)[rows] / step
-        columns = slice(len(here.states), len(here.states) + hold.columns)
-        through[place, :, columns] = hold.spread((one.d - here.d)[rows]) / step
-        for index, way in enumerate(ways):
-            at = width + 2 * index
+    ports = [way.port for way, _ in forces if way.port is not None]
+    n, width = len(here.states), len(here.states) + hold.width
+    size = width + sum(len(way.carried) for way, _ in forces)
+    by_step, through = np.zeros((len(changed), n, size)), np.zeros((len(changed), len(rows), size))
+    free = free_hold(len(ports))
+    inputs = _moved(view, hold, here.b, [(one.a - here.a, one.b - here.b) for one in changed], step)
+    acting = [(one.a - here.a, (one.g - here.g)[:, ports]) for one in changed] if ports else []
+    laws = _moved(view, free, here.g[:, ports], acting, step)
+    for place, one in enumerate(changed):
+        by_step[place, :, :width] = inputs[place]
+        through[place, :, :n] = (one.c - here.c)[rows] / step
+        through[place, :, n : n + hold.columns] = hold.spread((one.d - here.d)[rows]) / step
+        at, of_port = width, 0
+        for way, _ in forces:
+            places = slice(at, at + len(way.carried))
             if way.port is not None:
-                by_step[place, :, at : at + 2] = moved.force[:2, :, ports.index(way.port)].T
+                by_step[place, :, places] = laws[place][:, n + free.places(free.inner(of_port))]
                 through[place, :, at] = (one.h - here.h)[rows, way.port] / step
+                of_port += 1
             elif way.column is not None:
-                by_step[place, :, at : at + 2] = moved.state[:, len(here.states) + np.array(view.places(way.column))]
+                by_step[place, :, places] = inputs[place][:, n + hold.places(hold.inner(way.column))]
                 through[place, :, at] = (one.d - here.d)[rows, way.column] / step
+            at = places.stop
     return by_step, through
 
 
-def _moved(view: LinearView, changed: Sequence[CompiledModel], step: float, ports: Sequence[int]) -> list[Response]:
-    """Derivatives of one step."""
-    here, hold = view.compiled, view.hold
-    changes = [
-        (
-            (one.a - here.a) / step,
-            hold.spread((one.b - here.b) / step),
-            (one.g[:, ports] - here.g[:, ports]) / step,
-        )
-        for one in changed
-    ]
-    return response_slopes(
-        here.a,
-        hold.spread(here.b),
-        here.g[:, ports],
+def _moved(view: LinearView, hold: Hold, b: Real, changes: Sequence[tuple[Real, Real]], step: float) -> list[Real]:
+    """``[state, state + width]`` for each change of A and of what signals enter by: derivatives of one step."""
+    none = np.zeros((len(b), 0))
+    found = response_slopes(
+        view.compiled.a,
+        hold.spread(b),
+        none,
         hold,
-        changes,
+        [(by_a / step, hold.spread(by_b / step), none) for by_a, by_b in changes],
         step_s=1.0 / view.lines.sample_rate_hz,
         kink_at=hold.kink_at,
     )
+    return [one.state for one in found]

@@ -3,7 +3,8 @@
 import numpy as np
 
 from chladni.models.core.compiled_model import CompiledModel
-from chladni.models.integrator.hold import CHAIN, Hold, split_delay
+from chladni.models.integrator.band_limited import polynomials, rates
+from chladni.models.integrator.hold import Hold, chained, split_delay
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
@@ -26,21 +27,20 @@ def input_rows(compiled: CompiledModel, hold: Hold, signals: Real, sample_rate_h
     rows = np.zeros((count, hold.width))
     mapped = _mapped(compiled, signals, sample_rate_hz)
     column = kink = 0
-    for place, terminal in enumerate(compiled.inputs):
+    for place, (terminal, kind) in enumerate(zip(compiled.inputs, compiled.holds, strict=True)):
         delay_s = compiled.input_delays_s[place]
         if delay_s < 0:
             raise ModelError(f"input {terminal.name!r}: delay {delay_s:g} s is negative; an input can only be late")
-        if terminal.derivatives:
-            _fill_motion(rows, hold, column, _motion(mapped[place], delay_s * sample_rate_hz, count, sample_rate_hz))
-            column += CHAIN
-            continue
         whole, fraction = split_delay(delay_s, sample_rate_hz)
-        if fraction:
+        if (length := chained(terminal, kind)) > 1:
+            smooth = _band_limited if kind == "band_limited" else _spline
+            rows[:, hold.places(column)] = smooth(mapped[place], whole + fraction, count, length, sample_rate_hz).T
+        elif fraction:
             _fill_kinked(rows, hold, kink, mapped[place], whole, fraction)
             kink += 1
         else:
             _fill_straight(rows, hold, column, mapped[place], whole)
-        column += 1
+        column += length
     times_s = np.arange(count) / sample_rate_hz
     for generated in compiled.generated:
         samples = np.asarray(generated.samples(times_s), dtype=np.float64)
@@ -74,51 +74,56 @@ def _late(samples: Real, whole: int, count: int) -> Real:
 
 def _fill_straight(rows: Real, hold: Hold, column: int, samples: Real, whole: int) -> None:
     late = _late(samples, whole, len(rows))
+    rows[:, column] = late[:-1]
+    if column in hold.held:
+        return
     rise = np.diff(late)
     # Before the dead time has passed nothing comes: the first sample is a jump, no ramp from zero.
     rise[: min(whole, rise.size)] = 0.0
-    rows[:, column] = late[:-1]
-    rows[:, hold.columns + int(np.flatnonzero(hold.straight == column)[0])] = rise
+    rows[:, hold.rise_of(column)] = rise
 
 
 def _fill_kinked(rows: Real, hold: Hold, kink: int, samples: Real, whole: int, fraction: float) -> None:
-    """In each step the sample from ``whole`` steps ago falls at `fraction`: two straight pieces."""
+    """In each step the sample from ``whole`` steps ago falls at `fraction`: two straight pieces, or two values."""
     column = int(hold.kinked[kink])
     count = len(rows)
+    places = hold.columns + hold.straight.size + kink
     before, at, after = (_late(samples, whole + shift, count)[:count] for shift in (1, 0, -1))
     first, second = at - before, after - at
+    if column in hold.held:
+        rows[:, column], rows[:, places + hold.kinked.size] = before, first
+        return
     jump = np.zeros(count)
     if whole < count:
         # The signal starts inside this step.
         jump[whole], first[whole] = at[whole], 0.0
     second[:whole] = 0.0
-    places = hold.columns + hold.straight.size + kink
     start = before + (1 - fraction) * first
     start[: min(whole + 1, count)] = 0.0
     rows[:, column] = start
-    rows[:, hold.columns + int(np.flatnonzero(hold.straight == column)[0])] = first
+    rows[:, hold.rise_of(column)] = first
     rows[:, places] = second - first
     rows[:, places + hold.kinked.size] = jump
 
 
-def _motion(samples: Real, late: float, count: int, sample_rate_hz: float) -> Real:
-    """``[order, count]``: a prescribed motion and its four rates, `late` samples late."""
+def _band_limited(samples: Real, late: float, count: int, length: int, sample_rate_hz: float) -> Real:
+    """``[length + 1, count]``: a band-limited signal, its rates, and the rise of the last, `late` samples late."""
+    return np.asarray(rates(polynomials(samples, length, late, count), sample_rate_hz), dtype=np.float64)
+
+
+def _spline(samples: Real, late: float, count: int, length: int, sample_rate_hz: float) -> Real:
+    """The same of a prescribed motion that is a spline."""
     from scipy.interpolate import make_interp_spline
 
     # Counted in samples the spline's equations are well scaled; rates are scaled after.
-    spline = make_interp_spline(np.arange(samples.size), samples, k=min(CHAIN, samples.size - 1))
+    spline = make_interp_spline(np.arange(samples.size), samples, k=min(length, samples.size - 1))
     places = np.arange(count) - late
     inside = np.clip(places, 0.0, samples.size - 1.0)
     degree = int(spline.k)
-    motion = np.zeros((CHAIN, count))
-    for order in range(min(CHAIN, degree + 1)):
+    motion = np.zeros((length, count))
+    for order in range(min(length, degree + 1)):
         motion[order] = spline(inside, nu=order)
     motion[1:, places != inside] = 0.0
     motion[0, places < 0] = 0.0
-    return np.asarray(motion * sample_rate_hz ** np.arange(CHAIN)[:, None], dtype=np.float64)
-
-
-def _fill_motion(rows: Real, hold: Hold, column: int, motion: Real) -> None:
-    rows[:, column : column + CHAIN] = motion.T
-    last = hold.columns + int(np.flatnonzero(hold.straight == column + CHAIN - 1)[0])
-    rows[:-1, last] = np.diff(motion[-1])
+    motion *= sample_rate_hz ** np.arange(length)[:, None]
+    return np.vstack([motion, np.diff(motion[-1], append=motion[-1, -1])])

@@ -115,8 +115,10 @@ class Run:
         )
 
     def _segments(self, rows: Real) -> list[tuple[int, int]]:
-        """Stretches of steps that no jump of an input divides."""
+        """Stretches of steps that no jump of an input divides: of one that the laws see at once, see `Hold`."""
         m, lines = self._hold.columns, self._hold.straight
+        # The last rate of a smooth input may jump, the input itself doesn't.
+        seen = self._plan.motion_column[:, lines].any(axis=0) & ~np.isin(lines, self._hold.rate)
         ends = rows[:-1, lines] + rows[:-1, m : m + lines.size]
         for kink, column in enumerate(self._hold.kinked):
             after = 1.0 - self._hold.kink_at[kink]
@@ -124,7 +126,7 @@ class Run:
             line = int(np.searchsorted(lines, column))
             ends[:, line] += after * rows[:-1, place] + rows[:-1, place + self._hold.kinked.size]
         scale = np.abs(rows[:, lines]).max(axis=0, initial=0.0)
-        jumps = np.flatnonzero((np.abs(ends - rows[1:, lines]) > 1e-9 * scale).any(axis=1)) + 1
+        jumps = np.flatnonzero((np.abs(ends - rows[1:, lines]) > 1e-9 * scale)[:, seen].any(axis=1)) + 1
         stops = sorted({0, *jumps.tolist(), len(rows) - 1})
         return list(pairwise(stops))
 

@@ -5,8 +5,10 @@ import pytest
 
 import chladni
 from chladni.gap.plant.laid_inputs import LaidInputs
+from chladni.models.integrator.exponential import responses
 from chladni.models.integrator.hold import hold_of
 from chladni.models.integrator.input_rows import input_rows
+from chladni.models.integrator.linear_kernel import linear_march
 from tests.gap.arm import RATE_HZ, arm
 
 FORCE = np.random.default_rng(3).standard_normal((1, 400))
@@ -30,6 +32,23 @@ def test_rows_are_those_of_the_model_whatever_was_asked_before(compiled) -> None
     expected = input_rows(compiled, hold, FORCE, RATE_HZ, extra=0)
     np.testing.assert_array_equal(laid.rows(compiled, hold), expected)
     np.testing.assert_array_equal(laid.rows(compiled, hold), expected)
+
+
+@pytest.mark.parametrize("hold", ["zoh", "foh", "band_limited"])
+def test_parts_of_steps_carry_the_states_where_whole_ones_do(hold) -> None:
+    compiled = arm().compile().with_holds({"shaker": hold})
+    laid, layout = LaidInputs(FORCE, RATE_HZ), hold_of(compiled, RATE_HZ)
+    ends = []
+    for parts in (1, 4):
+        step = responses(
+            compiled.a, layout.spread(compiled.b), np.zeros((len(compiled.a), 0)), layout,
+            step_s=1 / (RATE_HZ * parts), kink_at=layout.kink_at, fractions=np.ones(1),
+        )[0].state  # fmt: skip
+        rows = laid.rows(compiled, layout, parts)
+        states = np.zeros((len(rows), len(compiled.a)))
+        linear_march(np.ascontiguousarray(step.T), rows, states)
+        ends.append(states[::parts])
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-9 * np.abs(ends[0]).max())
 
 
 def test_parts_of_steps_run_along_the_same_lines() -> None:

@@ -49,6 +49,11 @@ MODELS = {
         lambda: replace(three_bodies(), inputs=(StructureInput(name="shaker", kind="displacement", at="b0"),)),
         [Site(name="j2", kind="joint")],
     ),
+    "band-limited": (
+        lambda: three_bodies().with_holds({"hammer": "band_limited"}),
+        [Site(name="hammer", kind="input"), Site(name="b2", kind="body")],
+    ),
+    "held": (lambda: three_bodies().with_holds({"hammer": "zoh"}), [Site(name="hammer", kind="input")]),
     "drive": (lambda: drive_model(DRIVES["dc-servo"]), []),
 }
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete
 
 from chladni.gap.plant.linear_view import LinearView
 from chladni.gap.plant.record_lines import all_lines, segment_lines
@@ -39,6 +40,11 @@ def moved():
     return replace(three_bodies(), inputs=(StructureInput(name="shaker", kind="displacement", at="b0"),))
 
 
+def late():
+    """Driven with dead time."""
+    return three_bodies().with_effects([attached("delay", "hammer", {"delay": 2.37 / RATE_HZ})])
+
+
 def bare():
     """No body moves against the ground but through a damper: poles at zero beside fast ones."""
     structure = three_bodies().structure
@@ -51,10 +57,14 @@ MODELS = {
     "free body": free_body,
     "damper only": bare,
     "controller": controlled,
-    "late by a fraction of a sample": lambda: three_bodies().with_effects(
-        [attached("delay", "hammer", {"delay": 2.37 / RATE_HZ})]
-    ),
+    "late by a fraction of a sample": late,
     "prescribed displacement": moved,
+    "held": lambda: three_bodies().with_holds({"hammer": "zoh"}),
+    "held and late": lambda: late().with_holds({"hammer": "zoh"}),
+    "band-limited": lambda: three_bodies().with_holds({"hammer": "band_limited"}),
+    "band-limited and late": lambda: late().with_holds({"hammer": "band_limited"}),
+    "prescribed displacement, band-limited": lambda: moved().with_holds({"shaker": "band_limited"}),
+    "controller, band-limited": lambda: controlled().with_holds({"axis": "band_limited"}),
 }
 
 
@@ -81,7 +91,7 @@ def left_of(view, outputs):
 @pytest.mark.parametrize("segments", [False, True])
 def test_inputs_and_transients_make_the_whole_record(name, segments):
     model = MODELS[name]()
-    signals = band_noise(SAMPLES) * (1e-5 if name == "prescribed displacement" else 1.0)
+    signals = band_noise(SAMPLES) * (1e-5 if name.startswith("prescribed") else 1.0)
     compiled = model.compile()
     initial = 1e-4 * np.random.default_rng(1).standard_normal(len(compiled.states))
     outputs = Integrator(compiled, RATE_HZ).run(signals, initial=initial).outputs
@@ -108,8 +118,8 @@ def test_a_transient_is_the_start_less_the_end():
 
 
 def test_a_force_at_a_port_prints_its_pattern():
-    """A force at the middle body, straight between samples, is an input there."""
-    model = chain([2.0, 2.5, 3.0], [5e5, 6e5, 4e5], [40.0, 60.0, 50.0], at=1)
+    """A force at the middle body is a band-limited input there."""
+    model = chain([2.0, 2.5, 3.0], [5e5, 6e5, 4e5], [40.0, 60.0, 50.0], at=1).with_holds({"hammer": "band_limited"})
     signals = band_noise(SAMPLES)
     lines = all_lines(SAMPLES, sample_rate_hz=RATE_HZ)
     view = viewed(model, lines, signals)
@@ -120,6 +130,56 @@ def test_a_force_at_a_port_prints_its_pattern():
     start = np.zeros((6, 1))
     silent = viewed(model, lines, np.zeros_like(signals)).response(start, [(asked, force)])
     np.testing.assert_allclose(silent, view.pattern(asked)[:, None] * force, rtol=1e-9, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("hold", "share", "most"), [("band_limited", 0.25, 1e-4), ("band_limited", 0.45, 2e-3), ("zoh", 0.45, 1e-9)]
+)
+def test_the_lines_are_those_of_the_equations_in_continuous_time(hold, share, most):
+    """Pintelon and Schoukens, 2nd ed., chapter 13: ``H(j omega)`` of a band-limited input, and of a force.
+
+    Of a held one ``sum over k of H(s_k) (1 - e^(-s T))/(s_k T)`` at the images s_k, which leaves the matrix of SciPy.
+    """
+    model = three_bodies().with_holds({"hammer": hold})
+    lines = all_lines(SAMPLES, sample_rate_hz=RATE_HZ)
+    view = viewed(model, lines, band_noise(SAMPLES))
+    compiled, seen = model.compile(), lines.cycles <= share
+    if hold == "zoh":
+        a, b, c, d, _ = cont2discrete((compiled.a, compiled.b, compiled.c, compiled.d), 1 / RATE_HZ)
+        inverse = np.linalg.inv(lines.z[:, None, None] * np.eye(6) - a)
+        truth = np.moveaxis(c @ inverse @ b + d, 0, -1)[:, 0]
+    else:
+        truth = compiled.frequency_response(lines.frequency_hz)[:, 0]
+    found = view.pattern(view.way_of_input("hammer"))
+    assert np.abs(found - truth)[:, seen].max() < most * np.abs(truth[:, seen]).max()
+    if hold == "band_limited":
+        # The hammer hits the last body: a force there is the same.
+        force = view.pattern(view.way_of_port(compiled.port_index("b2", "body")))
+        np.testing.assert_allclose(force, found, rtol=1e-8)
+
+
+@pytest.mark.parametrize("lines_of", ["a record without periods", "segments"])
+def test_a_band_limited_log_is_explained_by_its_equations(lines_of):
+    """Lines off the record's own, from a start in motion: steady states in closed form, and the log's ends told."""
+    rng = np.random.default_rng(4)
+    model = three_bodies()
+    compiled = model.compile()
+    frequency_hz = rng.uniform(0.004, 0.4, 40) * RATE_HZ
+    amplitude = np.exp(2j * np.pi * rng.uniform(size=40))
+    wave = np.exp(2j * np.pi * frequency_hz[:, None] * np.arange(SAMPLES) / RATE_HZ)
+    signals = (amplitude @ wave).real[None]
+    outputs = ((compiled.frequency_response(frequency_hz)[:, 0] * amplitude) @ wave).real
+    lines = (
+        segment_lines(300, samples=SAMPLES, sample_rate_hz=RATE_HZ)
+        if lines_of == "segments"
+        else all_lines(SAMPLES, sample_rate_hz=RATE_HZ)
+    )
+    left = {
+        hold: left_of(viewed(model.with_holds({"hammer": hold}), lines, signals), outputs)[0]
+        for hold in ("band_limited", "foh")
+    }
+    assert left["band_limited"] < 1e-3
+    assert left["foh"] > 0.01
 
 
 def test_motion_at_a_port_is_what_sensors_there_would_measure():
