@@ -75,7 +75,6 @@ def _finer(rows: Real, hold: Hold, parts: int, step_s: float) -> Real:
         terms = [rows[:, place] * step_s**power / factorial(power) for power, place in enumerate(chain)]
         terms.append(rows[:, rise] * step_s ** (len(chain) - 1) / factorial(len(chain)))
         finer[:, :, column] = np.einsum("tn,ts->ns", terms, share ** np.arange(len(terms))[:, None])
-    finer = finer.reshape(len(rows) * parts, -1)
-    finer[:, hold.columns :] /= parts
+    finer[:, :, hold.columns :] /= parts
     # The last row is the value at the end, with nothing after it.
-    return finer[: (len(rows) - 1) * parts + 1]
+    return np.asarray(finer.reshape(len(rows) * parts, -1)[: (len(rows) - 1) * parts + 1])

@@ -9,12 +9,14 @@ ISCAS 1988).
 
 from functools import lru_cache
 from math import ceil, factorial
+from typing import TypeVar
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 Matrix = NDArray[np.float64]
+Numbers = TypeVar("Numbers", NDArray[np.float64], NDArray[np.complex128])
 #: Samples on either side that tell what is between two, and Kaiser's beta: 6e-5 is missed up to 0.45 of the rate.
 REACH, BETA = 32, 9.0
 #: Samples from which the signal beyond its ends is predicted, and the load on their products.
@@ -31,12 +33,12 @@ def through_nodes(degree: int) -> Matrix:
     return np.asarray(np.linalg.inv(np.vander(nodes(degree), increasing=True)))
 
 
-def rates(coefficients: NDArray[np.generic], sample_rate_hz: float) -> NDArray[np.generic]:
+def rates(coefficients: Numbers, sample_rate_hz: float) -> Numbers:
     """``[power, ...]``: value and rates at the start of a step, and the rise of the last rate, of polynomials."""
     degree = len(coefficients) - 1
     powers = np.arange(degree + 1)
     scale = np.array([factorial(power) for power in powers]) * sample_rate_hz ** np.minimum(powers, degree - 1.0)
-    return np.asarray(coefficients * scale.reshape(-1, *[1] * (coefficients.ndim - 1)))
+    return coefficients * scale.reshape(-1, *[1] * (coefficients.ndim - 1))
 
 
 def polynomials(samples: Matrix, degree: int, late: float, count: int) -> Matrix:

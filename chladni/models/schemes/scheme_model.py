@@ -141,7 +141,8 @@ class SchemeModel:
 
     def with_holds(self, holds: Mapping[str, HoldKind]) -> Self:
         """Give the scheme with other holds of its inputs and declared outputs; `ModelError` for another name."""
-        require_named(holds, [one.name for one in (*self.inputs, *self.outputs)])
+        names = [*(one.name for one in self.inputs), *(one.name for one in self.outputs)]
+        require_named(holds, names)
         return replace(
             self,
             inputs=tuple(replace(one, hold=holds.get(one.name, one.hold)) for one in self.inputs),

@@ -149,7 +149,8 @@ class StructureModel:
         ModelError
             When there's no such name, or a prescribed motion can't run like that.
         """
-        require_named(holds, [one.name for one in (*self.inputs, *self.outputs, *self.controllers)])
+        parts = (self.inputs, self.outputs, self.controllers)
+        require_named(holds, [one.name for part in parts for one in part])
         return replace(
             self,
             inputs=tuple(replace(one, hold=holds.get(one.name, one.hold)) for one in self.inputs),
