@@ -89,7 +89,7 @@ class CompiledModel(Value):
         ``(index, map)``, applied in order to the samples of an input before, of an output after, the integration.
         Only for inputs and outputs outside of every loop: inside a loop a law at the port does it.
     input_delays_s
-        Dead time of each input outside a loop, exact for the signal that joins the samples by straight lines.
+        Dead time of each input outside a loop, exact for the signal between the samples that its hold says.
     output_offsets_s
         How late the clock of each output is: ``y_sampled(t) = y(t - offset)``.
     """

@@ -65,7 +65,7 @@ class Integrator:
     compiled
         The model.
     sample_rate_hz
-        Of the inputs and outputs. Between samples inputs run along straight lines.
+        Of the inputs and outputs. Between samples inputs run as their `hold` says.
     tolerance
         Largest error of one step, beside the largest magnitude of each state so far.
     scheme
