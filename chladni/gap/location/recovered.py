@@ -18,6 +18,8 @@ _SMOOTH = 31
 #: Power over that of the lines that tell the force well, beyond which a line is believed only when it's so many times
 #: its noise: where a pattern fades, a little more noise than was thought makes a force of any size.
 _STRONGEST, _DOUBTED = 3.0, 30.0
+#: Of each state's power: what nobody knows of how states go together.
+_LOADED = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -113,23 +115,22 @@ def recovered(problem: LinearProblem, found: Profile, site: Site, others: Sequen
     patterns = [whole.pattern(view, one)[:, 0] for one in (site, *others)]
     residual = ((whole.measured - view.forced()) * whole.weight)[:, 0]
     transients = whole.transients(view)[:, :, 0]
-    first, *beside = (
-        _unknown(pattern, [*patterns[:place], *patterns[place + 1 :]], residual, transients, found.transient)
-        for place, pattern in enumerate(patterns)
-    )
+    start = _starts(view, whole.measured, whole.weight)
+    found_at = _unknowns(patterns, residual, transients, found.transient, start)
+    first, beside = found_at.force[0], found_at.force[1:]
     ways = [whole.way(view, one) for one in (site, *others)]
-    acting = [(way, one.force[None]) for way, one in zip(ways, (first, *beside), strict=True)]
-    force = lines.signal(first.force[None])[0]
+    acting = [(way, one[None]) for way, one in zip(ways, found_at.force, strict=True)]
+    force = lines.signal(first[None])[0]
     if site.kind == "output" and ways[0].port is None:
         row = measurement.output_names.index(site.name)
         # Not what was measured less the force: where noise hides that, it would be the shaped signal again.
-        seen = lines.signal(view.response(first.transient, acting[1:]))[row, 0]
+        seen = lines.signal(view.response(found_at.transient, acting[1:]))[row, 0]
         displacement, velocity = seen + measurement.outputs[row].mean(), np.zeros(lines.samples)
     elif site.kind == "input" and ways[0].port is None:
         row = measurement.input_names.index(site.name)
         displacement, velocity = measurement.inputs[row], np.zeros(lines.samples)
     else:
-        motion = view.motion(view.compiled.port_index(site.name, site.kind), first.transient, acting)
+        motion = view.motion(view.compiled.port_index(site.name, site.kind), found_at.transient, acting)
         displacement, velocity = (lines.signal(one)[0] for one in motion)
     return Recovered(
         site=site,
@@ -137,62 +138,94 @@ def recovered(problem: LinearProblem, found: Profile, site: Site, others: Sequen
         force=force,
         displacement=displacement,
         velocity=velocity,
-        reliable=first.reliable,
+        reliable=found_at.reliable,
         z=found.z,
-        transient=first.transient,
-        beside=tuple((one, lines.signal(free.force[None])[0]) for one, free in zip(others, beside, strict=True)),
+        transient=found_at.transient,
+        beside=tuple((one, lines.signal(free[None])[0]) for one, free in zip(others, beside, strict=True)),
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Unknown:
-    """A force ``[line]``, how far it's believed, and the transients ``[state, 1]`` beside it."""
+    """Forces ``[site, line]``, how far the first is believed, and the transients ``[state, 1]`` beside them."""
 
     force: Complex
     reliable: Real
     transient: Real
 
 
-def _unknown(
-    pattern: Complex, beside: Sequence[Complex], residual: Complex, transients: Complex, transient: Real
+def _unknowns(
+    patterns: Sequence[Complex], residual: Complex, transients: Complex, transient: Real, start: Real
 ) -> _Unknown:
-    """Recover the force along a pattern ``[output, line]`` with what lies along those beside it taken away."""
-    away = Projection([one[:, None] for one in beside]).away
-    pattern, residual = away(pattern[:, None])[:, 0], away(residual[:, None])[:, 0]
-    transients = away(transients[:, :, None])[:, :, 0]
-    strength = np.sum(np.abs(pattern) ** 2, axis=0)
-    thought = 1.0 / np.maximum(strength, 1e-200)
+    """Recover forces along patterns ``[output, line]``, random, of the power that each shows beside the others."""
+    along = np.moveaxis(np.asarray(patterns), -1, 0)
+    reach = along.transpose(0, 2, 1)
     for _ in range(2):
         left = residual - np.tensordot(transient[:, 0], transients, axes=1)
-        plain = np.sum(pattern.conj() * left, axis=0) * thought
-        # What no force explains says how much noise there is, where that is more than was thought.
-        across = np.sum(np.abs(left) ** 2, axis=0) - np.abs(plain) ** 2 * strength
-        noise = thought * np.maximum(_smooth(np.maximum(across, 0.0)) / max(len(pattern) - 1 - len(beside), 1), 1.0)
-        # Neighbours count by how well they tell the force: where a pattern fades, as that of a force on
-        # accelerometers does toward 0 Hz, those that still see it speak for those that don't.
-        say = 1.0 / noise**2
-        power = np.maximum(_smooth(say * (np.abs(plain) ** 2 - noise)) / np.maximum(_smooth(say), 1e-300), 0.0)
-        sure = power > _DOUBTED * noise
-        power = np.where(sure, power, np.minimum(power, _STRONGEST * _told(power, noise)))
-        reliable = power / (power + noise)
-        # What force and transient could both print goes to whichever needs less of itself for it.
-        transient = _transient(transients, pattern, residual, reliable * thought)
-    return _Unknown(force=np.asarray(reliable * plain, dtype=np.complex128), reliable=reliable, transient=transient)
+        shown = [_power(one, [*patterns[:place], *patterns[place + 1 :]], left) for place, one in enumerate(patterns)]
+        power, reliable = np.array([one[0] for one in shown]).T, shown[0][1]
+        # The quietest view of the noise is that from where the fewest forces can hide it.
+        noise = np.min([one[2] for one in shown], axis=0)
+        covariance = (reach * power[:, None]) @ along.conj() + noise[:, None, None] * np.eye(len(residual))
+        weight = np.linalg.inv(covariance)
+        # What forces and transients could both print goes to whichever needs less of itself for it.
+        transient = _transient(transients, weight, residual, start)
+    left = residual - np.tensordot(transient[:, 0], transients, axes=1)
+    force = power * np.einsum("lko,lop,pl->lk", along.conj(), weight, left, optimize=True)
+    return _Unknown(force=np.asarray(force.T, dtype=np.complex128), reliable=reliable, transient=transient)
 
 
-def _transient(transients: Complex, pattern: Complex, residual: Complex, held: Real) -> Real:
-    """Best transients ``[state, 1]`` when the force is random with a known power, by weighted least squares.
+def _power(pattern: Complex, beside: Sequence[Complex], left: Complex) -> tuple[Real, Real, Real]:
+    """``[line]`` power of a force along a pattern, how far it's believed, and the noise over what was thought."""
+    away = Projection([one[:, None] for one in beside]).away
+    pattern, left = away(pattern[:, None])[:, 0], away(left[:, None])[:, 0]
+    strength = np.sum(np.abs(pattern) ** 2, axis=0)
+    thought = 1.0 / np.maximum(strength, 1e-200)
+    plain = np.sum(pattern.conj() * left, axis=0) * thought
+    # What no force explains says how much noise there is, where that is more than was thought.
+    across = np.sum(np.abs(left) ** 2, axis=0) - np.abs(plain) ** 2 * strength
+    louder = np.maximum(_smooth(np.maximum(across, 0.0)) / max(len(pattern) - 1 - len(beside), 1), 1.0)
+    noise = thought * louder
+    # Neighbours count by how well they tell the force: where a pattern fades, as that of a force on
+    # accelerometers does toward 0 Hz, those that still see it speak for those that don't.
+    say = 1.0 / noise**2
+    power = np.maximum(_smooth(say * (np.abs(plain) ** 2 - noise)) / np.maximum(_smooth(say), 1e-300), 0.0)
+    power = np.where(power > _DOUBTED * noise, power, np.minimum(power, _STRONGEST * _told(power, noise)))
+    return power, power / (power + noise), louder
+
+
+def _starts(view: LinearView, measured: Complex, weight: Real) -> Real:
+    """``[state, state]`` inverse covariance of the transients: a machine starts and ends where it goes through.
+
+    A start that a force beside this one could print as well is told by next to nothing but noise.
+    """
+    states, forced = view.states(None, ())[:, 0], view.forced() * weight
+    driven = float(np.sum(np.abs(forced) ** 2))
+    spread = 4 * np.einsum("al,bl->ab", states, states.conj()).real / view.lines.samples
+    size = np.sqrt(np.diag(spread))
+    if not (driven > 0 and np.all(size > 0)):
+        return np.zeros_like(spread)
+    # What the log shows beyond the inputs' doing moves the states too.
+    more = max(float(np.sum(np.abs(measured * weight) ** 2)) / driven, 1.0)
+    related = spread / size / size[:, None] + _LOADED * np.eye(size.size)
+    return np.asarray(np.linalg.inv(related) / size / size[:, None] / more)
+
+
+def _transient(transients: Complex, weight: Complex, residual: Complex, start: Real) -> Real:
+    """Best transients ``[state, 1]`` when forces and noise are random, by weighted least squares.
 
     Parameters
     ----------
-    held
-        ``[line]`` share of what lies along the pattern that the force takes, over the pattern's square.
+    weight
+        ``[line, output, output]`` inverse covariance of forces and noise together.
+    start
+        ``[state, state]`` inverse covariance of the transients.
     """
-    along = np.sum(pattern.conj() * transients, axis=1)
-    weighted = transients - pattern * (held * along)[:, None]
-    normal = np.einsum("aol,bol->ab", weighted.conj(), transients).real
-    toward = np.einsum("aol,ol->a", weighted.conj(), residual).real
-    # Of a transient that lies along the force all but rounding is taken away: it is measured by what it was.
+    weighted = np.einsum("aol,lop->apl", transients.conj(), weight, optimize=True)
+    # Lines are complex, of unit variance: twice the sums are those of real numbers.
+    normal = np.einsum("apl,bpl->ab", weighted, transients).real + start / 2
+    toward = np.einsum("apl,pl->a", weighted, residual).real
+    # Of a transient that lies along the forces all but rounding is taken away: it is measured by what it was.
     own = np.finfo(np.float64).eps * np.sum(np.abs(transients) ** 2, axis=(1, 2))
     size = np.sqrt(np.maximum(np.maximum(np.diag(normal), own), 1e-300))
     scaled = np.linalg.lstsq(normal / size[:, None] / size, toward / size, rcond=1e-9)[0]

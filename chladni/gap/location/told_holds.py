@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chladni.gap.location.profile import profiled
 from chladni.gap.plant.linear_problem import LinearProblem
@@ -15,9 +14,8 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
 from chladni.models.core.port import HOLDS, HoldKind
+from chladni.signals.arrays import Complex, Real
 
-Matrix = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
 #: Bands of lines of each output whose scatter is that of what a model misses, and lines that are looked at.
 _BANDS, _LINES = 24, 3000
 #: Nats by which a hold must lead: odds of 1000 to one, since all that follows stands on it.
@@ -72,12 +70,12 @@ class _WithLateness:
         self._tunables, self._rate_hz = tunables, sample_rate_hz
         self.names = (*tunables.names, _LATE)
 
-    def values(self, z: Matrix) -> Mapping[str, float]:
+    def values(self, z: Real) -> Mapping[str, float]:
         return {**self._tunables.values(z[:-1]), _LATE: float(z[-1]) / self._rate_hz}
 
 
 def told_holds(
-    model: Model, measurement: Measurement, noise: NoiseFloor, tunables: Scaled, z: Matrix
+    model: Model, measurement: Measurement, noise: NoiseFloor, tunables: Scaled, z: Real
 ) -> tuple[ToldHold, ...]:
     """Tell how the inputs of a log run between their samples, one after another.
 
@@ -125,7 +123,7 @@ def _spread_lines(measurement: Measurement) -> RecordLines:
     )
 
 
-def _nats(problems: Sequence[LinearProblem], z: Matrix) -> Matrix:
+def _nats(problems: Sequence[LinearProblem], z: Real) -> Real:
     """``[hold]`` log likelihood less that of the best.
 
     On the straight way from one hold to another, at 0 and 1, the log lies somewhere. What the bands of all outputs
@@ -156,7 +154,7 @@ def _lead(place: float, variance: float) -> float:
     return (1 - 2 * place) / (2 * (variance + place**2))
 
 
-def _less(own: Matrix, other: Matrix, lines: float) -> float:
+def _less(own: Real, other: Real, lines: float) -> float:
     """Log likelihood of one hold over another by the ``[output, band]`` power that they leave, over the noise's.
 
     In each band its variance is unknown, but not below the noise's, as in the fits. Where neither comes down to the
@@ -171,11 +169,11 @@ class _View:
     """Where the parameters are best for one hold: place of the log on the way to each, its variance, power left."""
 
     places: list[tuple[float, float]]
-    power: Matrix
+    power: Real
     lines: float
 
 
-def _seen_from(problems: Sequence[LinearProblem], own: int, z: Matrix) -> _View:
+def _seen_from(problems: Sequence[LinearProblem], own: int, z: Real) -> _View:
     problem = problems[own]
     found = profiled(problem, (), z, iterations=4)
     here = problem.response(found.z, found.transient, ())
@@ -189,29 +187,30 @@ def _seen_from(problems: Sequence[LinearProblem], own: int, z: Matrix) -> _View:
     places = []
     for place, other in enumerate(problems):
         apart = _real(other.response(_moved(found.z, own, place), found.transient, ()) - here)
-        places.append(_placed(*(each - basis @ (basis.T @ each) for each in (apart, left)), power))
+        free, rest = (each - basis @ (basis.T @ each) for each in (apart, left))
+        places.append(_placed(free, rest, power))
     return _View(places=places, power=power, lines=lines)
 
 
-def _moved(z: Matrix, own: int, other: int) -> Matrix:
+def _moved(z: Real, own: int, other: int) -> Real:
     """Parameters under another hold, with which the outputs are as late as under the own."""
     found = z.copy()
     found[-1] += _LATE_BY[HOLDS[own]] - _LATE_BY[HOLDS[other]]
     return found
 
 
-def _real(spectra: Spectrum) -> Matrix:
+def _real(spectra: Complex) -> Real:
     """``[..., number]`` real and imaginary parts of ``[..., output, 1, line]``."""
     flat = np.ascontiguousarray(spectra.reshape(*spectra.shape[:-3], -1))
     return np.asarray(flat.view(np.float64))
 
 
-def _unit(rows: Matrix) -> Matrix:
+def _unit(rows: Real) -> Real:
     size = np.linalg.norm(rows, axis=1, keepdims=True)
     return np.asarray(np.divide(rows, size, out=np.zeros_like(rows), where=size > 0))
 
 
-def _placed(apart: Matrix, left: Matrix, power: Matrix) -> tuple[float, float]:
+def _placed(apart: Real, left: Real, power: Real) -> tuple[float, float]:
     """Where ``left [number]`` lies on the way ``apart [number]``, and the variance of that."""
     size, along = (
         np.concatenate([_sums(row) for row in each.reshape(len(power), -1)]) for each in (apart**2, left * apart)
@@ -227,10 +226,10 @@ def _placed(apart: Matrix, left: Matrix, power: Matrix) -> tuple[float, float]:
     return float(place), float(variance + 1 / total)
 
 
-def _sums(row: Matrix) -> Matrix:
+def _sums(row: Real) -> Real:
     return np.array([part.sum() for part in np.array_split(row, _BANDS)])
 
 
-def _leader(nats: Sequence[float] | Matrix) -> HoldKind | None:
+def _leader(nats: Sequence[float] | Real) -> HoldKind | None:
     second, first = np.argsort(nats)[-2:]
     return HOLDS[first] if nats[int(first)] - nats[int(second)] > BEYOND_DOUBT else None

@@ -13,22 +13,22 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
-Numbers = TypeVar("Numbers", NDArray[np.float64], NDArray[np.complex128])
+from chladni.signals.arrays import Complex, Real
+
+Numbers = TypeVar("Numbers", Real, Complex)
 #: Samples on either side that tell what is between two, and Kaiser's beta: 6e-5 is missed up to 0.45 of the rate.
 REACH, BETA = 32, 9.0
 #: Samples from which the signal beyond its ends is predicted, and the load on their products.
 _NEAR, _LOAD = 16 * REACH, 1e-10
 
 
-def nodes(degree: int) -> Matrix:
+def nodes(degree: int) -> Real:
     """``[degree + 1]`` instants of a step, its ends among them, that leave a polynomial little to miss (Lobatto)."""
     return np.asarray((1.0 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2.0)
 
 
-def through_nodes(degree: int) -> Matrix:
+def through_nodes(degree: int) -> Real:
     """``[power, node]``: coefficients of the polynomial through values at the `nodes`."""
     return np.asarray(np.linalg.inv(np.vander(nodes(degree), increasing=True)))
 
@@ -41,7 +41,7 @@ def rates(coefficients: Numbers, sample_rate_hz: float) -> Numbers:
     return coefficients * scale.reshape(-1, *[1] * (coefficients.ndim - 1))
 
 
-def polynomials(samples: Matrix, degree: int, late: float, count: int) -> Matrix:
+def polynomials(samples: Real, degree: int, late: float, count: int) -> Real:
     """``[power, count]`` coefficients, in shares of a step, of the signal in each step.
 
     Parameters
@@ -66,18 +66,18 @@ def polynomials(samples: Matrix, degree: int, late: float, count: int) -> Matrix
 
 
 @lru_cache(maxsize=32)
-def _filters(degree: int, ahead: float) -> Matrix:
+def _filters(degree: int, ahead: float) -> Real:
     """``[power, tap]``: coefficients of a step that begins `ahead` of a sample, from the samples around that."""
     apart = np.arange(-REACH, REACH + 2) - (nodes(degree) + ahead)[:, None]
     window = np.i0(BETA * np.sqrt(np.clip(1.0 - (apart / REACH) ** 2, 0.0, None))) / np.i0(BETA)
     taps = np.sinc(apart) * np.where(np.abs(apart) > REACH, 0.0, window)
     # A constant stays one.
-    found: Matrix = through_nodes(degree) @ (taps / taps.sum(axis=1, keepdims=True))
+    found: Real = through_nodes(degree) @ (taps / taps.sum(axis=1, keepdims=True))
     found.flags.writeable = False
     return found
 
 
-def _predicted(samples: Matrix) -> Matrix:
+def _predicted(samples: Real) -> Real:
     """``[REACH + 1]``: how a signal goes on, by the best linear prediction from its last `_NEAR` samples.
 
     Forward and backward least squares (the modified covariance method: Marple, *Digital Spectral Analysis*, 8.5).

@@ -43,8 +43,8 @@ def simulate(
 ) -> Simulation:
     """Simulate a model under an excitation.
 
-    Between samples the inputs run as their `hold` says, along straight lines by default; the linear part is exact for them, laws are integrated with
-    an error of `tolerance` a step (see docs/methods/integrator.md).
+    Between samples the inputs run as their `hold` says, along straight lines by default. The linear part is exact for
+    them, laws are integrated with an error of `tolerance` a step (see docs/methods/integrator.md).
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ def test_a_known_force_is_recovered_line_by_line():
     # Long periodic, so that the record ends as it starts: a transient could be the work of a force as well.
     period = np.vstack([band_noise(1000), band_noise(1000, seed=5, rms=60.0)]) * np.hanning(1000)
     true = four_bodies()
-    true = replace(true, inputs=(*true.inputs, StructureInput(name="unknown", at="b1")))
+    true = replace(true, inputs=(*true.inputs, StructureInput(name="unknown", at="b1", hold="band_limited")))
     log, floor = measured(true, np.tile(period, 15), noise=1e-6)
     unknown = np.tile(period[1], 3)
     log = replace(
