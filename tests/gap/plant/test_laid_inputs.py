@@ -8,7 +8,7 @@ from chladni.gap.plant.laid_inputs import LaidInputs
 from chladni.models.integrator.exponential import responses
 from chladni.models.integrator.hold import hold_of
 from chladni.models.integrator.input_rows import input_rows
-from chladni.models.integrator.linear_kernel import linear_march
+from chladni.models.integrator.march import linear_march
 from tests.gap.arm import RATE_HZ, arm
 
 FORCE = np.random.default_rng(3).standard_normal((1, 400))
