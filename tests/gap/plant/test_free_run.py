@@ -56,12 +56,14 @@ def test_effects_join_those_that_the_model_has(signals, log):
     assert not np.allclose(both, FreeRun(three_bodies(), log).outputs())
 
 
+@pytest.mark.parametrize("hold", ["zoh", "foh", "band_limited"])
 @pytest.mark.parametrize("effects", [(), (HARDENING,)], ids=["linear", "law"])
-def test_windows_that_start_where_the_last_ended_are_one_run(effects, signals, log):
-    compiled = three_bodies().with_effects(effects).compile()
+def test_windows_that_start_where_the_last_ended_are_one_run(effects, hold, signals, log):
+    model = three_bodies().with_holds({"hammer": hold})
+    compiled = model.with_effects(effects).compile()
     whole = Integrator(compiled, RATE_HZ, tolerance=1e-9).run(signals)
     starts = whole.states[:, [0, 700]].T
-    run = FreeRun(three_bodies(), log, windows=((0, 700), (700, 2000)))
+    run = FreeRun(model, log, windows=((0, 700), (700, 2000)))
     found = run.outputs(effects=effects, initial=starts)
     # Laws are marched through in an eighth of a sample, with an error of order 2: (150 Hz/8192 Hz)^2 2 pi^2/3.
     allowed = 3e-3 if effects else 1e-9
