@@ -30,7 +30,8 @@ def gap_document(found: Diagnosis) -> Document:
     Document
         ``format``, ``model``, ``logs``, ``verdict``, ``causes``, ``ranking``, ``where``, ``gap``,
         ``tuned_parameters`` and ``next_measurement`` always; ``naive``, ``advice``, ``remarks``, ``distortion``,
-        ``levels``, ``elsewhere``, ``left``, ``correlation`` and ``any_law`` when there is something in them.
+        ``levels``, ``elsewhere``, ``left``, ``correlation``, ``any_law``, ``set`` and ``coverage`` when there is
+        something in them.
         docs/gap.md says what each means.
     """
     return {
@@ -58,6 +59,8 @@ def gap_document(found: Diagnosis) -> Document:
                 "left": None if found.left is None else where_document(found.left),
                 "correlation": None if found.correlation is None else _correlation(found.correlation),
                 "any_law": None if found.any_law is None else _any_law(found.any_law),
+                "set": [_candidate(one) for one in found.answer_set],
+                "coverage": found.coverage if found.answer_set else None,
             }
         ),
     }
@@ -124,7 +127,8 @@ def closing_document(gap: Closing) -> Document:
     }
     if gap.by != "free_run":
         document["by"] = gap.by
-    return document | _when_there({"horizon_s": _known(gap.horizon_s), "explained": _known(gap.explained)})
+    known = {"horizon_s": gap.horizon_s, "explained": gap.explained, "after_over_noise": gap.after_over_noise}
+    return document | _when_there({key: _known(number) for key, number in known.items()})
 
 
 def _cause(cause: Cause) -> Document:

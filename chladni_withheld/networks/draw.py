@@ -23,7 +23,7 @@ DEFAULT: Mapping[Kind, int] = MappingProxyType(
     }
 )  # fmt: skip
 _MOST_DRAWS = 200
-WRITES_HOLD = False
+WRITES_HOLD = True
 """Whether half of the model files state how their inputs go on between samples."""
 _UNITS = {
     False: {"acceleration": "m/s^2", "velocity": "m/s", "displacement": "m", "force": "N"},

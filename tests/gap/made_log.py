@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.signal import butter, sosfilt
 
+from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.record_lines import all_lines
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.effects.catalogue import CATALOGUE
@@ -68,6 +70,12 @@ def white_floor(rms):
         rms=rms, whitening=np.ones((count, 1)), innovation_rms=rms, method=("quiet band",) * count,
         std=np.full(count, 0.1), upper_bound=np.zeros(count, dtype=bool),
     )  # fmt: skip
+
+
+def problem_of(run, floor):
+    """The log of a run beside the linear part of its model, on all lines."""
+    log = run.measurement
+    return LinearProblem(run.model, log, floor, run.tunables, all_lines(log.samples, log.sample_rate_hz))
 
 
 def measured(model, signals, *, noise=0.01, seed=0, initial=None, outputs=None, offset=0.0, rate_hz=RATE_HZ):

@@ -34,8 +34,8 @@ def shortness(compiled: CompiledModel, measurement: Measurement) -> str | None:
     if not found:
         return None
     return (
-        f"{measurement.log} is short: {'; '.join(found)}; no name gets more than even odds; take a longer part, or "
-        "record longer"
+        f"{measurement.log} is short: {'; '.join(found)}; many causes follow so few samples; take a longer part, "
+        "or record longer"
     )
 
 

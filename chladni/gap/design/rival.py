@@ -13,8 +13,6 @@ from chladni.gap.tuning.decay import decay
 from chladni.gap.tuning.effect_scale import EffectNumber, effect_numbers, with_numbers
 from chladni.signals.arrays import Real
 
-#: Hard bound on parameters that stay within their tolerance, in sigmas.
-_LIMIT = 3.0
 #: How far an effect's parameter may go in one linear step, in factors of e.
 _TRUST = 1.0
 #: Step of differences, in ln(value).
@@ -61,7 +59,7 @@ class Rival:
         self._effects = fit.effects
         fitted = hypothesis.fitted if len(hypothesis.fitted) == len(fit.effects) else None
         self._numbers: tuple[EffectNumber, ...] = effect_numbers(fit.effects, fitted)
-        limit = np.array([hypothesis.wide.get(name, _LIMIT) for name in tunables.names])
+        limit, sure = tunables.limits(hypothesis.freed), tunables.precision(hypothesis.freed)
         low = [max(one.low, -_TRUST) for one in self._numbers]
         high = [min(one.high, _TRUST) for one in self._numbers]
         #: Bounds on the unknowns, which are 0 at the fit.
@@ -69,9 +67,7 @@ class Rival:
         self.high = np.concatenate([np.maximum(limit - fit.z, 0.0), high])
         #: ``[unknown]`` where the unknowns are believed beforehand, and how much.
         self.believed = np.concatenate([-fit.z, np.zeros(len(low))])
-        # A parameter that may leave its tolerance pays for its freedom instead of its distance.
-        own = [0.0 if name in hypothesis.wide else 1.0 for name in tunables.names]
-        self.sure = np.concatenate([own, np.zeros(len(low))])
+        self.sure = np.concatenate([sure, np.zeros(len(low))])
 
     def paid(self, at: Real) -> float:
         """Nats that the parameters pay to go from the fit to ``at [unknown]``."""

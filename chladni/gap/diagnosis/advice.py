@@ -104,9 +104,7 @@ def _beyond_these_sensors(study: Study, causes: Causes) -> str | None:
 
 
 def _on_causes(study: Study, causes: Causes) -> str | None:
-    if causes.instead is not None:
-        return causes.instead.sentence()
-    if causes.verdict == "unknown" and causes.best.hypothesis.wide and causes.best.gap < _MOSTLY * causes.tuned.gap:
+    if causes.verdict == "unknown" and causes.best.hypothesis.freed and causes.best.gap < _MOSTLY * causes.tuned.gap:
         return _wrong_first(study, causes)
     if causes.verdict == "unknown":
         return "No effect of the catalogue explains the gap; the site and the recovered force say where to look."
@@ -122,7 +120,7 @@ def _wrong_first(study: Study, causes: Causes) -> str:
     wrong = " and ".join(
         f"{name} of {_short(values[name])} {unit} where the model has {_short(nominal)}"
         for name, nominal, unit in rows
-        if name in causes.best.hypothesis.wide
+        if name in causes.best.hypothesis.freed
     )
     return (
         f"With {wrong} an error of {_short(100 * causes.best.gap)} % is left, {_short(100 * causes.tuned.gap)} % "

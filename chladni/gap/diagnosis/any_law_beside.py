@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from chladni.gap.diagnosis.causes import Causes
-from chladni.gap.diagnosis.search import ALONE
+from chladni.gap.diagnosis.plausible import ALONE
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.any_law import left_by_any_law
 from chladni.gap.location.locate import Located, explained_share
@@ -18,7 +18,7 @@ def any_law(study: Study, causes: Causes, said: Sequence[Cause]) -> AnyLaw | Non
     or no force acts at a place. Over windows what an answer leaves is of another horizon: there it's asked only where
     nothing is named.
     """
-    if causes.verdict == "unknown" and causes.instead is None:
+    if causes.verdict == "unknown":
         found = _at_best(study)
     elif _leaves_something(study, causes, said):
         found = _at(study, said[0].site)

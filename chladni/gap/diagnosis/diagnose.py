@@ -8,21 +8,19 @@ from chladni.gap.comparison.distortion import distortion_where_told
 from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, regime_shares
-from chladni.gap.comparison.short_log import shortness
 from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.diagnosis.advice import advice_on, measure_next
 from chladni.gap.diagnosis.any_law_beside import any_law
-from chladni.gap.diagnosis.causes import Causes
+from chladni.gap.diagnosis.belief import COVERAGE
+from chladni.gap.diagnosis.causes import Causes, causes_found
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.correlation import correlation_of
-from chladni.gap.diagnosis.even_odds import at_even_odds
 from chladni.gap.diagnosis.evidence import evidence
 from chladni.gap.diagnosis.explained_share import with_shares
 from chladni.gap.diagnosis.joint_motions import JointMotions, joint_motions
 from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
 from chladni.gap.diagnosis.other_logs import tried_elsewhere
 from chladni.gap.diagnosis.remarks import remarks_on
-from chladni.gap.diagnosis.rounds import causes_found
 from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.location.locate import Located, Location, explained_share
 from chladni.gap.location.recovered import Recovered
@@ -88,8 +86,6 @@ def diagnose(
     study, causes = causes_found(study, lambda done: tell("explaining", 0.3 + 0.6 * done))
     tell("measuring the closing", 0.9)
     found = _assembled(study, causes, [one.log for one in measurements], seed)
-    if shortness(study.model.compile(), study.measurement) is not None:
-        found = at_even_odds(found)
     # Periods tell noise from distortion at every level, as they did for the first log.
     elsewhere, diverging = tried_elsewhere(study, causes, measurements[1:], seed=seed)
     levels = compare_levels([with_period(one) for one in measurements]) if len(measurements) > 1 else ()
@@ -135,6 +131,8 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         restoring_forces=tuple(_restoring(study, causes, one) for one in recoveries),
         signals=_signals(study, causes, before, after),
         distortion=() if distortion is None else distortion.told,
+        answer_set=() if causes.shaken is not None else causes.belief.answer_set(COVERAGE),
+        coverage=COVERAGE,
     )
 
 

@@ -64,6 +64,6 @@ def _believed(study: Study, causes: Causes, site: Site) -> Real:
         alone = (one.profile for one in study.location.ranked if site in one.places[0].sites)
         return next(alone, study.location.tuned).z
     z = np.array(causes.best.fit.z)
-    wrong = [study.contest.run.tunables.names.index(name) for name in causes.best.hypothesis.wide]
+    wrong = [study.contest.run.tunables.names.index(name) for name in causes.best.hypothesis.freed]
     z[wrong] = 0.0
     return z

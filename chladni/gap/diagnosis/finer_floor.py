@@ -5,26 +5,26 @@ from dataclasses import replace
 import numpy as np
 
 from chladni.gap.comparison.noise_estimate import estimate_noise, smaller_floor
-from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.own_signal import without_own_signal
-from chladni.gap.diagnosis.search import ALONE
+from chladni.gap.diagnosis.plausible import ALONE
 from chladni.gap.diagnosis.study import Study
+from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.noise_floor import NoiseFloor
 
 #: A floor that is lowered by less says the same.
 LOWER = 0.7
 
 
-def finer_floor(study: Study, causes: Causes) -> NoiseFloor | None:
-    """Give the noise of what the best cause leaves; None where that says nothing new.
+def finer_floor(study: Study, best: Contestant) -> NoiseFloor | None:
+    """Give the noise of what the best hypothesis leaves; None where that says nothing new.
 
     Distortion that no response explains is in a floor that is estimated without a model: up to thirty times the
     noise of a sensor, and a second effect hides there. Behind a first one much of it is gone, and what follows a
     sensor's own signal, as where that is clipped, is no noise either. The floor is asked of what is left again, and
-    where that is lower, and more is left than it, the contest is worth another round.
+    where that is lower, and more is left than it, the search goes on over it.
     """
-    measurement, noise, best = study.measurement, study.contest.noise, causes.best
-    if len(measurement.output_names) < 2 or not best.hypothesis.effects or causes.instead is not None:
+    measurement, noise = study.measurement, study.contest.noise
+    if len(measurement.output_names) < 2 or not best.hypothesis.effects:
         return None
     left = measurement.outputs - best.fit.outputs
     rest = without_own_signal(best.fit.outputs, left)

@@ -5,13 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from chladni.gap.diagnosis.causes import CLOSE, Causes
+from chladni.gap.diagnosis.belief import NAMED, TEMPER
+from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.diagnosis import Candidate, Cause, FittedNumber, Ranked
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.effects.effect_kind import EffectKind
 
+#: Nats within which a log can't tell two candidates apart: odds of e^2 when they are printed.
+CLOSE = 2.0 * TEMPER
 #: Of a floor that shakes and of a lattice: neither is a contest of likelihoods.
 _SHAKEN, _LATTICE = 0.9, 0.92
 
@@ -26,7 +29,8 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
     found: list[Cause] = []
     if causes.best is not causes.tuned:
         places = range(len(causes.best.hypothesis.named))
-        found += [_cause(causes, place) for place in sorted(places, key=lambda place: _left_alone(causes, place))]
+        told = [_cause(causes, place) for place in sorted(places, key=lambda place: _left_alone(causes, place))]
+        found += [one for one in told if one.probability >= NAMED]
     if causes.verdict == "effect" and study.stepping is not None:
         found += _in_steps(study, study.stepping, {one.site for one in found if one.effect == study.stepping.name})
     return tuple(found)
@@ -119,7 +123,7 @@ def _in_its_place(causes: Causes, candidate: Candidate) -> list[Candidate]:
     found = []
     for one in causes.ranked:
         named = one.hypothesis.named
-        close = one.log_evidence > best.log_evidence - CLOSE
+        close = causes.belief.nats(one) > causes.belief.nats(best) - CLOSE
         if close and len(named) == len(best.hypothesis.named) and kept.issubset(named):
             found += [other for other in named if other not in kept]
     return found
@@ -127,12 +131,12 @@ def _in_its_place(causes: Causes, candidate: Candidate) -> list[Candidate]:
 
 def probability_of(causes: Causes, *candidates: Candidate) -> float:
     """Probability of a word at one of some sites, all forms of its law and all that it stands beside together."""
-    pairs = zip(causes.ranked, causes.probabilities, strict=True)
-    return float(sum(share for one, share in pairs if not set(candidates).isdisjoint(one.hypothesis.named)))
+    return causes.belief.probability(*candidates)
 
 
 def _numbers(found: Contestant, place: int) -> dict[str, FittedNumber]:
-    if not found.fit.effects:
+    if place >= len(found.fit.effects):
+        # Of a wrong value the number stands among the tuned ones.
         return {}
     effect, std = found.fit.effects[place], found.fit.effect_std[place]
     return {

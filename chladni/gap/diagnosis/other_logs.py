@@ -76,7 +76,7 @@ def _as_told(run: FreeRun, noise: NoiseFloor, training: Mask, told: Contestant |
         training=training,
         start_z=None if told is None else told.fit.z,
         # They stay where they are, wherever that is.
-        z_limit=1e3,
+        held=False,
         tune=False,
         offsets=len(run.windows) == 1,
     ).outputs

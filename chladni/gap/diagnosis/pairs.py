@@ -5,14 +5,16 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from chladni.gap.diagnosis.following import Entered, followed, is_lost_beside
-from chladni.gap.diagnosis.search import ALONE, least_left, near_places, sound
+from chladni.gap.diagnosis.plausible import ALONE, least_left, near_places, sound
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.candidates import Form, forms_at, promised, screened, searched
-from chladni.gap.explanation.hypotheses import effect_hypotheses, hypothesis_of
+from chladni.gap.explanation.degenerate import is_another
+from chladni.gap.explanation.hypotheses import effect_hypotheses, hypothesis_of, little_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.known_effect import KnownEffect
 from chladni.gap.explanation.linear_words import linear_hypotheses
 from chladni.gap.explanation.screen import Screened
+from chladni.gap.explanation.wrong_values import wrong_values
 from chladni.gap.location.locate import Located, Location, locate, located_pairs
 from chladni.gap.tuning.law_error import with_law_error
 from chladni.models.core.model import Model
@@ -25,8 +27,9 @@ _SECOND, _EACH = 4, 2
 #: Places at which a second effect is looked for; most of them, where others leave at most so many times what the best
 #: one does.
 _PLACES, _MOST_PLACES, _AS_GOOD = 4, 7, 1.1
-#: Share of what others leave below which a screened law, and a fit, leaves much less.
-_PROMISED, _MUCH_LESS = 0.6, 0.5
+#: Share of what others leave below which a fit leaves much less.
+_MUCH_LESS = 0.5
+_TWO = 2
 #: Sensors at which two forces explain everything.
 _EXPLAINED = 2
 #: Linear words that are fitted beside the parameters behind a first effect.
@@ -34,15 +37,6 @@ _LINEAR = 4
 #: Two forces, or where they'd explain anything two laws, must leave less than this of what one leaves; pairs that are
 #: as good as the best are screened too, so many, and those searched whose laws promise most.
 _PAIR_GAIN, _PAIR_TIE, _SCREENED, _PAIRS = 0.6, 1.3, 8, 3
-#: An unknown force at a place that leaves more than this, over the noise, isn't alone: of made machines with
-#: one effect one in twenty leaves as much, of those with two four in five.
-TWO_FORCES = 1.2
-
-
-def two_act(location: Location) -> bool:
-    """Whether an unknown force at the best place leaves what only another one may explain."""
-    best = location.best
-    return best is not None and bool(best.profile.forces) and best.profile.chi > TWO_FORCES
 
 
 def second_causes(
@@ -74,8 +68,9 @@ def _entered_beside(
         return [], []
     model, location, known = behind
     trials = _second_trials(study, location, kept, known)
-    singles = effect_hypotheses(trials, count=_SECOND)
-    entered = study.contest.enter_all([_beside(found, kept, one, found.fit.z) for one in singles])
+    singles = [_beside(found, kept, one, found.fit.z) for one in effect_hypotheses(trials, count=_SECOND)]
+    values = [_beside(found, kept, one, one.start_z) for one in wrong_values(location, study.contest.run.tunables)]
+    entered = study.contest.enter_all([*singles, *values])
     good = sound(study, entered)
     if least_left(good) > ALONE:
         linear = linear_hypotheses(model, location, trials, count=_LINEAR)
@@ -96,28 +91,20 @@ def _stepping_stone(
     return stone if stone is not None and stone.chi < _MUCH_LESS * others else None
 
 
-def promises_another(study: Study, found: Contestant) -> bool:
-    """Whether a law at another place, screened on what a first effect leaves, promises to explain much of that.
-
-    Noise of any colour lets none do so, since there is no law that it follows.
-    """
-    behind = _behind(study, found, found.fit.effects)
-    if behind is None:
-        return False
-    _, location, known = behind
-    trials = _second_trials(study, location, found.fit.effects, known)
-    return min((one.chi for one in trials), default=np.inf) < _PROMISED * location.tuned.chi
-
-
 def _second_trials(
     study: Study, location: Location, kept: Sequence[AttachedEffect], known: KnownEffect | None
 ) -> list[Screened]:
     """Screen the best places for a second effect, beside those that are kept."""
     count = min(max(_PLACES, len(near_places(location, _AS_GOOD))), _MOST_PLACES)
     trials = screened(location, location.ranked[:count], study.kinds, known)
-    # At the same place a second word would mend the details of the first one's law.
+    # At the same place a second word would mend the details of the first one's law; but a machine has many tones.
     taken = _same_places(study, {one.site for one in kept})
-    return [one for one in trials if one.trial.site.name not in taken]
+    several = {(one.kind.name, one.site) for one in kept if one.kind.clues.several}
+    return [
+        one
+        for one in trials
+        if one.trial.site.name not in taken or (one.trial.effect, one.trial.site.name) in several
+    ]
 
 
 def _beside(found: Contestant, kept: tuple[AttachedEffect, ...], one: Hypothesis, z: Real) -> Hypothesis:
@@ -172,9 +159,9 @@ def _near_pairs(location: Location, pairs: Sequence[Located]) -> list[Located]:
 
 
 def exchanged(study: Study, both: Contestant) -> list[Contestant]:
-    """Enter other effects beside each of several: the first was found while the second was not known."""
+    """Enter other effects beside each of two: the first was found while the second was not known."""
     effects = both.fit.effects
-    return [one for kept in effects for one in second_causes(study, both, (kept,)) if len(effects) > 1]
+    return [one for kept in effects if len(effects) == _TWO for one in second_causes(study, both, (kept,))]
 
 
 def without_one(study: Study, both: Contestant) -> list[Contestant]:
@@ -191,6 +178,35 @@ def without_one(study: Study, both: Contestant) -> list[Contestant]:
         if len(effects) > 1
     ]
     return sound(study, study.contest.enter_all(fewer))
+
+
+def shared(study: Study, found: Contestant) -> list[Contestant]:
+    """Enter the words of a fit at all sites of their kinds at once: parts of a kind are made alike.
+
+    Where one does nothing it's left out, and the others are fitted again.
+    """
+    words = {one.kind.name: one for one in found.fit.effects}
+    everywhere = [*found.fit.effects, *(each for one in words.values() for each in _elsewhere(study, found, one))]
+    if len(everywhere) == len(found.fit.effects):
+        return []
+    entered = study.contest.enter_all([hypothesis_of((*everywhere,), found.fit.z, initial=found.fit.initial)])
+    run = study.contest.run
+    left = [[effect for effect in one.fit.effects if not is_another(run, one, effect)] for one in entered]
+    fewer = [
+        hypothesis_of((*some,), one.fit.z, initial=found.fit.initial)
+        for one, some in zip(entered, left, strict=True)
+        if len(found.fit.effects) < len(some) < len(one.fit.effects)
+    ]
+    return sound(study, [*entered, *study.contest.enter_all(fewer)])
+
+
+def _elsewhere(study: Study, found: Contestant, effect: AttachedEffect) -> list[AttachedEffect]:
+    """Give a little of an effect at the other sites of its kind; nothing of pairs, which a machine has many of."""
+    kinds = {site.name: site.kind for place in study.location.places for site in place.sites}
+    kind, taken = kinds.get(effect.site), {one.site for one in found.fit.effects}
+    if kind not in ("joint", "body", "input", "output") or effect.source is not None:
+        return []
+    return [little_of(effect, site=name) for name, other in kinds.items() if other == kind and name not in taken]
 
 
 def _behind(

@@ -1,80 +1,296 @@
-"""The search for one cause: every plausible effect entered, more while all leave something."""
+"""The search: moves that enter hypotheses, one after another while the believed one leaves something."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chladni.gap.diagnosis.following import Entered, followed, is_lost_beside
-from chladni.gap.diagnosis.study import Study
+from chladni.gap.diagnosis.belief import Belief
+from chladni.gap.diagnosis.following import followed
+from chladni.gap.diagnosis.pairs import exchanged, paired_causes, second_causes, shared, without_one
+from chladni.gap.diagnosis.plausible import is_lost, is_one_force, least_left, plausible_places, sound
+from chladni.gap.diagnosis.study import Study, contest_over, over_model
+from chladni.gap.diagnosis.told_holds import BEYOND_DOUBT, other_holds
 from chladni.gap.explanation.candidates import screened
-from chladni.gap.explanation.contest import weighed
-from chladni.gap.explanation.degenerate import is_degenerate
 from chladni.gap.explanation.hypotheses import (
     effect_hypotheses,
     polished,
     siblings,
     twins,
-    wrong_parameters,
 )
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.linear_words import linear_hypotheses
+from chladni.gap.explanation.screen import Screened
 from chladni.gap.explanation.sticking import sticking_hypotheses
-from chladni.gap.location.locate import Located, Location
-from chladni.gap.side_by_side import side_by_side
+from chladni.gap.explanation.wrong_values import with_wrong_values, wrong_values
+from chladni.gap.location.locate import Located
 from chladni.signals.errors import EstimateError
+
+if TYPE_CHECKING:
+    from chladni.gap.explanation.known_states import KnownStates
 
 Step = Callable[[float], None]
 #: Fits of an effect, and so many more while all leave something: along a motion that isn't quite the machine's the
 #: screen may rank a law low that fits.
 _FITTED, _AGAIN = 7, 16
-#: A best fit that leaves more than this has details of laws worth a fit, those of the first few.
-_DETAILED, _POLISHED = 1.1, 4
-#: A first effect that leaves less than this, over the noise's power, is alone.
-ALONE = 1.3
-#: An unknown force that leaves less than this explains all; with more than so many sensors that says something. A
-#: place at which it leaves so many times more is another one.
-_ONE_FORCE, _PATTERN_SENSORS, _SAME_PLACE = 1.15, 2, 1.25
-#: What another place leaves of the gap beyond the best one, where the cause may still be: beside floors that shook
-#: the next place left 0.02, beside a stop between a body and the ground that joint 0.0001.
-_NEAR = 0.003
-#: Named effects that leave so many times what the best place does leave far more.
-_FAR = 3.0
+#: First few forms whose details are fitted.
+_POLISHED = 4
+#: Leading sets behind which holds are asked for, and with which the search begins again beside another.
+_HOLD_LEADS, _AGAIN_FROM = 3, 8
+#: Nats that are worth another move: less pays for no name.
+WORTH = 12.0
+#: Sensors that don't tell two forces from any others.
+_TOLD = 2
+#: Leads beside which another cause is looked for; most rounds of that; causes up to which two at once are.
+_LEADS, _MOST_CAUSES, _PAIRED = 2, 2, 2
 
 
-def is_one_force(location: Location) -> bool:
-    """Whether an unknown force at one place leaves nothing, where there are sensors enough for that to say something.
+class Search:
+    """Hypotheses on one log, entered move by move while the believed one leaves something.
 
-    Then two known ones elsewhere would only imitate it, and so would one.
+    Parameters
+    ----------
+    study
+        Of the log.
+
+    Attributes
+    ----------
+    found
+        Every sound contestant, that without a cause first.
+    states
+        That the machine went through, where all runs were lost and a law follows from these; else None.
+    forces
+        Two unknown forces that explain much more than one, when they were looked for; else None.
     """
-    best = location.best
-    return best is not None and len(location.problem.measured) > _PATTERN_SENSORS and best.profile.chi < _ONE_FORCE
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+        self.nothing = _without_cause(study)
+        self.found = [self.nothing]
+        self.states: KnownStates | None = None
+        self.forces: Located | None = None
+        self._tried: set[object] = set()
+
+    @cached_property
+    def belief(self) -> Belief:
+        """What is believed of all that was found."""
+        return Belief(self.study.location, self.found, self.forces, told=self.study.coarse)
+
+    @property
+    def best(self) -> Contestant:
+        """The most probable one."""
+        return self.belief.best
+
+    def add(self, entered: Sequence[Contestant]) -> bool:
+        """Take sound contestants in; whether the most probable one is another now."""
+        before = self.best
+        self.found += sound(self.study, entered)
+        self.__dict__.pop("belief", None)
+        return self.best is not before
+
+    def enter(self, hypotheses: Sequence[Hypothesis], progress: Step | None = None) -> bool:
+        """Fit hypotheses and take them in, but for forms that were fitted before."""
+        new = [one for one in hypotheses if self._form(one) not in self._tried]
+        self._tried.update(self._form(one) for one in new)
+        return self.add(self.study.contest.enter_all(new, progress))
+
+    def _form(self, one: Hypothesis) -> object:
+        effects = frozenset((each.effect, each.site, each.variant, each.source) for each in one.effects)
+        return effects, one.fitted, self.study.contest.run.tunables.wrong(one.start_z)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the believed hypothesis leaves what another cause could be worth its price, and a name, for."""
+        return self.belief.unexplained(self.best) > WORTH and self.belief.beyond(self.best) > self.belief.least
+
+    def over(self, study: Study) -> "Search":
+        """Give the search of the same log over another floor, with what was found judged anew."""
+        other = copy(self)
+        other.study = study
+        other.found = [study.contest.judged(one.hypothesis, one.fit) for one in self.found]
+        other.nothing = other.found[0]
+        other.__dict__.pop("belief", None)
+        return other
+
+    def run(self, progress: Step) -> None:
+        """Make moves until nothing is left to be explained, or none helps."""
+        self.begin(progress)
+        self.go_on(progress)
+
+    def begin(self, progress: Step) -> None:
+        """Look for one cause, for two at once where forces at two places tell more, and for forms that hide."""
+        progress(0.1)
+        if self.is_open:
+            self._begin(progress)
+
+    def _begin(self, progress: Step) -> None:
+        candidates, hypotheses = self._one_cause(progress)
+        if self.is_open and self._other_holds() and self.is_open:
+            candidates, hypotheses = self._one_cause(progress)
+        if self.is_open and self.best.hypothesis.freed:
+            # Where an unknown force acts shows only behind the values that are wrong.
+            self.add(second_causes(self.study, self.best))
+        if self.is_open and self._several_act():
+            # Laws at one place only imitate what acts at two.
+            self._two_at_once()
+        elif self.is_open:
+            self._hidden_forms(candidates, hypotheses)
+        self._settle()
+
+    def go_on(self, progress: Step) -> None:
+        """Look for further causes, until nothing is left to be explained, or none helps."""
+        progress(0.8)
+        for _ in range(_MOST_CAUSES):
+            if self._forces_end_it or not (self.is_open and self._one_more(progress)):
+                break
+        self._settle()
+        progress(1.0)
+
+    @property
+    def _forces_end_it(self) -> bool:
+        """Whether unknown forces at fewer places than there are sensors leave nothing: others only imitate these."""
+        sensors = len(self.study.measurement.output_names)
+        tried = [one for one in (self.study.location.best, self.forces) if one is not None and one.profile.forces]
+        if any(effect.kind.clues.several for lead in self._leads() for effect in lead.hypothesis.effects):
+            # One place may have several of them.
+            return False
+        return sensors > _TOLD and any(
+            len(one.places) < sensors and self.belief.elsewhere(one) < WORTH for one in tried
+        )
+
+    def _other_holds(self) -> bool:
+        """Ask what inputs did between samples behind the leading causes, which may have hidden it; whether it's new.
+
+        What acts at an input itself could be any hold as far as an unknown force there tells.
+        """
+        study = self.study
+        leads = [one.best for one in self.belief.sets if one.causes][:_HOLD_LEADS]
+        model, nats = study.model, max((one.log_evidence for one in leads), default=0.0)
+        for others in other_holds(study.model, study.measurement):
+            for other in [model.with_holds(one) for one in others]:
+                found = contest_over(study, other).enter_all([_from_fit(one) for one in leads])
+                told = max((one.log_evidence for one in found), default=-np.inf)
+                if told > nats + BEYOND_DOUBT:
+                    model, nats = other, told
+        if model is study.model:
+            return False
+        begun = [_from_fit(one.best) for one in self.belief.sets[:_AGAIN_FROM] if one.causes]
+        self.study, self._tried = over_model(study, model), set()
+        self.nothing = _without_cause(self.study)
+        self.found = [self.nothing]
+        self.__dict__.pop("belief", None)
+        self.enter(begun)
+        return True
+
+    def _several_act(self) -> bool:
+        """Whether a force at the best place leaves what only another one explains."""
+        best, sensors = self.study.location.best, len(self.study.measurement.output_names)
+        return best is not None and sensors > _TOLD and self.belief.elsewhere(best) > WORTH
+
+    def _two_at_once(self) -> None:
+        pairs = paired_causes(self.study, self.best)
+        self.states = pairs.states or self.states
+        self.forces = pairs.forces or self.forces
+        self.add(pairs.ranked)
+        if self.best is not self.nothing:
+            self._settle()
+            self.add(without_one(self.study, self.best))
+
+    def _one_cause(self, progress: Step) -> tuple[list[Screened], list[Hypothesis]]:
+        """Fit what the screen promises most of, and values that may be wrong; give what was screened and fitted."""
+        study, location = self.study, self.study.location
+        places = plausible_places(location)
+        if not is_one_force(location):
+            places += self._beside_wrong_values()
+        candidates = screened(location, places, study.kinds)
+        progress(0.3)
+        hypotheses = effect_hypotheses(candidates, count=_FITTED)
+        values = wrong_values(location, study.contest.run.tunables)
+        self.enter([*hypotheses, *values], lambda done: progress(0.3 + 0.4 * done))
+        return candidates, hypotheses
+
+    def _hidden_forms(self, candidates: Sequence[Screened], hypotheses: Sequence[Hypothesis]) -> None:
+        """Fit forms that the screen ranks low though they're right: linear ones far off, laws whose runs are lost."""
+        study, location = self.study, self.study.location
+        self.enter(linear_hypotheses(study.model, location, candidates))
+        if self.is_open:
+            self.enter(_others(effect_hypotheses(candidates, count=_AGAIN), hypotheses))
+        if self.is_open and is_lost(location, self._least):
+            self.enter(sticking_hypotheses(location, study.kinds))
+        if self.is_open and is_lost(location, self._least):
+            shots = followed(study, location.best, hypotheses)
+            if shots is not None:
+                self.states = shots.states
+                self.add(shots.ranked)
+
+    def _beside_wrong_values(self) -> list[Located]:
+        """The leading places with the values that are wrong beside a force there."""
+        study = self.study
+        tunables = study.contest.run.tunables
+        leading = study.location.ranked[:_LEADS] if len(study.measurement.output_names) > 1 else ()
+        found = [with_wrong_values(study.location, one, tunables) for one in leading]
+        return [one for one in found if one is not None]
+
+    def _one_more(self, progress: Step) -> bool:
+        """Look for another cause beside those that are believed, or for several in their place; whether it helped."""
+        study, before, nats = self.study, self.best, self.belief.nats(self.best)
+        for lead in self._leads():
+            if self.is_open:
+                self.add(shared(study, lead))
+        for lead in self._leads():
+            if self.is_open:
+                self.add(second_causes(study, lead))
+        progress(0.86)
+        if self.is_open and not self._several_act() and len(before.hypothesis.effects) < _PAIRED:
+            self._two_at_once()
+        progress(0.94)
+        if self.best is before:
+            return False
+        self.add(exchanged(study, self.best))
+        self._settle()
+        while len(self.best.hypothesis.effects) > 1 and self.add(without_one(study, self.best)):
+            pass
+        return self.belief.nats(self.best) > nats + WORTH
+
+    def _settle(self) -> None:
+        """Fit the relatives of what leads, its details, and the sites that can't be told from its own."""
+        study = self.study
+        if not self.best.hypothesis.effects:
+            return
+        self.enter(self._relatives())
+        for one in self._forms():
+            # What details may bring is what is missing to noise alone.
+            if -one.left.log_likelihood(self.belief.level) > WORTH:
+                self.add(_polished(study, one))
+        self.enter(twins(self.best, study.location.places))
+
+    def _relatives(self) -> list[Hypothesis]:
+        others = siblings(self.best, self.study.contest.run)
+        return [one for one in others if all(self.study.takes_part(each.effect) for each in one.effects)]
+
+    def _forms(self) -> list[Contestant]:
+        """The first few forms that name as much as the best one."""
+        count = len(self.best.hypothesis.named)
+        alike = [one for one in self.found if one.hypothesis.effects and len(one.hypothesis.named) == count]
+        return best_forms(sorted(alike, key=self.belief.nats, reverse=True))
+
+    def _leads(self) -> list[Contestant]:
+        """The best and the next at another site: of two causes either may look like the first."""
+        leads: dict[frozenset[str], Contestant] = {}
+        for one in self.belief.sets:
+            if one.causes:
+                leads.setdefault(frozenset(effect.site for effect in one.best.hypothesis.effects), one.best)
+        return list(leads.values())[:_LEADS]
+
+    @property
+    def _least(self) -> float:
+        return least_left([one for one in self.found if one.hypothesis.effects])
 
 
-def plausible_places(location: Location) -> list[Located]:
-    """Give the places at which the cause may be: all, unless one alone leaves nothing."""
-    return near_places(location, _SAME_PLACE) if is_one_force(location) else list(location.ranked)
-
-
-def same_places(location: Location) -> list[Located]:
-    """Give the places that explain as much as the best one: one force to the sensors."""
-    enough = _SAME_PLACE * _least_chi(location)
-    return [one for one in location.ranked if one.profile.chi < enough]
-
-
-def near_places(location: Location, same: float) -> list[Located]:
-    """Give the places that leave at most `same` times what the best one does, or little more of the gap."""
-    first = _least_chi(location)
-    enough = max(same * first, first + _NEAR * (location.tuned.chi - first))
-    return [one for one in location.ranked if one.profile.chi < enough]
-
-
-def _least_chi(location: Location) -> float:
-    """Give what the best place leaves, over the noise's power; less than noise is no better than noise."""
-    return max(location.ranked[0].profile.chi, 1.0)
-
-
-def without_cause(study: Study) -> Contestant:
+def _without_cause(study: Study) -> Contestant:
     """Give the tuned model alone."""
     contest = study.contest
     found = contest.enter(Hypothesis(start_z=study.location.tuned.z), max_iterations=20)
@@ -89,68 +305,15 @@ def without_cause(study: Study) -> Contestant:
     return found
 
 
-def single_causes(study: Study, progress: Step) -> Entered:
-    """Enter every effect that the screen holds plausible, and parameters beyond their tolerance."""
-    location, contest = study.location, study.contest
-    places = plausible_places(location)
-    candidates = screened(location, places, study.kinds)
-    progress(0.3)
-    hypotheses = effect_hypotheses(candidates, count=_FITTED)
-    wrong = wrong_parameters(location)
-    entered = contest.enter_all([*hypotheses, *([wrong] if wrong else [])], lambda done: progress(0.3 + 0.5 * done))
-    found = sound(study, entered)
-    if least_left(found) > ALONE:
-        linear = linear_hypotheses(study.model, location, candidates)
-        found += sound(study, contest.enter_all(linear))
-    if least_left(found) > ALONE:
-        others = _others(effect_hypotheses(candidates, count=_AGAIN), hypotheses)
-        found += sound(study, contest.enter_all(others))
-    if is_lost(location, least_left(found)):
-        found += sound(study, contest.enter_all(sticking_hypotheses(location, study.kinds)))
-    lost = is_lost(location, least_left(found))
-    shots = followed(study, location.best, hypotheses) if lost else None
-    found += [] if shots is None else sound(study, shots.ranked)
-    ranked = weighed([*found, *sibling_causes(study, weighed(found))])
-    if ranked and ranked[0].chi > _DETAILED:
-        # A detail of its law that was set by the screen's grid must not cost a word its place.
-        forms = best_forms(ranked)
-        ranked = [*(_polished(study, one) for one in forms), *(one for one in ranked if one not in forms)]
-    return Entered(ranked=weighed(ranked), states=None if shots is None else shots.states)
-
-
-def is_lost(location: Location, left: float) -> bool:
-    """Whether what the best runs leave, over the noise's power, is far more than an unknown force does."""
-    return is_lost_beside(location.best, left)
-
-
-def is_far(location: Location, left: float) -> bool:
-    """Whether runs leave far more than the best place does, a sensor's or an input's own as well as a force's."""
-    best = location.best
-    return best is None or left > _FAR * max(best.profile.chi, 1.0)
-
-
-def least_left(found: Sequence[Contestant]) -> float:
-    """Give what the best of contestants leaves, over the noise's power; infinite without any."""
-    return min((one.chi for one in found), default=np.inf)
+def _from_fit(found: Contestant) -> Hypothesis:
+    """Give a hypothesis again from where its fit ended."""
+    return replace(found.hypothesis, effects=found.fit.effects, start_z=found.fit.z, initial=found.fit.initial)
 
 
 def _others(found: Sequence[Hypothesis], tried: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Those that name what none of the tried ones does."""
     names = {one.named for one in tried}
     return [one for one in found if one.named not in names]
-
-
-def sibling_causes(study: Study, ranked: Sequence[Contestant]) -> list[Contestant]:
-    """Enter what contains an effect or is contained in it, where that one leads, alone or beside another effect."""
-    others = siblings(ranked[0], study.contest.run) if ranked else []
-    allowed = [one for one in others if all(study.takes_part(effect.effect) for effect in one.effects)]
-    return sound(study, study.contest.enter_all(allowed))
-
-
-def twin_causes(study: Study, found: Contestant) -> list[Contestant]:
-    """Enter the effects of a fit at the other sites that print the same pattern."""
-    # All: where a second effect acts may explain too little alone to be followed.
-    return sound(study, study.contest.enter_all(twins(found, study.location.places)))
 
 
 def best_forms(ranked: Sequence[Contestant]) -> list[Contestant]:
@@ -162,30 +325,11 @@ def best_forms(ranked: Sequence[Contestant]) -> list[Contestant]:
     return list(forms.values())[:_POLISHED]
 
 
-def _polished(study: Study, found: Contestant) -> Contestant:
-    """Let the details of the laws move too: creep, presliding, shape; kept when that pays."""
+def _polished(study: Study, found: Contestant) -> list[Contestant]:
+    """Let the details of the laws move too: creep, presliding, shape."""
     finer = polished(found.hypothesis, found.fit)
     if finer is None:
-        return found
+        return []
     # Windows of a lost fit begin where no details lead out: then it's the linear part that tells their states.
     starts = [finer, replace(finer, initial=None)] if study.windows is not None else [finer]
-    return weighed([found, *sound(study, study.contest.enter_all(starts))])[0]
-
-
-def detailed(study: Study, found: Contestant) -> Contestant:
-    """Give a contestant with the details of its laws fitted too, when it leaves enough for them to matter."""
-    return _polished(study, found) if found.chi > _DETAILED else found
-
-
-def sound(study: Study, entered: Sequence[Contestant]) -> list[Contestant]:
-    """Leave out what is its law in name only, and what steps larger than a sensor's signal make of it."""
-
-    def is_sound(one: Contestant) -> bool:
-        return not is_degenerate(study.contest.run, one) and not _is_rounding(study, one)
-
-    return [one for one, kept in zip(entered, side_by_side(is_sound, entered), strict=True) if kept]
-
-
-def _is_rounding(study: Study, one: Contestant) -> bool:
-    """Whether an effect is at a sensor of which only steps are left: what these take looks like tones and gains."""
-    return not study.coarse.isdisjoint(effect.site for effect in one.hypothesis.effects)
+    return study.contest.enter_all(starts)

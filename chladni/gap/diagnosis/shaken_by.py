@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from chladni.gap.diagnosis.search import near_places
+from chladni.gap.diagnosis.plausible import near_places
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.any_law import left_by_any_law
 from chladni.gap.explanation.contest import held_gap
@@ -70,12 +70,15 @@ def shaken_by(study: Study, tuned: Contestant) -> ShakenGround | None:
     if any(_follows(study, one) for one in near_places(study.location, _TIED)):
         return None
     site = _grounds(ground)[0]
+    parameters = floor_motion(study.location.problem, site, ground.profile.z, kind)
+    if not parameters:
+        return None
     names = [site.name, *(name for one in (ground, *tied) for name in one.places[0].names)]
     return ShakenGround(
         effect=kind.name,
         group=tuple(dict.fromkeys(names)),
         predicted=predicted,
-        parameters=floor_motion(study.location.problem, site, ground.profile.z, kind),
+        parameters=parameters,
     )
 
 

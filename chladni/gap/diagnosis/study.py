@@ -8,6 +8,7 @@ import numpy as np
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.quiet_floor import quiet_floor
+from chladni.gap.diagnosis.told_holds import with_told_holds
 from chladni.gap.explanation.contest import Contest, training_mask
 from chladni.gap.explanation.known_states import KnownStates
 from chladni.gap.location.locate import Located, Location, locate
@@ -110,7 +111,11 @@ def study_of(
     kinds = taking_part(leave_out, own.values())
     lattices = _lattices(measurement, noise, _stepping(kinds))
     noise = _with_rounding(noise, model, measurement, lattices)
-    location = locate(model, measurement, noise, Tunables.of(model))
+    tunables = Tunables.of(model)
+    location = locate(model, measurement, noise, tunables)
+    told = with_told_holds(model, location)
+    if told is not model:
+        model, location = told, locate(told, measurement, noise, tunables)
     windows = None if _runs_free(model, location) else windows_for(model, measurement)
     run = FreeRun(model, measurement, windows=windows)
     training = training_of(measurement, windows)
@@ -118,7 +123,7 @@ def study_of(
         model=model,
         measurement=measurement,
         location=location,
-        contest=Contest(run, location.problem.noise, training),
+        contest=Contest(run, location.problem, training),
         windows=windows,
         lattices=lattices,
         repeating=_repeating(measurement),
@@ -130,8 +135,21 @@ def over_floor(study: Study, noise: NoiseFloor) -> Study:
     """Give the study of the same log over another floor, its runs as long as they were."""
     noise = _with_rounding(noise, study.model, study.measurement, study.lattices)
     location = locate(study.model, study.measurement, noise, Tunables.of(study.model))
-    contest = Contest(study.contest.run, location.problem.noise, study.contest.training, study.contest.states)
+    contest = Contest(study.contest.run, location.problem, study.contest.training, study.contest.states)
     return replace(study, location=location, contest=contest)
+
+
+def contest_over(study: Study, model: Model) -> Contest:
+    """Give the contest on the same log of a model that differs in what happens between samples."""
+    old = study.contest
+    run = FreeRun(model, study.measurement, windows=study.windows)
+    problem = LinearProblem(model, study.measurement, old.noise, run.tunables, old.problem.lines)
+    return Contest(run, problem, old.training, old.states)
+
+
+def over_model(study: Study, model: Model) -> Study:
+    """Give the study of the same log beside such a model."""
+    return over_floor(replace(study, model=model, contest=contest_over(study, model)), study.contest.noise)
 
 
 def floor_of(measurement: Measurement) -> NoiseFloor:
@@ -144,7 +162,7 @@ def over_windows(study: Study, states: KnownStates) -> Study:
     """Give the study of the same log over windows that begin at known states."""
     windows = short_windows(study.model, study.measurement)
     run, training = FreeRun(study.model, study.measurement, windows=windows), training_in_windows(windows)
-    return replace(study, windows=windows, contest=Contest(run, study.contest.noise, training, states))
+    return replace(study, windows=windows, contest=Contest(run, study.location.problem, training, states))
 
 
 def recovered_states(problem: LinearProblem, located: Located | None) -> KnownStates | None:

@@ -81,7 +81,7 @@ def forms_at(
         located, site, others = at
         motion = recovered(problem, located.profile, site, others)
         motion = motion if known is None else known.along(motion, problem.measurement)
-        screen = Screen(problem, located.profile, site, others=others)
+        screen = Screen(problem, located.profile, site, others=others, limit=problem.limits(located.profile.z))
         return [(one, screen) for one in screen.run(trials_at(problem, measurement, motion, band, kinds))]
 
     sites = [(located, site, tuple(others)) for located in places for site, others in sites_at(located)]

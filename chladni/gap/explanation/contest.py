@@ -3,28 +3,29 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chladni.gap.comparison.shares import pooled_gap
+from chladni.gap.explanation.evidence import Left, doubt_of, freedom_nats, left_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.known_states import KnownStates
 from chladni.gap.plant.free_run import FreeRun
-from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.side_by_side import side_by_side
 from chladni.gap.tuning.output_error import OutputErrorFit, fit_output_error, with_coloured_spread
 from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError, ModelError
 
+if TYPE_CHECKING:
+    from chladni.gap.records.noise_floor import NoiseFloor
+
 #: Independent samples that a log is taken for, whatever its length: a model that is right but for details of its law
 #: must not be refuted by those details a million times over (see docs/methods/gap-explanation.md).
 EFFECTIVE_SAMPLES = 200.0
-#: Share of the noise's power that details of a law may leave without counting against it.
-SLACK = 0.3
 #: Least of them that tell a state at the start of a window.
 _LEAST_SAMPLES = 2.0
-#: Nats by which fits of one form differ that ended at the same place.
-_SAME = 0.5
 _BLOCK_S = 0.75
 #: Every so manieth block is held out.
 _EVERY = 3
@@ -58,8 +59,13 @@ class Contest:
         Those that windows begin their search at; without them each begins at what its linear part alone would.
     """
 
-    def __init__(self, run: FreeRun, noise: NoiseFloor, training: Mask, states: KnownStates | None = None) -> None:
-        self.run, self.noise, self.training, self.states = run, noise, training, states
+    def __init__(
+        self, run: FreeRun, problem: LinearProblem, training: Mask, states: KnownStates | None = None
+    ) -> None:
+        self.run, self.problem, self.training, self.states = run, problem, training, states
+        self.noise: NoiseFloor = problem.noise
+        #: Energy that runs over windows leave without a law, of what was entered.
+        self._without_laws = np.inf
 
     def enter(
         self,
@@ -68,46 +74,62 @@ class Contest:
         max_iterations: int = 12,
         tune: bool = True,
         initial: Real | None = None,
-        only_coarse: bool = False,
     ) -> Contestant | None:
         """Fit a hypothesis, from some initial states ``[window, state]``; None when its start already diverges."""
+        freed = tuple(dict.fromkeys((*hypothesis.freed, *self.run.tunables.wrong(hypothesis.start_z))))
         try:
             if initial is None:
                 initial = self._initial(hypothesis)
             fit = fit_output_error(
                 self.run, self.noise,
                 effects=hypothesis.effects, fitted=hypothesis.fitted or None, training=self.training,
-                start_z=np.clip(hypothesis.start_z, -3.0, 3.0) if not hypothesis.wide else hypothesis.start_z,
-                z_limit={name: hypothesis.wide.get(name, 3.0) for name in self.run.tunables.names},
-                start_initial=initial, max_iterations=max_iterations, tune=tune, only_coarse=only_coarse,
+                start_z=hypothesis.start_z, freed=freed,
+                start_initial=initial, max_iterations=max_iterations, tune=tune,
                 # Over windows each start is free: of a free axis a constant is the same thing again.
                 offsets=len(self.run.windows) == 1,
             )  # fmt: skip
         except (ModelError, EstimateError, np.linalg.LinAlgError):
             return None
-        return self.judged(hypothesis, fit)
+        # One that came back inside its tolerance isn't wrong.
+        return self.judged(replace(hypothesis, freed=self.run.tunables.wrong(fit.z)), fit)
 
     def judged(self, hypothesis: Hypothesis, fit: OutputErrorFit) -> Contestant:
         """Weigh a fit on the samples that it didn't see."""
-        held = fit.held_by_output
-        # A parameter that may leave its tolerance pays for its freedom instead of its distance.
-        wide = [self.run.tunables.names.index(name) for name in hypothesis.wide]
-        prior = fit.prior_cost - float(np.sum(fit.z[wide] ** 2))
+        freedom = freedom_nats(self.run, fit, hypothesis.fitted, hypothesis.freed)
+        left, starts = self._left(hypothesis, fit), self._starts(fit)
         return Contestant(
             hypothesis=hypothesis,
             fit=fit,
-            held=held,
+            held=fit.held_by_output,
             gap=held_gap(self.run.measurement.outputs, fit.outputs, ~self.training),
-            prior=prior,
-            starts=self._starts(fit),
+            prior=fit.prior_cost,
+            left=left,
+            freedom=freedom,
+            starts=starts,
+            log_evidence=left.log_likelihood() - 0.5 * fit.prior_cost + freedom - starts,
         )
+
+    def _left(self, hypothesis: Hypothesis, fit: OutputErrorFit) -> Left:
+        detailed = [one.site for one in hypothesis.effects if not one.kind.clues.exact]
+        if len(self.run.windows) == 1:
+            return left_of(self.problem, self.run, fit, detailed)
+        # Each window begins anew: over the record's lines what is left there prints no pattern.
+        expected = float(self.problem.scale)
+        energy = expected * float(np.mean(fit.held_by_output))
+        if not hypothesis.effects:
+            self._without_laws = min(self._without_laws, energy)
+        tuned = (energy, expected, 0.0, 0.0) if detailed else (0.0, 0.0, energy, expected)
+        return Left(
+            along=tuned[0], along_expected=tuned[1], across=tuned[2], across_expected=tuned[3],
+            force=self._without_laws, doubt=doubt_of(self.noise), sites=len(set(detailed)),
+        )  # fmt: skip
 
     def with_spread(self, found: Contestant) -> Contestant:
         """Give a contestant with the standard deviations that the colour of its residual allows."""
         try:
             fit = with_coloured_spread(
                 self.run, self.noise, found.fit,
-                fitted=found.hypothesis.fitted or None, training=self.training,
+                fitted=found.hypothesis.fitted or None, training=self.training, freed=found.hypothesis.freed,
                 tune=bool(np.any(found.fit.parameter_std)), offsets=len(self.run.windows) == 1,
             )  # fmt: skip
         except (ModelError, EstimateError, np.linalg.LinAlgError):
@@ -139,63 +161,10 @@ class Contest:
         progress: Callable[[float], None] | None = None,
         *,
         max_iterations: int = 12,
-        only_coarse: bool = False,
     ) -> list[Contestant]:
         """Fit hypotheses, and give them in their order; those that diverge are left out."""
-        enter = partial(self.enter, max_iterations=max_iterations, only_coarse=only_coarse)
+        enter = partial(self.enter, max_iterations=max_iterations)
         return [one for one in side_by_side(enter, hypotheses, progress) if one is not None]
-
-
-def weighed(contestants: Sequence[Contestant]) -> list[Contestant]:
-    """Give contestants with their evidence, by falling evidence.
-
-    Noise that no fit saw can't be less than what the best of them leaves of it: where an effect at a sensor, such as
-    clipping, looked like noise at first, its floor is lowered to that, the same for all.
-    """
-    if not contestants:
-        return []
-    floor = lowest(contestants)
-    found = [
-        replace(one, log_evidence=log_evidence(one.held / floor, one.prior, one.hypothesis.freedom) - one.starts)
-        for one in contestants
-    ]
-    return sorted(found, key=lambda one: -one.log_evidence)
-
-
-def distinct(ranked: Sequence[Contestant]) -> list[Contestant]:
-    """Give weighed contestants without those that ended where another of the same name and form did.
-
-    Searches from several starts often find one fit; in a share of probabilities it counts once.
-    """
-    found: list[Contestant] = []
-    for one in ranked:
-        if not any(_is_same(one, other) for other in found):
-            found.append(one)
-    return found
-
-
-def _is_same(one: Contestant, other: Contestant) -> bool:
-    forms = [
-        {(effect.effect, effect.site, effect.variant, effect.source) for effect in each.hypothesis.effects}
-        for each in (one, other)
-    ]
-    close = abs(one.log_evidence - other.log_evidence) < _SAME
-    return close and forms[0] == forms[1] and one.hypothesis.wide == other.hypothesis.wide
-
-
-def lowest(contestants: Sequence[Contestant]) -> Real:
-    """Give ``[output]`` what the best of contestants leave, over the noise's estimate; at most 1."""
-    return np.asarray(np.minimum(np.min([one.held for one in contestants], axis=0), 1.0), dtype=np.float64)
-
-
-def log_evidence(held: Real, prior: float, freedom: int) -> float:
-    """Held-out predictive log likelihood in nats, with prior and a penalty for freedom (Schwarz 1978).
-
-    ``-N/2 sum_j ln((m_j + slack)/(1 + slack)) - prior/2 - freedom/2 ln N`` with m_j the whitened mean square of
-    output j and N the effective number of samples.
-    """
-    likelihood = -0.5 * EFFECTIVE_SAMPLES * float(np.sum(np.log((held + SLACK) / (1.0 + SLACK))))
-    return likelihood - 0.5 * prior - 0.5 * freedom * float(np.log(EFFECTIVE_SAMPLES))
 
 
 def held_gap(measured: Real, simulated: Real, held: Mask) -> float:

@@ -13,10 +13,11 @@ from chladni.signals.errors import ModelError
 
 def is_degenerate(run: FreeRun, found: Contestant) -> bool:
     """Whether an effect of a fitted hypothesis does what a parameter or another effect does."""
-    return any(_degenerate(run, found, effect) for effect in found.fit.effects)
+    return any(is_another(run, found, effect) for effect in found.fit.effects)
 
 
-def _degenerate(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool:
+def is_another(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool:
+    """Whether one effect of a fit does what a parameter or another effect does."""
     judge = effect.kind.clues.is_degenerate
     if judge is None:
         return False

@@ -8,11 +8,8 @@ import numpy as np
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.screen import Screened
-from chladni.gap.location.locate import Location, tuned_stepwise
-from chladni.gap.location.profile import Profile
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.places import Place
-from chladni.gap.side_by_side import side_by_side
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.core.parameter import Parameter
 from chladni.models.effects.attached_effect import AttachedEffect, attached_if_possible
@@ -20,12 +17,10 @@ from chladni.models.effects.clues import FittedForm
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-#: A parameter outside of this many sigmas is wrong, not uncertain.
-OUTSIDE = 3.0
 #: Misfit over another's up to which a screened form is as good, and how many of those are tried too.
 _TIED, _TIES = 1.02, 2
-#: How far one may be searched for outside its tolerance, in sigmas.
-_FAR = 15.0
+#: Of the numbers that make an effect larger, what it begins with where something else may do a part of it.
+_LITTLE = 0.1
 
 
 def effect_hypotheses(screened: Sequence[Screened], *, count: int, margin: float = 40.0) -> list[Hypothesis]:
@@ -63,8 +58,7 @@ def hypothesis_of(
 ) -> Hypothesis:
     """Give the hypothesis that these effects act."""
     fitted = tuple(effect.usually_fitted for effect in effects)
-    start = np.clip(z, -OUTSIDE, OUTSIDE)
-    return Hypothesis(effects=effects, fitted=fitted, start_z=start, screened=screened, initial=initial)
+    return Hypothesis(effects=effects, fitted=fitted, start_z=z, screened=screened, initial=initial)
 
 
 def effect_of(one: Screened) -> AttachedEffect | None:
@@ -77,6 +71,13 @@ def effect_of(one: Screened) -> AttachedEffect | None:
         return None
     values = {name: _inside(plain.parameters[name]) for name in plain.values}
     return replace(plain, values=values)
+
+
+def little_of(effect: AttachedEffect, site: str) -> AttachedEffect:
+    """Give a tenth of an effect at a site: where it isn't known yet how much of it acts there."""
+    sizes = effect.kind.clues.sizes
+    values = {name: (_LITTLE if name in sizes else 1.0) * one for name, one in effect.values.items()}
+    return replace(effect, site=site, values=values)
 
 
 def siblings(found: Contestant, run: FreeRun) -> list[Hypothesis]:
@@ -149,55 +150,7 @@ def polished(coarse: Hypothesis, fit: OutputErrorFit) -> Hypothesis | None:
     )
     if fitted == coarse.fitted or not effects:
         return None
-    start = np.clip(fit.z, -OUTSIDE, OUTSIDE)
-    return replace(coarse, effects=effects, fitted=fitted, start_z=start, initial=fit.initial)
-
-
-def wrong_parameters(location: Location, *, most: int = 2) -> Hypothesis | None:
-    """Give the hypothesis that a few parameters are outside of their tolerance, None when none goes there.
-
-    All may go far at first; those that do stay free, the others are held within their tolerance again.
-
-    Parameters
-    ----------
-    most
-        Parameters at once.
-    """
-    problem, names = location.problem, location.problem.tunables.names
-    steps = (*location.segments, problem)
-    far = tuned_stepwise(steps, np.zeros(len(names)), _FAR)
-    order = np.argsort(-np.abs(far.z))
-    outside = [int(place) for place in order if abs(far.z[place]) > OUTSIDE]
-    # A body heavier than its tolerance carries something: that is an effect, not a wrong value.
-    outside = [place for place in outside if not (_is_inertia(names[place]) and far.z[place] > 0)]
-    if not outside:
-        return None
-
-    def held(count: int) -> Profile:
-        limit = np.full(len(names), OUTSIDE)
-        limit[outside[:count]] = _FAR
-        return tuned_stepwise(steps, np.clip(far.z, -limit, limit), limit)
-
-    counts = range(1, min(most, len(outside)) + 1)
-    best: tuple[int, Profile] | None = None
-    for count, found in zip(counts, side_by_side(held, counts), strict=True):
-        if best is None or found.cost < 0.8 * best[1].cost:
-            best = count, found
-    if best is None or best[1].chi > 0.5 * location.tuned.chi:
-        return None
-    chosen = [names[place] for place in outside[: best[0]]]
-    return Hypothesis(wide=dict.fromkeys(chosen, _FAR), start_z=best[1].z, screened=best[1].chi)
-
-
-def _is_inertia(name: str) -> bool:
-    """Whether a parameter is what a body resists acceleration with, in a structure or a drive.
-
-    Examples
-    --------
-    >>> [_is_inertia(name) for name in ("arm.mass", "reduced_mass", "inertia", "arm.damping")]
-    [True, True, True, False]
-    """
-    return name.split(".")[-1] in ("mass", "inertia", "reduced_mass")
+    return replace(coarse, effects=effects, fitted=fitted, start_z=fit.z, initial=fit.initial)
 
 
 def _inside(parameter: Parameter) -> float:

@@ -1,10 +1,10 @@
 """Hypotheses on what a model lacks, and what their fits say."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.explanation.evidence import Left
 from chladni.gap.records.diagnosis import PARAMETER, Candidate
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.effects.attached_effect import AttachedEffect
@@ -21,8 +21,8 @@ class Hypothesis:
         With the values that their fit starts from.
     fitted
         For each effect the names of the parameters that move.
-    wide
-        Parameters that may leave their tolerance, with their limit in sigmas.
+    freed
+        Names of parameters whose value may be wrong.
     start_z
         Where the parameters start.
     screened
@@ -33,7 +33,7 @@ class Hypothesis:
 
     effects: tuple[AttachedEffect, ...] = ()
     fitted: tuple[tuple[str, ...], ...] = ()
-    wide: Mapping[str, float] = field(default_factory=dict)
+    freed: tuple[str, ...] = ()
     start_z: Real
     screened: float | None = None
     initial: Real | None = None
@@ -42,13 +42,13 @@ class Hypothesis:
     def named(self) -> tuple[Candidate, ...]:
         """What it names as causes."""
         effects = [Candidate(effect=one.effect, site=one.site) for one in self.effects]
-        return (*effects, *(Candidate(effect=PARAMETER, site=name) for name in self.wide))
+        return (*effects, *(Candidate(effect=PARAMETER, site=name) for name in self.freed))
 
     @property
     def freedom(self) -> int:
         """Numbers that it adds to the tuned model; which other output an effect listens to is one more."""
         chosen = sum(effect.source is not None for effect in self.effects)
-        return sum(len(names) for names in self.fitted) + len(self.wide) + chosen
+        return sum(len(names) for names in self.fitted) + len(self.freed) + chosen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,6 +69,10 @@ class Contestant:
         Nats, but for a constant that all hypotheses that were weighed together share.
     starts
         Nats that it pays for the states that its effects begin windows with, beyond those of the first.
+    left
+        What it leaves on the telling lines, of its laws' force and elsewhere.
+    freedom
+        Nats that its numbers cost, see `freedom_nats`.
     """
 
     hypothesis: Hypothesis
@@ -76,6 +80,8 @@ class Contestant:
     held: Real
     gap: float
     prior: float
+    left: Left
+    freedom: float = 0.0
     log_evidence: float = 0.0
     starts: float = 0.0
 
@@ -83,8 +89,3 @@ class Contestant:
     def chi(self) -> float:
         """Mean of `held` over the outputs."""
         return float(np.mean(self.held))
-
-    @property
-    def most_left(self) -> float:
-        """Largest of `held`: what the output misses that is explained least."""
-        return float(np.max(self.held))

@@ -9,11 +9,13 @@ import numpy as np
 from chladni.gap.location.recovered import Recovered
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.linear_view import LinearView
+from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import all_lines
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.core.port import PortKind
 from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.models.effects.pair import TILDE
 from chladni.signals.arrays import Real
 from chladni.signals.value import Value
 
@@ -99,14 +101,19 @@ class KnownEffect(Value):
         if site.kind == "output":
             row = rest.output_names.index(site.name)
             return replace(motion, displacement=motion.displacement + self.outputs[row])
-        key = (site.name, site.kind)
-        if key not in self.displacement:
-            return motion
+        parts = self._parts(site)
         return replace(
             motion,
-            displacement=motion.displacement + self.displacement[key],
-            velocity=motion.velocity + self.velocity[key],
+            displacement=motion.displacement + sum(sign * self.displacement[key] for sign, key in parts),
+            velocity=motion.velocity + sum(sign * self.velocity[key] for sign, key in parts),
         )
+
+    def _parts(self, site: Site) -> list[tuple[float, tuple[str, PortKind]]]:
+        """Ports whose motions add up to a site's, each with its sign."""
+        plain: list[tuple[float, tuple[str, PortKind]]] = [(1.0, (site.name, site.kind))]
+        if site.kind == "pair":
+            plain = [(sign, (name, "body")) for sign, name in zip((-1.0, 1.0), site.name.split(TILDE), strict=True)]
+        return [(sign, key) for sign, key in plain if key in self.displacement]
 
 
 def _only_laws(run: FreeRun, effects: tuple[AttachedEffect, ...]) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from chladni.gap.explanation.hypotheses import OUTSIDE, effect_of, hypothesis_of
+from chladni.gap.explanation.hypotheses import effect_of, hypothesis_of
 from chladni.gap.explanation.hypothesis import Hypothesis
 from chladni.gap.explanation.screen import Screened
 from chladni.gap.location.locate import Location, tuned_stepwise
@@ -87,7 +87,7 @@ def _starts(effect: AttachedEffect) -> list[AttachedEffect]:
 def fitted_beside(model: Model, location: Location, effect: AttachedEffect, z: Real) -> LinearFit | None:
     """Fit from the start that is best over short segments; None where none converges."""
     numbers = effect_numbers((effect,))
-    limit = np.repeat([OUTSIDE, _UNBOUNDED], [z.size, len(numbers)])
+    limit = np.concatenate([location.problem.limits(z), np.full(len(numbers), _UNBOUNDED)])
     begun: list[tuple[Profile, AttachedEffect]] = []
     for start in _starts(effect):
         first = _beside(location.segments[0], model, start)

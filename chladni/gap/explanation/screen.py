@@ -12,6 +12,7 @@ from chladni.gap.explanation.trial import SiteTrial
 from chladni.gap.location.profile import Profile, bounded_minimum
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
+from chladni.gap.plant.tunable import OUTSIDE
 from chladni.gap.side_by_side import side_by_side
 from chladni.models.effects.trial import Numbers, Shape
 from chladni.signals.arrays import Real
@@ -72,11 +73,17 @@ class Screen:
     others
         Sites whose force may be anything meanwhile.
     limit
-        Bound on the parameters, in sigmas of their tolerances.
+        Bounds on the parameters, in sigmas of their tolerances.
     """
 
     def __init__(
-        self, problem: LinearProblem, found: Profile, site: Site, *, others: Sequence[Site] = (), limit: float = 3.0
+        self,
+        problem: LinearProblem,
+        found: Profile,
+        site: Site,
+        *,
+        others: Sequence[Site] = (),
+        limit: float | Real = OUTSIDE,
     ) -> None:
         self.problem, self.site, self.others, self.limit = problem, site, tuple(others), limit
         self.z = found.z

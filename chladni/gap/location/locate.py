@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from chladni.gap.location.noise_behind import noise_behind
-from chladni.gap.location.profile import Profile, profiled
+from chladni.gap.location.profile import Profile, profile_at, profiled
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.neighbours import Scaled
 from chladni.gap.plant.places import Place, Site, placed, sites_of
@@ -26,6 +26,8 @@ _SEGMENT_LINES = 1500
 _RECORD_LINES = 1500
 #: Places that are followed to the end: so many, and more where the segments don't tell them apart.
 _FOLLOWED, _FOLLOWED_AGAIN, _TIED, _MOST = 5, 4, 1.5, 10
+#: Pairs of bodies without a joint that are profiled with the other places.
+_PAIRS = 5
 #: Two forces explain everything at two sensors, and any law at one.
 _PAIR_SENSORS = 2
 #: Places that are paired with every other one, at least and at most; misfit over the best one's of a place that is
@@ -99,7 +101,7 @@ def locate(
     whole = LinearProblem(
         model, measurement, noise, tunables, all_lines(measurement.samples, measurement.sample_rate_hz)
     )
-    start = np.zeros(len(tunables.names)) if start_z is None else np.clip(start_z, -3.0, 3.0)
+    start = np.zeros(len(tunables.names)) if start_z is None else start_z
     segments, tuned = _tuned_on_segments(model, whole, start)
     view = segments[-1].view(tuned.z)
     places = placed(view, sites_of(view.compiled, measurement.output_names), measurement.output_names, noise)
@@ -166,11 +168,22 @@ def _tuned_on_segments(model: Model, whole: LinearProblem, start: Real) -> tuple
     return tuple(problems), tuned_stepwise(problems, start)
 
 
-def tuned_stepwise(problems: Sequence[LinearProblem], z: Real, limit: float | Real = 3.0) -> Profile:
-    """Fit the parameters alone on one problem after another, each starting where the one before ended."""
-    found = profiled(problems[0], (), z, iterations=8, limit=limit)
+def tuned_stepwise(
+    problems: Sequence[LinearProblem], z: Real, limit: float | Real | None = None, sites: Sequence[Site] = ()
+) -> Profile:
+    """Fit the parameters on one problem after another, each starting where the one before ended.
+
+    Parameters
+    ----------
+    limit
+        See `profiled`.
+    sites
+        At which forces may be anything.
+    """
+    limit = problems[0].limits(z) if limit is None else limit
+    found = profiled(problems[0], sites, z, iterations=8, limit=limit)
     for problem in problems[1:]:
-        found = profiled(problem, (), found.z, iterations=8, limit=limit)
+        found = profiled(problem, sites, found.z, iterations=8, limit=limit)
     return found
 
 
@@ -190,8 +203,17 @@ def _roughly(problems: Sequence[LinearProblem], plain: Profile, places: Sequence
     """
     if len(problems[-1].measured) < 2:
         return [(replace(plain, sites=(place.sites[0],)), place) for place in places]
+    places = _worth_a_profile(problems[-1], plain, places)
     found = side_by_side(lambda place: (_rough_profile(problems, plain, place, start), place), places)
     return sorted(found, key=lambda one: one[0].chi)
+
+
+def _worth_a_profile(problem: LinearProblem, plain: Profile, places: Sequence[Place]) -> list[Place]:
+    """Leave out pairs of bodies that explain little at the tuned parameters, of which a model has many."""
+    pairs = [place for place in places if all(site.kind == "pair" for site in place.sites)]
+    found = side_by_side(lambda place: profile_at(problem, (place.sites[0],), plain.z).misfit, pairs)
+    kept = [pairs[place] for place in np.argsort(found, kind="stable")[:_PAIRS]]
+    return [place for place in places if place not in pairs or place in kept]
 
 
 def _rough_profile(problems: Sequence[LinearProblem], plain: Profile, place: Place, start: Real) -> Profile:

@@ -44,7 +44,9 @@ def noise_behind(problem: LinearProblem, found: Profile) -> NoiseFloor:
             np.vstack([matrix, wish]), np.concatenate([left[:, low:high].mean(axis=1), np.diag(wish)])
         )[0]
         factor[:, low:high] = np.clip(found_power, _LEAST**2, 1.0)[:, None]
-    density = factor / whole.weight[:, 0] ** 2
+    former_density = problem.noise.density(whole.lines.cycles)
+    # What no model follows a machine to is in the weight beside the noise.
+    density = np.maximum(factor / whole.weight[:, 0] ** 2 - whole.error, _LEAST**2 * former_density)
     former = problem.noise
     return noise_floor_of(
         np.pad(density, ((0, 0), (1, 1 - measurement.samples % 2)), mode="edge"),

@@ -18,6 +18,9 @@ _RANK = 1e-10
 _UNDETERMINED = 1e-12
 
 
+_Promise = tuple[Real, float]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Profile:
     """Fit of the bounded parameters under the hypothesis that forces of any shape act at some sites.
@@ -170,17 +173,19 @@ def profiled(
     start: Real,
     *,
     iterations: int = 8,
-    limit: float | Real = 3.0,
+    limit: float | Real | None = None,
 ) -> Profile:
     """Refit the parameters and the transient while forces at `sites` may be anything.
 
     Gauss and Newton steps within ``|z| <= limit`` on what is left (variable projection: Golub and Pereyra 1973),
-    shortened while they don't improve.
+    shortened while they don't improve. By default parameters stay within their tolerances, but for those that start
+    outside, which may be wrong by anything.
     """
+    limit = problem.limits(start) if limit is None else limit
     best = _fitted(problem, sites, start)
     for _ in range(iterations):
         here = best.profile
-        step, promised = _step(problem, best, limit)
+        ((step, promised),) = _steps(problem, best, (limit,))
         if (
             here.misfit + here.prior / 2 - promised - (here.z + step) @ (here.z + step) / 2
             < 1e-3 * here.expected**0.5
@@ -193,16 +198,22 @@ def profiled(
     return best.profile
 
 
-def _step(problem: LinearProblem, fit: _Fit, limit: float | Real) -> tuple[Real, float]:
-    """Solve the linearised problem within the bounds; give the step in z and the misfit that it promises."""
+def promises(problem: LinearProblem, sites: Sequence[Site], z: Real, limits: Sequence[Real]) -> list[_Promise]:
+    """Give the step in z, and the misfit that it promises, within each of some bounds on ``abs(z)``."""
+    return _steps(problem, _fitted(problem, sites, z), limits)
+
+
+def _steps(problem: LinearProblem, fit: _Fit, limits: Sequence[float | Real]) -> list[_Promise]:
+    """Solve the linearised problem within bounds."""
     here = fit.profile
     z = here.z
     # Where forces and transients are large, so is what the parameters do to them (Kaufman 1975).
     slopes = problem.slopes(z, here.transient, list(zip(here.sites, here.forces, strict=True)))
     matrix, right = fit.out.rest(slopes), fit.out.rest(fit.residual)
     normal = matrix @ matrix.T + np.eye(z.size) / 2.0
-    moved = bounded_minimum(normal, matrix @ right - z / 2.0, -limit - z, limit - z)
-    return moved, float(np.sum((right - moved @ matrix) ** 2))
+    toward = matrix @ right - z / 2.0
+    moved = [bounded_minimum(normal, toward, -limit - z, limit - z) for limit in limits]
+    return [(step, float(np.sum((right - step @ matrix) ** 2))) for step in moved]
 
 
 def bounded_minimum(normal: Real, toward: Real, low: Real, high: Real) -> Real:

@@ -1,6 +1,6 @@
 """A linear problem with more numbers than its model has parameters: what they do to the equations is free."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -14,6 +14,8 @@ from chladni.signals.arrays import Real
 Values = Mapping[str, float]
 #: ``make(parameters, numbers)``: equations at values of parameters, SI, and ``[number]`` further ones.
 Make = Callable[[Values, Real], CompiledModel]
+#: Steps that a further number may take.
+_UNBOUNDED = 1e4
 
 
 def with_further(problem: LinearProblem, count: int, make: Make) -> LinearProblem:
@@ -40,6 +42,12 @@ class _Numbers:
     @property
     def names(self) -> tuple[str, ...]:
         return (*self.tunables.names, *self.further)
+
+    def wrong(self, z: Real) -> tuple[str, ...]:
+        return self.tunables.wrong(z[: len(self.tunables.names)])
+
+    def limits(self, freed: Collection[str] = ()) -> Real:
+        return np.concatenate([self.tunables.limits(freed), np.full(len(self.further), _UNBOUNDED)])
 
     def values(self, z: Real) -> dict[str, float]:
         own = len(self.tunables.names)

@@ -11,7 +11,7 @@ from chladni.gap.plant.places import Site, way_to
 from chladni.gap.plant.record_lines import RecordLines
 from chladni.gap.plant.view_slopes import same_frame, view_slopes
 from chladni.gap.records.measurement import Measurement
-from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.gap.records.noise_floor import LAW_ERROR, NoiseFloor
 from chladni.signals.arrays import Complex, Real
 
 #: Of a tunable's sigma: small against curvature, large against rounding of responses.
@@ -51,7 +51,9 @@ class LinearProblem:
         compiled = model.compile()
         names = [terminal.name for terminal in compiled.outputs]
         self.rows = tuple(names.index(name) for name in measurement.output_names)
-        self.weight = 1.0 / np.sqrt(noise.density(lines.cycles))[:, None]
+        #: ``[output, 1, line]``: of noise, and of what no model follows a machine to.
+        self.error = (LAW_ERROR * np.std(measurement.outputs, axis=1)[:, None]) ** 2
+        self.weight = 1.0 / np.sqrt(noise.density(lines.cycles) + self.error)[:, None]
         self.measured = lines.spectrum(measurement.outputs)
 
     @property
@@ -71,6 +73,10 @@ class LinearProblem:
             self.model, self.measurement, noise, self.tunables, self.lines, neighbours=self._neighbours
         )
 
+    def limits(self, z: Real) -> Real:
+        """``[parameter]`` bounds on ``abs(z)`` of a search that starts here, wide where that is outside."""
+        return self.tunables.limits(self.tunables.wrong(z))
+
     def view(self, z: Real) -> LinearView:
         """Give the linear part at parameters z."""
         # What is profiled at some parameters is linearised there next.
@@ -86,11 +92,11 @@ class LinearProblem:
 
     def pattern(self, view: LinearView, site: Site) -> Complex:
         """Whitened ``[output, 1, line]`` of a force at a site."""
-        return view.pattern(self.way(view, site))[:, None] * self.weight
+        return np.asarray(view.pattern(self.way(view, site))[:, None] * self.weight, dtype=np.complex128)
 
     def transients(self, view: LinearView) -> Complex:
         """Whitened ``[state, output, 1, line]``, see `LinearView.transients`: each segment has its own."""
-        return view.transients()[:, :, None] * self.weight
+        return np.asarray(view.transients()[:, :, None] * self.weight, dtype=np.complex128)
 
     def response(self, z: Real, transient: Real, forces: Sequence[tuple[Site, Complex]]) -> Complex:
         """Whitened ``[output, segment, line]`` response at parameters z to inputs, transients and forces."""

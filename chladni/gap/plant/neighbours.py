@@ -1,6 +1,6 @@
 """Equations of a model at some parameters, and at those with one of them changed."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Protocol, Self
 
 from chladni.gap.plant.kept import Kept
@@ -23,6 +23,12 @@ class Scaled(Protocol):
 
     def values(self, z: Real) -> Mapping[str, float]:
         """Values ``nominal exp(tolerance z)`` by name."""
+
+    def wrong(self, z: Real) -> tuple[str, ...]:
+        """Names of those outside their tolerance."""
+
+    def limits(self, freed: Collection[str] = ()) -> Real:
+        """``[parameter]`` bounds on ``abs(z)``."""
 
 
 class Varied(Protocol):

@@ -1,15 +1,23 @@
 """Parameters that a fit may move, on the scale of how well they are believed."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from chladni.models.core.model import Model
-from chladni.signals.arrays import Real
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value, require_shape
+
+#: Sigmas of its tolerance beyond which a parameter is wrong, not uncertain.
+OUTSIDE = 3.0
+#: A slip of the pen is a factor of ten, a wrong unit or formula two to three: one sigma of what a wrong value may be
+#: wrong by, as a logarithm, and the furthest that is searched.
+SLIP, FURTHEST = float(np.log(3.0)), float(np.log(30.0))
+#: What rounding adds to a bound.
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,6 +59,22 @@ class Tunables(Value):
             tolerance=np.array([one.tolerance for one in moving], dtype=np.float64),
             units=tuple(one.unit for one in moving),
         )
+
+    def wrong(self, z: Real) -> tuple[str, ...]:
+        """Names of the parameters that are wrong at ``z [parameter]``."""
+        return tuple(name for name, one in zip(self.names, z, strict=True) if abs(one) > OUTSIDE + _ROUNDING)
+
+    def limits(self, freed: Collection[str] = ()) -> Real:
+        """``[parameter]`` bounds on ``abs(z)``, those of the freed ones as far as a wrong value is searched for."""
+        far = np.maximum(FURTHEST / self.tolerance, OUTSIDE)
+        return np.where(self._are(freed), far, OUTSIDE)
+
+    def precision(self, freed: Collection[str] = ()) -> Real:
+        """``[parameter]`` precision of z before a log is seen: 1, of the freed ones that of a slip."""
+        return np.where(self._are(freed), np.minimum(self.tolerance / SLIP, 1.0) ** 2, 1.0)
+
+    def _are(self, names: Collection[str]) -> Mask:
+        return np.array([one in names for one in self.names], dtype=np.bool_)
 
     def values(self, z: Real) -> dict[str, float]:
         """Value of each parameter by name, SI.

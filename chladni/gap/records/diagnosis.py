@@ -47,7 +47,8 @@ class Candidate:
     Attributes
     ----------
     effect, site
-        The word and the name; ``parameter`` with a name like ``elbow.stiffness`` for a wrong value.
+        The word and the name; ``parameter`` with a name like ``elbow.stiffness`` for a wrong value. In an answer set
+        also ``unknown`` with the place that explains most, and ``none`` with an empty site.
     """
 
     effect: str
@@ -235,6 +236,11 @@ class Closing:
     horizon_s: float | None = None
     explained: float | None = None
 
+    @property
+    def after_over_noise(self) -> float | None:
+        """RMS that the answer leaves over the noise's; None without noise. Well above 1 something is missing."""
+        return self.after / self.noise if self.noise > 0 else None
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RestoringForce(Value):
@@ -387,6 +393,8 @@ class Diagnosis:
         Of the tuned parameters' errors; None where nothing was tuned.
     any_law
         Where something is left: what a law of the motion at one place would explain, whatever its name.
+    answer_set, coverage
+        Effects and sites that together hold the truth with this probability; empty where nothing was weighed.
     """
 
     model: str
@@ -410,6 +418,8 @@ class Diagnosis:
     left: Where | None = None
     correlation: Correlation | None = None
     any_law: AnyLaw | None = None
+    answer_set: tuple[Candidate, ...] = ()
+    coverage: float = 0.95
 
     @property
     def restoring_force(self) -> RestoringForce | None:

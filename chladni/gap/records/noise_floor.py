@@ -7,6 +7,9 @@ import numpy as np
 from chladni.signals.arrays import Mask, Real
 from chladni.signals.value import Value
 
+#: Share of an output's RMS that no law of a catalogue is righter than. More would hide faint effects in the quiet
+#: bands of coloured noise: with 1 % two of fifty made cases turned wrong, with 0.3 % one.
+LAW_ERROR = 3e-3
 # Of a spectrum for pictures: finer than any that is drawn beside it.
 LINES = 4097
 

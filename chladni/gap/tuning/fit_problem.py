@@ -1,6 +1,6 @@
 """An output-error fit as a least-squares problem: what it costs at a point, and how that changes around it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -83,8 +83,8 @@ class FitProblem:
         Which of their parameters move.
     tune
         Whether the model's parameters move too.
-    z_limit
-        Bound on ``abs(z)``, one for all or by name.
+    freed
+        Names of parameters that may be wrong by a slip, see `Tunables`.
     start_z
         ``[parameter]``: where they start, or stay.
     """
@@ -98,7 +98,8 @@ class FitProblem:
         effects: Sequence[AttachedEffect],
         numbers: Sequence[EffectNumber],
         tune: bool,
-        z_limit: float | Mapping[str, float],
+        freed: Sequence[str] = (),
+        held: bool = True,
         start_z: Real,
     ) -> None:
         self.run, self.whitening, self.training = run, whitening, training
@@ -106,10 +107,11 @@ class FitProblem:
         self.tuned = len(run.tunables.names) if tune else 0
         self.start_z = start_z
         self.evaluations = 0
-        limit = _limits(run.tunables.names, z_limit)[: self.tuned]
+        limit, sure = run.tunables.limits(freed), run.tunables.precision(freed)
+        limit = limit[: self.tuned] if held else np.full(self.tuned, np.inf)
         self.low = np.concatenate([-limit, [number.low for number in numbers]])
         self.high = np.concatenate([limit, [number.high for number in numbers]])
-        self._prior = np.concatenate([np.ones(self.tuned), np.full(len(numbers), _UNKNOWN)])
+        self._prior = np.concatenate([sure[: self.tuned], np.full(len(numbers), _UNKNOWN)])
         self._wide = np.zeros(0)
         compiled = run.compiled(start_z, self.effects)
         self.has_laws = bool(compiled.laws)
@@ -162,7 +164,11 @@ class FitProblem:
         """Half the squares of what is believed beforehand, in nats."""
         spread = self._spread(point)
         at_start = np.sum((point.initial * (spread > 0) / np.where(spread > 0, spread, 1.0)) ** 2)
-        return float(0.5 * np.sum(self._prior * point.x**2) + 0.5 * at_start)
+        return self.prior_of(point.x) + float(0.5 * at_start)
+
+    def prior_of(self, x: Real) -> float:
+        """Half the squares of what the unknowns' sizes are believed to be beforehand, in nats."""
+        return float(0.5 * np.sum(self._prior * x**2))
 
     def slopes(self, here: Evaluation) -> Slopes:
         """Gauss and Newton's equations around a point, each output weighed by what it misses.
@@ -318,13 +324,3 @@ def _eliminated(own: Real, cross: Real, slope: Real) -> tuple[Real, Real]:
     held = own + np.diag(1e-13 * np.diag(own) + 1e-300) + np.diag(np.where(np.diag(own) > 0, 0.0, 1.0))
     solved = np.asarray(np.linalg.solve(held, np.column_stack([cross, slope])), dtype=np.float64)
     return solved[:, :-1], -solved[:, -1]
-
-
-def _limits(names: Sequence[str], z_limit: float | Mapping[str, float]) -> Real:
-    if isinstance(z_limit, Mapping):
-        return np.array([z_limit.get(name, Z_LIMIT) for name in names], dtype=np.float64)
-    return np.full(len(names), float(z_limit))
-
-
-#: Hard bound on parameters, in sigmas of their tolerance.
-Z_LIMIT = 3.0

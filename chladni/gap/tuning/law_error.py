@@ -6,12 +6,9 @@ import numpy as np
 from scipy import fft
 from scipy.linalg import solve_toeplitz
 
-from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.gap.records.noise_floor import LAW_ERROR, NoiseFloor
 from chladni.signals.arrays import Real
 
-#: Share of an output's RMS that no law of a catalogue is righter than. More would hide faint effects in the quiet
-#: bands of coloured noise: with 1 % two of fifty made cases turned wrong, with 0.3 % one.
-LAW_ERROR = 3e-3
 #: Intervals of the noise's spectrum from 0 to half the sample rate.
 _INTERVALS = 8192
 

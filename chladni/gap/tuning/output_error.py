@@ -11,7 +11,7 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.bounded_step import bounded_step
 from chladni.gap.tuning.coloured_spread import coloured_information
 from chladni.gap.tuning.effect_scale import effect_numbers
-from chladni.gap.tuning.fit_problem import Z_LIMIT, Evaluation, FitProblem, Point, Slopes
+from chladni.gap.tuning.fit_problem import Evaluation, FitProblem, Point, Slopes
 from chladni.gap.tuning.law_error import with_law_error
 from chladni.gap.tuning.residual import Whitening
 from chladni.models.effects.attached_effect import AttachedEffect
@@ -67,7 +67,7 @@ class OutputErrorFit(Value):
     held_by_output
         ``[output]`` the same, empty when it saw all.
     prior_cost
-        ``z.z``: what leaving the nominal values costs.
+        ``z.z``, of freed parameters over their own spread: what leaving the nominal values costs.
     cost
         Negative log-likelihood and half the prior cost, nats: what the fit made least.
     converged
@@ -114,12 +114,12 @@ def fit_output_error(
     training: Mask | None = None,
     start_z: Real | None = None,
     start_initial: Real | None = None,
-    z_limit: float | Mapping[str, float] = Z_LIMIT,
+    freed: Sequence[str] = (),
+    held: bool = True,
     tune: bool = True,
     offsets: bool = True,
     max_iterations: int = 12,
     precision: float = PRECISION,
-    only_coarse: bool = False,
 ) -> OutputErrorFit:
     """Fit parameters, effects and initial states to a log.
 
@@ -143,8 +143,10 @@ def fit_output_error(
         ``[parameter]`` where the parameters start; nominal by default. Without `tune` they stay there.
     start_initial
         ``[window, state]`` where initial states start; at rest by default.
-    z_limit
-        Bound on the parameters in sigmas of their tolerances, one for all or by name.
+    freed
+        Names of parameters that may be wrong by a slip.
+    held
+        Whether the others are kept within three sigmas of their tolerances.
     tune
         Whether the parameters move.
     offsets
@@ -153,8 +155,6 @@ def fit_output_error(
         Of the fit.
     precision
         Nats; a step that promises less ends the fit.
-    only_coarse
-        Whether coarse runs do, where there are such: wrong by a per cent, which tells what leads anywhere.
 
     Raises
     ------
@@ -170,15 +170,12 @@ def fit_output_error(
     require_shape("start_z", z, (count,), "the tunable parameters")
     problem = FitProblem(
         run, _whitening(run, noise, training, offsets), training,
-        effects=effects, numbers=effect_numbers(effects, fitted), tune=tune, z_limit=z_limit, start_z=z,
+        effects=effects, numbers=effect_numbers(effects, fitted), tune=tune, freed=freed, held=held, start_z=z,
     )  # fmt: skip
     start = problem.start_of_windows() if problem.has_laws and len(run.windows) > 1 else problem.start()
     if start_initial is not None:
         start = Point(start.x, np.array(start_initial, dtype=np.float64).reshape(start.initial.shape))
-    if problem.coarse and only_coarse:
-        here, slopes, converged, iterations = _descend(problem, problem.evaluate(start), max_iterations, precision)
-    else:
-        here, slopes, converged, iterations = _fit(problem, start, max_iterations, precision)
+    here, slopes, converged, iterations = _fit(problem, start, max_iterations, precision)
     return _report(problem, here, slopes, converged=converged, iterations=iterations)
 
 
@@ -189,6 +186,7 @@ def with_coloured_spread(
     *,
     fitted: Sequence[Sequence[str]] | None = None,
     training: Mask | None = None,
+    freed: Sequence[str] = (),
     tune: bool = True,
     offsets: bool = True,
 ) -> OutputErrorFit:
@@ -201,7 +199,7 @@ def with_coloured_spread(
     ----------
     fit
         What `fit_output_error` gave for the other arguments.
-    fitted, training, tune, offsets
+    fitted, training, freed, tune, offsets
         As it was given them.
 
     Raises
@@ -212,7 +210,8 @@ def with_coloured_spread(
     seen = np.ones(run.measurement.samples, dtype=bool) if training is None else training
     problem = FitProblem(
         run, _whitening(run, noise, seen, offsets), seen,
-        effects=fit.effects, numbers=effect_numbers(fit.effects, fitted), tune=tune, z_limit=np.inf, start_z=fit.z,
+        effects=fit.effects, numbers=effect_numbers(fit.effects, fitted), tune=tune, freed=freed, held=False,
+        start_z=fit.z,
     )  # fmt: skip
     problem.coarse = False
     x = np.concatenate([fit.z[: problem.tuned], np.zeros(len(problem.numbers))])
@@ -317,7 +316,7 @@ def _report(
         misfit_by_output=here.residual.power,
         held_misfit=float(np.mean(by_output)) if held.any() else None,
         held_by_output=by_output,
-        prior_cost=float(z @ z),
+        prior_cost=2.0 * problem.prior_of(x),
         cost=here.cost,
         converged=converged,
         iterations=iterations,

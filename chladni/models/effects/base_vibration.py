@@ -35,9 +35,15 @@ def _check(values: Values) -> str:
 
 #: Share of the power that is left out at either end of a band: tails there are the estimate's, not the floor's.
 _TAIL = 0.05
+#: Share of a force's power that the strongest hundredth of its lines, from this share on, holds of tones alone.
+_TONES, _LINES = 0.9, 0.99
 
 
 def _of_force(acceleration: Real, sample_rate_hz: float) -> Values:
+    power = np.sort(np.abs(np.fft.rfft(acceleration)) ** 2)
+    if power[int(_LINES * power.size) :].sum() > _TONES * power.sum():
+        # A few lines: something that turns nearby, and on which side of the mount it stands isn't told.
+        return {}
     low_hz, high_hz = flat_band(acceleration, sample_rate_hz)
     return {"level": float(np.sqrt(np.mean(acceleration**2))), "band": high_hz, "band_start": low_hz}
 

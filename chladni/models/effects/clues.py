@@ -71,8 +71,6 @@ class Clues:
         Whether it happens at a time of its own, so that only the whole log shows it.
     nested
         ``nested(fitted)`` gives forms of other effects that contain it or that it contains, begun where it ended.
-    opposite
-        ``opposite(values)`` gives the effect that differs in the sign of its number, or None.
     resisting
         ``resisting(force, speed)`` gives values with which it resists with a force at every speed well above one: of
         a joint that sticks nothing but that can be told.
@@ -83,7 +81,7 @@ class Clues:
         ``in_samples(signal)`` finds it in the samples of an output themselves. No fit weighs it then.
     of_force
         ``of_force(force, sample_rate_hz)`` gives its numbers from its force ``[sample]``, which follows nothing that
-        a model knows. No law is looked for then.
+        a model knows; nothing where the force isn't one of its kind. No law is looked for then.
     """
 
     trials: Callable[[TrialMotion], Iterable[Trial]] | None = None
@@ -95,7 +93,6 @@ class Clues:
     is_loop: bool = False
     timed: bool = False
     nested: Callable[[FittedForm], Iterable[Relative]] | None = None
-    opposite: Callable[[Numbers], Relative | None] | None = None
     resisting: Callable[[float, float], Numbers] | None = None
     doubts: Callable[[str, Numbers, Parameters], Iterable[str]] | None = None
     in_samples: Callable[[Real], Lattice | None] | None = None

@@ -8,7 +8,7 @@ import numpy as np
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import LawAtPort
-from chladni.models.effects.clues import Clues, Relative
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.effects.trial import Force, Trial, TrialMotion, positive, proportional
 
@@ -55,12 +55,6 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
     )  # fmt: skip
 
 
-def _softening(values: Values) -> Relative | None:
-    if set(values) != {"cubic"}:
-        return None
-    return Relative(effect="softening_stiffness", values={"cubic": -values["cubic"]})
-
-
 HARDENING_STIFFNESS = EffectKind(
     name="hardening_stiffness",
     family="stiffness",
@@ -70,7 +64,7 @@ HARDENING_STIFFNESS = EffectKind(
         (Parameter(name="cubic", value=1e9, unit="N/m^3", low=0.0, high=1e14, minimum=0.0, maximum=1e20),)
     ),
     neutral={"cubic": 0.0},
-    clues=Clues(trials=_trials, sizes=("cubic",), opposite=_softening),
+    clues=Clues(trials=_trials, sizes=("cubic",)),
     variants=(
         Variant(name="cubic", attach=LawAtPort(law=cubic, numbers=_numbers), formula="F = cubic d^3", odd=True),
         Variant(

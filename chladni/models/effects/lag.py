@@ -7,7 +7,7 @@ import numpy as np
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.effects.attaching import pass_through
-from chladni.models.effects.clues import Clues
+from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.linear_filter import first_order, second_order
 from chladni.models.effects.trial import Force, Shape, Trial, TrialMotion, logarithms, numbers, shaped
@@ -46,6 +46,15 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
     )  # fmt: skip
 
 
+#: Usual range of the second order's damping ratio: beyond it one of its two poles is far above the other.
+_DAMPING = (0.2, 2.0)
+
+
+def _is_degenerate(fitted: FittedForm) -> bool:
+    """Whether it's of second order in name only: the first order does the same with one number."""
+    return fitted.variant == "second_order" and fitted.values["damping_ratio"] > _DAMPING[1]
+
+
 LAG = EffectKind(
     name="lag",
     said="a lag",
@@ -62,7 +71,7 @@ LAG = EffectKind(
     ),
     neutral={"time_constant": 0.0},
     linear=True,
-    clues=Clues(trials=_trials, details=("damping_ratio",)),
+    clues=Clues(trials=_trials, is_degenerate=_is_degenerate, details=("damping_ratio",)),
     variants=(
         Variant(name="first_order", attach=attach_first_order, formula="u_acts/u = 1/(time_constant p + 1)"),
         Variant(
@@ -73,7 +82,8 @@ LAG = EffectKind(
                 (
                     Parameter(
                         # Zero would ring for ever: no actuator does.
-                        name="damping_ratio", value=0.7, unit="1", low=0.2, high=2.0, minimum=1e-6, maximum=1e3
+                        name="damping_ratio", value=0.7, unit="1", low=_DAMPING[0], high=_DAMPING[1], minimum=1e-6,
+                        maximum=1e3,
                     ),
                 )
             ),

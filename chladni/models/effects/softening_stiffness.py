@@ -10,7 +10,7 @@ from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.core.simulation import Simulation
 from chladni.models.effects.attaching import LawAtPort
-from chladni.models.effects.clues import Clues, Relative
+from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.effects.trial import (
     Force,
@@ -109,12 +109,6 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
     )  # fmt: skip
 
 
-def _hardening(values: Values) -> Relative | None:
-    if set(values) != {"cubic"}:
-        return None
-    return Relative(effect="hardening_stiffness", values={"cubic": -values["cubic"]})
-
-
 SOFTENING_STIFFNESS = EffectKind(
     name="softening_stiffness",
     family="stiffness",
@@ -125,7 +119,7 @@ SOFTENING_STIFFNESS = EffectKind(
     ),
     neutral={"cubic": 0.0},
     flags=_flags,
-    clues=Clues(trials=_trials, sizes=("cubic",), opposite=_hardening),
+    clues=Clues(trials=_trials, sizes=("cubic",)),
     variants=(
         Variant(
             name="cubic",

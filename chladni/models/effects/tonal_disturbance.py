@@ -89,7 +89,7 @@ TONAL_DISTURBANCE = EffectKind(
     ),
     optional=("phase",),
     neutral={"amplitude": 0.0},
-    clues=Clues(trials=_trials, details=("phase",), sizes=("amplitude",), exact=True),
+    clues=Clues(trials=_trials, details=("phase",), sizes=("amplitude",), exact=True, several=True),
     variants=(
         Variant(
             name="sine",

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from chladni.gap.explanation.contest import Contest, training_mask, weighed
+from chladni.gap.explanation.contest import Contest, training_mask
 from chladni.gap.explanation.hypotheses import hypothesis_of
 from chladni.gap.explanation.hypothesis import Hypothesis
 from chladni.gap.plant.free_run import FreeRun
@@ -11,7 +11,7 @@ from chladni.models.structures.structure import Body, Joint, Structure
 from chladni.models.structures.structure_input import StructureInput
 from chladni.models.structures.structure_model import StructureModel
 from chladni.models.structures.structure_output import StructureOutput
-from tests.gap.made_log import band_noise, measured, three_bodies
+from tests.gap.made_log import band_noise, measured, problem_of, three_bodies
 
 SAMPLES = 4096
 
@@ -25,13 +25,15 @@ def acting(word, site, **values):
 def wrong(name):
     """The hypothesis that a parameter is far outside its tolerance; without a name, that nothing is missing."""
     start = acting("gain_error", "hammer", gain=1.1).start_z
-    return Hypothesis(wide={name: 15.0} if name else {}, start_z=start)
+    return Hypothesis(freed=(name,) if name else (), start_z=start)
 
 
 def fitted(model, log, floor, *hypotheses):
     """Candidates, best first."""
-    contest = Contest(FreeRun(model, log), floor, training_mask(log.samples, log.sample_rate_hz))
-    return weighed([contest.enter(one) for one in hypotheses])
+    run = FreeRun(model, log)
+    contest = Contest(run, problem_of(run, floor), training_mask(log.samples, log.sample_rate_hz))
+    entered = [contest.enter(one) for one in hypotheses]
+    return sorted(entered, key=lambda one: -one.log_evidence)
 
 
 def contested(effect, *hypotheses, noise=0.02, outputs=None, signals=None):

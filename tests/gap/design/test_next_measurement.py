@@ -16,7 +16,7 @@ from chladni.gap.plant.windows import windows_for
 from chladni.models.effects.attached_effect import attached
 from chladni.models.structures.controller import Controller
 from tests.gap.design.close_candidates import acting, axis, contested, fitted, wrong
-from tests.gap.made_log import band_noise, measured
+from tests.gap.made_log import band_noise, measured, problem_of
 
 HARDENING = attached("hardening_stiffness", "j1", {"cubic": 1.2e9})
 COULOMB = attached("coulomb_friction", "j1", {"force": 0.3})
@@ -162,10 +162,10 @@ def test_a_free_axis_is_compared_in_windows():
     log, floor = measured(true, force, noise=0.002, rate_hz=500.0)
     run = FreeRun(model, log, windows=windows_for(model, log))
     assert len(run.windows) > 1
-    contest = Contest(run, floor, training_mask(log.samples, log.sample_rate_hz))
+    contest = Contest(run, problem_of(run, floor), training_mask(log.samples, log.sample_rate_hz))
     z = np.zeros(len(run.tunables.names))
     friction = hypothesis_of((attached("coulomb_friction", "guide", {"force": 2.0}),), z)
-    candidates = [contest.enter(friction), contest.enter(Hypothesis(wide={"guide.damping": 15.0}, start_z=z))]
+    candidates = [contest.enter(friction), contest.enter(Hypothesis(freed=("guide.damping",), start_z=z))]
     search = Search(model, log, run.tunables, candidates, floor, seed=1)
     # Coulomb friction of 3 N at 20 N of force, in noise of 0.2 %: the log tells them apart already.
     assert search.now_nats > 20

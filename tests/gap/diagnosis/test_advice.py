@@ -1,12 +1,13 @@
 """What is asked for after an answer: what tells it from others that come near, or what the log lacks for any."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from chladni.gap.diagnosis.advice import measure_next
+from chladni.gap.diagnosis.belief import Belief
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.gap.diagnosis.study import Study, study_of
-from chladni.gap.explanation.contest import weighed
 from chladni.gap.explanation.hypotheses import hypothesis_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.records.diagnosis import Verdict
@@ -33,17 +34,19 @@ def answered(study: Study, entered: list[Contestant], verdict: Verdict = "effect
     """The causes with the first of contestants as the answer."""
     tuned = study.contest.enter(Hypothesis(start_z=study.location.tuned.z))
     assert tuned is not None
-    ranked = weighed([tuned, *entered])
-    best = next(one for one in ranked if one.fit is (entered or [tuned])[0].fit)
-    others = tuple(one for one in ranked if one.hypothesis.named)
+    return believing(study, tuned, entered, verdict)
+
+
+def believing(study: Study, tuned: Contestant, ranked: Sequence[Contestant], verdict: Verdict = "effect") -> Causes:
     return Causes(
         verdict=verdict,
-        tuned=next(one for one in ranked if one.fit is tuned.fit),
-        best=best,
-        ranked=others,
-        probabilities=(1.0 / max(len(others), 1),) * len(others),
-        shaken=None, noise=study.contest.noise, distorted=(), instead=None, states=None,
-    )  # fmt: skip
+        tuned=tuned,
+        best=ranked[0] if ranked else tuned,
+        belief=Belief(study.location, [tuned, *ranked]),
+        shaken=None,
+        noise=study.contest.noise,
+        distorted=(),
+    )
 
 
 def entered(study: Study, *effects: tuple[AttachedEffect, ...]) -> list[Contestant]:
@@ -75,13 +78,13 @@ def test_two_causes_are_compared_with_two_others() -> None:
     less = causes.best.log_evidence - 1.0
     near = [replace(each, log_evidence=less) for each in causes.ranked if each is not causes.best]
     near.sort(key=lambda each: len(each.hypothesis.named))
-    said = measure_next(study, replace(causes, ranked=(causes.best, *near)), seed=0) or ""
+    said = measure_next(study, believing(study, causes.tuned, [causes.best, *near]), seed=0) or ""
     assert "gain error at a0 with hardening stiffness at j1" in said
     assert "gain error at a0 with coulomb friction at j1" in said
     assert "gain error at a0 alone then differ" in said
     # None of them comes near: nothing is left to be told apart.
     far = [replace(each, log_evidence=causes.best.log_evidence - 20.0) for each in near]
-    assert measure_next(study, replace(causes, ranked=(causes.best, *far)), seed=0) is None
+    assert measure_next(study, believing(study, causes.tuned, [causes.best, *far]), seed=0) is None
 
 
 def test_nothing_missing_in_loud_noise_says_what_may_be_hidden() -> None:
@@ -104,10 +107,11 @@ def test_an_effect_in_loud_noise_asks_for_a_higher_level() -> None:
 def test_an_only_sensor_is_asked_for_another_one() -> None:
     study = studied(log_of(HARDENING, outputs=[2]))
     causes = answered(study, entered(study, (HARDENING,)))
-    lone = replace(causes, tuned=replace(causes.tuned, log_evidence=causes.best.log_evidence - 100.0))
+    tuned = replace(causes.tuned, log_evidence=causes.best.log_evidence - 100.0)
+    lone = believing(study, tuned, [causes.best])
     said = measure_next(study, lone, seed=0) or ""
     assert said.startswith("One sensor can't tell where a force acts: add ")
-    assert measure_next(study, replace(lone, verdict="none", best=lone.tuned, ranked=()), seed=0) is None
+    assert measure_next(study, believing(study, tuned, [], "none"), seed=0) is None
     several = studied(log_of(HARDENING))
     assert measure_next(several, answered(several, entered(several, (HARDENING,))), seed=0) is None
 

@@ -6,7 +6,7 @@ import pytest
 
 import chladni
 from chladni.gap.diagnosis.any_law_beside import any_law
-from chladni.gap.diagnosis.causes import Causes, causes_of
+from chladni.gap.diagnosis.causes import Causes, causes_found
 from chladni.gap.diagnosis.naming import causes_named
 from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.records.diagnosis import AnyLaw
@@ -19,7 +19,7 @@ def judged(effect: AttachedEffect, *, words: set[str]) -> tuple[Study, Causes]:
     """What is said where these words take part alone."""
     log = measured((effect,), seed=7, seconds=5.0)
     study = study_of(arm(), log, leave_out=frozenset(CATALOGUE) - words, own={})
-    return study, causes_of(study, lambda _: None)
+    return causes_found(study, lambda _: None)
 
 
 def beside(effect: AttachedEffect, *, words: set[str]) -> tuple[str, AnyLaw | None]:

@@ -2,11 +2,13 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import chladni
+from chladni.apps.diagnose import diagnose_gap
 from chladni.apps.gap_document import gap_document
 from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.gap.records.diagnosis import Diagnosis
@@ -275,3 +277,13 @@ def test_distortion_of_a_level_is_told_once() -> None:
 def test_no_measurement_is_refused() -> None:
     with pytest.raises(EstimateError, match="no measurement"):
         diagnose(arm(), [])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("end_s", [5.05, 5.3])
+def test_a_moment_of_a_measured_axis_names_nothing_for_sure(shared_data: Path, end_s: float) -> None:
+    model, log = shared_data / "models" / "emps.toml", shared_data / "emps.mcap"
+    found = diagnose_gap(model, log, start_s=5.0, end_s=end_s)
+    assert all(cause.probability <= 0.5 for cause in found.causes)
+    assert found.remarks[0].startswith("emps.mcap is short")
+    assert found.used[0].warnings == found.remarks[:1]

@@ -27,10 +27,10 @@ def studied(*effects: AttachedEffect, off: dict[str, float], outputs: Sequence[s
     return study_of(arm(), with_outputs(log, outputs) if outputs else log, leave_out=frozenset(), own={})
 
 
-def believing(study: Study, *, wide: Sequence[str] = (), z: Real | None = None) -> SimpleNamespace:
-    """What the contest would say: that parameters are nominal but for `z`, of which those of `wide` are wrong."""
+def believing(study: Study, *, freed: Sequence[str] = (), z: Real | None = None) -> SimpleNamespace:
+    """What the contest would say: that parameters are nominal but for `z`, of which those of `freed` are wrong."""
     z = np.zeros(len(study.contest.run.tunables.names)) if z is None else z
-    best = SimpleNamespace(fit=SimpleNamespace(z=z), hypothesis=SimpleNamespace(wide=dict.fromkeys(wide, 7.0)))
+    best = SimpleNamespace(fit=SimpleNamespace(z=z), hypothesis=SimpleNamespace(freed=tuple(freed)))
     return SimpleNamespace(best=best, tuned=None)
 
 
@@ -90,7 +90,7 @@ def test_a_wrong_stiffness_shows_as_the_spring_that_its_joint_lacks() -> None:
     z = np.zeros(len(names))
     z[names.index("elbow.stiffness")] = 5.0
     wrong = [made.friction(effect="parameter", site="elbow.stiffness")]
-    (elbow,) = evidence(study, believing(study, wide=["elbow.stiffness"], z=z), wrong)
+    (elbow,) = evidence(study, believing(study, freed=["elbow.stiffness"], z=z), wrong)
     assert elbow.site.name == "elbow"
     inside = slice(300, -300)
     displacement, force = elbow.displacement[inside], elbow.force[inside]

@@ -1,7 +1,6 @@
 """A floor that is too high is asked for again behind the best cause, and only where that hides something."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,7 +22,12 @@ def rubbing():
     study = study_of(arm(), measured((RUB,), seconds=3.0, noise=NOISE, off={}), leave_out=frozenset(), own={})
     contest, high = study.contest, np.array([0.0, 0.0, 10.0])
     return replace(
-        study, contest=Contest(contest.run, contest.noise.raised(high * contest.noise.rms), contest.training)
+        study,
+        contest=Contest(
+            contest.run,
+            contest.problem.with_noise(contest.noise.raised(high * contest.noise.rms)),
+            contest.training,
+        ),
     )
 
 
@@ -31,7 +35,7 @@ def answer(study, left):
     """What a cause explains but for some signal that it leaves."""
     found = study.contest.enter(hypothesis_of((RUB,), study.location.tuned.z))
     missed = replace(found.fit, outputs=found.fit.outputs - left)
-    return SimpleNamespace(best=replace(found, fit=missed), instead=None)
+    return replace(found, fit=missed)
 
 
 @pytest.mark.slow
@@ -56,7 +60,7 @@ def test_a_clipped_sensor_s_distortion_is_not_in_the_floor_that_is_told(rubbing)
         rubbing,
         measurement=replace(rubbing.measurement, outputs=rubbing.measurement.outputs + [[0.0], [0.0], [1.0]] * cut),
     )
-    finer = finer_floor(clipped, SimpleNamespace(best=found, instead=None))
+    finer = finer_floor(clipped, found)
     assert finer is not None
     assert finer.rms[2] == pytest.approx(noise, rel=0.15)
 
@@ -66,7 +70,7 @@ def test_nothing_new_is_told_where_nothing_was_named_or_only_noise_is_left(rubbi
     nothing = answer(rubbing, np.zeros_like(rubbing.measurement.outputs))
     assert finer_floor(rubbing, nothing) is None
     plain = rubbing.contest.enter(hypothesis_of((), rubbing.location.tuned.z), tune=False)
-    assert finer_floor(rubbing, SimpleNamespace(best=plain, instead=None)) is None
+    assert finer_floor(rubbing, plain) is None
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from chladni.gap.diagnosis.causes import causes_of
+from chladni.gap.diagnosis.causes import causes_found
 from chladni.gap.diagnosis.other_logs import tried_elsewhere
 from chladni.gap.diagnosis.study import study_of
 from chladni.models.effects.attached_effect import attached
@@ -28,7 +28,7 @@ def answer():
     """A spring that gets stiffer, and nothing else to name."""
     log, _ = measured(hardening(), band_noise(1500), seed=7)
     study = study_of(machine(), log, leave_out=frozenset(CATALOGUE) - {"hardening_stiffness"}, own={})
-    return study, causes_of(study, [].append)
+    return causes_found(study, [].append)
 
 
 @pytest.mark.slow
@@ -66,7 +66,7 @@ def test_a_log_without_periods_is_begun_by_what_its_quiet_band_tells():
     rubbing = axis().with_effects((attached("coulomb_friction", "j0", {"force": 30.0}),))
     first, _ = measured(rubbing, pushed(1, 4), noise=1e-5, seed=7)
     study = study_of(axis(), first, leave_out=frozenset(CATALOGUE) - {"coulomb_friction"}, own={})
-    causes = causes_of(study, [].append)
+    study, causes = causes_found(study, [].append)
     assert causes.verdict == "effect"
     assert study.windows is not None
     second, _ = measured(rubbing, pushed(2, 1), noise=1e-5, seed=8)

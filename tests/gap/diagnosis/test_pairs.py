@@ -1,4 +1,4 @@
-"""How much a second effect must bring: where no force at one place explains a gap, no more than a first one."""
+"""Two effects: the second behind the first, both at once, and where two forces tell that there are two."""
 
 from dataclasses import replace
 
@@ -7,12 +7,10 @@ import pytest
 
 import chladni
 from chladni.gap.comparison.noise_estimate import estimate_noise
-from chladni.gap.diagnosis import pairs, search
+from chladni.gap.diagnosis import pairs, plausible
 from chladni.gap.diagnosis.pairs import second_causes
-from chladni.gap.diagnosis.price import added_nats
-from chladni.gap.diagnosis.search import single_causes
+from chladni.gap.diagnosis.search import Search
 from chladni.gap.diagnosis.study import recovered_states, study_of
-from chladni.gap.explanation.contest import weighed
 from chladni.gap.explanation.hypotheses import hypothesis_of
 from chladni.gap.location.locate import Location, explained_share, locate, located_pairs
 from chladni.gap.plant.tunable import Tunables
@@ -28,27 +26,11 @@ LATE = chladni.attached("time_offset", "acc_column", {"offset": 3e-4})
 WHEEL = chladni.attached("extra_mode", "wrist", {"mass": 0.2, "frequency": 60.0, "damping_ratio": 0.05})
 
 
-def nats(*effects: AttachedEffect) -> float:
-    log = measured(effects, seconds=6.0, seed=4)
-    return added_nats(locate(arm(), log, estimate_noise(log), Tunables.of(arm())))
-
-
-@pytest.mark.slow
-def test_two_causes_that_no_single_place_explains_need_less() -> None:
-    assert nats(SPRING, LATE) < 20.0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("effects", [(), (SPRING,), (LATE,)])
-def test_details_of_one_law_mustn_t_name_a_second(effects: tuple[AttachedEffect, ...]) -> None:
-    assert nats(*effects) == 100.0
-
-
 @pytest.mark.nightly
 def test_the_second_is_found_behind_the_first() -> None:
     study = study_of(arm(), measured((SPRING, LATE), seconds=6.0, seed=4), leave_out=all_but(), own={})
-    first = single_causes(study, lambda _: None).ranked[0]
-    found = weighed(second_causes(study, first))[0]
+    first = study.contest.enter(hypothesis_of((SPRING,), study.location.tuned.z))
+    found = most_probable(second_causes(study, first))
     assert {one.effect for one in found.hypothesis.effects} == {"hardening_stiffness", "time_offset"}
     assert np.all(found.held < 1.3)
 
@@ -59,10 +41,14 @@ def test_a_second_effect_is_kept_though_the_first_turns_out_to_be_nothing(monkey
     first = study.contest.enter(hypothesis_of((WHEEL,), study.location.tuned.z))
     # As an oscillator that imitates something else is, once that isn't all of the gap any more.
     monkeypatch.setattr(
-        search, "is_degenerate", lambda _, found: WHEEL.effect in words(found) and len(words(found)) > 1
+        plausible, "is_degenerate", lambda _, found: WHEEL.effect in words(found) and len(words(found)) > 1
     )
-    found = weighed(second_causes(study, first))[0]
+    found = most_probable(second_causes(study, first))
     assert words(found) == {"hardening_stiffness", "time_offset"}
+
+
+def most_probable(found):
+    return max(found, key=lambda one: one.log_evidence)
 
 
 def words(found) -> set[str]:
@@ -84,10 +70,10 @@ def two_sensors(*effects: AttachedEffect, words: frozenset[str]):
 def test_of_two_sensors_laws_tell_where_two_effects_are(first) -> None:
     effects = chladni.attached(first[0], "j0", first[1]), chladni.attached("coulomb_friction", "j1", {"force": 6.0})
     study = two_sensors(*effects, words=frozenset({"coulomb_friction", "hardening_stiffness", "gain_error"}))
-    nothing = search.without_cause(study)
+    nothing = Search(study).nothing
     forces = located_pairs(study.location)
     pair, forms = pairs._weighed_pairs(study, nothing, forces)[0]
-    assert {name for place in pair.places for name in place.names} == {"j0", "b0", "hammer", "j1"}
+    assert {name for place in pair.places for name in place.names} == {"j0", "b0", "j1"}
     at_j1 = [one for one, _ in forms if one.trial.site.name == "j1"]
     assert min(at_j1, key=lambda one: one.cost).trial.effect == "coulomb_friction"
     # Beside a fit that leaves no more than they promise they aren't worth any.
@@ -99,8 +85,8 @@ def test_two_laws_whose_runs_are_lost_are_followed_from_the_states_that_two_forc
     caught = chladni.attached("ripple", "j0", {"amplitude": 20.0, "period": 1e-3, "phase": 0.7})
     rubbing = chladni.attached("coulomb_friction", "j1", {"force": 5.0})
     study = two_sensors(caught, rubbing, words=frozenset({"ripple", "coulomb_friction"}))
-    found = pairs.paired_causes(study, search.without_cause(study))
-    assert words(weighed(found.ranked)[0]) == {"ripple", "coulomb_friction"}
+    found = pairs.paired_causes(study, Search(study).nothing)
+    assert words(most_probable(found.ranked)) == {"ripple", "coulomb_friction"}
     assert found.states is not None
     # Of either force alone the machine would have gone another way.
     other = recovered_states(study.location.problem, study.location.best)
@@ -110,7 +96,7 @@ def test_two_laws_whose_runs_are_lost_are_followed_from_the_states_that_two_forc
 def test_one_sensor_is_explained_by_any_force() -> None:
     log = with_outputs(measured((SPRING,), seconds=4.0), ["acc_wrist"])
     study = study_of(arm(), log, leave_out=frozenset(), own={})
-    assert pairs._weighed_pairs(study, search.without_cause(study), located_pairs(study.location)) == []
+    assert pairs._weighed_pairs(study, Search(study).nothing, located_pairs(study.location)) == []
 
 
 def test_two_forces_are_told_where_they_explain_much_more_than_one() -> None:
@@ -125,3 +111,26 @@ def test_two_forces_are_told_where_they_explain_much_more_than_one() -> None:
     assert explained_share(both.tuned, found.profile) > max(both.shares.values())
     one = location(SPRING)
     assert pairs._two_forces(one, located_pairs(one)) is None
+
+
+def test_the_leading_place_is_paired_with_those_that_were_not_followed() -> None:
+    study = study_of(arm(), measured(seconds=2.0), leave_out=frozenset(), own={})
+    first = study.location.ranked[0]
+    pairs = located_pairs(replace(study.location, ranked=(first,)))
+    assert {pair.places[1] for pair in pairs} == set(study.location.places) - {first.places[0]}
+
+
+def test_a_place_that_explains_as_much_as_the_leading_ones_is_paired_with_all_too() -> None:
+    study = study_of(arm(), measured(seconds=2.0), leave_out=frozenset(), own={})
+    first, second, third = study.location.ranked[:3]
+    followed = {one.places[0] for one in (first, second, third)}
+    far = next(place for place in study.location.places if place not in followed)
+
+    def paired(misfit: float) -> bool:
+        """Whether the third place is, when it leaves so many times what the first does."""
+        again = replace(third, profile=replace(third.profile, misfit=misfit * first.profile.misfit))
+        pairs = located_pairs(replace(study.location, ranked=(first, second, again)))
+        return any(set(pair.places) == {far, third.places[0]} for pair in pairs)
+
+    assert paired(1.05)
+    assert not paired(2.0)

@@ -10,7 +10,7 @@ from chladni.gap.records.measurement import Measurement
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
-from tests.gap.made_log import RATE_HZ, band_noise, chain
+from tests.gap.made_log import RATE_HZ, band_noise, chain, measured, three_bodies
 
 DAMPING, TOLD = 400.0, 800.0
 
@@ -38,12 +38,22 @@ def test_alone_it_is_named() -> None:
     assert found.tuned_parameters["j0.damping"].value == pytest.approx(DAMPING, rel=0.01)
 
 
+@pytest.mark.slow
+def test_a_slip_of_a_factor_of_ten_is_named_and_no_effect_is() -> None:
+    right = three_bodies()
+    model = right.with_values({"j1.stiffness": 10.0 * right.parameters["j1.stiffness"].value})
+    log, _ = measured(right, band_noise(3000, rms=150.0))
+    found = diagnose(model, [log])
+    assert found.verdict == "parameters"
+    assert [(one.effect, one.site) for one in found.causes] == [("parameter", "j1.stiffness")]
+    assert found.tuned_parameters["j1.stiffness"].value == pytest.approx(6e5, rel=0.01)
+
+
 @pytest.mark.nightly
-def test_beside_friction_nothing_is_missing_would_be_wrong() -> None:
+def test_beside_friction_both_are_named() -> None:
     found = diagnosed(chladni.attached("coulomb_friction", "j0", {"force": 8.0}))
-    assert found.verdict == "unknown"
-    assert found.causes == ()
-    assert found.advice is not None
-    assert found.advice.startswith("With j0.damping of 4")
-    assert "where the model has 800 " in found.advice
-    assert "put that right in the model and ask again" in found.advice
+    assert found.verdict == "effect"
+    assert {(one.effect, one.site) for one in found.causes} == {
+        ("parameter", "j0.damping"), ("coulomb_friction", "j0")
+    }  # fmt: skip
+    assert found.tuned_parameters["j0.damping"].value == pytest.approx(DAMPING, rel=0.02)

@@ -1,17 +1,15 @@
 """What a fit drove an effect to, where that is no longer what its word means."""
 
-from types import SimpleNamespace
-
-import numpy as np
 import pytest
 
 from chladni.gap.explanation.degenerate import is_degenerate
 from chladni.gap.explanation.excited_band import excited_band_hz
-from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
+from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
-from chladni.models.effects.attached_effect import AttachedEffect, attached
+from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.extra_mode import STIFF_MOUNT
 from tests.gap.arm import arm, measured
+from tests.gap.fitted import contestant
 
 
 @pytest.fixture(scope="module")
@@ -22,20 +20,13 @@ def run() -> FreeRun:
 def hanging(frequency_hz: float, damping_ratio: float = 0.02) -> Contestant:
     """A fit that ended at a mass that hangs at a body with this frequency."""
     values = {"mass": 0.5, "frequency": frequency_hz, "damping_ratio": damping_ratio}
-    return ended_at(attached("extra_mode", "arm", values))
+    return contestant(attached("extra_mode", "arm", values))
 
 
 def changing(at: float, rise: float) -> Contestant:
     """A fit that ended at a spring that changes about a time, slowly or not."""
     values = {"relative_change": 0.2, "time": at, "rise": rise}
-    return ended_at(attached("varying_stiffness", "elbow", values, variant="step"))
-
-
-def ended_at(effect: AttachedEffect) -> Contestant:
-    hypothesis = Hypothesis(effects=(effect,), fitted=((),), start_z=np.zeros(0))
-    return Contestant(
-        hypothesis=hypothesis, fit=SimpleNamespace(effects=(effect,)), held=np.ones(3), gap=0.0, prior=0.0
-    )
+    return contestant(attached("varying_stiffness", "elbow", values, variant="step"))
 
 
 def test_an_oscillator_that_never_swings_in_a_log_is_a_spring_to_where_it_stands(run: FreeRun) -> None:

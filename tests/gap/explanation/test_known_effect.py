@@ -12,7 +12,7 @@ from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.windows import training_in_windows
 from chladni.models.effects.attached_effect import attached
 from chladni.models.integrator.integrator import Integrator
-from tests.gap.made_log import RATE_HZ, WORDS, band_noise, measured, three_bodies
+from tests.gap.made_log import RATE_HZ, WORDS, band_noise, measured, problem_of, three_bodies
 
 SAMPLES = 6000
 STOP = attached("hardening_stiffness", "j1", {"cubic": 4e12})
@@ -24,7 +24,7 @@ def made():
     signals = band_noise(SAMPLES, rms=150.0)
     log, floor = measured(three_bodies().with_effects((STOP, MOUNT)), signals)
     run = FreeRun(three_bodies(), log)
-    contest = Contest(run, floor, training_mask(log.samples, log.sample_rate_hz))
+    contest = Contest(run, problem_of(run, floor), training_mask(log.samples, log.sample_rate_hz))
     first = contest.enter(hypothesis_of((STOP,), np.zeros(len(run.tunables.names))), tune=False)
     return log, floor, contest, first
 
@@ -51,7 +51,7 @@ def test_over_windows_it_is_what_the_linear_model_answers_to_the_law_s_force(mad
     windows = tuple((start, start + 500) for start in range(0, SAMPLES, 500))
     run = FreeRun(three_bodies(), log, windows=windows)
     states = Integrator(run.compiled(None, (STOP,)), RATE_HZ, tolerance=1e-9).run(log.inputs).states
-    there = Contest(run, floor, training_in_windows(windows))
+    there = Contest(run, problem_of(run, floor), training_in_windows(windows))
     start = np.ascontiguousarray(states[:, ::500].T)
     fit = there.enter(hypothesis_of((STOP,), first.fit.z), tune=False, initial=start).fit
     whole, parts = (KnownEffect.of(one, at, (STOP,)) for one, at in ((contest.run, first.fit), (run, fit)))

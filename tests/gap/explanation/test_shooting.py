@@ -30,7 +30,7 @@ def made():
     toothed = machine().with_effects((attached("ripple", "j0", TEETH),))
     log, floor = measured(toothed, band_noise(6000, rms=60.0), noise=5e-3)
     study = study_of(machine(), log, leave_out=frozenset(), own={})
-    contest = Contest(study.contest.run, floor, study.contest.training)
+    contest = Contest(study.contest.run, study.contest.problem.with_noise(floor), study.contest.training)
     return contest, Shooting(contest, recovered_states(study.location.problem, study.location.best))
 
 
@@ -65,7 +65,7 @@ def test_a_run_of_one_end_only_is_entered_where_windows_led() -> None:
     softly = attached("ripple", "j0", {**TEETH, "amplitude": 3.0})
     log, floor = measured(machine().with_effects((softly,)), band_noise(4000, rms=60.0), noise=5e-3)
     study = study_of(machine(), log, leave_out=frozenset(), own={})
-    contest = Contest(study.contest.run, floor, study.contest.training)
+    contest = Contest(study.contest.run, study.contest.problem.with_noise(floor), study.contest.training)
     shooting = Shooting(contest, recovered_states(study.location.problem, study.location.best))
     found = shooting.entered(shooting.shot(near(1.03)))
     assert found.chi < 1.3

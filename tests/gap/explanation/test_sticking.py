@@ -3,8 +3,8 @@
 import pytest
 
 import chladni
-from chladni.gap.diagnosis.search import detailed
 from chladni.gap.diagnosis.study import study_of
+from chladni.gap.explanation.hypotheses import polished
 from chladni.gap.explanation.sticking import sticking_hypotheses
 from tests.gap.made_log import band_noise, chain, measured, three_bodies
 
@@ -28,7 +28,10 @@ def test_sliding_force_is_found_however_much_of_it_sticks(force: float) -> None:
     (sticking,) = sticking_hypotheses(study.location, study.kinds)
     entered = study.contest.enter(sticking)
     assert entered is not None
-    found = detailed(study, entered)
+    finer = polished(entered.hypothesis, entered.fit)
+    assert finer is not None
+    found = study.contest.enter(finer)
+    assert found is not None
     assert found.fit.effects[0].site == "j1"
     assert found.fit.effects[0].values["force"] == pytest.approx(force, rel=0.02)
     # What bristles do before they slip stays: the law creeps there.

@@ -129,7 +129,7 @@ def test_bounds_hold_against_any_amount_of_data(signals):
     held = fit_output_error(run, floor, start_z=np.clip(z, -3.0, 3.0))
     assert np.abs(held.z).max() <= 3.0
     assert held.misfit > 1.5
-    wider = fit_output_error(run, floor, start_z=held.z, z_limit={"j1.stiffness": 10.0})
+    wider = fit_output_error(run, floor, start_z=held.z, freed=["j1.stiffness"])
     assert wider.z[place] == pytest.approx(4.0, abs=0.1)
     assert wider.misfit < 1.08
 

@@ -1,0 +1,221 @@
+"""What is believed: sets of causes, each by its best fit, beside "unknown at a place"; all by one evidence."""
+
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import comb
+
+import numpy as np
+
+from chladni.gap.explanation.evidence import DETAILS, Left, doubt_of, left_by_force
+from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.location.locate import Located, Location
+from chladni.gap.plant.places import sites_of
+from chladni.gap.records.diagnosis import PARAMETER, Candidate
+from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.models.effects.catalogue import CATALOGUE
+
+#: Prior odds of one more cause: machines lack one thing more often than two.
+ANOTHER = 0.1
+#: Share of the gap's power that a cause must have to be named: less is what a law, or the model, is rounded by.
+LEAST_SHARE = 0.02
+#: A name is given when it's more probable than not.
+NAMED = 0.5
+#: Doubts of a floor within which what a fit leaves may be noise alone.
+_SIGMAS = 2.0
+#: From nats to probabilities, by machines whose answers are known (see docs/methods/gap-explanation.md): so many nats
+#: count as one, for lines and sensors miss what a model lacks together; and how often all that was weighed is wrong.
+TEMPER, LAPSE = 5.0, 0.03
+#: Probability with which an answer set holds the truth.
+COVERAGE = 0.95
+
+Causes = frozenset[Candidate]
+
+
+@dataclass(frozen=True, slots=True)
+class Believed:
+    """A set of causes (none: the model is right) with its best fit and its probability."""
+
+    causes: Causes
+    best: Contestant
+    nats: float
+    probability: float
+
+
+class Belief:
+    """Posterior over the sets of causes that were fitted, and over an unknown one at each place.
+
+    Parameters
+    ----------
+    location
+        Of the log.
+    contestants
+        All that were fitted, the one without causes first.
+    pair
+        Unknown forces at two places that explain much more than one, None without.
+    told
+        Names of sensors whose error needs no fit to be told: nothing unknown acts there.
+    """
+
+    def __init__(
+        self,
+        location: Location,
+        contestants: Sequence[Contestant],
+        pair: Located | None = None,
+        *,
+        told: Collection[str] = (),
+    ) -> None:
+        self._location = location
+        problem = location.problem
+        kinds = [site.kind for site in sites_of(problem.model.compile(), problem.measurement.output_names)]
+        self._kinds = Counter(kinds)
+        #: Nats of one more cause: that there is one, and that it's this word at this site.
+        self.word = float(
+            np.log(ANOTHER) - np.log(max(sum(kind in one.sites for one in CATALOGUE.values() for kind in kinds), 1))
+        )
+        self.value = float(np.log(ANOTHER) - np.log(max(len(problem.tunables.names), 1)))
+        self.site = float(np.log(ANOTHER) - np.log(max(len(kinds), 1)))
+        self._contestants, self._sensors = tuple(contestants), len(problem.measured)
+        places = [*location.ranked, *([] if pair is None else [pair])]
+        self._places = [one for one in places if all(set(told).isdisjoint(each.names) for each in one.places)]
+
+    def nats(self, one: Contestant) -> float:
+        """Evidence and prior of one fit."""
+        prior = self.value * len(one.hypothesis.freed) + self._words(one.hypothesis.effects)
+        return one.log_evidence - one.left.log_likelihood() + self._likelihood(one.left) + prior
+
+    @cached_property
+    def _least_left(self) -> float:
+        return min(one.left.over_noise for one in self._contestants)
+
+    @cached_property
+    def _is_sure(self) -> bool:
+        """Whether a fit leaves noise alone, whose level is known by that."""
+        return self._least_left < 1.0 + _SIGMAS * doubt_of(self._location.problem.noise)
+
+    @cached_property
+    def level(self) -> float:
+        """Share of the floor that the noise has: what a fit leaves says so for all, as far as the floor allows."""
+        return self._least_left if self._is_sure else 1.0
+
+    def _likelihood(self, left: Left) -> float:
+        return left.log_likelihood(self.level, sure=self._is_sure)
+
+    def unexplained(self, one: Contestant) -> float:
+        """Nats of what a fit leaves that neither noise nor usual details of its laws account for."""
+        return one.left.unexplained(self.level)
+
+    def elsewhere(self, located: Located) -> float:
+        """Nats of what a force at a place (or two) leaves."""
+        return self._left_by_force(located).elsewhere(self.level)
+
+    def beyond(self, one: Contestant) -> float:
+        """Energy that a fit leaves beyond the noise."""
+        return one.left.beyond(self.level)
+
+    def _words(self, effects: Sequence[AttachedEffect]) -> float:
+        """Nats of effects: each at a site of its own, or one word at several sites of a kind, as far as that is less.
+
+        Parts of a kind are made alike: what one joint lacks the others may lack too. Then there's one more cause,
+        that they share it, and which of the sites do.
+        """
+        nats = 0.0
+        kinds = {one.kind.name: one.kind for one in effects}
+        for name, kind in kinds.items():
+            alike = [one.site for one in effects if one.kind.name == name]
+            sites, count = set(alike), len(alike)
+            where = sum(self._kinds[each] for each in kind.sites)
+            shared = np.log(ANOTHER) - np.log(comb(max(where, len(sites)), len(sites)))
+            nats += self.word + max(self.word * (count - 1), shared if len(sites) == count > 1 else -np.inf)
+        return float(nats)
+
+    def unknown_at(self, located: Located) -> float:
+        """Nats of a force of any shape at a place (or two): its size is free, and no law is in it.
+
+        Each of its numbers costs a nat: one that the log tells nothing of is none.
+        """
+        if not located.profile.forces:
+            return -np.inf
+        left = self._left_by_force(located)
+        places = len(located.places)
+        return self._likelihood(left) - 0.5 * located.profile.prior + (self.site - DETAILS) * places
+
+    def _left_by_force(self, located: Located) -> Left:
+        return left_by_force(self._location.problem, self._location.tuned, located.profile)
+
+    @cached_property
+    def sets(self) -> tuple[Believed, ...]:
+        """Sets of causes by falling probability."""
+        best: dict[Causes, Contestant] = {}
+        for one in sorted(self._contestants, key=self.nats, reverse=True):
+            best.setdefault(frozenset(one.hypothesis.named), one)
+        best = {causes: one for causes, one in best.items() if not self._has_idle(causes, best)}
+        nats = np.array([self.nats(one) for one in best.values()])
+        unknown = self._unknown()
+        top = max(float(nats.max()), unknown)
+        weight = np.exp((nats - top) / TEMPER)
+        share = (1.0 - LAPSE) * weight / (weight.sum() + np.exp((unknown - top) / TEMPER))
+        found = [
+            Believed(causes, one, float(each), float(part))
+            for (causes, one), each, part in zip(best.items(), nats, share, strict=True)
+        ]
+        return tuple(sorted(found, key=lambda one: -one.nats))
+
+    @cached_property
+    def least(self) -> float:
+        """Energy that a cause must explain: a share of what values alone, right or wrong, leave."""
+        return LEAST_SHARE * min(self.beyond(one) for one in self._contestants if not one.hypothesis.effects)
+
+    def _has_idle(self, causes: Causes, best: Mapping[Causes, Contestant]) -> bool:
+        """Whether a set leaves hardly less than the same without one of its causes.
+
+        A word at several sites is one cause: each of them could do a part of what the others do.
+        """
+        words = Counter(one.effect for one in causes)
+        alone = [one for one in causes if words[one.effect] == 1 or one.effect == PARAMETER]
+        fewer = [best[causes - {one}] for one in alone if causes - {one} in best]
+        return any(self.beyond(one) - self.beyond(best[causes]) < self.least for one in fewer)
+
+    def _unknown(self) -> float:
+        return float(np.logaddexp.reduce([self.anywhere, *(self.unknown_at(one) for one in self._places)]))
+
+    @cached_property
+    def anywhere(self) -> float:
+        """Nats of forces of any shape at as many places as there are sensors: any of these explain all."""
+        tuned = self._location.tuned
+        left = Left(
+            along=tuned.misfit, along_expected=tuned.expected, across=0.0, across_expected=0.0,
+            force=np.inf, doubt=doubt_of(self._location.problem.noise), sites=self._sensors,
+        )  # fmt: skip
+        return self._likelihood(left) - 0.5 * tuned.prior + (self.site - DETAILS) * self._sensors
+
+    @property
+    def best(self) -> Contestant:
+        """The most probable fit."""
+        return self.sets[0].best
+
+    @property
+    def unknown(self) -> float:
+        """Probability that the cause is none of those that were fitted."""
+        return max(1.0 - sum(one.probability for one in self.sets), 0.0)
+
+    def probability(self, *candidates: Candidate) -> float:
+        """Probability of any of some causes, whatever stands beside it."""
+        wanted = set(candidates)
+        return float(sum(one.probability for one in self.sets if not wanted.isdisjoint(one.causes)))
+
+    def answer_set(self, coverage: float) -> tuple[Candidate, ...]:
+        """Give effects and sites that together hold the truth with some probability, the most probable first."""
+        places = max(self._places, key=self.unknown_at).places if self._places else ()
+        unknown = [Candidate(effect="unknown", site=one.names[0]) for one in places]
+        rows = [(one.probability, [*one.causes] or [Candidate(effect="none", site="")]) for one in self.sets]
+        rows.append((self.unknown, unknown or [Candidate(effect="unknown", site="")]))
+        found: dict[Candidate, None] = {}
+        held = 0.0
+        for probability, named in sorted(rows, key=lambda row: -row[0]):
+            found.update(dict.fromkeys(sorted(named, key=lambda one: (one.site, one.effect))))
+            held += probability
+            if held >= coverage:
+                break
+        return tuple(found)

@@ -1,0 +1,69 @@
+"""What inputs did between their samples, told from the log, whatever else is missing."""
+
+import numpy as np
+
+from chladni.gap.explanation.evidence import Left, left_by_force
+from chladni.gap.location.locate import Location
+from chladni.gap.location.profile import profiled
+from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.records.measurement import Measurement
+from chladni.models.core.model import Model
+from chladni.models.core.port import HOLDS, HoldKind
+
+#: Nats by which a hold must lead: odds of 1000 to one, since all that follows stands on it.
+BEYOND_DOUBT = float(np.log(1000.0))
+#: Leading places at which an unknown force may act meanwhile.
+_PLACES = 3
+
+
+def with_told_holds(model: Model, location: Location) -> Model:
+    """Give the model with the holds of its inputs that a log tells.
+
+    What is missing somewhere hides what an input did between its samples. So each hold is weighed beside an unknown
+    force at each of the leading places, and without any, parameters tuned anew: the evidence of the best of these.
+    Inputs whose hold the model states, which never move, or whose rate acts too, are left as they are; so are all
+    when the model leaves noise alone, or where no hold leads beyond doubt.
+
+    Parameters
+    ----------
+    model
+        Of the location's problem.
+    location
+        Of the log, with the holds that the model has.
+    """
+    nats = _nats(model, location)
+    # One sensor knows no force beside a hold: a wrong value would pass for one, but where a hold leaves noise alone.
+    enough = -np.inf if len(location.problem.measured) > 1 else -BEYOND_DOUBT
+    for others in other_holds(model, location.problem.measurement):
+        if nats == 0.0:
+            break
+        tried = [model.with_holds(one) for one in others]
+        found = [_nats(one, location) for one in tried]
+        if max(found) > max(nats + BEYOND_DOUBT, enough):
+            model, nats = tried[int(np.argmax(found))], max(found)
+    return model
+
+
+def other_holds(model: Model, measurement: Measurement) -> list[list[dict[str, HoldKind]]]:
+    """Give the questions that a log may answer, each with its answers: the hold of all inputs, then of each."""
+    rows = zip(model.compile().inputs, measurement.inputs, strict=True)
+    asked = [
+        one.name for one, signal in rows if one.hold is None and not one.derivatives and np.any(signal != signal[0])
+    ]
+    # One device has often written all of them.
+    together = [asked] if len(asked) > 1 else []
+    return [[dict.fromkeys(names, hold) for hold in HOLDS] for names in (*together, *([one] for one in asked))]
+
+
+def _nats(model: Model, location: Location) -> float:
+    """Log likelihood of the log by the model, with an unknown force at the place that needs it most, or without."""
+    old = location.problem
+    problem = LinearProblem(model, old.measurement, old.noise, old.tunables, old.lines)
+    tuned = profiled(problem, (), location.tuned.z, iterations=4)
+    plain = Left(along=0.0, along_expected=0.0, across=tuned.misfit, across_expected=tuned.expected, force=0.0)
+    found = [plain.log_likelihood() - tuned.prior / 2]
+    for one in location.ranked[:_PLACES] if len(problem.measured) > 1 else ():
+        beside = profiled(problem, (one.places[0].sites[0],), one.profile.z, iterations=4)
+        left = left_by_force(problem, tuned, beside)
+        found.append(left.log_likelihood() - beside.prior / 2)
+    return max(found)

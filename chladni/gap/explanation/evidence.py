@@ -1,0 +1,212 @@
+"""Evidence: how probable a hypothesis makes a log; noise, details of its laws and its own freedom are allowed for."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from chladni.gap.location.profile import Elimination, Profile
+from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.linear_view import LinearView
+from chladni.gap.plant.places import sites_of, way_to
+from chladni.gap.plant.tunable import SLIP
+from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.gap.tuning.effect_scale import effect_numbers
+from chladni.gap.tuning.output_error import OutputErrorFit
+from chladni.signals.arrays import Complex, Real
+
+#: Independent numbers that what a law differs from the machine's by is worth, along its own force and elsewhere.
+DETAILS, ELSEWHERE = 6.0, 60.0
+#: Share of its force, as RMS, that a right law leaves at most, usually; and numbers that what goes beyond is worth.
+USUAL, UNUSUAL = 0.1, 20.0
+#: Of a floor's power: what it is uncertain by beyond its degrees of freedom (bias of a local fit, drift of a sensor).
+DOUBT = 0.05
+#: e-folds: one sigma of an effect's number before a log is seen.
+SIZE = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Left:
+    """What a fit leaves on the telling lines of a log, as whitened energy; noise alone leaves the expected one.
+
+    Attributes
+    ----------
+    along, along_expected
+        Of it what a force at the sites of laws with details could print.
+    across, across_expected
+        The rest.
+    force
+        Energy along the same that the model with the fit's parameters leaves without those laws.
+    doubt
+        Share of the expected energy that the noise is uncertain by.
+    sites
+        Of laws with details: each differs from the machine's in its own way.
+    """
+
+    along: float
+    along_expected: float
+    across: float
+    across_expected: float
+    force: float
+    doubt: float = DOUBT
+    sites: int = 1
+
+    @property
+    def over_noise(self) -> float:
+        """Energy over what noise leaves."""
+        return (self.along + self.across) / (self.along_expected + self.across_expected)
+
+    @property
+    def details(self) -> float:
+        """Share of the laws' force, as RMS, that the laws leave beyond noise; 0 without such laws."""
+        beyond = max(self.along - self.along_expected, 0.0)
+        return float(np.sqrt(beyond / max(self.force - self.along_expected, beyond, 1e-300)))
+
+    def beyond(self, level: float = 1.0) -> float:
+        """Energy beyond the noise."""
+        return sum(
+            max(energy - level * expected, 0.0)
+            for energy, expected in ((self.along, self.along_expected), (self.across, self.across_expected))
+        )
+
+    def elsewhere(self, level: float = 1.0) -> float:
+        """Nats of what no force at the sites could print, whatever the floor may be wrong by.
+
+        Parameters
+        ----------
+        level
+            Share of the floor that the noise has.
+        """
+        noise = level * self.across_expected
+        return _student(_beyond_doubt(self.across - noise, self.doubt * noise), ELSEWHERE)
+
+    def unexplained(self, level: float = 1.0) -> float:
+        """Nats of what neither noise, wrong as the floor may be, nor usual details of the laws account for."""
+        noise = level * self.along_expected
+        # Where no force without the laws is known, of windows, no detail is usual.
+        usual = self._usual if np.isfinite(self.force) else 0.0
+        surplus = _beyond_doubt(self.along - noise - usual, self.doubt * noise)
+        return self.elsewhere(level) + _student(surplus, UNUSUAL, usual)
+
+    def log_likelihood(self, level: float = 1.0, *, sure: bool = True) -> float:
+        """Nats, but for what all hypotheses share.
+
+        Of noise alone it's the misfit. What goes beyond that by D independent numbers of unknown size is
+        ``-D ln(1 + misfit/D)`` (Student's distribution: a Gaussian discrepancy whose scale is integrated out): few
+        numbers for usual details of the laws, more for what they leave of their force beyond, most for all else.
+
+        Parameters
+        ----------
+        level
+            Share of the floor that the noise has.
+        sure
+            Whether a hypothesis that leaves noise alone tells that; else it's the floor, as far as that is known.
+        """
+        told = _told if sure else _beyond_doubt
+        across, along = level * self.across_expected, level * self.along_expected
+        details = told(min(self.along - along, self._usual), self.doubt * along)
+        unusual = told(self.along - along - self._usual, self.doubt * along)
+        return -(
+            _student(details, DETAILS * max(self.sites, 1))
+            + (_student(unusual, UNUSUAL, self._usual) if unusual else 0.0)
+            + _student(told(self.across - across, self.doubt * across), ELSEWHERE)
+        )
+
+    @property
+    def _usual(self) -> float:
+        return USUAL**2 * max(self.force - self.along_expected, 0.0)
+
+
+def _student(energy: float, numbers: float, usual: float = 0.0) -> float:
+    return numbers * float(np.log1p(energy / (usual + numbers)))
+
+
+def _told(beyond: float, doubted: float) -> float:
+    """What the noise may be more by says little; what is far beyond that counts in full."""
+    return beyond**2 / (beyond + doubted) if beyond > 0 else 0.0
+
+
+def _beyond_doubt(beyond: float, doubted: float) -> float:
+    """Nats at least, when a Gaussian floor may be wrong by its doubt: the square of that over two, up to all."""
+    return beyond**2 / (beyond + 2.0 * doubted**2) if beyond > 0 else 0.0
+
+
+def doubt_of(noise: NoiseFloor) -> float:
+    """Share of its power that a floor is uncertain by."""
+    return float(2.0 * np.max(noise.std)) + DOUBT
+
+
+def left_of(problem: LinearProblem, run: FreeRun, fit: OutputErrorFit, detailed: Sequence[str]) -> Left:
+    """Split what a fit leaves into what its laws' details could print, and the rest.
+
+    Parameters
+    ----------
+    problem
+        Of the record: its lines and noise.
+    detailed
+        Names of the sites of laws with details.
+    """
+    measurement, lines = problem.measurement, problem.lines
+    weight = problem.weight
+    linear = tuple(one for one in fit.effects if one.kind.linear)
+    view, plain = (
+        LinearView(run.compiled(fit.z, effects), lines, measurement.inputs, problem.rows) for effects in (linear, ())
+    )
+    residual = lines.spectrum(measurement.outputs - fit.outputs) * weight
+    missing = np.asarray((problem.measured - plain.forced()) * weight, dtype=np.complex128)
+    along, across = _split(view, measurement.output_names, detailed, weight, residual)
+    force, _ = _split(plain, measurement.output_names, detailed, weight, missing)
+    count, sensors, sites = lines.index.size, len(measurement.output_names), min(len(set(detailed)), len(residual))
+    return Left(
+        along=along,
+        along_expected=float(sites * count),
+        across=across,
+        across_expected=float((sensors - sites) * count),
+        force=force,
+        doubt=doubt_of(problem.noise),
+        sites=len(set(detailed)),
+    )
+
+
+def left_by_force(problem: LinearProblem, tuned: Profile, found: Profile) -> Left:
+    """Give what a force of any shape at some sites leaves; `tuned` is the profile without."""
+    share = min(len(found.sites) / len(problem.measured), 1.0)
+    return Left(
+        along=max(tuned.misfit - found.misfit, 0.0),
+        along_expected=tuned.expected * share,
+        across=found.misfit,
+        across_expected=tuned.expected * (1.0 - share),
+        # Of a force of any shape nothing is unusual.
+        force=np.inf,
+        doubt=doubt_of(problem.noise),
+        sites=len(found.sites),
+    )
+
+
+def _split(
+    view: LinearView, outputs: Sequence[str], names: Sequence[str], weight: Real, residual: Complex
+) -> tuple[float, float]:
+    sites = [site for site in sites_of(view.compiled, outputs) if site.name in names]
+    patterns = [view.pattern(way_to(view, site, outputs))[:, None] * weight for site in sites]
+    transients = view.transients()[:, :, None] * weight
+    whole, across = (float(np.sum(Elimination(some, transients).rest(residual) ** 2)) for some in ([], patterns))
+    return whole - across, across
+
+
+def freedom_nats(run: FreeRun, fit: OutputErrorFit, fitted: Sequence[Sequence[str]], freed: Sequence[str]) -> float:
+    """Nats that numbers cost which a log narrows down, by Laplace's approximation.
+
+    ``1/2 sum ln min(l, 1)`` with l the eigenvalues of the numbers' covariance over their spread before: what a log
+    doesn't narrow down costs nothing.
+    """
+    effects = effect_numbers(fit.effects, fitted or None)
+    count = len(fit.covariance) - len(effects)
+    tunables = run.tunables
+    places = [tunables.names.index(name) for name in freed] if count else []
+    before = np.concatenate([SLIP / tunables.tolerance[places], np.full(len(effects), SIZE)])
+    chosen = [*places, *range(count, len(fit.covariance))]
+    if not chosen:
+        return 0.0
+    over = fit.covariance[np.ix_(chosen, chosen)] / before / before[:, None]
+    return float(0.5 * np.sum(np.log(np.clip(np.linalg.eigvalsh(over), 1e-300, 1.0))))
