@@ -127,7 +127,7 @@ def draw(found: Diagnosis, elbow: Real, path: Path) -> None:
     signals = found.signals
     if signals is None:
         return
-    motion = explained_simulator(arm(), found).respond(torques(), RATE_HZ).motions[0]
+    _, motion = explained_simulator(arm(), found).respond(torques(), RATE_HZ).motions
     figure, (top, bottom) = plt.subplots(2, 1, figsize=(9, 7), layout="constrained")
     span = slice(round(5.0 * RATE_HZ), round(6.0 * RATE_HZ))
     time_s = np.arange(signals.measured.shape[1])[span] / RATE_HZ

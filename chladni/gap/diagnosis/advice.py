@@ -50,7 +50,8 @@ def _doubted_values(study: Study, causes: Causes) -> Iterator[str | None]:
 
 def measure_next(study: Study, causes: Causes, seed: int) -> str | None:
     """What to measure so that the answer gets clearer, None when it's clear or nothing would help."""
-    if causes.shaken is not None:
+    if causes.shaken is not None or study.contest.run.is_black_box:
+        # What other sensors and excitations would tell takes equations.
         return None
     if causes.verdict == "unknown":
         return what_is_missing(study.model, study.measurement, causes.noise, sites=_likely_sites(study, ()))
@@ -104,6 +105,8 @@ def _beyond_these_sensors(study: Study, causes: Causes) -> str | None:
 
 
 def _on_causes(study: Study, causes: Causes) -> str | None:
+    if causes.within_step:
+        return "The simulator's own step moves its outputs more than any effect does; shorten the step."
     if causes.verdict == "unknown" and causes.best.hypothesis.freed and causes.best.gap < _MOSTLY * causes.tuned.gap:
         return _wrong_first(study, causes)
     if causes.verdict == "unknown":

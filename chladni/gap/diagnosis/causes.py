@@ -9,7 +9,7 @@ from chladni.gap.diagnosis.own_signal import FOLLOWS, share_of_own_signal
 from chladni.gap.diagnosis.plausible import is_lost
 from chladni.gap.diagnosis.search import Search
 from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
-from chladni.gap.diagnosis.study import Study, over_floor, over_windows
+from chladni.gap.diagnosis.study import Study, over_floor, over_windows, step_error
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.location.locate import Located
 from chladni.gap.records.diagnosis import Verdict
@@ -40,6 +40,8 @@ class Causes:
         Outputs whose residual, when nothing is named, follows their own signal in a curve.
     forces
         Unknown forces at two places that explain much more than one anywhere, when pairs were looked for; else None.
+    within_step
+        Whether the best causes do less than the own step of a simulator that isn't ours.
     """
 
     verdict: Verdict
@@ -50,6 +52,7 @@ class Causes:
     noise: NoiseFloor
     distorted: tuple[str, ...]
     forces: Located | None = None
+    within_step: bool = False
 
     @property
     def ranked(self) -> tuple[Contestant, ...]:
@@ -103,6 +106,8 @@ def _parted(search: Search) -> bool:
 def _judged(search: Search) -> Causes:
     study, belief, tuned, best = search.study, search.belief, search.nothing, search.best
     verdict = _verdict(belief)
+    within_step = verdict == "effect" and _within_step(study, tuned, best)
+    verdict = "unknown" if within_step else verdict
     shaken = shaken_by(study, tuned) if verdict == "unknown" else None
     if shaken is not None or (verdict == "none" and study.lattices):
         verdict = "effect"
@@ -121,8 +126,14 @@ def _judged(search: Search) -> Causes:
         shaken=shaken,
         noise=study.contest.noise.lowered(best.held),
         distorted=distorted,
+        within_step=within_step,
         forces=search.forces,
     )
+
+
+def _within_step(study: Study, tuned: Contestant, best: Contestant) -> bool:
+    error = step_error(study, best.fit)
+    return error is not None and error > tuned.gap - best.gap
 
 
 def _verdict(belief: Belief) -> Verdict:

@@ -4,23 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from chladni.gap.comparison.measuring import measurement_of
-from chladni.gap.comparison.noise_estimate import estimate_noise, noise_of_residual, smaller_floor
-from chladni.gap.comparison.periodicity import with_period
-from chladni.gap.comparison.shares import (
-    pooled_gap,
-)
-from chladni.gap.diagnosis.simulator_findings import SimulatorFindings
-from chladni.gap.diagnosis.simulator_runs import SimulatorRuns
-from chladni.gap.diagnosis.simulator_search import SimulatorSearch, search
-from chladni.gap.records.diagnosis import (
-    PARAMETER,
-    Diagnosis,
-)
-from chladni.gap.simulators.signal_model import SignalModel
-from chladni.gap.simulators.simulator import RefinableSimulator, Simulator
+from chladni.gap.diagnosis.diagnose import diagnose
+from chladni.gap.records.diagnosis import PARAMETER, Diagnosis
+from chladni.gap.simulators.simulator import Simulator
 from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
 from chladni.models.effects.attached_effect import attached
-from chladni.models.effects.catalogue import taking_part
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.signals.time_series import TimeSeries
 
@@ -71,17 +59,17 @@ def diagnose_simulator(
     EstimateError
         When the log is shorter than 3 s.
     """
-    measurement, remarks = measurement_of(SignalModel(simulator=simulator), recording, log=log)
-    measurement = with_period(measurement)
-    noise = estimate_noise(measurement)
-    runs = SimulatorRuns.of(simulator, measurement, noise)
-    found = search(runs, taking_part(leave_out, own_effects), progress=progress or _silent)
-    # What is left in the end is an upper bound too, and where a linear fit took distortion for noise, the lower one.
-    left = noise_of_residual(measurement.outputs - found.best.outputs, sample_rate_hz=measurement.sample_rate_hz)
-    told = SimulatorFindings(
-        search=found, noise=smaller_floor(noise, left), remarks=remarks, seed=seed, step_error=_step_error(found)
+    model = WrappedSimulator(simulator=simulator)
+    measurement, remarks = measurement_of(model, recording, log=log)
+    found = diagnose(
+        model,
+        [measurement],
+        leave_out=frozenset(leave_out),
+        own_effects=own_effects,
+        seed=seed,
+        progress=progress,
     )
-    return told.diagnosis()
+    return replace(found, remarks=(*remarks, *found.remarks))
 
 
 def explained_simulator(
@@ -115,17 +103,3 @@ def explained_simulator(
     ]
     values = {name: number.value for name, number in diagnosis.tuned_parameters.items()}
     return WrappedSimulator(simulator=simulator, values=values, effects=tuple(effects))
-
-
-def _step_error(found: SimulatorSearch) -> float | None:
-    """How far half the step moves the best explanation, as a gap; None where the simulator can't tell."""
-    simulator = found.runs.wrapped.simulator
-    if not isinstance(simulator, RefinableSimulator):
-        return None
-    finer = replace(found.runs, wrapped=WrappedSimulator(simulator=simulator.refined()))
-    measured = found.runs.measurement.outputs
-    return pooled_gap(found.best.outputs - finer.simulated(found.best.z, found.best.effects), measured)
-
-
-def _silent(_doing: str, _share: float) -> None:
-    """Nobody listens."""

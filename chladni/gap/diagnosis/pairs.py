@@ -214,12 +214,12 @@ def _behind(
 ) -> tuple[Model, Location, KnownEffect | None] | None:
     """Where the rest of the gap lies when some effects of a fit are known; None when the model diverges without.
 
-    Linear effects are in the model that comes with it, others are taken from the log.
+    Linear effects, and all of a black box's, are in the model that comes with it; others are taken from the log.
     """
     contest, model, known = study.contest, study.model, None
     # They leave details of their laws, which a quiet band of coloured noise would make more of than of any effect.
     floor = with_law_error(contest.noise.lowered(found.held), np.std(study.measurement.outputs, axis=1))
-    if all(one.kind.linear for one in kept):
+    if contest.run.is_black_box or all(one.kind.linear for one in kept):
         model = model.with_effects((*model.effects, *kept))
     else:
         try:

@@ -6,10 +6,12 @@ import numpy as np
 
 from chladni.gap.comparison.distortion import Distortion
 from chladni.gap.comparison.outside_band import products_outside
+from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.comparison.unstable_model import instability_found
 from chladni.gap.diagnosis.causes import Causes
-from chladni.gap.diagnosis.study import Study
+from chladni.gap.diagnosis.study import Study, step_error
 from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.plant.black_box import BlackBox
 from chladni.gap.records.measurement import Measurement
 from chladni.io.log_info import some_of
 
@@ -44,7 +46,23 @@ def remarks_on(study: Study, causes: Causes, shown: Contestant, distortion: Dist
         found.append(_undetermined(shown.fit.undetermined))
     if np.any(causes.noise.upper_bound):
         found.append("the noise floor of some outputs is an upper bound: distortion may be in it")
+    found += _of_black_box(study, shown)
     return (*found, *filter(None, [_stability(study, shown)]), *_of_distortion(study.measurement, distortion))
+
+
+def _of_black_box(study: Study, shown: Contestant) -> list[str]:
+    """What limits an answer on a plant that only responds."""
+    if not isinstance(study.model, BlackBox):
+        return []
+    error, measured = step_error(study, shown.fit), study.measurement.outputs
+    floor = pooled_gap(np.broadcast_to(study.contest.noise.rms[:, None], measured.shape), measured)
+    if error is None or error <= floor:
+        return [*study.model.untold]
+    return [
+        *study.model.untold,
+        f"half the simulator's step moves its outputs by {error:.1%}, more than the noise of {floor:.1%}; shorten "
+        "the step, or part of this answer is the step's",
+    ]
 
 
 def _undetermined(names: Sequence[str]) -> str:

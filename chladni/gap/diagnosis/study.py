@@ -8,6 +8,7 @@ import numpy as np
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.quiet_floor import quiet_floor
+from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.diagnosis.told_holds import with_told_holds
 from chladni.gap.explanation.contest import Contest, training_mask
 from chladni.gap.explanation.known_states import KnownStates
@@ -19,6 +20,7 @@ from chladni.gap.plant.tunable import Tunables
 from chladni.gap.plant.windows import short_windows, training_in_windows, windows_for
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.core.model import Model
 from chladni.models.effects.catalogue import taking_part
 from chladni.models.effects.effect_kind import EffectKind
@@ -166,12 +168,24 @@ def over_windows(study: Study, states: KnownStates) -> Study:
 
 
 def recovered_states(problem: LinearProblem, located: Located | None) -> KnownStates | None:
-    """Give the states under the unknown forces at a place, or at two; None without any."""
-    if located is None or not located.profile.forces:
+    """Give the states under the unknown forces at a place, or at two; None without any, and of a black box."""
+    if located is None or not located.profile.forces or problem.starts_known:
         return None
     first, *others = located.profile.sites
     motion = recovered(problem, located.profile, first, others)
     return KnownStates(names=problem.model.compile().states, values=motion.states(problem))
+
+
+def step_error(study: Study, fit: OutputErrorFit) -> float | None:
+    """How far half a simulator's own step moves a fit on held-out samples, as a gap; None where that isn't told."""
+    finer = study.contest.run.refined()
+    if finer is None:
+        return None
+    try:
+        moved = fit.outputs - fit.offsets[:, None] - finer.outputs(fit.z, fit.effects)
+    except ModelError:
+        return float("inf")
+    return pooled_gap(moved[:, study.held], study.measurement.outputs[:, study.held])
 
 
 def training_of(measurement: Measurement, windows: Sequence[tuple[int, int]] | None) -> Mask:
@@ -194,8 +208,11 @@ def _require_within_reach(model: Model, measurement: Measurement) -> None:
 def _runs_free(model: Model, location: Location) -> bool:
     """Whether the linear part follows the whole record from one state, but for a force at the best place.
 
-    A free body does, when its forces are told well enough; one that doesn't is compared over windows.
+    A free body does, when its forces are told well enough; one that doesn't is compared over windows. A black box
+    starts nowhere else than where it starts.
     """
+    if location.problem.starts_known:
+        return True
     growing = np.linalg.eigvals(model.compile().a).real.max(initial=-1.0) * location.problem.measurement.duration_s
     best = location.best
     if growing > 1.0 or best is None or len(location.problem.measured) < 2:

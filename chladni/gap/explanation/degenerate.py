@@ -1,13 +1,10 @@
 """Effects that a fit drove to where they are something else: a yield that is never reached is a spring."""
 
-import numpy as np
-
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.effects.clues import FittedForm
-from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 
@@ -26,22 +23,10 @@ def is_another(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool:
         values=effect.values,
         duration_s=run.measurement.duration_s,
         band_hz=excited_band_hz(run.measurement),
-        motion=lambda: _motion(run, found, effect),
+        motion=lambda: run.law_motion(found.fit.z, found.fit.effects, found.fit.initial, site=effect.site),
     )
     try:
         return judge(fitted)
     except ModelError:
         # A run that diverges shows no law at work.
         return True
-
-
-def _motion(run: FreeRun, found: Contestant, effect: AttachedEffect) -> tuple[Real, Real]:
-    """Displacement and velocity that the effect's law saw, over the whole log."""
-    compiled = run.compiled(found.fit.z, found.fit.effects)
-    runs = run.integrations(found.fit.z, found.fit.effects, found.fit.initial)
-    for row, port in enumerate(runs[0][1].ports):
-        if compiled.ports[port].name == effect.site:
-            displacement = np.concatenate([integration.displacement[row] for _, integration in runs])
-            velocity = np.concatenate([integration.velocity[row] for _, integration in runs])
-            return displacement, velocity
-    raise ModelError(f"no law acts at {effect.site!r}")

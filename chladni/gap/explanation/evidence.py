@@ -8,7 +8,7 @@ import numpy as np
 from chladni.gap.location.profile import Elimination, Profile
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.linear_problem import LinearProblem
-from chladni.gap.plant.linear_view import LinearView
+from chladni.gap.plant.linear_view import View
 from chladni.gap.plant.places import sites_of, way_to
 from chladni.gap.plant.tunable import SLIP
 from chladni.gap.records.noise_floor import NoiseFloor
@@ -150,9 +150,7 @@ def left_of(problem: LinearProblem, run: FreeRun, fit: OutputErrorFit, detailed:
     measurement, lines = problem.measurement, problem.lines
     weight = problem.weight
     linear = tuple(one for one in fit.effects if one.kind.linear)
-    view, plain = (
-        LinearView(run.compiled(fit.z, effects), lines, measurement.inputs, problem.rows) for effects in (linear, ())
-    )
+    view, plain = (problem.beside(fit.z, run.compiled(fit.z, effects)) for effects in (linear, ()))
     residual = lines.spectrum(measurement.outputs - fit.outputs) * weight
     missing = np.asarray((problem.measured - plain.forced()) * weight, dtype=np.complex128)
     along, across = _split(view, measurement.output_names, detailed, weight, residual)
@@ -185,7 +183,7 @@ def left_by_force(problem: LinearProblem, tuned: Profile, found: Profile) -> Lef
 
 
 def _split(
-    view: LinearView, outputs: Sequence[str], names: Sequence[str], weight: Real, residual: Complex
+    view: View, outputs: Sequence[str], names: Sequence[str], weight: Real, residual: Complex
 ) -> tuple[float, float]:
     sites = [site for site in sites_of(view.compiled, outputs) if site.name in names]
     patterns = [view.pattern(way_to(view, site, outputs))[:, None] * weight for site in sites]

@@ -11,6 +11,7 @@ from chladni.gap.explanation.hypothesis import Hypothesis
 from chladni.gap.explanation.screen import Screened
 from chladni.gap.location.locate import Location, tuned_stepwise
 from chladni.gap.location.profile import Profile, profiled
+from chladni.gap.plant.black_box import BlackBox
 from chladni.gap.plant.further_numbers import with_further
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.tuning.effect_scale import effect_numbers, with_numbers
@@ -64,8 +65,10 @@ def linear_hypotheses(
     model
         Of the location's problem.
     count
-        Of screened forms that are fitted, at half a second each.
+        Of screened forms that are fitted, at half a second each. A black box has no equations to fit.
     """
+    if isinstance(model, BlackBox):
+        return []
     enough = _PLAUSIBLE * min((one.profile.chi for one in location.ranked), default=0.0)
     there = {site.name: one for one in location.ranked if one.profile.chi < enough for site in one.places[0].sites}
     worth = [one for one in screened if one.trial.site.name in there]

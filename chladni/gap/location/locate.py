@@ -157,6 +157,8 @@ def located_pairs(location: Location, rough: int = 5) -> list[Located]:
 
 def _tuned_on_segments(model: Model, whole: LinearProblem, start: Real) -> tuple[tuple[LinearProblem, ...], Profile]:
     measurement = whole.measurement
+    if whole.starts_known:
+        return (whole,), tuned_stepwise([whole], start)
     period = measurement.sample_rate_hz / lowest_hz(model, measurement)
     problems = []
     for periods in _SEGMENTS:

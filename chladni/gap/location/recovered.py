@@ -7,7 +7,7 @@ import numpy as np
 
 from chladni.gap.location.profile import Profile, Projection
 from chladni.gap.plant.linear_problem import LinearProblem
-from chladni.gap.plant.linear_view import LinearView, Way
+from chladni.gap.plant.linear_view import View, Way
 from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import RecordLines, all_lines
 from chladni.signals.arrays import Complex, Real
@@ -84,7 +84,7 @@ class Recovered(Value):
         found = view.states(self.transient, acting)
         return np.asarray(view.lines.signal(found)[:, 0], dtype=np.float64)
 
-    def _acting(self, problem: LinearProblem) -> tuple[LinearView, list[tuple[Way, Complex]]]:
+    def _acting(self, problem: LinearProblem) -> tuple[View, list[tuple[Way, Complex]]]:
         """Give the model on all lines, and the forces on it with the ways that they take in."""
         whole = problem.on(all_lines(problem.measurement.samples, problem.measurement.sample_rate_hz))
         view, forces = whole.view(self.z), ((self.site, self.force), *self.beside)
@@ -194,7 +194,7 @@ def _power(pattern: Complex, beside: Sequence[Complex], left: Complex) -> tuple[
     return power, power / (power + noise), louder
 
 
-def _starts(view: LinearView, measured: Complex, weight: Real) -> Real:
+def _starts(view: View, measured: Complex, weight: Real) -> Real:
     """``[state, state]`` inverse covariance of the transients: a machine starts and ends where it goes through.
 
     A start that a force beside this one could print as well is told by next to nothing but noise.

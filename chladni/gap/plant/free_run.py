@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
+from chladni.gap.plant.black_box import BlackBox, Response
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.laid_inputs import LaidInputs
 from chladni.gap.plant.linear_run import LinearRuns, can_run, is_plain
@@ -13,6 +15,7 @@ from chladni.gap.records.measurement import Measurement
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Effect, Model
 from chladni.models.core.port import PortKind
+from chladni.models.core.simulation import PortMotion
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.hold import hold_of
 from chladni.models.integrator.input_rows import input_rows
@@ -86,12 +89,20 @@ class FreeRun:
 
     def compiled(self, z: Real | None = None, effects: Sequence[Effect] = ()) -> CompiledModel:
         """Equations of the model at some parameters, with these effects behind those that it has."""
-        model = self.model
-        if z is not None and np.any(z):
-            model = model.with_values(self.tunables.values(np.asarray(z, dtype=np.float64)))
-        if effects:
-            model = model.with_effects((*model.effects, *effects))
-        return model.compile()
+        return _at(self.model, self.tunables, z, effects).compile()
+
+    @property
+    def is_black_box(self) -> bool:
+        """Whether the model only responds, from its own start: it's run for every slope."""
+        return isinstance(self.model, BlackBox)
+
+    def refined(self) -> "FreeRun | None":
+        """Give the runs with half the steps of a simulator that isn't ours; None where it can't, or needn't."""
+        finer = self.model.refined() if isinstance(self.model, BlackBox) else None
+        return None if finer is None else FreeRun(finer, self.measurement)
+
+    def _responded(self, box: BlackBox, z: Real | None, effects: Sequence[Effect]) -> Response:
+        return _at(box, self.tunables, z, effects).respond(self.measurement.inputs, self.measurement.sample_rate_hz)
 
     def outputs(
         self, z: Real | None = None, effects: Sequence[AttachedEffect] = (), initial: Real | None = None
@@ -112,6 +123,8 @@ class FreeRun:
         ModelError
             When parameters are impossible or the model diverges.
         """
+        if isinstance(self.model, BlackBox):
+            return self._responded(self.model, z, effects).outputs[self.rows]
         compiled, rate = self.compiled(z, effects), self.measurement.sample_rate_hz
         late_s = self.late_s(compiled)
         if len(self.windows) == 1 or not np.any(late_s):
@@ -173,12 +186,31 @@ class FreeRun:
         ModelError
             When the site has no port; see `outputs` too.
         """
+        if isinstance(self.model, BlackBox):
+            joint = self.compiled().port_index(site, "joint")
+            return _site_motion(self._responded(self.model, z, effects).motions[joint])
         return self._motions(z, effects, initial, [self.compiled(z, effects).port_index(site)])[0]
+
+    def law_motion(self, z: Real, effects: Sequence[AttachedEffect], initial: Real, *, site: str) -> tuple[Real, Real]:
+        """Displacement and velocity that a law at a site saw; `ModelError` where none acts, see `outputs` too."""
+        if isinstance(self.model, BlackBox):
+            motion = self.motion(z, effects, initial, site=site)
+            return motion.displacement, motion.velocity
+        compiled, runs = self.compiled(z, effects), self.integrations(z, effects, initial)
+        for row, port in enumerate(runs[0][1].ports):
+            if compiled.ports[port].name == site:
+                displacement = np.concatenate([integration.displacement[row] for _, integration in runs])
+                velocity = np.concatenate([integration.velocity[row] for _, integration in runs])
+                return displacement, velocity
+        raise ModelError(f"no law acts at {site!r}")
 
     def motions(
         self, z: Real | None = None, effects: Sequence[AttachedEffect] = (), initial: Real | None = None
     ) -> dict[tuple[str, PortKind], SiteMotion]:
         """Motion at every port of the model during one run, by name and kind; see `outputs`."""
+        if isinstance(self.model, BlackBox):
+            found = self._responded(self.model, z, effects).motions
+            return {(one.name, "joint"): _site_motion(one) for one in found}
         ports = self.compiled(z, effects).ports
         found = self._motions(z, effects, initial, range(len(ports)))
         return {(port.name, port.kind): motion for port, motion in zip(ports, found, strict=True)}
@@ -228,6 +260,22 @@ class FreeRun:
         known = hold.source >= 0
         columns[:, hold.source[known]] = rows[:, : hold.columns][:, known]
         return columns
+
+
+ModelT = TypeVar("ModelT", bound=Model)
+
+
+def _at(model: ModelT, tunables: Tunables, z: Real | None, effects: Sequence[Effect]) -> ModelT:
+    """Give the model at some parameters, with these effects behind those that it has."""
+    if z is not None and np.any(z):
+        model = model.with_values(tunables.values(np.asarray(z, dtype=np.float64)))
+    return model.with_effects((*model.effects, *effects)) if effects else model
+
+
+def _site_motion(motion: PortMotion) -> SiteMotion:
+    return SiteMotion(
+        site=motion.name, displacement=motion.displacement, velocity=motion.velocity, force=motion.force
+    )
 
 
 def mapped_outputs(compiled: CompiledModel, rows: Whole, outputs: Real, sample_rate_hz: float) -> Real:

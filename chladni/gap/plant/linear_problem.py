@@ -4,14 +4,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from chladni.gap.plant.black_box import BlackBox, BlackBoxRuns
 from chladni.gap.plant.kept import Kept
-from chladni.gap.plant.linear_view import LinearView, Way
+from chladni.gap.plant.linear_view import LinearView, View, Way
 from chladni.gap.plant.neighbours import STEP, Neighbours, Scaled, Varied
 from chladni.gap.plant.places import Site, way_to
 from chladni.gap.plant.record_lines import RecordLines
 from chladni.gap.plant.view_slopes import same_frame, view_slopes
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import LAW_ERROR, NoiseFloor
+from chladni.models.core.compiled_model import CompiledModel
 from chladni.signals.arrays import Complex, Real
 
 #: Of a tunable's sigma: small against curvature, large against rounding of responses.
@@ -41,13 +43,13 @@ class LinearProblem:
         tunables: Scaled,
         lines: RecordLines,
         *,
-        neighbours: Neighbours | None = None,
+        neighbours: Neighbours | BlackBoxRuns | None = None,
     ) -> None:
         self.model, self.measurement, self.tunables, self.lines = model, measurement, tunables, lines
         self.noise = noise
-        self._neighbours = Neighbours(model, tunables) if neighbours is None else neighbours
+        self._neighbours = _neighbours(model, tunables, measurement) if neighbours is None else neighbours
         self._inputs: dict[tuple[object, ...], Complex] = {}
-        self._views: Kept[LinearView] = Kept(_VIEWS)
+        self._views: Kept[View] = Kept(_VIEWS)
         compiled = model.compile()
         names = [terminal.name for terminal in compiled.outputs]
         self.rows = tuple(names.index(name) for name in measurement.output_names)
@@ -77,24 +79,37 @@ class LinearProblem:
         """``[parameter]`` bounds on ``abs(z)`` of a search that starts here, wide where that is outside."""
         return self.tunables.limits(self.tunables.wrong(z))
 
-    def view(self, z: Real) -> LinearView:
+    @property
+    def starts_known(self) -> bool:
+        """Whether the plant starts where it starts: then segments of a record forgive nothing."""
+        return isinstance(self._neighbours, BlackBoxRuns)
+
+    def view(self, z: Real) -> View:
         """Give the linear part at parameters z."""
         # What is profiled at some parameters is linearised there next.
         return self._views.get(z.tobytes(), lambda: self._linear(z))
 
-    def _linear(self, z: Real) -> LinearView:
+    def beside(self, z: Real, compiled: CompiledModel) -> View:
+        """Give the linear part at parameters z as equations with more in them have it; a black box without."""
+        if isinstance(self._neighbours, BlackBoxRuns):
+            return self.view(z)
+        return LinearView(compiled, self.lines, self.measurement.inputs, self.rows, known=self._inputs)
+
+    def _linear(self, z: Real) -> View:
+        if isinstance(self._neighbours, BlackBoxRuns):
+            return self._neighbours.view(z, self.lines)
         equations = self._neighbours.at(z)
         return LinearView(equations, self.lines, self.measurement.inputs, self.rows, known=self._inputs)
 
-    def way(self, view: LinearView, site: Site) -> Way:
+    def way(self, view: View, site: Site) -> Way:
         """How a force at a site enters the equations of a view."""
         return way_to(view, site, self.measurement.output_names)
 
-    def pattern(self, view: LinearView, site: Site) -> Complex:
+    def pattern(self, view: View, site: Site) -> Complex:
         """Whitened ``[output, 1, line]`` of a force at a site."""
         return np.asarray(view.pattern(self.way(view, site))[:, None] * self.weight, dtype=np.complex128)
 
-    def transients(self, view: LinearView) -> Complex:
+    def transients(self, view: View) -> Complex:
         """Whitened ``[state, output, 1, line]``, see `LinearView.transients`: each segment has its own."""
         return np.asarray(view.transients()[:, :, None] * self.weight, dtype=np.complex128)
 
@@ -108,6 +123,9 @@ class LinearProblem:
         """``[tunable, output, segment, line]``: derivatives of `response` with all else held."""
         if not z.size:
             return np.zeros((0, *self.measured.shape), dtype=np.complex128)
+        if isinstance(self._neighbours, BlackBoxRuns):
+            changes = self._neighbours.slopes(z)[:, : len(self.rows)]
+            return np.asarray(self.lines.spectrum(changes) * self.weight, dtype=np.complex128)
         view = self.view(z)
         ways = [(self.way(view, site), force) for site, force in forces]
         changed = self._neighbours.changed(z)
@@ -131,3 +149,9 @@ class LinearProblem:
         ways = [(self.way(there, site), force) for site, force in forces]
         slope = (there.response(transient, ways) * self.weight - here) / _RESPONSE_STEP
         return np.asarray(slope, dtype=np.complex128)
+
+
+def _neighbours(model: Varied, tunables: Scaled, measurement: Measurement) -> Neighbours | BlackBoxRuns:
+    if isinstance(model, BlackBox):
+        return BlackBoxRuns(model, tunables, measurement)
+    return Neighbours(model, tunables)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg import schur
@@ -41,6 +42,44 @@ class Way:
     column: int | None = None
 
 
+class View(Protocol):
+    """A plant on the lines of a record, linear in forces; see `LinearView`."""
+
+    compiled: CompiledModel
+    lines: RecordLines
+    #: Share of their power by which patterns of one place may differ.
+    rounding: float
+
+    def forced(self) -> Complex:
+        """``[output, segment, line]`` under the log's inputs."""
+
+    def response(self, transient: Real | None, forces: Sequence[tuple[Way, Complex]]) -> Complex:
+        """``[output, segment, line]`` under inputs, transients and forces."""
+
+    def states(self, transient: Real | None, forces: Sequence[tuple[Way, Complex]]) -> Complex:
+        """``[state, segment, line]`` under the same."""
+
+    def motion(
+        self, port: int, transient: Real | None, forces: Sequence[tuple[Way, Complex]]
+    ) -> tuple[Complex, Complex]:
+        """Displacement and velocity ``[segment, line]`` at a port, under the same."""
+
+    def transients(self) -> Complex:
+        """``[state, output, line]``: what one of each state more at the start prints."""
+
+    def pattern(self, way: Way) -> Complex:
+        """``[output, line]`` that a force of one prints."""
+
+    def way_of_port(self, port: int) -> Way:
+        """Way of a force at a port."""
+
+    def way_of_input(self, name: str) -> Way:
+        """Way of a change of an input."""
+
+    def way_of_output(self, place: int) -> Way:
+        """Way of an error of the sensor in row `place` of the measured outputs."""
+
+
 class LinearView:
     """Linear equations of a compiled model, sampled, on the lines of a record.
 
@@ -65,6 +104,9 @@ class LinearView:
         Spectra of the inputs by dead times and holds, shared by views of one record: they are the same for all
         parameters.
     """
+
+    #: But for this, patterns of one place are the same.
+    rounding = 1e-9
 
     def __init__(
         self,

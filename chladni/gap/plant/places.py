@@ -5,14 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.gap.plant.linear_view import LinearView, Way
+from chladni.gap.plant.linear_view import View, Way
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.port import PortKind
 from chladni.signals.arrays import Complex
-
-#: Patterns that differ by less than this share of their power are the same but for rounding.
-_SAME = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +54,7 @@ def sites_of(compiled: CompiledModel, outputs: Sequence[str]) -> tuple[Site, ...
     return (*dict.fromkeys(ports), *inputs, *(Site(name=name, kind="output") for name in outputs))
 
 
-def way_to(view: LinearView, site: Site, outputs: Sequence[str]) -> Way:
+def way_to(view: View, site: Site, outputs: Sequence[str]) -> Way:
     """Give how a force (change, error) at a site enters the equations.
 
     Parameters
@@ -73,7 +70,7 @@ def way_to(view: LinearView, site: Site, outputs: Sequence[str]) -> Way:
     return view.way_of_port(view.compiled.port_index(site.name, site.kind))
 
 
-def printed_patterns(view: LinearView, sites: Sequence[Site], outputs: Sequence[str], noise: NoiseFloor) -> Complex:
+def printed_patterns(view: View, sites: Sequence[Site], outputs: Sequence[str], noise: NoiseFloor) -> Complex:
     """``[site, output, line]`` that a force of one (a change of an input, an error) at each site prints, over noise.
 
     Parameters
@@ -91,7 +88,7 @@ def printed_patterns(view: LinearView, sites: Sequence[Site], outputs: Sequence[
     return found
 
 
-def placed(view: LinearView, sites: Sequence[Site], outputs: Sequence[str], noise: NoiseFloor) -> tuple[Place, ...]:
+def placed(view: View, sites: Sequence[Site], outputs: Sequence[str], noise: NoiseFloor) -> tuple[Place, ...]:
     """Put together sites whose patterns are proportional on every line.
 
     Parameters
@@ -108,7 +105,7 @@ def placed(view: LinearView, sites: Sequence[Site], outputs: Sequence[str], nois
             continue
         unit = printed / np.where(size > 0, size, 1.0)
         for group, known in found:
-            if np.mean(np.abs(np.sum(known.conj() * unit, axis=0)) ** 2) > 1 - _SAME:
+            if np.mean(np.abs(np.sum(known.conj() * unit, axis=0)) ** 2) > 1 - view.rounding:
                 group.append(site)
                 break
         else:

@@ -1,25 +1,22 @@
 """Effects at inputs, outputs and joints of a system whose equations nobody knows."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chladni.gap.simulators.joint_law import JointLaw
 from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.model import Effect
 from chladni.models.core.port import Port, Terminal
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-
-if TYPE_CHECKING:
-    from chladni.models.effects.attached_effect import AttachedEffect
 
 
 def with_signals_changed(
     signals: Real,
     sample_rate_hz: float,
     terminals: Sequence[Terminal],
-    effects: Sequence["AttachedEffect"],
+    effects: Sequence[Effect],
     kind: str,
 ) -> Real:
     """Give the signals as effects at inputs (or outputs) leave them.
@@ -52,7 +49,7 @@ def with_signals_changed(
     return np.asarray(Integrator(compiled, sample_rate_hz).run(signals).outputs)
 
 
-def joint_law(joint: Port, effects: Sequence["AttachedEffect"]) -> JointLaw:
+def joint_law(joint: Port, effects: Sequence[Effect]) -> JointLaw:
     """Give the law that effects make at one joint.
 
     Raises

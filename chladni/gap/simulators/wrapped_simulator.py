@@ -1,17 +1,19 @@
-"""A simulator with effects wrapped around it."""
+"""A simulator with effects wrapped around it, as a model: implements `BlackBox`."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
-from chladni.gap.simulators.effects_around import joint_law, with_signals_changed
-from chladni.gap.simulators.simulator import Simulator, SimulatorResponse
+from chladni.gap.simulators.effects_around import joint_law, unconnected, with_signals_changed
+from chladni.gap.simulators.simulator import RefinableSimulator, Simulator, SimulatorResponse
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.model import Effect, ModelKind
+from chladni.models.core.parameter import Parameters
+from chladni.models.core.port import HoldKind
+from chladni.models.core.simulation import Simulation
 from chladni.models.effects.wording import nearest
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-
-if TYPE_CHECKING:
-    from chladni.models.effects.attached_effect import AttachedEffect
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +37,7 @@ class WrappedSimulator:
 
     simulator: Simulator
     values: Mapping[str, float] = field(default_factory=dict)
-    effects: tuple["AttachedEffect", ...] = ()
+    effects: tuple[Effect, ...] = ()
 
     def __post_init__(self) -> None:
         self.simulator.parameters.with_values(self.values)
@@ -47,6 +49,29 @@ class WrappedSimulator:
                     f"{nearest(effect.site, known, 'sites')}"
                 )
 
+    @property
+    def name(self) -> str:
+        """The simulator's."""
+        return self.simulator.name
+
+    @property
+    def kind(self) -> ModelKind:
+        """Signals only: a scheme without blocks."""
+        return "scheme"
+
+    @property
+    def parameters(self) -> Parameters:
+        """The simulator's, with the values here."""
+        return self.simulator.parameters.with_values(self.values)
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Sentences on what can't be looked for."""
+        told = ["effects at bodies and the ground can't be wrapped around a simulator and were not tried"]
+        if not self.simulator.joints:
+            told.append("the simulator names no joints, so that friction and play were not tried")
+        return tuple(told)
+
     def sites(self, kind: str) -> list[str]:
         """Names of the inputs, outputs or joints."""
         if kind == "joint":
@@ -57,9 +82,28 @@ class WrappedSimulator:
         """Give the same with some parameters replaced."""
         return replace(self, values={**self.values, **values})
 
-    def with_effects(self, effects: Sequence["AttachedEffect"]) -> Self:
+    def with_effects(self, effects: Sequence[Effect]) -> Self:
         """Give the same with these effects in place of those it has."""
         return replace(self, effects=tuple(effects))
+
+    def with_holds(self, holds: Mapping[str, HoldKind]) -> Self:  # noqa: ARG002 - what a model offers
+        """Give the same: what happens between samples is the simulator's."""
+        return self
+
+    def refined(self) -> Self | None:
+        """Give the same with steps half as long, None where the simulator can't tell the error of its step."""
+        if not isinstance(self.simulator, RefinableSimulator):
+            return None
+        return replace(self, simulator=self.simulator.refined())
+
+    def compile(self) -> CompiledModel:
+        """Give inputs, outputs and joints, with nothing in between."""
+        inputs = [replace(one, hold=one.hold or "foh") for one in self.simulator.inputs]
+        return unconnected(inputs, self.simulator.outputs, self.simulator.joints)
+
+    def flags(self, simulation: Simulation) -> tuple[str, ...]:  # noqa: ARG002 - what a model offers
+        """None."""
+        return ()
 
     def respond(self, inputs: Real, sample_rate_hz: float) -> SimulatorResponse:
         """Simulate from the start of the log.
@@ -71,7 +115,7 @@ class WrappedSimulator:
 
         Returns
         -------
-        What the sensors would record, and the motion at joints that carry effects.
+        What the sensors would record, and the motion at each joint.
 
         Raises
         ------
@@ -79,10 +123,10 @@ class WrappedSimulator:
             When the simulation diverges, or an effect can't act at its site.
         """
         acting = with_signals_changed(inputs, sample_rate_hz, self.simulator.inputs, self._at("input"), "input")
+        acting_at = self._at("joint")
         laws = {
-            joint.name: joint_law(joint, found)
+            joint.name: joint_law(joint, [each for each in acting_at if each.site == joint.name])
             for joint in self.simulator.joints
-            if (found := [each for each in self._at("joint") if each.site == joint.name])
         }
         response = self.simulator.respond(acting, sample_rate_hz, values=self.values, joint_laws=laws)
         return replace(response, outputs=self.recorded(response.outputs, sample_rate_hz))
@@ -91,6 +135,6 @@ class WrappedSimulator:
         """Give what sensors record of true outputs."""
         return with_signals_changed(outputs, sample_rate_hz, self.simulator.outputs, self._at("output"), "output")
 
-    def _at(self, kind: str) -> list["AttachedEffect"]:
+    def _at(self, kind: str) -> list[Effect]:
         names = self.sites(kind)
         return [effect for effect in self.effects if effect.site in names]

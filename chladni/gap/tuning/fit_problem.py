@@ -18,6 +18,8 @@ from chladni.signals.errors import EstimateError
 
 #: How far apart the two runs of a difference are, in ln(value) of a parameter.
 _APART = 1e-5
+#: The same of a plant whose step isn't ours: large against the jitter that friction leaves in its runs.
+_JITTER = 1e-2
 #: Precision of an effect's parameter before a log is seen: none, but for what keeps the equations regular.
 _UNKNOWN = 1e-6
 #: Curvatures beyond this say that neighbouring motions part, not what a parameter does.
@@ -117,6 +119,9 @@ class FitProblem:
         self.has_laws = bool(compiled.laws)
         self.has_slopes = can_run(compiled)
         self.coarse = self.has_slopes
+        #: Whether the last slopes are secants of the steps since those before, not differences where they were asked.
+        self.stale = False
+        self._known: tuple[Evaluation, Real] | None = None
 
     def start(self) -> Point:
         """Where the fit begins: at rest, moved into the bounds."""
@@ -170,8 +175,13 @@ class FitProblem:
         """Half the squares of what the unknowns' sizes are believed to be beforehand, in nats."""
         return float(0.5 * np.sum(self._prior * x**2))
 
-    def slopes(self, here: Evaluation) -> Slopes:
+    def slopes(self, here: Evaluation, *, fresh: bool = False) -> Slopes:
         """Gauss and Newton's equations around a point, each output weighed by what it misses.
+
+        Parameters
+        ----------
+        fresh
+            Whether secants don't do.
 
         Raises
         ------
@@ -179,7 +189,7 @@ class FitProblem:
             When neighbouring motions part so fast that slopes leave the numbers.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            found = self._equations(here, *self._columns(here))
+            found = self._equations(here, *self._columns(here, fresh=fresh))
         # NaN is beyond too.
         if not (np.all(np.abs(found.curvature) < _PARTED) and np.all(np.isfinite(found.gradient))):
             raise EstimateError(
@@ -246,10 +256,11 @@ class FitProblem:
         self.evaluations += 1
         return self.run.outputs(self.z(x), self.effects_at(x), initial)
 
-    def _columns(self, here: Evaluation) -> tuple[Real, Callable[[int, int], Real]]:
+    def _columns(self, here: Evaluation, *, fresh: bool = False) -> tuple[Real, Callable[[int, int], Real]]:
         """Slopes ``[unknown, output, sample]``, and whitened ``[state, output, training sample]`` of each window."""
         if here.made is None:
-            return self._differences(here), self._local(here.point)
+            own = self._secants(here, fresh) if self.run.is_black_box else self._differences(here)
+            return own, self._local(here.point)
         steps = self._steps(here.point.x)
         changed = [(self._setting(here.point.x + row), by) for row, by in zip(np.diag(steps), steps, strict=True)]
         own, starts = slopes_of(self.run, here.made, changed)
@@ -258,6 +269,19 @@ class FitProblem:
 
     def _setting(self, x: Real) -> Setting:
         return Setting(self.z(x), self.effects_at(x))
+
+    def _secants(self, here: Evaluation, fresh: bool) -> Real:
+        """Differences, then what agrees with each step that was made (Broyden 1965): somebody else's runs are dear."""
+        if fresh or self._known is None:
+            columns, self.stale = self._differences(here), False
+        else:
+            before, columns = self._known
+            moved = here.point.x - before.point.x
+            if np.any(moved):
+                change = here.outputs - before.outputs - np.tensordot(moved, columns, axes=1)
+                columns, self.stale = columns + np.multiply.outer(moved / (moved @ moved), change), True
+        self._known = here, columns
+        return columns
 
     def _differences(self, here: Evaluation) -> Real:
         """``[unknown, output, sample]``: change of the outputs, by differences."""
@@ -270,8 +294,9 @@ class FitProblem:
 
     def _steps(self, x: Real) -> Real:
         """Steps of each unknown, away from the nearer bound."""
+        apart = _JITTER if self.run.is_black_box else _APART
         steps = np.concatenate(
-            [_APART / self.run.tunables.tolerance[: self.tuned], np.full(len(self.numbers), _APART)]
+            [apart / self.run.tunables.tolerance[: self.tuned], np.full(len(self.numbers), apart)]
         )
         return np.asarray(np.where(x + steps > self.high, -steps, steps))
 

@@ -249,15 +249,17 @@ def _descend(problem: FitProblem, here: Evaluation, most: int, enough: float) ->
     level, iterations = 0, 0
     slopes = problem.slopes(here)
     while iterations < most:
-        iterations += 1
+        # Slopes are what costs: steps along secants are counted with the differences that they start from.
+        iterations += not problem.stale
         found, promised, level = _search(problem, here, slopes, level)
-        if found is None:
+        if found is None and not problem.stale:
             return here, slopes, promised < _STUCK, iterations
-        gained, here = here.cost - found.cost, found
-        if max(promised, gained) < enough:
+        gained, here = (0.0, here) if found is None else (here.cost - found.cost, found)
+        done = found is None or max(promised, gained) < enough
+        if done and not problem.stale:
             return here, slopes, True, iterations
         try:
-            slopes = problem.slopes(here)
+            slopes = problem.slopes(here, fresh=done)
         except EstimateError:
             return here, slopes, False, iterations
     return here, slopes, False, iterations

@@ -1,0 +1,282 @@
+"""Plants that only respond: runs of somebody else's program under a log, and what small pulses tell of it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, Self, runtime_checkable
+
+import numpy as np
+
+from chladni.gap.plant.kept import Kept
+from chladni.gap.plant.linear_view import Way
+from chladni.gap.plant.neighbours import Scaled
+from chladni.gap.plant.record_lines import RecordLines
+from chladni.gap.records.measurement import Measurement
+from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.core.model import Model
+from chladni.models.core.port_law import PortLaw
+from chladni.models.core.simulation import PortMotion
+from chladni.signals.arrays import Complex, Real
+
+#: Sigmas of a parameter between two runs that tell a slope: large against the jitter that friction leaves in a run.
+_NUDGE = 0.05
+#: Where in a record pulses are given, as a share of it, and their answer over the largest of each output: a machine
+#: answers otherwise in another pose, and small enough it answers as a linear one.
+_PULSES, _SMALL = (0.01, 0.3, 0.6), 1e-3
+#: Share of the largest input that the first pulse has, and steps until the answer has the size that's wanted.
+_FIRST, _STEPS = 0.02, 3
+#: Samples of an answer before its pulse: a law is asked within the step before, and an accelerometer feels it there.
+_AHEAD = 2
+#: How many times the answers to pulses are shifted to span what the plant does when it's let go, and the size of a
+#: decay over the largest one's below which it's rounding.
+_SHIFTS, _DECAY = 16, 1e-4
+#: Sigmas to which parameters are rounded before pulses are given.
+_GRID = 0.5
+#: Runs, slopes and answers that are kept.
+_RUNS, _SLOPES, _ANSWERS = 32, 8, 32
+
+
+class Response(Protocol):
+    """What a run gives: ``outputs [output, sample]``, and the motion at each joint."""
+
+    @property
+    def outputs(self) -> Real:
+        """As sensors record them, SI."""
+
+    @property
+    def motions(self) -> tuple[PortMotion, ...]:
+        """One for each joint of the plant, in its order."""
+
+
+@runtime_checkable
+class BlackBox(Model, Protocol):
+    """A plant that nobody knows the equations of; `compile` gives its terminals and joints, with nothing in between."""
+
+    def respond(self, inputs: Real, sample_rate_hz: float) -> Response:
+        """Run from its own start under ``inputs [input, sample]``; `ModelError` when it diverges."""
+
+    def refined(self) -> Self | None:
+        """Give the same with steps half as long; None where it can't."""
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Sentences on what can't be looked for in it."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Pulse:
+    """A force at a joint that knows nothing but the time: implements `Effect`."""
+
+    site: str
+    force: float
+    at_s: float
+    interval_s: float
+
+    effect = "pulse"
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Of interest to nobody."""
+        return {}
+
+    def attach(self, compiled: CompiledModel) -> CompiledModel:
+        """Give the joint with the pulse's law."""
+        numbers = (self.force, self.at_s, self.interval_s)
+        law = PortLaw(port=compiled.port_index(self.site), function=_pulse_law, parameters=numbers)
+        return replace(compiled, laws=(*compiled.laws, law))
+
+
+def _pulse_law(_d: float, _s: float, t: float, parameters: Any, _state: Any, _rates: Any) -> float:
+    return parameters[0] * max(0.0, 1.0 - abs(t - parameters[1]) / parameters[2])  # type: ignore[no-any-return]
+
+
+class BlackBoxRuns:
+    """Runs of a black box under one log, at any parameters, and its answers to pulses.
+
+    Signals are rows of ``[signal, sample]``: the measured outputs, then displacement and velocity of each joint.
+
+    Parameters
+    ----------
+    box, tunables, measurement
+        What runs, what may vary, and under what.
+    """
+
+    def __init__(self, box: BlackBox, tunables: Scaled, measurement: Measurement) -> None:
+        self.box, self.tunables, self.measurement = box, tunables, measurement
+        self.compiled = box.compile()
+        names = [terminal.name for terminal in self.compiled.outputs]
+        self._rows = [names.index(name) for name in measurement.output_names]
+        self._runs: Kept[Real] = Kept(_RUNS)
+        self._slopes: Kept[Real] = Kept(_SLOPES)
+        self._answers: Kept[Real] = Kept(_ANSWERS)
+        self._decays: Kept[Real] = Kept(1)
+
+    def at(self, z: Real) -> Real:
+        """``[signal, sample]`` at ``z [parameter]``, in units of their tolerance."""
+        return self._runs.get(z.tobytes(), lambda: self._signals(self._set(z), self.measurement.inputs))
+
+    def slopes(self, z: Real) -> Real:
+        """``[parameter, signal, sample]`` change with each parameter."""
+        return self._slopes.get(z.tobytes(), lambda: self._differences(z))
+
+    def view(self, z: Real, lines: RecordLines) -> "BlackBoxView":
+        """Give the plant at z on some lines."""
+        return BlackBoxView(self, z, lines)
+
+    def answer(self, z: Real, kind: str, name: str) -> Real:
+        """``[signal, sample]`` change by a force of one at a joint, or of an input, for the sample `_AHEAD`.
+
+        The mean over a few pulses along the record, at parameters near z.
+        """
+        near = _GRID * np.round(z / _GRID)
+        return self._answers.get((near.tobytes(), kind, name), lambda: self._answer(near, kind, name))
+
+    def decays(self) -> Real:
+        """``[decay, signal, sample]`` that span what the plant does when it's let go: what follows after pulses.
+
+        A force that still acts at a record's end leaves what its spectrum would have come in again at the start.
+        """
+        return self._decays.get(None, self._spanned)
+
+    def _spanned(self) -> Real:
+        nominal, samples = np.zeros(len(self.tunables.names)), self.measurement.samples
+        sites = [("joint", port.name) for port in self.compiled.ports]
+        sites += [("input", terminal.name) for terminal in self.compiled.inputs]
+        rows = []
+        for shift in np.unique(np.geomspace(1, max(samples // 4, 1), _SHIFTS).astype(int)):
+            for kind, name in sites:
+                answer = self.answer(nominal, kind, name)[:, _AHEAD + shift :]
+                rows.append(np.pad(answer, ((0, 0), (0, samples - answer.shape[1]))))
+        count, free = len(self._rows), np.array(rows)
+        scale = np.std(self.measurement.outputs, axis=1)
+        seen = (free[:, :count] / np.where(scale > 0, scale, 1.0)[:, None]).reshape(len(free), -1)
+        size = np.linalg.norm(seen, axis=1)
+        free, seen = (one[size > 0] / size[size > 0].reshape(-1, *[1] * (one.ndim - 1)) for one in (free, seen))
+        values, vectors = np.linalg.eigh(seen @ seen.T)
+        kept = values > _DECAY**2 * values.max(initial=0.0)
+        return np.asarray(np.tensordot((vectors[:, kept] / np.sqrt(values[kept])).T, free, axes=1))
+
+    def _set(self, z: Real) -> BlackBox:
+        return self.box.with_values(self.tunables.values(z)) if z.size else self.box
+
+    def _signals(self, box: BlackBox, inputs: Real) -> Real:
+        found = box.respond(inputs, self.measurement.sample_rate_hz)
+        moved = [row for motion in found.motions for row in (motion.displacement, motion.velocity)]
+        return np.vstack([found.outputs[self._rows], *moved])
+
+    def _differences(self, z: Real) -> Real:
+        # Inward, where the other side may lie outside of what is possible.
+        steps = np.diag(np.where(z > 0, -_NUDGE, _NUDGE))
+        found = np.zeros((z.size, *self.at(z).shape))
+        for place, step in enumerate(steps):
+            found[place] = (self._signals(self._set(z + step), self.measurement.inputs) - self.at(z)) / step[place]
+        return found
+
+    def _answer(self, z: Real, kind: str, name: str) -> Real:
+        size = _FIRST * float(np.max(np.abs(self.measurement.inputs), initial=0.0)) or 1.0
+        places = [_AHEAD + int(share * self.measurement.samples) for share in _PULSES]
+        for _ in range(_STEPS):
+            share = self._share(self._pulsed(z, kind, name, size, places[0]))
+            if not share or 0.1 < share / _SMALL < 10.0:
+                break
+            size *= _SMALL / share
+        found, told = np.zeros_like(self.at(z)), np.zeros(self.measurement.samples)
+        for at in places:
+            answer = self._pulsed(z, kind, name, size, at)[:, at - _AHEAD :] / size
+            found[:, : answer.shape[1]] += answer
+            told[: answer.shape[1]] += 1.0
+        return found / np.maximum(told, 1.0)
+
+    def _share(self, change: Real) -> float:
+        """Largest change of an output over the output's own largest."""
+        whole = np.max(np.abs(self.measurement.outputs), axis=1)
+        largest = np.max(np.abs(change[: len(whole)]), axis=1)
+        return float(np.max(largest / np.where(whole > 0, whole, 1.0)))
+
+    def _pulsed(self, z: Real, kind: str, name: str, size: float, at: int) -> Real:
+        """``[signal, sample]`` change by a pulse."""
+        box, inputs, rate = self._set(z), self.measurement.inputs, self.measurement.sample_rate_hz
+        if kind == "input":
+            inputs = np.array(inputs)
+            inputs[self.measurement.input_names.index(name), at] += size
+        else:
+            pulse = _Pulse(name, size, at / rate, 1.0 / rate)
+            box = box.with_effects((*box.effects, pulse))
+        return self._signals(box, inputs) - self.at(z)
+
+
+class BlackBoxView:
+    """A black box on the lines of a record: implements `View`.
+
+    What the inputs do is what it does; what forces do besides is linear in them, as pulses tell.
+    """
+
+    #: Pulses are followed to the record's end, and a step acts for all of itself.
+    rounding = 1e-3
+
+    def __init__(self, runs: BlackBoxRuns, z: Real, lines: RecordLines) -> None:
+        self.compiled, self.lines = runs.compiled, lines
+        self._runs, self._z, self._count = runs, z, len(runs.measurement.output_names)
+        self._spectrum = lines.spectrum(runs.at(z))
+        self._free = lines.spectrum(runs.decays()[..., : lines.samples])[:, :, :1]
+
+    def forced(self) -> Complex:
+        """``[output, segment, line]`` under the log's inputs."""
+        return self._spectrum[: self._count]
+
+    def response(self, transient: Real | None, forces: Sequence[tuple[Way, Complex]]) -> Complex:
+        """``[output, segment, line]`` under the log's inputs, decays and forces ``[segment, line]``."""
+        return self._moved(transient, [(way.outputs, force) for way, force in forces], slice(self._count))
+
+    def states(self, _transient: Real | None, _forces: Sequence[tuple[Way, Complex]]) -> Complex:
+        """``[decay, segment, line]``: nobody sees its states."""
+        return np.zeros((len(self._free), *self._spectrum.shape[1:]), dtype=np.complex128)
+
+    def transients(self) -> Complex:
+        """``[decay, output, line]``, see `BlackBoxRuns.decays`."""
+        return self._free[:, : self._count, 0]
+
+    def motion(
+        self, port: int, transient: Real | None, forces: Sequence[tuple[Way, Complex]]
+    ) -> tuple[Complex, Complex]:
+        """Displacement and velocity ``[segment, line]`` at a joint, under the same as `response`."""
+        rows = slice(self._count + 2 * port, self._count + 2 * port + 2)
+        found = self._moved(transient, [(way.states[2 * port :][:2], force) for way, force in forces], rows)
+        return found[0], found[1]
+
+    def _moved(
+        self, transient: Real | None, forces: Sequence[tuple[Complex, Complex]], rows: slice
+    ) -> Complex:
+        """``[signal, segment, line]`` of some signals."""
+        found = self._spectrum[rows]
+        if transient is not None:
+            found = found + np.einsum("dol,ds->osl", self._free[:, rows, 0], transient)
+        for pattern, force in forces:
+            found = found + pattern[:, None] * force
+        return np.asarray(found, dtype=np.complex128)
+
+    def pattern(self, way: Way) -> Complex:
+        """``[output, line]`` that a force of one prints."""
+        return way.outputs
+
+    def way_of_port(self, port: int) -> Way:
+        """Way of a force at a joint; its `states` are displacement and velocity of each joint."""
+        return self._way(self._runs.answer(self._z, "joint", self.compiled.ports[port].name), port=port)
+
+    def way_of_input(self, name: str) -> Way:
+        """Way of a change of an input."""
+        return self._way(self._runs.answer(self._z, "input", name), column=self.compiled.column_of(name))
+
+    def way_of_output(self, place: int) -> Way:
+        """Way of an error of the sensor in row `place` of the measured outputs."""
+        error = np.zeros((self._spectrum.shape[0], _AHEAD + 1))
+        error[place, _AHEAD] = 1.0
+        return self._way(error)
+
+    def _way(self, answer: Real, *, port: int | None = None, column: int | None = None) -> Way:
+        # What lasts longer than a segment comes in again at its start: the transform is the same.
+        length = self.lines.samples
+        folded = np.pad(answer, ((0, 0), (0, -answer.shape[1] % length)))
+        printed = np.fft.rfft(folded.reshape(len(answer), -1, length).sum(axis=1), axis=1)[:, self.lines.index]
+        printed = printed * self.lines.z**_AHEAD
+        none = np.zeros((0, self.lines.index.size), dtype=np.complex128)
+        return Way(states=printed[self._count :], outputs=printed[: self._count], carried=none, port=port, column=column)
