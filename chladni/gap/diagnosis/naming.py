@@ -12,6 +12,7 @@ from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.diagnosis import Candidate, Cause, FittedNumber, Ranked
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.effects.effect_kind import EffectKind
+from chladni.models.files.site_units import compiled_site_units, known_site, units_at
 
 #: Nats within which a log can't tell two candidates apart: odds of e^2 when they are printed.
 CLOSE = 2.0 * TEMPER
@@ -29,7 +30,7 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
     found: list[Cause] = []
     if causes.best is not causes.tuned:
         places = range(len(causes.best.hypothesis.named))
-        told = [_cause(causes, place) for place in sorted(places, key=lambda place: _left_alone(causes, place))]
+        told = [_cause(study, causes, place) for place in sorted(places, key=lambda place: _left_alone(causes, place))]
         found += [one for one in told if one.probability >= NAMED]
     if causes.verdict == "effect" and study.stepping is not None:
         found += _in_steps(study, study.stepping, {one.site for one in found if one.effect == study.stepping.name})
@@ -91,7 +92,7 @@ def tuned_numbers(study: Study, fit: OutputErrorFit) -> dict[str, FittedNumber]:
     }
 
 
-def _cause(causes: Causes, place: int) -> Cause:
+def _cause(study: Study, causes: Causes, place: int) -> Cause:
     best = causes.best
     candidate = best.hypothesis.named[place]
     near = _in_its_place(causes, candidate)
@@ -104,7 +105,7 @@ def _cause(causes: Causes, place: int) -> Cause:
         probability=probability_of(causes, *(replace(candidate, site=site) for site in group)),
         group=tuple(group),
         alternatives=tuple(dict.fromkeys(one for one in near if one.effect != candidate.effect)),
-        parameters=_numbers(best, place),
+        parameters=_numbers(study, best, place),
         variant=effect.variant if effect is not None else None,
         source=effect.source if effect is not None else None,
     )
@@ -134,13 +135,17 @@ def probability_of(causes: Causes, *candidates: Candidate) -> float:
     return causes.belief.probability(*candidates)
 
 
-def _numbers(found: Contestant, place: int) -> dict[str, FittedNumber]:
+def _numbers(study: Study, found: Contestant, place: int) -> dict[str, FittedNumber]:
     if place >= len(found.fit.effects):
         # Of a wrong value the number stands among the tuned ones.
         return {}
     effect, std = found.fit.effects[place], found.fit.effect_std[place]
+    units = compiled_site_units(study.model.compile())
+    there = units_at(effect.site, units) if known_site(effect.site, units) else None
     return {
-        name: FittedNumber(value=float(one.value), std=_finite(std.get(name)), unit=one.unit)
+        name: FittedNumber(
+            value=float(one.value), std=_finite(std.get(name)), unit=one.unit if there is None else there.of(one.unit)
+        )
         for name, one in effect.parameters.items()
     }
 

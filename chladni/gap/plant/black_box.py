@@ -29,7 +29,7 @@ _AHEAD = 2
 #: How many times the answers to pulses are shifted to span what the plant does when it's let go, and the size of a
 #: decay over the largest one's below which it's rounding.
 _SHIFTS, _DECAY = 16, 1e-4
-#: Sigmas to which parameters are rounded before pulses are given.
+#: Sigmas to which parameters are rounded where slopes and pulses are asked for: neighbours share them.
 _GRID = 0.5
 #: Runs, slopes and answers that are kept.
 _RUNS, _SLOPES, _ANSWERS = 32, 8, 32
@@ -109,14 +109,16 @@ class BlackBoxRuns:
         self._slopes: Kept[Real] = Kept(_SLOPES)
         self._answers: Kept[Real] = Kept(_ANSWERS)
         self._decays: Kept[Real] = Kept(1)
+        self._sizes: Kept[float] = Kept(_ANSWERS)
 
     def at(self, z: Real) -> Real:
         """``[signal, sample]`` at ``z [parameter]``, in units of their tolerance."""
         return self._runs.get(z.tobytes(), lambda: self._signals(self._set(z), self.measurement.inputs))
 
     def slopes(self, z: Real) -> Real:
-        """``[parameter, signal, sample]`` change with each parameter."""
-        return self._slopes.get(z.tobytes(), lambda: self._differences(z))
+        """``[parameter, signal, sample]`` change with each parameter, at parameters near z."""
+        near = _near(z)
+        return self._slopes.get(near.tobytes(), lambda: self._differences(near))
 
     def view(self, z: Real, lines: RecordLines) -> "BlackBoxView":
         """Give the plant at z on some lines."""
@@ -127,7 +129,7 @@ class BlackBoxRuns:
 
         The mean over a few pulses along the record, at parameters near z.
         """
-        near = _GRID * np.round(z / _GRID)
+        near = _near(z)
         return self._answers.get((near.tobytes(), kind, name), lambda: self._answer(near, kind, name))
 
     def decays(self) -> Real:
@@ -172,19 +174,25 @@ class BlackBoxRuns:
         return found
 
     def _answer(self, z: Real, kind: str, name: str) -> Real:
-        size = _FIRST * float(np.max(np.abs(self.measurement.inputs), initial=0.0)) or 1.0
         places = [_AHEAD + int(share * self.measurement.samples) for share in _PULSES]
-        for _ in range(_STEPS):
-            share = self._share(self._pulsed(z, kind, name, size, places[0]))
-            if not share or 0.1 < share / _SMALL < 10.0:
-                break
-            size *= _SMALL / share
+        size = self._sizes.get((kind, name), lambda: self._size(kind, name, places[0]))
         found, told = np.zeros_like(self.at(z)), np.zeros(self.measurement.samples)
         for at in places:
             answer = self._pulsed(z, kind, name, size, at)[:, at - _AHEAD :] / size
             found[:, : answer.shape[1]] += answer
             told[: answer.shape[1]] += 1.0
         return found / np.maximum(told, 1.0)
+
+    def _size(self, kind: str, name: str, at: int) -> float:
+        """Pulse that is answered by as little as is wanted."""
+        nominal = np.zeros(len(self.tunables.names))
+        size = _FIRST * float(np.max(np.abs(self.measurement.inputs), initial=0.0)) or 1.0
+        for _ in range(_STEPS):
+            share = self._share(self._pulsed(nominal, kind, name, size, at))
+            if not share or 0.1 < share / _SMALL < 10.0:
+                break
+            size *= _SMALL / share
+        return size
 
     def _share(self, change: Real) -> float:
         """Largest change of an output over the output's own largest."""
@@ -202,6 +210,11 @@ class BlackBoxRuns:
             pulse = _Pulse(name, size, at / rate, 1.0 / rate)
             box = box.with_effects((*box.effects, pulse))
         return self._signals(box, inputs) - self.at(z)
+
+
+def _near(z: Real) -> Real:
+    # Without the sign of zero: what is the same has one key.
+    return np.asarray(_GRID * np.round(z / _GRID) + 0.0)
 
 
 class BlackBoxView:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from threading import Lock
 from typing import Protocol
 
 import numpy as np
@@ -13,6 +14,10 @@ from chladni.models.core.port import Port, Terminal
 from chladni.models.core.simulation import PortMotion
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
+
+
+#: Nobody's function needs to bear being called by several threads at once.
+_ONE_AT_A_TIME = Lock()
 
 
 class SimulatorFunction(Protocol):
@@ -68,7 +73,8 @@ class CallableSimulator:
         """
         running = {name: law.started() for name, law in joint_laws.items()}
         numbers = self.parameters.with_values(values).numbers()
-        outputs = np.asarray(self.function(inputs, sample_rate_hz, numbers, running), dtype=np.float64)
+        with _ONE_AT_A_TIME:
+            outputs = np.asarray(self.function(inputs, sample_rate_hz, numbers, running), dtype=np.float64)
         expected = (len(self.outputs), inputs.shape[1])
         if outputs.shape != expected:
             raise ModelError(
