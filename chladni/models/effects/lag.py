@@ -7,7 +7,7 @@ import numpy as np
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.effects.attaching import pass_through
-from chladni.models.effects.clues import Clues, FittedForm
+from chladni.models.effects.clues import Clues, FittedForm, Relative
 from chladni.models.effects.effect_kind import EffectKind, Site, Values, Variant
 from chladni.models.effects.linear_filter import first_order, second_order
 from chladni.models.effects.trial import Force, Shape, Trial, TrialMotion, logarithms, numbers, shaped
@@ -55,6 +55,12 @@ def _is_degenerate(fitted: FittedForm) -> bool:
     return fitted.variant == "second_order" and fitted.values["damping_ratio"] > _DAMPING[1]
 
 
+def _delays(fitted: FittedForm) -> Iterator[Relative]:
+    """Give the dead time that slow commands are as late by: well below its corner a lag does the same."""
+    damping = fitted.values.get("damping_ratio", 0.5)
+    yield Relative(effect="delay", values={"delay": 2.0 * damping * fitted.values["time_constant"]})
+
+
 LAG = EffectKind(
     name="lag",
     said="a lag",
@@ -71,7 +77,7 @@ LAG = EffectKind(
     ),
     neutral={"time_constant": 0.0},
     linear=True,
-    clues=Clues(trials=_trials, is_degenerate=_is_degenerate, details=("damping_ratio",)),
+    clues=Clues(trials=_trials, is_degenerate=_is_degenerate, details=("damping_ratio",), nested=_delays),
     variants=(
         Variant(name="first_order", attach=attach_first_order, formula="u_acts/u = 1/(time_constant p + 1)"),
         Variant(
