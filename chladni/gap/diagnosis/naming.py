@@ -30,7 +30,9 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
     found: list[Cause] = []
     if causes.best is not causes.tuned:
         places = range(len(causes.best.hypothesis.named))
-        told = [_cause(study, causes, place) for place in sorted(places, key=lambda place: _left_alone(causes, place))]
+        told = [
+            _cause(study, causes, place) for place in sorted(places, key=lambda place: _left_alone(causes, place))
+        ]
         found += [one for one in told if one.probability >= NAMED]
     if causes.verdict == "effect" and study.stepping is not None:
         found += _in_steps(study, study.stepping, {one.site for one in found if one.effect == study.stepping.name})

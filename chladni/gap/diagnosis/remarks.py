@@ -58,11 +58,11 @@ def _of_black_box(study: Study, shown: Contestant) -> list[str]:
     floor = pooled_gap(np.broadcast_to(study.contest.noise.rms[:, None], measured.shape), measured)
     if error is None or error <= floor:
         return [*study.model.untold]
-    return [
-        *study.model.untold,
+    of_step = (
         f"half the simulator's step moves its outputs by {error:.1%}, more than the noise of {floor:.1%}; shorten "
-        "the step, or part of this answer is the step's",
-    ]
+        "the step, or part of this answer is the step's"
+    )
+    return [*study.model.untold, of_step]
 
 
 def _undetermined(names: Sequence[str]) -> str:

@@ -49,7 +49,7 @@ class Response(Protocol):
 
 @runtime_checkable
 class BlackBox(Model, Protocol):
-    """A plant that nobody knows the equations of; `compile` gives its terminals and joints, with nothing in between."""
+    """A plant without known equations; `compile` gives its terminals and joints, with nothing in between."""
 
     def respond(self, inputs: Real, sample_rate_hz: float) -> Response:
         """Run from its own start under ``inputs [input, sample]``; `ModelError` when it diverges."""
@@ -256,9 +256,7 @@ class BlackBoxView:
         found = self._moved(transient, [(way.states[2 * port :][:2], force) for way, force in forces], rows)
         return found[0], found[1]
 
-    def _moved(
-        self, transient: Real | None, forces: Sequence[tuple[Complex, Complex]], rows: slice
-    ) -> Complex:
+    def _moved(self, transient: Real | None, forces: Sequence[tuple[Complex, Complex]], rows: slice) -> Complex:
         """``[signal, segment, line]`` of some signals."""
         found = self._spectrum[rows]
         if transient is not None:
@@ -292,4 +290,6 @@ class BlackBoxView:
         printed = np.fft.rfft(folded.reshape(len(answer), -1, length).sum(axis=1), axis=1)[:, self.lines.index]
         printed = printed * self.lines.z**_AHEAD
         none = np.zeros((0, self.lines.index.size), dtype=np.complex128)
-        return Way(states=printed[self._count :], outputs=printed[: self._count], carried=none, port=port, column=column)
+        return Way(
+            states=printed[self._count :], outputs=printed[: self._count], carried=none, port=port, column=column
+        )

@@ -191,7 +191,9 @@ class FreeRun:
             return _site_motion(self._responded(self.model, z, effects).motions[joint])
         return self._motions(z, effects, initial, [self.compiled(z, effects).port_index(site)])[0]
 
-    def law_motion(self, z: Real, effects: Sequence[AttachedEffect], initial: Real, *, site: str) -> tuple[Real, Real]:
+    def law_motion(
+        self, z: Real, effects: Sequence[AttachedEffect], initial: Real, *, site: str
+    ) -> tuple[Real, Real]:
         """Displacement and velocity that a law at a site saw; `ModelError` where none acts, see `outputs` too."""
         if isinstance(self.model, BlackBox):
             motion = self.motion(z, effects, initial, site=site)

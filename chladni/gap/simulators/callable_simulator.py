@@ -15,7 +15,6 @@ from chladni.models.core.simulation import PortMotion
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-
 #: Nobody's function needs to bear being called by several threads at once.
 _ONE_AT_A_TIME = Lock()
 
@@ -73,8 +72,12 @@ class CallableSimulator:
         """
         running = {name: law.started() for name, law in joint_laws.items()}
         numbers = self.parameters.with_values(values).numbers()
-        with _ONE_AT_A_TIME:
-            outputs = np.asarray(self.function(inputs, sample_rate_hz, numbers, running), dtype=np.float64)
+        try:
+            # A run that leaves the numbers is told below, once.
+            with _ONE_AT_A_TIME, np.errstate(all="ignore"):
+                outputs = np.asarray(self.function(inputs, sample_rate_hz, numbers, running), dtype=np.float64)
+        except ArithmeticError as error:
+            raise ModelError(f"simulator {self.name!r}: its function diverges ({error})") from error
         expected = (len(self.outputs), inputs.shape[1])
         if outputs.shape != expected:
             raise ModelError(

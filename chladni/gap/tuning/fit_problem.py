@@ -271,7 +271,7 @@ class FitProblem:
         return Setting(self.z(x), self.effects_at(x))
 
     def _secants(self, here: Evaluation, fresh: bool) -> Real:
-        """Differences, then what agrees with each step that was made (Broyden 1965): somebody else's runs are dear."""
+        """Differences, then what agrees with each step that was made (Broyden 1965): runs of others are dear."""
         if fresh or self._known is None:
             columns, self.stale = self._differences(here), False
         else:
@@ -295,9 +295,7 @@ class FitProblem:
     def _steps(self, x: Real) -> Real:
         """Steps of each unknown, away from the nearer bound."""
         apart = _JITTER if self.run.is_black_box else _APART
-        steps = np.concatenate(
-            [apart / self.run.tunables.tolerance[: self.tuned], np.full(len(self.numbers), apart)]
-        )
+        steps = np.concatenate([apart / self.run.tunables.tolerance[: self.tuned], np.full(len(self.numbers), apart)])
         return np.asarray(np.where(x + steps > self.high, -steps, steps))
 
     def _spread(self, point: Point) -> Real:
