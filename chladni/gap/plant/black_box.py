@@ -230,7 +230,8 @@ class BlackBoxView:
         self.compiled, self.lines = runs.compiled, lines
         self._runs, self._z, self._count = runs, z, len(runs.measurement.output_names)
         self._spectrum = lines.spectrum(runs.at(z))
-        self._free = lines.spectrum(runs.decays()[..., : lines.samples])[:, :, :1]
+        free = np.fft.rfft(runs.decays()[..., : lines.samples], axis=-1)[..., lines.index]
+        self._free = np.asarray(free / np.sqrt(lines.samples), dtype=np.complex128)
 
     def forced(self) -> Complex:
         """``[output, segment, line]`` under the log's inputs."""
@@ -246,7 +247,7 @@ class BlackBoxView:
 
     def transients(self) -> Complex:
         """``[decay, output, line]``, see `BlackBoxRuns.decays`."""
-        return self._free[:, : self._count, 0]
+        return self._free[:, : self._count]
 
     def motion(
         self, port: int, transient: Real | None, forces: Sequence[tuple[Way, Complex]]
@@ -260,7 +261,7 @@ class BlackBoxView:
         """``[signal, segment, line]`` of some signals."""
         found = self._spectrum[rows]
         if transient is not None:
-            found = found + np.einsum("dol,ds->osl", self._free[:, rows, 0], transient)
+            found = found + np.einsum("dol,ds->osl", self._free[:, rows], transient)
         for pattern, force in forces:
             found = found + pattern[:, None] * force
         return np.asarray(found, dtype=np.complex128)

@@ -211,8 +211,8 @@ class FreeRun:
     ) -> dict[tuple[str, PortKind], SiteMotion]:
         """Motion at every port of the model during one run, by name and kind; see `outputs`."""
         if isinstance(self.model, BlackBox):
-            found = self._responded(self.model, z, effects).motions
-            return {(one.name, "joint"): _site_motion(one) for one in found}
+            moved = self._responded(self.model, z, effects).motions
+            return {(one.name, "joint"): _site_motion(one) for one in moved}
         ports = self.compiled(z, effects).ports
         found = self._motions(z, effects, initial, range(len(ports)))
         return {(port.name, port.kind): motion for port, motion in zip(ports, found, strict=True)}

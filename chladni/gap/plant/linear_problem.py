@@ -1,6 +1,7 @@
 """A measurement beside the linear part of a model: residual spectra, and how they move with the parameters."""
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
@@ -126,7 +127,8 @@ class LinearProblem:
         if isinstance(self._neighbours, BlackBoxRuns):
             changes = self._neighbours.slopes(z)[:, : len(self.rows)]
             return np.asarray(self.lines.spectrum(changes) * self.weight, dtype=np.complex128)
-        view = self.view(z)
+        # Of equations it is one.
+        view = cast("LinearView", self.view(z))
         ways = [(self.way(view, site), force) for site, force in forces]
         changed = self._neighbours.changed(z)
         found = np.empty((z.size, *self.measured.shape), dtype=np.complex128)

@@ -34,6 +34,8 @@ _FLAT = 1e-15
 #: Iterations that are left for fine runs at least.
 _FINE = 4
 _DAMPINGS = (0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
+#: Of them, those that are tried before slopes are asked for again.
+_ALONG_SECANTS = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -270,7 +272,9 @@ def _search(
 ) -> tuple[Evaluation | None, float, int]:
     """First damping whose step makes the cost less, from the one that did last time; what the first promised."""
     promised = np.inf
-    for place in range(level, len(_DAMPINGS)):
+    # Along secants that don't lead on, more damping costs more than slopes do.
+    last = min(level + _ALONG_SECANTS, len(_DAMPINGS)) if problem.stale else len(_DAMPINGS)
+    for place in range(level, last):
         step = _step(problem, here, slopes, _DAMPINGS[place])
         expected = _expected(slopes, step)
         promised = min(promised, expected) if np.isfinite(promised) else expected
