@@ -102,6 +102,7 @@ def test_friction_by_another_law_is_named():
     assert found.verdict == "effect"
     (cause,) = found.causes
     assert cause.effect in FAMILIES["friction"]
+    assert all(one.effect in FAMILIES["friction"] for one in cause.alternatives)
     assert (cause.site, cause.group) == ("guide", ("guide",))
     assert 0.5 < cause.probability <= 1.0
     assert found.gap.closed > 0.9
@@ -119,7 +120,10 @@ def test_what_was_found_is_simulated():
     again = explained_simulator(slide(), found).respond(
         log_of([chladni.attached(STICKY, "guide", {"strength": 4.0})], MOVED).values[:1], RATE_HZ
     )
-    assert np.allclose(again.outputs, signals.after, rtol=1e-9, atol=1e-12)
+    # But for a constant of each sensor, which no simulator explains.
+    constants = signals.after - again.outputs
+    assert np.allclose(constants, constants[:, :1], rtol=1e-9, atol=1e-9)
+    assert np.all(np.abs(constants[:, 0]) < signals.noise_rms)
 
 
 def test_where_the_gap_lies():
