@@ -31,10 +31,13 @@ def with_told_holds(model: Model, location: Location) -> Model:
     location
         Of the log, with the holds that the model has.
     """
+    asked = other_holds(model, location.problem.measurement)
+    if not asked:
+        return model
     nats = _nats(model, location)
     # One sensor knows no force beside a hold: a wrong value would pass for one, but where a hold leaves noise alone.
     enough = -np.inf if len(location.problem.measured) > 1 else -BEYOND_DOUBT
-    for others in other_holds(model, location.problem.measurement):
+    for others in asked:
         if nats == 0.0:
             break
         tried = [model.with_holds(one) for one in others]

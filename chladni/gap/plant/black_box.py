@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.linear_view import Way
@@ -31,6 +32,8 @@ _AHEAD = 2
 _SHIFTS, _DECAY = 16, 1e-4
 #: Sigmas to which parameters are rounded where slopes and pulses are asked for: neighbours share them.
 _GRID = 0.5
+#: Lines over which the power of what is missed is taken for the same.
+_SMOOTH = 31
 #: Runs, slopes and answers that are kept.
 _RUNS, _SLOPES, _ANSWERS = 32, 8, 32
 
@@ -110,6 +113,7 @@ class BlackBoxRuns:
         self._answers: Kept[Real] = Kept(_ANSWERS)
         self._decays: Kept[Real] = Kept(1)
         self._sizes: Kept[float] = Kept(_ANSWERS)
+        self._doubt: Kept[Real] = Kept(1)
 
     def at(self, z: Real) -> Real:
         """``[signal, sample]`` at ``z [parameter]``, in units of their tolerance."""
@@ -132,6 +136,33 @@ class BlackBoxRuns:
         near = _near(z)
         return self._answers.get((near.tobytes(), kind, name), lambda: self._answer(near, kind, name))
 
+    def doubt(self) -> Real:
+        """``[output]`` share of a force's answer that differs from pose to pose: no linear view follows it.
+
+        Of all joints and inputs the largest, as power.
+        """
+        return self._doubt.get(None, self._doubted)
+
+    def _doubted(self) -> Real:
+        nominal, count = np.zeros(len(self.tunables.names)), len(self._rows)
+        found = np.zeros(count)
+        for kind, name in self._sites():
+            answers = self._answers_at(nominal, kind, name)
+            # As far as all of them were followed.
+            told = min(answer.shape[1] for answer in answers)
+            each = np.array([answer[:count, :told] for answer in answers])
+            whole = np.sum(each**2, axis=(0, 2))
+            apart = np.sum((each - each.mean(axis=0)) ** 2, axis=(0, 2)) * len(each) / (len(each) - 1)
+            found = np.maximum(found, np.where(whole > 0, apart / np.where(whole > 0, whole, 1.0), 0.0))
+        return np.minimum(found, 1.0)
+
+    def error(self, lines: RecordLines) -> Real:
+        """``[output, line]`` power of what is missed at the nominal parameters that no linear view follows."""
+        nominal = np.zeros(len(self.tunables.names))
+        missed = lines.spectrum(self.measurement.outputs - self.at(nominal)[: len(self._rows)])
+        power = uniform_filter1d(np.mean(np.abs(missed) ** 2, axis=1), _SMOOTH, axis=-1, mode="reflect")
+        return np.asarray(self.doubt()[:, None] * power)
+
     def decays(self) -> Real:
         """``[decay, signal, sample]`` that span what the plant does when it's let go: what follows after pulses.
 
@@ -141,11 +172,9 @@ class BlackBoxRuns:
 
     def _spanned(self) -> Real:
         nominal, samples = np.zeros(len(self.tunables.names)), self.measurement.samples
-        sites = [("joint", port.name) for port in self.compiled.ports]
-        sites += [("input", terminal.name) for terminal in self.compiled.inputs]
         rows = []
         for shift in np.unique(np.geomspace(1, max(samples // 4, 1), _SHIFTS).astype(int)):
-            for kind, name in sites:
+            for kind, name in self._sites():
                 answer = self.answer(nominal, kind, name)[:, _AHEAD + shift :]
                 rows.append(np.pad(answer, ((0, 0), (0, samples - answer.shape[1]))))
         count, free = len(self._rows), np.array(rows)
@@ -174,14 +203,21 @@ class BlackBoxRuns:
         return found
 
     def _answer(self, z: Real, kind: str, name: str) -> Real:
-        places = [_AHEAD + int(share * self.measurement.samples) for share in _PULSES]
-        size = self._sizes.get((kind, name), lambda: self._size(kind, name, places[0]))
         found, told = np.zeros_like(self.at(z)), np.zeros(self.measurement.samples)
-        for at in places:
-            answer = self._pulsed(z, kind, name, size, at)[:, at - _AHEAD :] / size
+        for answer in self._answers_at(z, kind, name):
             found[:, : answer.shape[1]] += answer
             told[: answer.shape[1]] += 1.0
         return found / np.maximum(told, 1.0)
+
+    def _answers_at(self, z: Real, kind: str, name: str) -> list[Real]:
+        """``[signal, sample]`` from `_AHEAD` before each pulse on, for one of one."""
+        places = [_AHEAD + int(share * self.measurement.samples) for share in _PULSES]
+        size = self._sizes.get((kind, name), lambda: self._size(kind, name, places[0]))
+        return [self._pulsed(z, kind, name, size, at)[:, at - _AHEAD :] / size for at in places]
+
+    def _sites(self) -> list[tuple[str, str]]:
+        joints = [("joint", port.name) for port in self.compiled.ports]
+        return joints + [("input", terminal.name) for terminal in self.compiled.inputs]
 
     def _size(self, kind: str, name: str, at: int) -> float:
         """Pulse that is answered by as little as is wanted."""

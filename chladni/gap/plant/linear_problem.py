@@ -54,8 +54,10 @@ class LinearProblem:
         compiled = model.compile()
         names = [terminal.name for terminal in compiled.outputs]
         self.rows = tuple(names.index(name) for name in measurement.output_names)
-        #: ``[output, 1, line]``: of noise, and of what no model follows a machine to.
+        #: ``[output, line]``: power of what no model, and no linear view, follows a machine to.
         self.error = (LAW_ERROR * np.std(measurement.outputs, axis=1)[:, None]) ** 2
+        if isinstance(self._neighbours, BlackBoxRuns):
+            self.error = self.error + self._neighbours.error(lines)
         self.weight = 1.0 / np.sqrt(noise.density(lines.cycles) + self.error)[:, None]
         self.measured = lines.spectrum(measurement.outputs)
 

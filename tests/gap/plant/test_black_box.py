@@ -7,7 +7,7 @@ import pytest
 
 import chladni
 from chladni.gap.location.profile import profile_at
-from chladni.gap.plant.black_box import BlackBox
+from chladni.gap.plant.black_box import BlackBox, BlackBoxRuns
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site, placed, sites_of
@@ -128,3 +128,22 @@ def test_runs_carry_effects_and_tell_what_laws_saw():
     assert np.allclose([displacement, velocity], slower)
     force = run.motion(z, (friction,), site="guide").force
     assert np.allclose(force, 0.1 * np.tanh(velocity / 0.02))
+
+
+def test_a_sensor_that_answers_by_the_pose_says_little_of_where_a_force_is():
+    def respond(inputs, _sample_rate_hz, _values, _joint_laws):
+        # A weak echo, and its square, which a small change moves by twice what stands there.
+        way = np.cumsum(inputs[0]) / 30.0
+        return np.array([inputs[0], way**2])
+
+    simulator = callable_simulator(
+        respond,
+        name="bent",
+        inputs=(Terminal(name="push", unit="N"),),
+        outputs=(Terminal(name="place", unit="m"), Terminal(name="speed", unit="m/s")),
+    )
+    plant = WrappedSimulator(simulator=simulator)
+    measurement = log_of(plant, None)
+    plain, bent = BlackBoxRuns(plant, Tunables.of(plant), measurement).doubt()
+    assert plain < 1e-12
+    assert bent > 0.1
