@@ -152,6 +152,9 @@ class Search:
     @property
     def _forces_end_it(self) -> bool:
         """Whether unknown forces at fewer places than there are sensors leave nothing: others only imitate these."""
+        if self.study.contest.run.is_black_box:
+            # What its linear view doesn't follow another cause may do.
+            return False
         sensors = len(self.study.measurement.output_names)
         tried = [one for one in (self.study.location.best, self.forces) if one is not None and one.profile.forces]
         if any(effect.kind.clues.several for lead in self._leads() for effect in lead.hypothesis.effects):
