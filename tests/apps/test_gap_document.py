@@ -60,7 +60,19 @@ SCHEMA: Mapping[str, Any] = {
 }
 # What may stand beside the agreed keys, by the place it stands in.
 MORE = {
-    "": {"naive", "advice", "remarks", "distortion", "levels", "elsewhere", "left", "correlation", "any_law"},
+    "": {
+        "naive",
+        "advice",
+        "remarks",
+        "distortion",
+        "levels",
+        "elsewhere",
+        "left",
+        "correlation",
+        "any_law",
+        "set",
+        "coverage",
+    },
     ".causes": {"variant", "from", "share"},
     ".ranking": {"beside"},
     ".where.channels": {"noise_from"},
@@ -68,8 +80,10 @@ MORE = {
     ".where": {"pair"},
     ".where.sites": {"group"},
     ".where.regimes": {"time"},
-    ".gap": {"by", "horizon_s", "explained"},
+    ".gap": {"by", "horizon_s", "explained", "after_over_noise"},
 }
+# Of some of these: what their values may be.
+KINDS_OF_MORE: Mapping[str, Any] = {".set": [CANDIDATE], ".coverage": NUMBER, ".gap.after_over_noise": NUMBER}
 KINDS = made.every_kind()
 
 
@@ -85,7 +99,8 @@ def strays(value: Any, schema: Any, place: str = "") -> list[str]:
         return [stray for one in value.values() for stray in strays(one, schema[str], place)]
     if not set(schema) <= set(value) <= set(schema) | MORE.get(place, set()):
         return [f"{place}: keys {sorted(set(value) ^ set(schema))}"]
-    return [stray for key, one in schema.items() for stray in strays(value[key], one, f"{place}.{key}")]
+    more = {key: KINDS_OF_MORE[f"{place}.{key}"] for key in value if f"{place}.{key}" in KINDS_OF_MORE}
+    return [stray for key, one in {**schema, **more}.items() for stray in strays(value[key], one, f"{place}.{key}")]
 
 
 def written(found: Diagnosis) -> Any:
@@ -176,6 +191,22 @@ def test_how_it_was_measured_is_told_only_where_it_was_not_by_free_run() -> None
     assert (windows["by"], windows["horizon_s"]) == ("windows", 0.5)
 
 
+def test_what_is_left_is_told_in_units_of_the_noise_where_that_is_known() -> None:
+    found = made.unknown()
+    gap = written(found)["gap"]
+    assert gap["after_over_noise"] == pytest.approx(found.gap.after / found.gap.noise)
+    assert "after_over_noise" not in written(replace(found, gap=replace(found.gap, noise=0.0)))["gap"]
+
+
+def test_what_holds_the_truth_is_there_with_its_probability_where_something_was_weighed() -> None:
+    rub, nothing = Candidate(effect="coulomb_friction", site="elbow"), Candidate(effect="none", site="")
+    document = written(replace(made.diagnosis(), answer_set=(rub, nothing), coverage=0.9))
+    assert strays(document, SCHEMA) == []
+    assert document["set"] == [{"effect": "coulomb_friction", "site": "elbow"}, {"effect": "none", "site": ""}]
+    assert document["coverage"] == 0.9
+    assert {"set", "coverage"}.isdisjoint(written(made.diagnosis()))
+
+
 def test_what_is_not_known_is_null_and_never_nan() -> None:
     found = made.agreeing()
     assert written(found)["gap"]["closed"] is None
@@ -207,6 +238,7 @@ def test_keys_beside_the_agreed_ones_are_there_only_with_content() -> None:
             left=made.unknown().left,
             correlation=known,
             any_law=AnyLaw(site="elbow", group=(), force=0.99, law=0.98, named=0.93),
+            answer_set=(naive,),
         )
     )
     assert set(full) == set(SCHEMA) | MORE[""]

@@ -8,7 +8,7 @@ from math import comb
 
 import numpy as np
 
-from chladni.gap.explanation.evidence import DETAILS, Left, doubt_of, left_by_force
+from chladni.gap.explanation.evidence import DETAILS, Left, doubt_of, highest_level, left_by_force
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.location.locate import Located, Location
 from chladni.gap.plant.places import sites_of
@@ -22,11 +22,11 @@ ANOTHER = 0.1
 LEAST_SHARE = 0.02
 #: A name is given when it's more probable than not.
 NAMED = 0.5
-#: Doubts of a floor within which what a fit leaves may be noise alone.
-_SIGMAS = 2.0
 #: From nats to probabilities, by machines whose answers are known (see docs/methods/gap-explanation.md): so many nats
 #: count as one, for lines and sensors miss what a model lacks together; and how often all that was weighed is wrong.
 TEMPER, LAPSE = 5.0, 0.03
+#: Nats within which a log can't tell two candidates apart: odds of e^2 when they are printed.
+CLOSE = 2.0 * TEMPER
 #: Probability with which an answer set holds the truth.
 COVERAGE = 0.95
 
@@ -83,24 +83,13 @@ class Belief:
     def nats(self, one: Contestant) -> float:
         """Evidence and prior of one fit."""
         prior = self.value * len(one.hypothesis.freed) + self._words(one.hypothesis.effects)
-        return one.log_evidence - one.left.log_likelihood() + self._likelihood(one.left) + prior
-
-    @cached_property
-    def _least_left(self) -> float:
-        return min(one.left.over_noise for one in self._contestants)
-
-    @cached_property
-    def _is_sure(self) -> bool:
-        """Whether a fit leaves noise alone, whose level is known by that."""
-        return self._least_left < 1.0 + _SIGMAS * doubt_of(self._location.problem.noise)
+        return one.log_evidence - one.left.log_likelihood() + one.left.log_likelihood(self.level) + prior
 
     @cached_property
     def level(self) -> float:
         """Share of the floor that the noise has: what a fit leaves says so for all, as far as the floor allows."""
-        return self._least_left if self._is_sure else 1.0
-
-    def _likelihood(self, left: Left) -> float:
-        return left.log_likelihood(self.level, sure=self._is_sure)
+        least = min(one.left.over_noise for one in self._contestants)
+        return min(least, highest_level(self._location.problem.noise))
 
     def unexplained(self, one: Contestant) -> float:
         """Nats of what a fit leaves that neither noise nor usual details of its laws account for."""
@@ -139,7 +128,7 @@ class Belief:
             return -np.inf
         left = self._left_by_force(located)
         places = len(located.places)
-        return self._likelihood(left) - 0.5 * located.profile.prior + (self.site - DETAILS) * places
+        return left.log_likelihood(self.level) - 0.5 * located.profile.prior + (self.site - DETAILS) * places
 
     def _left_by_force(self, located: Located) -> Left:
         return left_by_force(self._location.problem, self._location.tuned, located.profile)
@@ -188,7 +177,7 @@ class Belief:
             along=tuned.misfit, along_expected=tuned.expected, across=0.0, across_expected=0.0,
             force=np.inf, doubt=doubt_of(self._location.problem.noise), sites=self._sensors,
         )  # fmt: skip
-        return self._likelihood(left) - 0.5 * tuned.prior + (self.site - DETAILS) * self._sensors
+        return left.log_likelihood(self.level) - 0.5 * tuned.prior + (self.site - DETAILS) * self._sensors
 
     @property
     def best(self) -> Contestant:
@@ -204,6 +193,14 @@ class Belief:
         """Probability of any of some causes, whatever stands beside it."""
         wanted = set(candidates)
         return float(sum(one.probability for one in self.sets if not wanted.isdisjoint(one.causes)))
+
+    def alike(self, cause: Candidate) -> tuple[Candidate, ...]:
+        """Give a cause of the first set, with the same word at sites that the log can't tell from its own."""
+        first = self.sets[0]
+        near = [one for one in self.sets if one.nats > first.nats - CLOSE and len(one.causes) == len(first.causes)]
+        rest = first.causes - {cause}
+        others = [each for one in near if rest < one.causes for each in one.causes - rest]
+        return tuple(dict.fromkeys([cause, *(each for each in others if each.effect == cause.effect)]))
 
     def answer_set(self, coverage: float) -> tuple[Candidate, ...]:
         """Give effects and sites that together hold the truth with some probability, the most probable first."""

@@ -69,7 +69,8 @@ def causes_found(study: Study, progress: Step) -> tuple[Study, Causes]:
     if finer is not None:
         # Behind what was found noise turns out lower than it was estimated: what was taken for it is another cause.
         search = search.over(over_floor(search.study, finer))
-        search.go_on(_part(progress, 0.7, 0.85))
+        go_on = search.go_on if search.best.hypothesis.effects else search.run
+        go_on(_part(progress, 0.7, 0.85))
     if _parted(search):
         # A machine that may take several ways goes one that a model of almost the same numbers doesn't: a law that
         # follows over short windows from the states that an unknown force led through is judged over windows.
@@ -140,7 +141,7 @@ def _verdict(belief: Belief) -> Verdict:
     first = belief.sets[0]
     if not first.causes:
         return "none" if first.probability > belief.unknown else "unknown"
-    if not any(belief.probability(one) >= NAMED for one in first.causes):
+    if not any(belief.probability(*belief.alike(one)) >= NAMED for one in first.causes):
         return "unknown"
     return "effect" if first.best.hypothesis.effects else "parameters"
 

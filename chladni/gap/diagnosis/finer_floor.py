@@ -24,10 +24,13 @@ def finer_floor(study: Study, best: Contestant) -> NoiseFloor | None:
     where that is lower, and more is left than it, the search goes on over it.
     """
     measurement, noise = study.measurement, study.contest.noise
-    if len(measurement.output_names) < 2 or not best.hypothesis.effects:
+    if len(measurement.output_names) < 2:
         return None
     left = measurement.outputs - best.fit.outputs
     rest = without_own_signal(best.fit.outputs, left)
+    if not best.hypothesis.effects and np.array_equal(rest, left):
+        # Behind values alone nothing new is told, but where a sensor follows its own signal.
+        return None
     finer = smaller_floor(noise, estimate_noise(replace(measurement, outputs=rest)))
     lower = bool(np.any(finer.rms < LOWER * noise.rms))
     more = bool(np.any(np.mean(left**2, axis=1) > ALONE * finer.rms**2))

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from chladni.gap.diagnosis.belief import NAMED, TEMPER
+from chladni.gap.diagnosis.belief import CLOSE, NAMED
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.hypothesis import Contestant
@@ -14,8 +14,6 @@ from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.models.files.site_units import compiled_site_units, known_site, units_at
 
-#: Nats within which a log can't tell two candidates apart: odds of e^2 when they are printed.
-CLOSE = 2.0 * TEMPER
 #: Of a floor that shakes and of a lattice: neither is a contest of likelihoods.
 _SHAKEN, _LATTICE = 0.9, 0.92
 

@@ -27,8 +27,6 @@ _SECOND, _EACH = 4, 2
 #: Places at which a second effect is looked for; most of them, where others leave at most so many times what the best
 #: one does.
 _PLACES, _MOST_PLACES, _AS_GOOD = 4, 7, 1.1
-#: Share of what others leave below which a fit leaves much less.
-_MUCH_LESS = 0.5
 _TWO = 2
 #: Sensors at which two forces explain everything.
 _EXPLAINED = 2
@@ -51,44 +49,19 @@ def second_causes(
     effects
         Those of the fit that are taken for known, all by default.
     """
-    entered, good = _entered_beside(study, found, tuple(found.fit.effects if effects is None else effects))
-    stone = _stepping_stone(found, entered, good) if effects is None else None
-    if stone is not None:
-        _, again = _entered_beside(study, stone, stone.fit.effects[-1:])
-        good += again
-    return good
-
-
-def _entered_beside(
-    study: Study, found: Contestant, kept: tuple[AttachedEffect, ...]
-) -> tuple[list[Contestant], list[Contestant]]:
-    """Enter another effect beside those of a fit that are kept; all that were entered, and the sound ones."""
+    kept = tuple(found.fit.effects if effects is None else effects)
     behind = _behind(study, found, kept)
     if behind is None:
-        return [], []
+        return []
     model, location, known = behind
     trials = _second_trials(study, location, kept, known)
     singles = [_beside(found, kept, one, found.fit.z) for one in effect_hypotheses(trials, count=_SECOND)]
     values = [_beside(found, kept, one, one.start_z) for one in wrong_values(location, study.contest.run.tunables)]
-    entered = study.contest.enter_all([*singles, *values])
-    good = sound(study, entered)
+    good = sound(study, study.contest.enter_all([*singles, *values]))
     if least_left(good) > ALONE:
         linear = linear_hypotheses(model, location, trials, count=_LINEAR)
-        more = study.contest.enter_all([_beside(found, kept, one, one.start_z) for one in linear])
-        entered, good = [*entered, *more], [*good, *sound(study, more)]
-    return entered, good
-
-
-def _stepping_stone(
-    found: Contestant, entered: Sequence[Contestant], good: Sequence[Contestant]
-) -> Contestant | None:
-    """Give the fit that isn't sound but leaves much less than any other: what it added is right, if nothing else.
-
-    An oscillator that imitated rubber may turn into a spring once the second effect is known.
-    """
-    stone = min(entered, key=lambda one: one.chi, default=None)
-    others = min(least_left(good), found.chi)
-    return stone if stone is not None and stone.chi < _MUCH_LESS * others else None
+        good += sound(study, study.contest.enter_all([_beside(found, kept, one, one.start_z) for one in linear]))
+    return good
 
 
 def _second_trials(

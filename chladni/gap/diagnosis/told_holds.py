@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from chladni.gap.explanation.evidence import Left, left_by_force
+from chladni.gap.explanation.evidence import Left, highest_level, left_by_force
 from chladni.gap.location.locate import Location
 from chladni.gap.location.profile import profiled
 from chladni.gap.plant.linear_problem import LinearProblem
@@ -22,7 +22,7 @@ def with_told_holds(model: Model, location: Location) -> Model:
     What is missing somewhere hides what an input did between its samples. So each hold is weighed beside an unknown
     force at each of the leading places, and without any, parameters tuned anew: the evidence of the best of these.
     Inputs whose hold the model states, which never move, or whose rate acts too, are left as they are; so are all
-    when the model leaves noise alone, or where no hold leads beyond doubt.
+    when the model leaves noise alone, and where no hold leads beyond doubt and brings all down to the noise.
 
     Parameters
     ----------
@@ -34,16 +34,17 @@ def with_told_holds(model: Model, location: Location) -> Model:
     asked = other_holds(model, location.problem.measurement)
     if not asked:
         return model
-    nats = _nats(model, location)
-    # One sensor knows no force beside a hold: a wrong value would pass for one, but where a hold leaves noise alone.
-    enough = -np.inf if len(location.problem.measured) > 1 else -BEYOND_DOUBT
+    tuned = location.tuned
+    if tuned.misfit <= highest_level(location.problem.noise) * tuned.expected:
+        return model
+    nats, _ = _weighed(model, location)
     for others in asked:
-        if nats == 0.0:
-            break
         tried = [model.with_holds(one) for one in others]
-        found = [_nats(one, location) for one in tried]
-        if max(found) > max(nats + BEYOND_DOUBT, enough):
-            model, nats = tried[int(np.argmax(found))], max(found)
+        found = [_weighed(one, location) for one in tried]
+        best = max(range(len(found)), key=lambda place: found[place][0])
+        # Where a hold doesn't bring all down to the noise, what else is missing may pass for it.
+        if found[best][0] > nats + BEYOND_DOUBT and not found[best][1]:
+            model, nats = tried[best], found[best][0]
     return model
 
 
@@ -58,15 +59,16 @@ def other_holds(model: Model, measurement: Measurement) -> list[list[dict[str, H
     return [[dict.fromkeys(names, hold) for hold in HOLDS] for names in (*together, *([one] for one in asked))]
 
 
-def _nats(model: Model, location: Location) -> float:
-    """Log likelihood of the log by the model, with an unknown force at the place that needs it most, or without."""
+def _weighed(model: Model, location: Location) -> tuple[float, float]:
+    """Evidence with an unknown force where that tells most, or without; nats of what is left beyond doubt."""
     old = location.problem
+    level = highest_level(old.noise)
     problem = LinearProblem(model, old.measurement, old.noise, old.tunables, old.lines)
     tuned = profiled(problem, (), location.tuned.z, iterations=4)
     plain = Left(along=0.0, along_expected=0.0, across=tuned.misfit, across_expected=tuned.expected, force=0.0)
-    found = [plain.log_likelihood() - tuned.prior / 2]
+    found = [(plain.log_likelihood(level) - tuned.prior / 2, plain.elsewhere(level))]
     for one in location.ranked[:_PLACES] if len(problem.measured) > 1 else ():
         beside = profiled(problem, (one.places[0].sites[0],), one.profile.z, iterations=4)
         left = left_by_force(problem, tuned, beside)
-        found.append(left.log_likelihood() - beside.prior / 2)
+        found.append((left.log_likelihood(level) - beside.prior / 2, left.elsewhere(level)))
     return max(found)

@@ -22,6 +22,8 @@ DETAILS, ELSEWHERE = 6.0, 60.0
 USUAL, UNUSUAL = 0.1, 20.0
 #: Of a floor's power: what it is uncertain by beyond its degrees of freedom (bias of a local fit, drift of a sensor).
 DOUBT = 0.05
+#: Doubts of a floor within which what is left may be noise alone.
+_SIGMAS = 2.0
 #: e-folds: one sigma of an effect's number before a log is seen.
 SIZE = 2.0
 
@@ -89,7 +91,7 @@ class Left:
         surplus = _beyond_doubt(self.along - noise - usual, self.doubt * noise)
         return self.elsewhere(level) + _student(surplus, UNUSUAL, usual)
 
-    def log_likelihood(self, level: float = 1.0, *, sure: bool = True) -> float:
+    def log_likelihood(self, level: float = 1.0) -> float:
         """Nats, but for what all hypotheses share.
 
         Of noise alone it's the misfit. What goes beyond that by D independent numbers of unknown size is
@@ -100,17 +102,14 @@ class Left:
         ----------
         level
             Share of the floor that the noise has.
-        sure
-            Whether a hypothesis that leaves noise alone tells that; else it's the floor, as far as that is known.
         """
-        told = _told if sure else _beyond_doubt
         across, along = level * self.across_expected, level * self.along_expected
-        details = told(min(self.along - along, self._usual), self.doubt * along)
-        unusual = told(self.along - along - self._usual, self.doubt * along)
+        details = _told(min(self.along - along, self._usual), self.doubt * along)
+        unusual = _told(self.along - along - self._usual, self.doubt * along)
         return -(
             _student(details, DETAILS * max(self.sites, 1))
             + (_student(unusual, UNUSUAL, self._usual) if unusual else 0.0)
-            + _student(told(self.across - across, self.doubt * across), ELSEWHERE)
+            + _student(_told(self.across - across, self.doubt * across), ELSEWHERE)
         )
 
     @property
@@ -130,6 +129,11 @@ def _told(beyond: float, doubted: float) -> float:
 def _beyond_doubt(beyond: float, doubted: float) -> float:
     """Nats at least, when a Gaussian floor may be wrong by its doubt: the square of that over two, up to all."""
     return beyond**2 / (beyond + 2.0 * doubted**2) if beyond > 0 else 0.0
+
+
+def highest_level(noise: NoiseFloor) -> float:
+    """Share of a floor that the noise has at most: two doubts more."""
+    return 1.0 + _SIGMAS * doubt_of(noise)
 
 
 def doubt_of(noise: NoiseFloor) -> float:

@@ -9,13 +9,15 @@ import numpy as np
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import LawAtPort
-from chladni.models.effects.clues import Clues
+from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, logarithms, numbers, positive, rms
 from chladni.signals.arrays import Real
 
 #: Angles in degrees at which a spring may stand; at 90 it's a cube, near 0 it hardly turns.
 _ANGLES_DEG = (30.0, 60.0, 90.0, 120.0, 150.0)
+#: Share of its force beside a straight line below which it's a spring along the joint.
+_STRAIGHT = 0.02
 
 
 def turning(d: float, _s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -57,6 +59,17 @@ def _trial(motion: TrialMotion, angle: float) -> Trial:
     return Trial(build=build, grid=grid, values=values, parameters=3)
 
 
+def _is_degenerate(fitted: FittedForm) -> bool:
+    """Whether its force along the motion is a straight line's: of one far shorter, or longer, than its way."""
+    d, _ = fitted.motion()
+    length, angle = fitted.values["length"], fitted.values["angle"]
+    along = length * np.cos(angle) + d
+    stretched = np.maximum(np.hypot(along, length * np.sin(angle)), 1e-9 * length)
+    force = (stretched - length) * along / stretched - np.cos(angle) ** 2 * d
+    line = np.polynomial.Polynomial.fit(d, force, 1)
+    return bool(np.std(force - line(d)) < _STRAIGHT * np.std(force))
+
+
 GEOMETRIC = EffectKind(
     name="geometric",
     said="geometric stiffness",
@@ -81,7 +94,7 @@ GEOMETRIC = EffectKind(
     ),
     optional=("angle",),
     neutral={"stiffness": 0.0},
-    clues=Clues(trials=_trials, sizes=("stiffness",)),
+    clues=Clues(trials=_trials, sizes=("stiffness",), is_degenerate=_is_degenerate),
     variants=(
         Variant(
             name="spring",

@@ -1,5 +1,7 @@
 """Candidates that were fitted to a made log: what the tests of further measurements share."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from chladni.gap.explanation.contest import Contest, training_mask
@@ -36,9 +38,9 @@ def fitted(model, log, floor, *hypotheses):
     return sorted(entered, key=lambda one: -one.log_evidence)
 
 
-def contested(effect, *hypotheses, noise=0.02, outputs=None, signals=None):
+def contested(effect, *hypotheses, noise=0.02, outputs=None, signals=None, tolerances=None):
     """Arguments of a search: nominal model, a log of the machine with `effect`, and the candidates."""
-    model = three_bodies()
+    model = replace(three_bodies(), tolerances=tolerances or {})
     signals = band_noise(SAMPLES) if signals is None else signals
     log, floor = measured(model.with_effects((effect,)), signals, noise=noise, outputs=outputs)
     return model, log, FreeRun(model, log).tunables, fitted(model, log, floor, *hypotheses), floor

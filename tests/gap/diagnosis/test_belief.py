@@ -11,6 +11,7 @@ from chladni.gap.diagnosis.belief import ANOTHER, Belief
 from chladni.gap.diagnosis.causes import _verdict
 from chladni.gap.diagnosis.search import WORTH, Search
 from chladni.gap.explanation.evidence import Left
+from chladni.gap.plant.places import Place, Site
 from chladni.gap.records.diagnosis import PARAMETER, Candidate
 from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.catalogue import CATALOGUE
@@ -23,15 +24,39 @@ RUB = attached("coulomb_friction", "j1", {"force": 5.0})
 SHARE = 0.02
 #: Three joints, three bodies, the ground, an input, three sensors.
 SITES = {"joint": 3, "body": 3, "ground": 1, "input": 1, "output": 3}
+#: Numbers that a discrepancy is worth along the force of one law, and elsewhere.
+ALONG, ACROSS = 6, 60
+#: Of the floor's power, what is uncertain: twice its standard deviation of a tenth, and 5 %.
+DOUBT = 0.25
+#: The same of what a fit leaves, unless it says otherwise.
+OWN_DOUBT = 0.05
+#: Nats of an unknown force at a place before the log is seen: that there is one, that it's there, and its numbers.
+UNKNOWN = np.log(ANOTHER) - np.log(sum(SITES.values())) - ALONG
 
 
 def place(misfit: float, *, places: int = 1, sensors: int = 3):
     """A force at one place, or at two, that leaves so many times the noise."""
     expected = (sensors - places) * LINES
+    sites = tuple(Site(name=f"j{one}", kind="joint") for one in range(places))
     profile = SimpleNamespace(
-        misfit=misfit * expected, expected=expected, prior=0.0, forces=(None,) * places, sites=(None,) * places
+        misfit=misfit * expected, expected=expected, prior=0.0, forces=(None,) * places, sites=sites
     )
-    return SimpleNamespace(profile=profile, places=(None,) * places)
+    return SimpleNamespace(profile=profile, places=tuple(Place(sites=(one,)) for one in sites))
+
+
+def leaving_all(share: float) -> Left:
+    """What leaves so many times the noise along and across."""
+    return leaving(share, along=(share - 1.0) * LINES)
+
+
+def student(energy: float, numbers: int) -> float:
+    """Nats of a discrepancy of so many independent numbers, whose size nobody knows."""
+    return -numbers * np.log(1 + energy / numbers)
+
+
+def told(beyond: float, noise: float, doubt: float) -> float:
+    """What counts beyond a noise that a fit tells."""
+    return beyond**2 / (beyond + doubt * noise)
 
 
 def weighed(*pairs):
@@ -47,12 +72,14 @@ def test_probabilities_of_all_sets_and_of_none_of_them_are_one() -> None:
 
 
 def test_a_set_with_one_more_cause_pays_for_it_and_for_which_it_is() -> None:
-    belief = Belief(location(), [contestant()])
+    # All leave noise alone, so that they differ in nothing but their price.
+    noise = leaving(1.0)
+    belief = Belief(location(), [contestant(left=noise)])
     words = sum(SITES[kind] for one in CATALOGUE.values() for kind in one.sites if kind in SITES)
-    nothing, one, two = (belief.nats(each) for each in (contestant(), contestant(LAG), contestant(LAG, RUB)))
+    nothing, one, two = (belief.nats(contestant(*effects, left=noise)) for effects in ((), (LAG,), (LAG, RUB)))
     assert nothing - one == pytest.approx(np.log(words / ANOTHER))
     assert one - two == pytest.approx(nothing - one)
-    value = belief.nats(contestant(freed=("j1.stiffness",)))
+    value = belief.nats(contestant(freed=("j1.stiffness",), left=noise))
     parameters = len(location().problem.tunables.names)
     assert nothing - value == pytest.approx(np.log(parameters / ANOTHER))
     # More values than words at sites there are not: so a wrong value is likelier than any one word.
@@ -83,8 +110,12 @@ def test_what_leaves_less_than_the_floor_says_for_all_that_noise_is_less() -> No
     assert belief.level == pytest.approx(0.25)
     assert belief.nats(found[1]) - belief.nats(found[2]) == pytest.approx(-low(0.5).log_likelihood(0.25))
     assert belief.best is found[1]
-    # It is never raised.
-    assert Belief(location(), [contestant(left=low(2.0))]).level == 1.0
+
+
+def test_a_fit_tells_the_noise_as_far_as_the_floor_allows_and_else_the_floor_does() -> None:
+    most = 1.0 + 2.0 * DOUBT
+    assert Belief(location(), [contestant(left=leaving_all(most - 0.01))]).level == pytest.approx(most - 0.01)
+    assert Belief(location(), [contestant(left=leaving_all(most + 0.01))]).level == pytest.approx(most)
 
 
 def test_a_cause_without_which_as_little_is_left_is_none() -> None:
@@ -99,13 +130,16 @@ def test_a_cause_without_which_as_little_is_left_is_none() -> None:
 
 
 def test_one_word_at_several_sites_of_a_kind_is_one_cause_more_and_which_of_them() -> None:
-    belief = Belief(location(), [contestant()])
+    # All leave noise alone, so that they differ in nothing but their price.
+    noise = leaving(1.0)
+    belief = Belief(location(), [contestant(left=noise)])
     alike = [replace(RUB, site=site) for site in ("j0", "j1", "j2")]
-    one, all_three = belief.nats(contestant(alike[0])), belief.nats(contestant(*alike))
+    one, two, three = (belief.nats(contestant(*alike[:count], left=noise)) for count in (1, 2, 3))
     joints = sum(SITES[kind] for kind in RUB.kind.sites)
-    assert all_three - one == pytest.approx(np.log(ANOTHER) - np.log(math.comb(joints, 3)))
+    assert two - one == pytest.approx(np.log(ANOTHER) - np.log(math.comb(joints, 2)))
+    assert three - one == pytest.approx(np.log(ANOTHER) - np.log(math.comb(joints, 3)))
     # Others share nothing, and pay each for itself.
-    others = belief.nats(contestant(alike[0], LAG))
+    others = belief.nats(contestant(alike[0], LAG, left=noise))
     assert others - one == pytest.approx(belief.word)
 
 
@@ -151,6 +185,30 @@ def test_a_force_of_any_shape_is_believed_where_no_law_explains_what_it_does() -
     one, two = (Belief(location([each], misfit=100.0), [nothing]) for each in (place(1.0), place(1.0, places=2)))
     first, both = (each.unknown_at(each._location.ranked[0]) for each in (one, two))
     assert first > both
+
+
+@pytest.mark.parametrize(("chi", "level"), [(1.0, 1.0), (100.0, 1.0 + 2.0 * DOUBT)])
+def test_an_unknown_force_pays_for_each_place_and_for_its_numbers_there(chi: float, level: float) -> None:
+    # What the model leaves is all a force's; as many places as there are sensors take all of it.
+    fit = contestant(left=leaving(chi))
+    for places in (1, 2):
+        where = location([place(1.0, places=places)], misfit=100.0)
+        noise = level * places * LINES
+        along = 3 * 100.0 * LINES - (3 - places) * LINES
+        assert Belief(where, [fit]).unknown_at(where.ranked[0]) == pytest.approx(
+            student(told(along - noise, noise, DOUBT), ALONG * places) + UNKNOWN * places
+        )
+    noise = level * 3 * LINES
+    assert Belief(where, [fit]).anywhere == pytest.approx(
+        student(told(100.0 * 3 * LINES - noise, noise, DOUBT), ALONG * 3) + UNKNOWN * 3
+    )
+
+
+def test_where_a_sensor_is_told_to_err_nothing_unknown_acts() -> None:
+    where, left = location([place(1.0)], misfit=100.0), leaving(100.0)
+    fit = contestant(left=left, log_evidence=left.log_likelihood())
+    for told_to_err, site in (((), "j0"), (("j1",), "j0"), (("j0",), "")):
+        assert Belief(where, [fit], told=told_to_err).answer_set(0.9) == (Candidate(effect="unknown", site=site),)
 
 
 def test_where_nothing_was_found_to_act_no_force_is_believed() -> None:

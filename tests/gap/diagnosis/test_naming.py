@@ -11,10 +11,12 @@ from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.diagnosis import PARAMETER
 from chladni.models.effects.attached_effect import attached
 from tests.gap.fitted import SURE, as_probable, causes, contestant
+from tests.made_diagnosis import arm_model
 
 LAG = attached("lag", "shaker", {"time_constant": 1e-3})
 MOUNT = attached("mounting_resonance", "acc_wrist", {"frequency": 200.0, "damping_ratio": 0.02})
-NO_STEPS = SimpleNamespace(stepping=None)
+#: Of the arm, none of whose sensors steps.
+NO_STEPS = SimpleNamespace(model=arm_model(), stepping=None)
 
 
 def weighed_causes(*weighed: tuple[Contestant, float]) -> Causes:

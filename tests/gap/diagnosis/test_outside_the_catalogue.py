@@ -63,7 +63,8 @@ def test_a_joint_that_relaxes_a_little_passes_for_no_wrong_value() -> None:
 def test_a_loop_is_believed_where_there_is_one_and_drag_is_none(word: str) -> None:
     values = {
         "quadratic_damping": {"coefficient": 300.0},
-        "hysteresis": {"force": 20.0, "yield": 1e-4, "shape": 2.0},
+        # A tenth of the way and more: what yields sooner is friction.
+        "hysteresis": {"force": 20.0, "yield": 5e-4, "shape": 2.0},
     }[word]
     log = measured((chladni.attached(word, "elbow", values),), seed=5, seconds=5.0)
     found = diagnose(arm(), [log], leave_out=frozenset(CATALOGUE) - {"hysteresis", "gain_error", "delay"})

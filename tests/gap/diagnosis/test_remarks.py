@@ -14,7 +14,7 @@ def remarks(ki: float, *, found_ki: float, undetermined: tuple[str, ...] = ()) -
     """Of a loop whose fit ended at another integral gain."""
     log, _ = measured(loop(0.5 * EDGE), 0.01 * np.sin(np.arange(400) / 50)[None], rate_hz=500.0)
     run = FreeRun(loop(ki), log)
-    study = SimpleNamespace(measurement=log, contest=SimpleNamespace(run=run), repeating=())
+    study = SimpleNamespace(model=run.model, measurement=log, contest=SimpleNamespace(run=run), repeating=())
     fit = SimpleNamespace(z=run.tunables.z({"loop.ki": found_ki}), effects=(), undetermined=undetermined)
     causes = SimpleNamespace(distorted=(), noise=white_floor([1e-6, 1e-6]))
     return remarks_on(study, causes, SimpleNamespace(fit=fit), None)

