@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import comb
 
@@ -11,6 +11,7 @@ import numpy as np
 from chladni.gap.explanation.evidence import DETAILS, Left, doubt_of, highest_level, left_by_force
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.location.locate import Located, Location
+from chladni.gap.location.profile import Profile
 from chladni.gap.plant.places import sites_of
 from chladni.gap.records.diagnosis import PARAMETER, Candidate
 from chladni.models.effects.attached_effect import AttachedEffect
@@ -56,6 +57,8 @@ class Belief:
         Unknown forces at two places that explain much more than one, None without.
     told
         Names of sensors whose error needs no fit to be told: nothing unknown acts there.
+    windows
+        Whether contestants run over windows: what they leave is of another horizon than the location's record.
     """
 
     def __init__(
@@ -65,6 +68,7 @@ class Belief:
         pair: Located | None = None,
         *,
         told: Collection[str] = (),
+        windows: bool = False,
     ) -> None:
         self._location = location
         problem = location.problem
@@ -77,6 +81,8 @@ class Belief:
         self.value = float(np.log(ANOTHER) - np.log(max(len(problem.tunables.names), 1)))
         self.site = float(np.log(ANOTHER) - np.log(max(len(kinds), 1)))
         self._contestants, self._sensors = tuple(contestants), len(problem.measured)
+        alone = [one.left.along + one.left.across for one in contestants if not one.hypothesis.effects]
+        self._horizon = min(alone) / location.tuned.misfit if windows and location.tuned.misfit else 1.0
         places = [*location.ranked, *([] if pair is None else [pair])]
         self._places = [one for one in places if all(set(told).isdisjoint(each.names) for each in one.places)]
 
@@ -131,7 +137,11 @@ class Belief:
         return left.log_likelihood(self.level) - 0.5 * located.profile.prior + (self.site - DETAILS) * places
 
     def _left_by_force(self, located: Located) -> Left:
-        return left_by_force(self._location.problem, self._location.tuned, located.profile)
+        tuned, found = self._of_horizon(self._location.tuned), self._of_horizon(located.profile)
+        return left_by_force(self._location.problem, tuned, found)
+
+    def _of_horizon(self, profile: Profile) -> Profile:
+        return replace(profile, misfit=self._horizon * profile.misfit) if self._horizon != 1.0 else profile
 
     @cached_property
     def sets(self) -> tuple[Believed, ...]:
@@ -172,7 +182,7 @@ class Belief:
     @cached_property
     def anywhere(self) -> float:
         """Nats of forces of any shape at as many places as there are sensors: any of these explain all."""
-        tuned = self._location.tuned
+        tuned = self._of_horizon(self._location.tuned)
         left = Left(
             along=tuned.misfit, along_expected=tuned.expected, across=0.0, across_expected=0.0,
             force=np.inf, doubt=doubt_of(self._location.problem.noise), sites=self._sensors,

@@ -69,7 +69,7 @@ def sound(study: Study, entered: Sequence[Contestant]) -> list[Contestant]:
     """Leave out what is its law in name only, and what steps larger than a sensor's signal make of it."""
 
     def is_sound(one: Contestant) -> bool:
-        return not is_degenerate(study.contest.run, one) and not _is_rounding(study, one)
+        return not is_degenerate(study.contest.run, one) and not _is_rounding(study, one) and _is_possible(study, one)
 
     return [one for one, kept in zip(entered, side_by_side(is_sound, entered), strict=True) if kept]
 
@@ -77,3 +77,13 @@ def sound(study: Study, entered: Sequence[Contestant]) -> list[Contestant]:
 def _is_rounding(study: Study, one: Contestant) -> bool:
     """Whether an effect is at a sensor of which only steps are left: what these take looks like tones and gains."""
     return not study.coarse.isdisjoint(effect.site for effect in one.hypothesis.effects)
+
+
+def _is_possible(study: Study, one: Contestant) -> bool:
+    """Whether outputs may have recorded what they did with the errors that a fit gives them."""
+    recorded = dict(zip(study.measurement.output_names, study.measurement.outputs, strict=True))
+    return all(
+        effect.kind.clues.possible(recorded[effect.site], effect.values)
+        for effect in one.fit.effects
+        if effect.kind.clues.possible is not None and effect.site in recorded
+    )

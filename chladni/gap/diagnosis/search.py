@@ -77,7 +77,9 @@ class Search:
     @cached_property
     def belief(self) -> Belief:
         """What is believed of all that was found."""
-        return Belief(self.study.location, self.found, self.forces, told=self.study.coarse)
+        study = self.study
+        windows = study.windows is not None
+        return Belief(study.location, self.found, self.forces, told=study.coarse, windows=windows)
 
     @property
     def best(self) -> Contestant:

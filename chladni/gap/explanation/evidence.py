@@ -17,9 +17,9 @@ from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.signals.arrays import Complex, Real
 
 #: Independent numbers that what a law differs from the machine's by is worth, along its own force and elsewhere.
-DETAILS, ELSEWHERE = 6.0, 60.0
+DETAILS, ELSEWHERE = 8.0, 60.0
 #: Share of its force, as RMS, that a right law leaves at most, usually; and numbers that what goes beyond is worth.
-USUAL, UNUSUAL = 0.1, 20.0
+USUAL, UNUSUAL = 1.0 / 6.0, 20.0
 #: Of a floor's power: what it is uncertain by beyond its degrees of freedom (bias of a local fit, drift of a sensor).
 DOUBT = 0.05
 #: Doubts of a floor within which what is left may be noise alone.

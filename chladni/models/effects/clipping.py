@@ -8,7 +8,11 @@ from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.effects.clues import Clues
 from chladni.models.effects.effect_kind import EffectKind, Variant
 from chladni.models.effects.saturation import CLIPPED, KNEE, ROUNDED, rounded_limit
-from chladni.models.effects.trial import Trial, TrialMotion, shaped
+from chladni.models.effects.trial import Numbers, Trial, TrialMotion, shaped
+from chladni.signals.arrays import Real
+
+#: Of the limit, what noise may add to a sample there; share of the samples that may lie beyond all the same.
+_BEYOND, _FEW = 1.1, 0.01
 
 
 def _trials(motion: TrialMotion) -> Iterator[Trial]:
@@ -20,6 +24,12 @@ def _trials(motion: TrialMotion) -> Iterator[Trial]:
     if inside:
         yield shaped(lambda value: motion.spectrum(np.clip(y, -value, value) - y), inside, "limit")
         yield rounded_limit(motion, inside)
+
+
+def _is_possible(recorded: Real, values: Numbers) -> bool:
+    """Whether hardly a sample lies beyond the limit: a force that only stops growing goes on there."""
+    beyond = np.abs(recorded) > _BEYOND * values["limit"]
+    return bool(np.mean(beyond) < _FEW)
 
 
 CLIPPING = EffectKind(
@@ -36,7 +46,7 @@ CLIPPING = EffectKind(
         )
     ),
     neutral={"limit": 1e18},
-    clues=Clues(trials=_trials),
+    clues=Clues(trials=_trials, possible=_is_possible),
     # The range of a sensor and the limit of an actuator cut a signal in the same way: one law, two words.
     variants=(
         Variant(

@@ -77,6 +77,8 @@ class Clues:
     doubts
         ``doubts(site, values, modelled)`` gives sentences on numbers that rather another mistake has; `modelled` are
         the model's parameters.
+    possible
+        ``possible(recorded, values)`` says whether an output that errs so may have recorded these samples.
     in_samples
         ``in_samples(signal)`` finds it in the samples of an output themselves. No fit weighs it then.
     of_force
@@ -95,5 +97,6 @@ class Clues:
     nested: Callable[[FittedForm], Iterable[Relative]] | None = None
     resisting: Callable[[float, float], Numbers] | None = None
     doubts: Callable[[str, Numbers, Parameters], Iterable[str]] | None = None
+    possible: Callable[[Real, Numbers], bool] | None = None
     in_samples: Callable[[Real], Lattice | None] | None = None
     of_force: Callable[[Real, float], Numbers] | None = None

@@ -65,9 +65,11 @@ def _is_degenerate(fitted: FittedForm) -> bool:
     length, angle = fitted.values["length"], fitted.values["angle"]
     along = length * np.cos(angle) + d
     stretched = np.maximum(np.hypot(along, length * np.sin(angle)), 1e-9 * length)
-    force = (stretched - length) * along / stretched - np.cos(angle) ** 2 * d
+    pull = (stretched - length) * along / stretched
+    force = pull - np.cos(angle) ** 2 * d
     line = np.polynomial.Polynomial.fit(d, force, 1)
-    return bool(np.std(force - line(d)) < _STRAIGHT * np.std(force))
+    # In line with the joint nothing is left but rounding.
+    return bool(np.std(force - line(d)) < max(_STRAIGHT * np.std(force), 1e-9 * np.std(pull)))
 
 
 GEOMETRIC = EffectKind(

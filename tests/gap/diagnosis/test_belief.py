@@ -25,7 +25,7 @@ SHARE = 0.02
 #: Three joints, three bodies, the ground, an input, three sensors.
 SITES = {"joint": 3, "body": 3, "ground": 1, "input": 1, "output": 3}
 #: Numbers that a discrepancy is worth along the force of one law, and elsewhere.
-ALONG, ACROSS = 6, 60
+ALONG, ACROSS = 8, 60
 #: Of the floor's power, what is uncertain: twice its standard deviation of a tenth, and 5 %.
 DOUBT = 0.25
 #: The same of what a fit leaves, unless it says otherwise.

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from chladni.models.effects.attached_effect import attached
+from chladni.models.effects.catalogue import CATALOGUE
 from tests.models.effects.motions import force
 from tests.models.effects.small_models import one_body, with_loop
 
@@ -41,3 +42,14 @@ def test_a_model_that_has_a_port_at_an_output_says_that_it_is_in_a_loop() -> Non
     with_port = attached("gain_error", "place", {"gain": 1.0}).attach(one_body(), in_loop=True)
     assert with_port.ports[-1].kind == "output"
     assert attached("clipping", "place", {"limit": 2.0}).attach(with_port).laws
+
+
+def test_a_sensor_does_not_record_what_lies_far_beyond_its_range() -> None:
+    signal = np.sin(np.linspace(0.0, 60.0, 3000)) + 0.02 * np.random.default_rng(1).standard_normal(3000)
+    possible = CATALOGUE["clipping"].clues.possible
+    assert possible is not None
+    assert possible(
+        np.clip(signal, -0.7, 0.7) + 0.02 * np.random.default_rng(2).standard_normal(3000), {"limit": 0.7}
+    )
+    # A force that grows on, if slower: no end of a range.
+    assert not possible(np.clip(signal, -0.7, 0.7) + 0.4 * signal, {"limit": 0.7})

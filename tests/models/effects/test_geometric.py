@@ -2,6 +2,8 @@ import numpy as np
 import pytest
 
 from chladni.models.effects.attached_effect import attached
+from chladni.models.effects.catalogue import CATALOGUE
+from chladni.models.effects.clues import FittedForm
 from tests.models.effects.small_models import one_body
 
 
@@ -37,3 +39,25 @@ def test_at_an_angle_it_has_an_even_term() -> None:
     force = force_of(stiffness=3e3, length=0.07, angle=angle)
     even = 0.5 * (force(d) + force(-d)) / d**2
     assert even == pytest.approx(1.5 * 3e3 * np.cos(angle) * np.sin(angle) ** 2 / 0.07, rel=1e-3)
+
+
+def test_along_its_joint_or_far_shorter_than_its_way_it_is_a_spring() -> None:
+    way = 1e-3 * np.sin(np.linspace(0.0, 60.0, 2000))
+
+    def degenerate(length: float, angle: float) -> bool:
+        judge = CATALOGUE["geometric"].clues.is_degenerate
+        assert judge is not None
+        values = {"stiffness": 1e4, "length": length, "angle": angle}
+        return judge(
+            FittedForm(
+                variant="spring",
+                values=values,
+                duration_s=1.0,
+                band_hz=(1.0, 50.0),
+                motion=lambda: (way, np.zeros_like(way)),
+            )
+        )
+
+    assert degenerate(1e-9, 1.8)
+    assert degenerate(0.05, 0.0)
+    assert not degenerate(2e-3, np.pi / 2)
