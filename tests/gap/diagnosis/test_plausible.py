@@ -3,6 +3,8 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
+
 from chladni.gap.diagnosis import plausible
 from chladni.gap.diagnosis.plausible import (
     is_far,
@@ -84,6 +86,9 @@ def test_least_left_is_that_of_the_best() -> None:
 
 def test_fits_that_are_another_effect_and_those_at_sensors_of_steps_are_left_out(monkeypatch) -> None:
     monkeypatch.setattr(plausible, "is_degenerate", lambda _, one: one.chi > 5.0)
-    study = SimpleNamespace(contest=SimpleNamespace(run=None), coarse=frozenset({"a0"}))
+    # The other sensor recorded more than the end of its range lets through.
+    log = SimpleNamespace(output_names=("a0", "a1"), outputs=np.array([np.zeros(100), np.linspace(-9.0, 9.0, 100)]))
+    study = SimpleNamespace(contest=SimpleNamespace(run=None), coarse=frozenset({"a0"}), measurement=log)
     kept, turned, stepping = contestant(DRAG), contestant(DRAG, chi=9.0), contestant(DRAG, GAIN)
-    assert sound(study, [kept, turned, stepping]) == [kept]
+    clips, wider = (contestant(attached("clipping", "a1", {"limit": limit})) for limit in (4.0, 8.5))
+    assert sound(study, [kept, turned, stepping, clips, wider]) == [kept, wider]
