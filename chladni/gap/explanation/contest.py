@@ -95,8 +95,8 @@ class Contest:
 
     def judged(self, hypothesis: Hypothesis, fit: OutputErrorFit) -> Contestant:
         """Weigh a fit on the samples that it didn't see."""
-        freedom = freedom_nats(self.run, fit, hypothesis.fitted, hypothesis.freed)
         left, starts = self._left(hypothesis, fit), self._starts(fit)
+        freedom = freedom_nats(self.run, fit, hypothesis.fitted, hypothesis.freed, left)
         return Contestant(
             hypothesis=hypothesis,
             fit=fit,

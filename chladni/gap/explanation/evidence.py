@@ -20,6 +20,8 @@ from chladni.signals.arrays import Complex, Real
 DETAILS, ELSEWHERE = 8.0, 60.0
 #: Share of its force, as RMS, that a right law leaves at most, usually; and numbers that what goes beyond is worth.
 USUAL, UNUSUAL = 1.0 / 6.0, 20.0
+#: The same from which on another word may do better: looking costs no name.
+_OPEN = 0.1
 #: Of a floor's power: what it is uncertain by beyond its degrees of freedom (bias of a local fit, drift of a sensor).
 DOUBT = 0.05
 #: Doubts of a floor within which what is left may be noise alone.
@@ -87,7 +89,7 @@ class Left:
         """Nats of what neither noise, wrong as the floor may be, nor usual details of the laws account for."""
         noise = level * self.along_expected
         # Where no force without the laws is known, of windows, no detail is usual.
-        usual = self._usual if np.isfinite(self.force) else 0.0
+        usual = self._usual(_OPEN) if np.isfinite(self.force) else 0.0
         surplus = _beyond_doubt(self.along - noise - usual, self.doubt * noise)
         return self.elsewhere(level) + _student(surplus, UNUSUAL, usual)
 
@@ -104,17 +106,27 @@ class Left:
             Share of the floor that the noise has.
         """
         across, along = level * self.across_expected, level * self.along_expected
-        details = _told(min(self.along - along, self._usual), self.doubt * along)
-        unusual = _told(self.along - along - self._usual, self.doubt * along)
+        usual = self._usual(USUAL)
+        details = _told(min(self.along - along, usual), self.doubt * along)
+        unusual = _told(self.along - along - usual, self.doubt * along)
         return -(
             _student(details, DETAILS * max(self.sites, 1))
-            + (_student(unusual, UNUSUAL, self._usual) if unusual else 0.0)
+            + (_student(unusual, UNUSUAL, usual) if unusual else 0.0)
             + _student(_told(self.across - across, self.doubt * across), ELSEWHERE)
         )
 
     @property
-    def _usual(self) -> float:
-        return USUAL**2 * max(self.force - self.along_expected, 0.0)
+    def flatness(self) -> tuple[float, float]:
+        """How many times flatter the likelihood is around a fit than noise alone would make it, along and across.
+
+        Of ``D ln(1 + m/D)`` the curvature is that of m over ``1 + m/D``.
+        """
+        along = _told(self.along - self.along_expected, self.doubt * self.along_expected)
+        across = _told(self.across - self.across_expected, self.doubt * self.across_expected)
+        return 1.0 + along / (DETAILS * max(self.sites, 1)), 1.0 + across / ELSEWHERE
+
+    def _usual(self, share: float) -> float:
+        return share**2 * max(self.force - self.along_expected, 0.0)
 
 
 def _student(energy: float, numbers: float, usual: float = 0.0) -> float:
@@ -196,19 +208,25 @@ def _split(
     return whole - across, across
 
 
-def freedom_nats(run: FreeRun, fit: OutputErrorFit, fitted: Sequence[Sequence[str]], freed: Sequence[str]) -> float:
+def freedom_nats(
+    run: FreeRun, fit: OutputErrorFit, fitted: Sequence[Sequence[str]], freed: Sequence[str], left: Left
+) -> float:
     """Nats that numbers cost which a log narrows down, by Laplace's approximation.
 
     ``1/2 sum ln min(l, 1)`` with l the eigenvalues of the numbers' covariance over their spread before: what a log
-    doesn't narrow down costs nothing.
+    doesn't narrow down costs nothing. The covariance is noise's, and wider where more than noise is `left`: along for
+    the numbers of laws with details, else across.
     """
     effects = effect_numbers(fit.effects, fitted or None)
     count = len(fit.covariance) - len(effects)
     tunables = run.tunables
     places = [tunables.names.index(name) for name in freed] if count else []
-    before = np.concatenate([SLIP / tunables.tolerance[places], np.full(len(effects), SIZE)])
     chosen = [*places, *range(count, len(fit.covariance))]
     if not chosen:
         return 0.0
+    along, across = left.flatness
+    flat = [across] * len(places)
+    flat += [across if fit.effects[one.effect].kind.clues.exact else along for one in effects]
+    before = np.concatenate([SLIP / tunables.tolerance[places], np.full(len(effects), SIZE)]) / np.sqrt(flat)
     over = fit.covariance[np.ix_(chosen, chosen)] / before / before[:, None]
     return float(0.5 * np.sum(np.log(np.clip(np.linalg.eigvalsh(over), 1e-300, 1.0))))

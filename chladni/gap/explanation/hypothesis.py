@@ -44,12 +44,6 @@ class Hypothesis:
         effects = [Candidate(effect=one.effect, site=one.site) for one in self.effects]
         return (*effects, *(Candidate(effect=PARAMETER, site=name) for name in self.freed))
 
-    @property
-    def freedom(self) -> int:
-        """Numbers that it adds to the tuned model; which other output an effect listens to is one more."""
-        chosen = sum(effect.source is not None for effect in self.effects)
-        return sum(len(names) for names in self.fitted) + len(self.freed) + chosen
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Contestant:

@@ -89,7 +89,7 @@ class _Pulse:
 
 
 def _pulse_law(_d: float, _s: float, t: float, parameters: Any, _state: Any, _rates: Any) -> float:
-    return parameters[0] * max(0.0, 1.0 - abs(t - parameters[1]) / parameters[2])  # type: ignore[no-any-return]
+    return float(parameters[0] * max(0.0, 1.0 - abs(t - parameters[1]) / parameters[2]))
 
 
 class BlackBoxRuns:

@@ -151,7 +151,7 @@ def test_numbers_cost_what_the_exact_evidence_of_a_linear_model_says() -> None:
     variance = 1.0 / (x @ x + 1.0 / SIZE**2)
     slope = variance * (x @ y)
     at_best = multivariate_normal(slope * x, np.eye(x.size)).logpdf(y) - 0.5 * (slope / SIZE) ** 2
-    told = freedom_nats(RUN, fit_of(np.array([[variance]]), LAG), (("time_constant",),), ())
+    told = freedom_nats(RUN, fit_of(np.array([[variance]]), LAG), (("time_constant",),), (), NOISE)
     assert at_best + told == pytest.approx(exact, rel=1e-9)
 
 
@@ -160,11 +160,28 @@ def test_a_wrong_value_costs_by_how_far_it_may_be_wrong() -> None:
     covariance = np.diag(np.full(len(tunables.names), 1e-4))
     place = tunables.names.index("j1.stiffness")
     expected = np.log(0.01 * tunables.tolerance[place] / SLIP)
-    assert freedom_nats(RUN, fit_of(covariance), (), ["j1.stiffness"]) == pytest.approx(expected)
+    assert freedom_nats(RUN, fit_of(covariance), (), ["j1.stiffness"], NOISE) == pytest.approx(expected)
     # Of what stays within its tolerance the prior pays.
-    assert freedom_nats(RUN, fit_of(covariance), (), ()) == 0.0
+    assert freedom_nats(RUN, fit_of(covariance), (), (), NOISE) == 0.0
+
+
+def test_where_more_than_noise_is_left_numbers_are_narrowed_down_less() -> None:
+    # Of D ln(1 + m/D) with m quadratic in a number: the curvature at its least, by differences.
+    numbers, least, curvature, step = DETAILS, 700.0, 1e4, 1e-4
+
+    def misfit(x: float) -> float:
+        return numbers * np.log1p((least + 0.5 * curvature * x**2) / numbers)
+
+    seen = (misfit(step) - 2.0 * misfit(0.0) + misfit(-step)) / step**2
+    more = replace(NOISE, along=NOISE.along + least)
+    assert more.flatness == (pytest.approx(curvature / seen, rel=1e-3), 1.0)
+    fit = fit_of(np.array([[1.0 / curvature]]), LAG)
+    told = freedom_nats(RUN, fit, (("time_constant",),), (), more)
+    assert told == pytest.approx(0.5 * np.log(1.0 / seen / SIZE**2), rel=1e-3)
+    # What noise alone is left of narrows them down as noise does.
+    assert told > freedom_nats(RUN, fit, (("time_constant",),), (), NOISE) + 1.0
 
 
 def test_a_number_that_the_log_does_not_narrow_down_costs_nothing() -> None:
     wide = fit_of(np.array([[(3.0 * SIZE) ** 2]]), LAG)
-    assert freedom_nats(RUN, wide, (("time_constant",),), ()) == 0.0
+    assert freedom_nats(RUN, wide, (("time_constant",),), (), NOISE) == 0.0

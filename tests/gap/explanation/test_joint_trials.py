@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chladni.gap.explanation.candidates import screened
-from chladni.gap.explanation.hypotheses import effect_hypotheses, hypothesis_of
+from chladni.gap.explanation.hypotheses import effect_hypotheses
 from chladni.gap.location.locate import locate
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
@@ -127,8 +127,3 @@ def test_a_few_forms_that_are_as_good_as_the_last_one_are_tried_too(found):
     assert len(effect_hypotheses(plain, count=3)) == 3
     tied = [*plain[:3], *(replace(one, misfit=plain[2].misfit) for one in plain[3:])]
     assert len(effect_hypotheses(tied, count=3)) == 5
-
-
-def test_which_output_an_effect_listens_to_is_a_number_more():
-    share = attached("cross_axis", "force", {"coefficient": 0.1}, source="way")
-    assert hypothesis_of((share,), np.zeros(0)).freedom == 2
