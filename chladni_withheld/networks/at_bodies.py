@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from chladni_withheld.networks.draft import Draft, Made, pick
+from chladni_withheld.networks.draft import Draft, Made, pick, pick_bodies_apart
 from chladni_withheld.networks.excitation import Band, random_signal
 from chladni_withheld.networks.machine import Addition, Link, Satellite
 from chladni_withheld.networks.network import GROUND, Matrix
@@ -85,11 +85,10 @@ def missing_link(rng: Rng, scene: Scene) -> Draft | None:
 def gyroscopic(rng: Rng, scene: Scene) -> Draft | None:
     """Two bodies of one rotor's axis, without a joint: each one's speed pushes the other."""
     network = scene.network
-    pairs = [(first, second) for first, second in network.apart() if first != GROUND]
-    chosen = pick(rng, range(len(pairs)))
+    chosen = pick_bodies_apart(rng, scene)
     if chosen is None:
         return None
-    first, second = pairs[chosen]
+    first, second = chosen
     pushed = scene.inertia(first) + scene.inertia(second)
     speeds = scene.travel(GROUND, first)[1] + scene.travel(GROUND, second)[1]
 

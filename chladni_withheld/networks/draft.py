@@ -6,7 +6,7 @@ from dataclasses import KW_ONLY, dataclass
 import numpy as np
 
 from chladni_withheld.networks.machine import Addition, Element
-from chladni_withheld.networks.network import Matrix, Spectrum
+from chladni_withheld.networks.network import GROUND, Matrix, Spectrum
 from chladni_withheld.networks.scene import Scene
 
 Rng = np.random.Generator
@@ -94,3 +94,10 @@ def pick_joint(rng: Rng, scene: Scene, *, spring: bool = False) -> JointPort:
 def pick(rng: Rng, things: tuple[int, ...] | range) -> int | None:
     """Pick one; None of none."""
     return int(rng.choice(list(things))) if len(things) else None
+
+
+def pick_bodies_apart(rng: Rng, scene: Scene) -> tuple[int, int] | None:
+    """Pick two bodies that share no joint; None of none."""
+    pairs = [(first, second) for first, second in scene.network.apart() if first != GROUND]
+    chosen = pick(rng, range(len(pairs)))
+    return None if chosen is None else pairs[chosen]

@@ -3,9 +3,9 @@
 import numpy as np
 
 from chladni_withheld.networks import laws
-from chladni_withheld.networks.draft import Draft, Made, pick, pick_joint
+from chladni_withheld.networks.draft import Draft, Made, pick, pick_bodies_apart, pick_joint
 from chladni_withheld.networks.machine import Addition, Link, Rows
-from chladni_withheld.networks.network import GROUND, Matrix
+from chladni_withheld.networks.network import Matrix
 from chladni_withheld.networks.scene import Rng, Scene
 
 
@@ -73,11 +73,10 @@ def periodic_stiffness(rng: Rng, scene: Scene) -> Draft:
 def fluid_coupling(rng: Rng, scene: Scene) -> Draft | None:
     """Fluid between two bodies that share no joint: it couples their accelerations."""
     network = scene.network
-    pairs = [(first, second) for first, second in network.apart() if first != GROUND]
-    chosen = pick(rng, range(len(pairs)))
+    chosen = pick_bodies_apart(rng, scene)
     if chosen is None:
         return None
-    first, second = pairs[chosen]
+    first, second = chosen
 
     def build(size: float) -> Made:
         inertia = size * min(network.masses[first], network.masses[second])

@@ -68,15 +68,16 @@ def _still_close(causes: Causes) -> list[Contestant]:
     count = len(causes.best.hypothesis.named)
     if count <= 1:
         alike = [one for one in (*causes.ranked, causes.tuned) if len(one.hypothesis.named) <= 1]
-        alike.sort(key=lambda one: -one.log_evidence)
+        alike.sort(key=lambda one: -causes.belief.nats(one))
         first = alike[0]
     else:
         # An experiment between others than the answer would tell nothing of it.
         first = causes.best
         others = [one for one in causes.ranked if len(one.hypothesis.named) == count and one is not first]
         fewer = [one for one in causes.ranked if len(one.hypothesis.named) == count - 1][:1]
-        alike = [first, *sorted((*others, *fewer), key=lambda one: -one.log_evidence)]
-    return [one for one in alike if one is first or one.log_evidence > first.log_evidence - _STILL_CLOSE]
+        alike = [first, *sorted((*others, *fewer), key=lambda one: -causes.belief.nats(one))]
+    enough = causes.belief.nats(first) - _STILL_CLOSE
+    return [one for one in alike if one is first or causes.belief.nats(one) > enough]
 
 
 def _likely_sites(study: Study, named: Sequence[str]) -> list[str]:

@@ -16,6 +16,7 @@ from chladni.gap.plant.places import sites_of
 from chladni.gap.records.diagnosis import PARAMETER, Candidate
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.effects.catalogue import CATALOGUE
+from chladni.models.effects.effect_kind import EffectKind
 
 #: Prior odds of one more cause: machines lack one thing more often than two.
 ANOTHER = 0.1
@@ -55,6 +56,8 @@ class Belief:
         All that were fitted, the one without causes first.
     pair
         Unknown forces at two places that explain much more than one, None without.
+    kinds
+        Effects that take part.
     told
         Names of sensors whose error needs no fit to be told: nothing unknown acts there.
     windows
@@ -67,19 +70,18 @@ class Belief:
         contestants: Sequence[Contestant],
         pair: Located | None = None,
         *,
+        kinds: Collection[EffectKind] = tuple(CATALOGUE.values()),
         told: Collection[str] = (),
         windows: bool = False,
     ) -> None:
         self._location = location
         problem = location.problem
-        kinds = [site.kind for site in sites_of(problem.model.compile(), problem.measurement.output_names)]
-        self._kinds = Counter(kinds)
+        sites = [site.kind for site in sites_of(problem.model.compile(), problem.measurement.output_names)]
+        self._kinds = Counter(sites)
         #: Nats of one more cause: that there is one, and that it's this word at this site.
-        self.word = float(
-            np.log(ANOTHER) - np.log(max(sum(kind in one.sites for one in CATALOGUE.values() for kind in kinds), 1))
-        )
+        self.word = float(np.log(ANOTHER) - np.log(max(sum(kind in one.sites for one in kinds for kind in sites), 1)))
         self.value = float(np.log(ANOTHER) - np.log(max(len(problem.tunables.names), 1)))
-        self.site = float(np.log(ANOTHER) - np.log(max(len(kinds), 1)))
+        self.site = float(np.log(ANOTHER) - np.log(max(len(sites), 1)))
         self._contestants, self._sensors = tuple(contestants), len(problem.measured)
         alone = [one.left.along + one.left.across for one in contestants if not one.hypothesis.effects]
         self._horizon = min(alone) / location.tuned.misfit if windows and location.tuned.misfit else 1.0
@@ -115,7 +117,8 @@ class Belief:
         Parts of a kind are made alike: what one joint lacks the others may lack too. Then there's one more cause,
         that they share it, and which of the sites do.
         """
-        nats = 0.0
+        # Which other output one listens to is chosen, too.
+        nats = -np.log(max(self._kinds["output"] - 1, 1)) * sum(one.source is not None for one in effects)
         kinds = {one.kind.name: one.kind for one in effects}
         for name, kind in kinds.items():
             alike = [one.site for one in effects if one.kind.name == name]

@@ -143,6 +143,20 @@ def test_one_word_at_several_sites_of_a_kind_is_one_cause_more_and_which_of_them
     assert others - one == pytest.approx(belief.word)
 
 
+def test_which_other_output_an_effect_listens_to_is_paid_for() -> None:
+    noise = leaving(1.0)
+    belief = Belief(location(), [contestant(left=noise)])
+    gain = attached("gain_error", "a0", {"gain": 1.1})
+    crossed = attached("cross_axis", "a0", {"coefficient": 0.1}, source="a1")
+    plain, chosen = (belief.nats(contestant(one, left=noise)) for one in (gain, crossed))
+    assert plain - chosen == pytest.approx(np.log(SITES["output"] - 1))
+
+
+def test_words_that_take_no_part_share_no_prior() -> None:
+    alone = Belief(location(), [contestant()], kinds=[CATALOGUE["lag"]])
+    assert alone.word == pytest.approx(np.log(ANOTHER) - np.log(SITES["input"]))
+
+
 def test_an_answer_set_is_the_shortest_that_holds_its_coverage() -> None:
     found = weighed((contestant(LAG), 0.7), (contestant(DELAY), 0.2), (contestant(), 0.1))
     belief = Belief(location(), found)
