@@ -155,7 +155,6 @@ class Search:
         if self.is_open and self.best.hypothesis.freed:
             # Where an unknown force acts shows only behind the values that are wrong.
             self.add(second_causes(self.study, self.best))
-        self._share()
         if self.is_open and self._several_act():
             # Laws at one place only imitate what acts at two.
             self._two_at_once()
