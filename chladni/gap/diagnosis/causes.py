@@ -3,9 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from chladni.gap.diagnosis.belief import NAMED, Belief
+from chladni.gap.calibration import NAMED, SOME
+from chladni.gap.diagnosis.belief import Belief
 from chladni.gap.diagnosis.finer_floor import finer_floor
-from chladni.gap.diagnosis.own_signal import FOLLOWS, share_of_own_signal
+from chladni.gap.diagnosis.own_signal import share_of_own_signal
 from chladni.gap.diagnosis.plausible import is_lost
 from chladni.gap.diagnosis.search import Search
 from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
@@ -149,4 +150,4 @@ def _verdict(belief: Belief) -> Verdict:
 def _distorted(study: Study, tuned: Contestant) -> tuple[str, ...]:
     simulated = tuned.fit.outputs[:, study.held]
     shares = share_of_own_signal(simulated, study.measurement.outputs[:, study.held] - simulated)
-    return tuple(name for name, share in zip(study.measurement.output_names, shares, strict=True) if share > FOLLOWS)
+    return tuple(name for name, share in zip(study.measurement.output_names, shares, strict=True) if share > SOME)

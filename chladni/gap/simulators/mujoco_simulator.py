@@ -12,6 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from chladni.gap.calibration import LARGEST, UNNOTICED
 from chladni.gap.simulators.joint_law import JointLaw
 from chladni.gap.simulators.mujoco_numbers import index, names, parameter, set_number, turns
 from chladni.gap.simulators.simulator import SimulatorResponse
@@ -23,9 +24,7 @@ from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 #: MuJoCo's integrators that step in two halves, between which laws can act.
-_INTEGRATORS = {0: "Euler", 2: "implicit", 3: "implicitfast"}
-#: MuJoCo takes larger numbers for a mistake, and begins anew.
-_LARGEST = 1e10
+_INTEGRATORS = ("Euler", "implicit", "implicitfast")
 _FUNCTIONS = ("mj_step1", "mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM", "mj_step2")
 #: Units of what sensors give, by MuJoCo's name; two where it depends on whether the joint turns or slides.
 _SENSOR_UNITS = {
@@ -138,10 +137,10 @@ def mujoco_simulator(
     """
     mujoco = _mujoco()
     loaded = _load(mujoco, model)
-    if int(loaded.opt.integrator) not in _INTEGRATORS:
+    if mujoco.mjtIntegrator(loaded.opt.integrator).name not in {f"mjINT_{name.upper()}" for name in _INTEGRATORS}:
         raise ModelError(
             "MuJoCo model: laws can't act within the steps of its integrator (RK4 or discrete); set "
-            f"<option integrator> to {', '.join(_INTEGRATORS.values())}"
+            f"<option integrator> to {', '.join(_INTEGRATORS)}"
         )
     if keyframe is not None:
         index(loaded, "key", keyframe)
@@ -239,7 +238,7 @@ def _start(mujoco: Any, model: Any, data: Any, keyframe: str | None) -> None:
 
 def _steps(step_s: float, sample_rate_hz: float) -> int:
     steps = 1.0 / (step_s * sample_rate_hz)
-    if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
+    if round(steps) < 1 or abs(steps - round(steps)) > UNNOTICED * steps:
         raise ModelError(
             f"MuJoCo model: its step of {step_s:g} s doesn't divide the log's sample interval of "
             f"{1 / sample_rate_hz:g} s; set <option timestep> to the interval over a whole number"
@@ -250,10 +249,10 @@ def _steps(step_s: float, sample_rate_hz: float) -> int:
 def _require_commands(simulator: MujocoSimulator, inputs: Real) -> None:
     """Refuse what MuJoCo would take for zero, with a word on a file that nobody reads."""
     for terminal, row in zip(simulator.inputs, inputs, strict=True):
-        if not np.all(np.abs(row) < _LARGEST):
+        if not np.all(np.abs(row) < LARGEST):
             raise ModelError(
                 f"MuJoCo model {simulator.name!r}: input {terminal.name!r} reaches {np.max(np.abs(row)):g}; every "
-                f"sample must be finite and below {_LARGEST:g}"
+                f"sample must be finite and below {LARGEST:g}"
             )
 
 
