@@ -63,6 +63,12 @@ class Causes:
 
 def causes_found(study: Study, progress: Step) -> tuple[Study, Causes]:
     """Search and judge; also give the study that the answer is of, over another floor or over windows."""
+    search = searched(study, progress)
+    return search.study, judged(search)
+
+
+def searched(study: Study, progress: Step) -> Search:
+    """Search over the floor that was estimated, over a finer one, and over windows where a run can't follow."""
     progress = _rising(progress)
     search = Search(study)
     search.run(_part(progress, 0.0, 0.7))
@@ -79,7 +85,7 @@ def causes_found(study: Study, progress: Step) -> tuple[Study, Causes]:
         windows.begin(_part(progress, 0.85, 1.0))
         search = windows if _verdict(windows.belief) == "effect" else search
     progress(1.0)
-    return search.study, _judged(search)
+    return search
 
 
 def _rising(progress: Step) -> Step:
@@ -105,7 +111,8 @@ def _parted(search: Search) -> bool:
     return unknown and lost and search.states is not None
 
 
-def _judged(search: Search) -> Causes:
+def judged(search: Search) -> Causes:
+    """Give the verdict on what was found."""
     study, belief, tuned, best = search.study, search.belief, search.nothing, search.best
     verdict = _verdict(belief)
     within_step = verdict == "effect" and _within_step(study, tuned, best)
