@@ -80,6 +80,8 @@ NEAR_DEG = 10.0
 
 # Noise and floor.
 
+#: Noise over signal above which little can be said of anything. Chosen.
+LOUD = 0.3
 #: Highest order of an autoregressive noise (Ljung, System Identification, section 16.4, chooses below it). Chosen.
 AR_ORDER = 12
 #: Share of a signal's power that is always granted to noise: 80 dB, beyond most converters. Chosen.

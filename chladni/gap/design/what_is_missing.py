@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from chladni.gap.calibration import CYCLES_ASKED, LINES, LITTLE, LOCATED, NEAR_DEG, SOME, ZERO
+from chladni.gap.calibration import CYCLES_ASKED, LINES, LITTLE, LOCATED, LOUD, NEAR_DEG, ZERO
 from chladni.gap.comparison.short_log import modes_of
 from chladni.gap.design.experiments import excited_band_hz
 from chladni.gap.design.more_sensors import MoreSensor, more_sensors, with_noise_of, with_sensors
@@ -64,11 +64,11 @@ def level_missing(measurement: Measurement, noise: NoiseFloor) -> str | None:
     """Ask for a higher level or averages when noise drowns the outputs, None when it doesn't."""
     share = noise.rms / np.maximum(np.std(measurement.outputs, axis=1), ZERO)
     middle = float(np.median(share))
-    if middle <= SOME:
+    if middle <= LOUD:
         return None
     # What is measured holds the noise too.
     signal = max(1.0 - middle**2, LITTLE**2)
-    factor = min(max(2.0, float(np.ceil(middle / (SOME * signal**0.5)))), 4.0)
+    factor = min(max(2.0, float(np.ceil(middle / (LOUD * signal**0.5)))), 4.0)
     then = middle / float(np.hypot(factor * signal**0.5, middle))
     return (
         f"Noise is {middle:.0%} of what the sensors show: raise the level {factor:.0f} times, or average "
