@@ -4,8 +4,8 @@ A number that is no definition, no unit and no format stands here and nowhere el
 of effects stand in the effects' own files. Where several rules ask the same thing they share a number. Shares and
 ratios are words of a coarse scale: no rule is tuned more finely than from one word to the next.
 
-Sources: *paper*; *derived*; *measured*, on made machines or logs of others, all of them looked at; *chosen*, where
-answers hardly depend on it or nothing was measured.
+Sources: a paper; *derived*; *measured*, on made machines or logs of others that were looked at, where a decision of
+`docs/decisions` tells it by its number; else *chosen*, and nothing was measured.
 """
 
 from math import cbrt, log
@@ -32,11 +32,11 @@ MOST = 0.5
 TIED = 1.02
 #: As good, of places that are searched, and of levels. Chosen.
 ALIKE = 1.1
-#: Over the noise's power: what an unknown force leaves that explains all. Measured on made machines.
+#: Over the noise's power: what an unknown force leaves that explains all. Chosen.
 ONE_FORCE = 1.15
 #: Not the same any more: places, scatter of a machine that drifts, a share over the one that chance gives. Chosen.
 SAME = 1.25
-#: Over the noise's power: what a cause leaves that acts alone. Measured on made machines of two effects.
+#: Over the noise's power: what a cause leaves that acts alone. Measured (decisions 0018, 0020).
 ALONE = 1.3
 #: Clearly more: misfits that segments tell apart, a floor in loud bands, a gap beyond its motion's share. Chosen.
 CLEARLY = 1.5
@@ -44,20 +44,23 @@ CLEARLY = 1.5
 TRANSIENT = 2.0
 #: Far more: places and forms beyond it aren't looked at, runs beyond it are lost, a line stands out. Chosen.
 FAR = 3.0
-#: Power of a recovered force over its noise, from which a line that sticks out is believed. Measured on made arms.
+#: Power of a recovered force over its noise, from which a line that sticks out is believed. Measured (0016).
 DOUBTED = 30.0
 #: Misfit of a screened form over the best one's beyond which it isn't searched. Chosen: it saves time alone.
 HOPELESS = 100.0
 #: What more freedom must leave at most, of a misfit or a floor, to be worth it. Chosen.
 LESS = 0.7
-#: The same of two unknown forces over one. Measured on made machines of two effects.
+#: The same of two unknown forces over one. Measured (0025).
 PAIR_GAIN = 0.6
 #: Share of a gap that another place leaves beyond the best one, where the cause may still be. Measured: beside floors
 #: that shook the next place left 0.02, beside a stop between a body and the ground that joint 0.0001.
 NEAR = 0.003
-#: Share of a gap that a law of a joint's motion leaves, where what acts follows that; share of its speed below which
-#: a joint creeps. Measured: of floors that shook such laws left 0.2 to 0.5, of effects at that joint at most 0.12.
+#: Share of a gap that a law of a joint's motion leaves, where what acts follows that. Measured: of floors that shook
+#: such laws left 0.2 to 0.5, of effects at that joint at most 0.12.
 LEFT_BY_LAW = 0.15
+#: Share of its speed below which a joint creeps, where a search begins: a steeper law has minima that no slope leads
+#: out of. Chosen.
+CREEP = 0.15
 
 # What a log must hold.
 
@@ -65,11 +68,11 @@ LEFT_BY_LAW = 0.15
 FEWEST_SAMPLES = 32
 #: Fewer blocks, lines or degrees of freedom scatter too much to be believed. Chosen.
 FEWEST = 4
-#: Samples a cycle with which a mode is followed between the samples. Derived: Nyquist's two, and a quarter more.
+#: Samples a cycle with which a mode is followed between the samples. Chosen: Nyquist's two, and a quarter more.
 SAMPLES_A_CYCLE = 2.5
 #: Cycles that tell a signal's amplitude, or a frequency at all. Chosen.
 CYCLES = 4.0
-#: Cycles of the lowest mode that tell its frequency within a percent or so. Derived: 1/(2 pi zeta n) of a light mode.
+#: Cycles of the lowest mode that tell its frequency within a percent or so. Chosen.
 CYCLES_ASKED = 20.0
 #: Times of its slowest motion in which a model shows all that it does of itself. Derived: exp(-3) is 5 %.
 TIMES = 3.0
@@ -101,19 +104,19 @@ FAINT_WISH = 0.02
 SMOOTH = 31
 #: Lines that a tone must stand out of. Chosen.
 TONE_LINES = 201
-#: Least share of an output that is told from noise: three sigma for fifteen blocks of three outputs. Derived.
+#: Least share of an output that is told from noise. Derived of distortion: three sigma of fifteen blocks of three.
 NOTICED = 0.03
 
 # Evidence, see docs/methods/gap-explanation.md.
 
-#: Independent numbers that what a law differs from the machine's by is worth, along its own force. Measured, as all
-#: of this group but where it's said, on made machines of two generators and logs of others.
+#: Independent numbers that what a law differs from the machine's by is worth, along its own force. Measured on
+#: made cases, as the next.
 DETAILS = 8.0
 #: The same elsewhere.
 ELSEWHERE = 60.0
-#: Share of its force, as RMS, that a right law leaves at most, usually.
+#: Share of its force, as RMS, that a right law leaves at most, usually: a sixth. Chosen.
 USUAL = 0.1667
-#: Independent numbers that what goes beyond is worth.
+#: Independent numbers that what goes beyond is worth. Chosen.
 UNUSUAL = 20.0
 #: Share as `USUAL` from which on another word may do better: looking costs no name. Chosen.
 OPEN = 0.1
@@ -123,7 +126,8 @@ DOUBT = 0.05
 SIGMAS = 2.0
 #: e-folds: one sigma of an effect's number before a log is seen. Chosen: a factor of seven each way.
 SIZE = 2.0
-#: Samples that a log is taken for, whatever its length, where states at windows pay (decision 0020). Chosen.
+#: Samples that a log is taken for, whatever its length, where states at windows pay (decision 0020). Chosen; a log of
+#: fewer is short.
 EFFECTIVE_SAMPLES = 200
 
 # Belief and names.
@@ -139,11 +143,11 @@ NAMED = 0.5
 TEMPER = 5.0
 #: Probability that all that was weighed is wrong.
 LAPSE = 0.03
-#: Nats within which a log can't tell two candidates apart. Derived: odds of e^2 when they are printed.
-CLOSE = 2.0 * TEMPER
+#: Nats within which a log can't tell two candidates apart. Chosen: odds of e^2 when they are printed.
+CLOSE = SIGMAS * TEMPER
 #: Probability with which an answer set, or an interval, holds the truth. Chosen, as usual.
 COVERAGE = 0.95
-#: Nats that are worth another move: less pays for no name. Derived: odds of one more cause and of its word and site.
+#: Nats that are worth another move: less pays for no name. Chosen.
 WORTH = 12.0
 #: Probability of a floor that shakes, and of a lattice: neither is a contest of likelihoods. Chosen.
 UNWEIGHED = 0.9
@@ -206,7 +210,7 @@ PARTED = 10.0
 
 # Fits.
 
-#: Nats: a step that promises less changes no decision. Derived from `TEMPER`.
+#: Nats: a step that promises less changes no decision. Chosen: a fiftieth of `TEMPER`.
 PRECISION = 0.1
 #: Share of a cost that a further step must gain, where that's rough: coarse runs, screened forms. Chosen.
 GAINED = 0.01

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
-from chladni.gap.calibration import FAR, LEFT_BY_LAW, LITTLE, PLACES
+from chladni.gap.calibration import CREEP, FAR, LITTLE, PLACES
 from chladni.gap.explanation.hypotheses import hypothesis_of
 from chladni.gap.explanation.hypothesis import Hypothesis
 from chladni.gap.location.locate import Located, Location
@@ -42,7 +42,7 @@ def _sticking(
     compiled = problem.view(motion.z).compiled
     port = compiled.ports[compiled.port_index(site.name, "joint")]
     passed = motion.force + port.stiffness * motion.displacement + port.damping * motion.velocity
-    # Sliding begins with most of the force; a law that creeps less is so steep that no slope leads out of its minima.
+    # Sliding begins with most of the force.
     force = float(np.quantile(np.abs(passed - np.median(passed)), 1 - LITTLE))
-    effect = attached_if_possible(kind, site.name, resisting(force, LEFT_BY_LAW * float(np.std(motion.velocity))))
+    effect = attached_if_possible(kind, site.name, resisting(force, CREEP * float(np.std(motion.velocity))))
     return None if effect is None else hypothesis_of((effect,), located.profile.z)
