@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from chladni.gap.calibration import CYCLES, FORMS, PLACES, SAMPLES_A_CYCLE, SOME, TAIL
+from chladni.gap.calibration import CYCLES, FORMS, LITTLE, PLACES, SAMPLES_A_CYCLE, SOME, TAIL
 from chladni.gap.comparison.short_log import modes_of
 from chladni.gap.design.experiment import Change, Experiment
 from chladni.gap.plant.windows import windows_for
@@ -87,7 +87,7 @@ class Reach:
         yield self._sweep(span, "up")
         yield self._sweep((span[1], span[0]), "down")
         if modes:
-            yield from self._slow(SOME * modes[0])
+            yield from self._slow(LITTLE * modes[0])
 
     def positions(self) -> Iterator[Experiment]:
         """Give the same force at other bodies."""

@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from chladni.gap.calibration import LARGEST, UNNOTICED
+from chladni.gap.calibration import UNNOTICED
 from chladni.gap.simulators.joint_law import JointLaw
 from chladni.gap.simulators.mujoco_numbers import index, names, parameter, set_number, turns
 from chladni.gap.simulators.simulator import SimulatorResponse
@@ -94,7 +94,7 @@ class MujocoSimulator:
             mujoco.mj_setConst(model, data)
         _start(mujoco, model, data, self.keyframe)
         steps = _steps(float(model.opt.timestep), sample_rate_hz)
-        _require_commands(self, inputs)
+        _require_commands(self.name, self.inputs, inputs, float(mujoco.mjMAXVAL))
         return _run(self, model, data, np.ascontiguousarray(inputs, dtype=np.float64), steps, joint_laws)
 
 
@@ -246,13 +246,13 @@ def _steps(step_s: float, sample_rate_hz: float) -> int:
     return round(steps)
 
 
-def _require_commands(simulator: MujocoSimulator, inputs: Real) -> None:
+def _require_commands(name: str, terminals: Sequence[Terminal], inputs: Real, largest: float) -> None:
     """Refuse what MuJoCo would take for zero, with a word on a file that nobody reads."""
-    for terminal, row in zip(simulator.inputs, inputs, strict=True):
-        if not np.all(np.abs(row) < LARGEST):
+    for terminal, row in zip(terminals, inputs, strict=True):
+        if not np.all(np.abs(row) < largest):
             raise ModelError(
-                f"MuJoCo model {simulator.name!r}: input {terminal.name!r} reaches {np.max(np.abs(row)):g}; every "
-                f"sample must be finite and below {LARGEST:g}"
+                f"MuJoCo model {name!r}: input {terminal.name!r} reaches {np.max(np.abs(row)):g}; every "
+                f"sample must be finite and below {largest:g}"
             )
 
 
