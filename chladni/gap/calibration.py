@@ -46,7 +46,9 @@ TRANSIENT = 2.0
 FAR = 3.0
 #: Power of a recovered force over its noise, from which a line that sticks out is believed. Measured (0016).
 DOUBTED = 30.0
-#: Misfit of a screened form over the best one's beyond which it isn't searched. Chosen: it saves time alone.
+#: Misfit of a screened form over the best one's beyond which it isn't fitted. Chosen: it saves time alone.
+UNLIKELY = 40.0
+#: The same beyond which it isn't searched off its grid. Chosen: it saves time alone.
 HOPELESS = 100.0
 #: What more freedom must leave at most, of a misfit or a floor, to be worth it. Chosen.
 LESS = 0.7
@@ -269,8 +271,6 @@ SPARE_BYTES = 268_435_456
 NUDGE = 0.05
 #: Sigmas to which parameters are rounded where slopes and pulses are asked for: neighbours share them. Chosen.
 Z_GRID = 0.5
-#: Share of a record from one pulse to the next: a machine answers otherwise in another pose. Chosen.
-PULSE_EVERY = 0.3
 #: Samples of an answer before its pulse: a law is asked a step before, and an accelerometer feels it there. Derived.
 AHEAD = 2
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from chladni.gap.calibration import HOPELESS, LEADS, LITTLE, TIED
+from chladni.gap.calibration import LEADS, LITTLE, TIED, UNLIKELY
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.screen import Screened
@@ -19,7 +19,7 @@ from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 
-def effect_hypotheses(screened: Sequence[Screened], *, count: int, margin: float = HOPELESS) -> list[Hypothesis]:
+def effect_hypotheses(screened: Sequence[Screened], *, count: int, margin: float = UNLIKELY) -> list[Hypothesis]:
     """Give the best screened trials as hypotheses.
 
     Parameters

@@ -7,7 +7,7 @@ from typing import Any, Protocol, Self, runtime_checkable
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from chladni.gap.calibration import AHEAD, GRANTED, KEPT, MANY, NUDGE, PULSE_EVERY, SLIGHT, SMOOTH, WIDE, Z_GRID
+from chladni.gap.calibration import AHEAD, GRANTED, KEPT, MANY, NUDGE, SLIGHT, SMOOTH, WIDE, Z_GRID
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.linear_view import Way
 from chladni.gap.plant.neighbours import Scaled
@@ -193,7 +193,8 @@ class BlackBoxRuns:
 
     def _answers_at(self, z: Real, kind: str, name: str) -> list[Real]:
         """``[signal, sample]`` from `AHEAD` before each pulse on, for one of one."""
-        places = [AHEAD + int(PULSE_EVERY * turn * self.measurement.samples) for turn in range(3)]
+        # In thirds of the record: a machine answers otherwise in another pose.
+        places = [AHEAD + turn * self.measurement.samples // 3 for turn in range(3)]
         size = self._sizes.get((kind, name), lambda: self._size(kind, name, places[0]))
         return [self._pulsed(z, kind, name, size, at)[:, at - AHEAD :] / size for at in places]
 
